@@ -1,0 +1,128 @@
+"""Every exception and warning that kincompile raises on purpose.
+
+A message says what is wrong, where (names, not indices), what was given and expected, and what to
+do. Problems that can be found together are collected and raised once: the classes that collect
+accept one message or a sequence of them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class KincompileError(Exception):
+    """Base class of every error that kincompile raises on purpose."""
+
+
+class _CollectedError(KincompileError):
+    """An error that lists all the problems found in one go.
+
+    Parameters
+    ----------
+    problems : str or iterable of str
+        One message, or all the problems in the order in which they are to be read.
+
+    Attributes
+    ----------
+    problems : tuple of str
+        The messages, one per problem.
+    """
+
+    def __init__(self, problems: str | Iterable[str]) -> None:
+        self.problems = (problems,) if isinstance(problems, str) else tuple(problems)
+        if not self.problems:
+            raise InternalError(f"{type(self).__name__} was raised without a problem.")
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        """Give the message, or a count and one line per problem when there are several."""
+        if len(self.problems) == 1:
+            return self.problems[0]
+        lines = "\n".join(f"  - {problem}" for problem in self.problems)
+        return f"{len(self.problems)} problems:\n{lines}"
+
+
+class ModelError(_CollectedError, ValueError):
+    """The mechanism, as written, is unusable."""
+
+
+class StructuralError(_CollectedError, ValueError):
+    """The equations cannot determine the unknowns: too few, too many, or dependent."""
+
+
+class UnsupportedError(KincompileError, NotImplementedError):
+    """A target cannot print this expression or this kind of constraint."""
+
+
+class TemplateError(KincompileError):
+    """A template and the data for it do not fit together."""
+
+
+class ContractError(_CollectedError, ValueError):
+    """A loaded module is not what an emitted module must be."""
+
+
+class InputError(_CollectedError, ValueError):
+    """A value given to a function has the wrong name, shape, type or is not finite."""
+
+
+class SolveError(KincompileError, ArithmeticError):
+    """The motion could not be solved at every point.
+
+    Parameters
+    ----------
+    message : str
+        The time, the status and the remedy, as in ``Solution.message``.
+    solution : kincompile.runtime.solution.Solution
+        What was solved before the failure, with a status per point. Typed `Any` because this file
+        lies on the lowest floor and knows no other module.
+
+    Attributes
+    ----------
+    solution : kincompile.runtime.solution.Solution
+        The partial solution.
+    """
+
+    def __init__(self, message: str, solution: Any) -> None:
+        super().__init__(message, solution)
+        self.solution = solution
+
+    def __str__(self) -> str:
+        """Give the message alone; the partial solution is in `solution`."""
+        return str(self.args[0])
+
+
+class InternalError(KincompileError):
+    """A bug of kincompile, not of the caller.
+
+    Parameters
+    ----------
+    message : str
+        What was found that should be impossible.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+
+    def __str__(self) -> str:
+        """Give the message and say that the fault is not the caller's."""
+        return f"{self.args[0]} This is a bug in kincompile: please report it with the model."
+
+
+class KincompileWarning(UserWarning):
+    """Base class of every warning that kincompile gives."""
+
+
+class SingularConfigurationWarning(KincompileWarning):
+    """The mechanism is at, or very near, a configuration where Phi_q is singular."""
+
+
+class BranchSwitchWarning(KincompileWarning):
+    """The solution may have changed from one assembly branch to another."""
+
+
+class RedundantConstraintWarning(KincompileWarning):
+    """A constraint repeats what the others already demand."""

@@ -1,0 +1,81 @@
+"""Writing files so that a reader never meets a half-written one."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from kincompile.errors import InputError
+
+
+def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path:
+    """Write `content` to `path` in one step: the old file stays whole until the new one is.
+
+    The content goes to a temporary file in the same folder, which then replaces `path`. Text is
+    written as UTF-8 with the line ends as given, so the bytes are the same on every system.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write; an existing one is replaced and keeps its permissions.
+    content : str or bytes
+        The whole content.
+
+    Returns
+    -------
+    pathlib.Path
+        The path written.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written: says which, why, and what to do.
+    """
+    target = Path(path)
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    if target.is_dir():
+        raise InputError(f"cannot write {target}: it is a folder. Give the name of a file in it.")
+    try:
+        _replace(target, data)
+    except OSError as error:
+        raise InputError(_explanation(target, error)) from error
+    return target
+
+
+def _replace(target: Path, data: bytes) -> None:
+    """Write a temporary neighbour of `target` and move it into place."""
+    destination = target.resolve()  # through a symbolic link, so that the link itself stays
+    handle, name = tempfile.mkstemp(dir=destination.parent, prefix=f".{target.name}.")
+    temporary = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        temporary.chmod(_mode(destination))
+        temporary.replace(destination)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _mode(destination: Path) -> int:
+    """Give the permissions of the file to be replaced, or those a new file would get."""
+    if destination.exists():
+        return destination.stat().st_mode & 0o7777
+    mask = os.umask(0)  # the mask can only be read by setting it
+    os.umask(mask)
+    return 0o666 & ~mask
+
+
+def _explanation(target: Path, error: OSError) -> str:
+    """Say which file could not be written, why, and what to do."""
+    folder = target.parent
+    if isinstance(error, FileNotFoundError):
+        remedy = f"the folder {folder} does not exist. Create it first, or choose another folder."
+    elif isinstance(error, NotADirectoryError):
+        remedy = f"{folder} is a file, not a folder. Choose another folder."
+    elif isinstance(error, PermissionError):
+        remedy = f"no permission to write in {folder}. Choose a folder you may write to."
+    else:
+        remedy = f"{error.strerror or error}. Free some space or choose another folder."
+    return f"cannot write {target}: {remedy}"
