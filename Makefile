@@ -1,0 +1,92 @@
+# `make demo` and `make test` need Python 3.11 or newer and nothing else; both fill .venv first.
+# The interpreter may be named: make PYTHON=python3.12 demo
+
+SHELL := /bin/sh
+export PYTHON
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c .ci/constraints.txt
+PYTEST := $(BIN)/python -m pytest
+
+# One stamp per extra, so that a second call installs nothing and the demo does not wait for test
+# tools. The environment has one too: its python is a link, and shows the age of what it links to.
+VENV_READY := $(VENV)/venv.stamp
+DEMO_READY := $(VENV)/demo.stamp
+TEST_READY := $(VENV)/test.stamp
+LINT_READY := $(VENV)/lint.stamp
+
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+.PHONY: help demo test test-slow lint format types goldens update-goldens bench clean
+
+help:
+	@echo "make demo            compile the wrecker boom, run it, say what was written"
+	@echo "make test            run the tests                 make test-slow    the packaging tests"
+	@echo "make lint            ruff check, ruff format       make format       repair what ruff can"
+	@echo "make types           mypy                          make bench        the benchmarks"
+	@echo "make goldens         compare generated/ with re-emission, under several hash seeds"
+	@echo "make update-goldens  rewrite generated/"
+	@echo "make clean           remove what make has made"
+
+$(VENV_READY): .ci/make-venv
+	@echo "Making the virtual environment $(VENV)"
+	@.ci/make-venv $(VENV)
+	@touch $@
+
+$(DEMO_READY): $(VENV_READY) pyproject.toml .ci/constraints.txt
+	@echo "Installing kincompile into $(VENV)"
+	@$(PIP) --editable .
+	@touch $@
+
+$(TEST_READY): $(DEMO_READY)
+	@echo "Installing the test tools into $(VENV)"
+	@$(PIP) --editable '.[test]'
+	@touch $@
+
+$(LINT_READY): $(TEST_READY)
+	@echo "Installing ruff and mypy into $(VENV)"
+	@$(PIP) --editable '.[lint]'
+	@touch $@
+
+demo: $(DEMO_READY)
+	@mkdir -p demo
+	@$(BIN)/kincompile compile examples/wrecker_boom.py -o demo/wrecker_boom_kinematics.py
+	@$(BIN)/kincompile run examples/wrecker_boom.py -o demo/wrecker_boom.csv
+	@echo
+	@echo "Written:"
+	@echo "  demo/wrecker_boom_kinematics.py  Phi, Phi_q, nu and gamma as a NumPy module, to read or to import"
+	@echo "  demo/wrecker_boom.csv            position, velocity and acceleration over time"
+
+test: $(TEST_READY)
+	@$(PYTEST)
+
+test-slow: $(TEST_READY)
+	@$(PYTEST) -m slow
+
+lint: $(LINT_READY)
+	@$(BIN)/ruff check --quiet
+	@$(BIN)/ruff format --quiet --check
+	@$(BIN)/ruff check --quiet --isolated --select E9,F generated
+
+format: $(LINT_READY)
+	@$(BIN)/ruff check --fix
+	@$(BIN)/ruff format
+
+types: $(LINT_READY)
+	@$(BIN)/mypy
+
+# Emission must not depend on the order of a set: the same bytes under every hash seed.
+goldens: $(TEST_READY)
+	@for seed in 0 1 4242; do PYTHONHASHSEED=$$seed $(PYTEST) -k golden || exit 1; done
+
+# Fails by design after a rewrite, so that nothing passes by updating.
+update-goldens: $(TEST_READY)
+	@$(PYTEST) -k golden --update-goldens
+
+bench: $(TEST_READY)
+	@$(BIN)/python -m benchmarks
+
+clean:
+	@rm -rf $(VENV) demo build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,269 @@
+"""The floors, the wall and the absence of cycles, read from the imports.
+
+An import counts wherever it stands, under `TYPE_CHECKING` too: a type is a dependency like any
+other.
+"""
+
+import ast
+import graphlib
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = "kincompile"
+
+# A module imports from lower floors or from its own folder.
+FLOORS = {
+    "errors": 0,
+    "files": 0,
+    "names": 0,
+    "calculus": 1,
+    "model": 2,
+    "derive": 3,
+    "structure": 4,
+    "ir": 5,
+    "emit": 6,
+}
+GROUND = {name for name, floor in FLOORS.items() if floor == 0}
+# Beyond the wall: it stands on the ground floor alone, and no floor stands on it.
+RUNTIME = "runtime"
+BOTH_SIDES = {"__init__", "__main__", "compiler", "cli", "teach", "view"}
+
+# Modules that may import kincompile inside a function. The lazy table of public names is what the
+# package promises: `import kincompile` loads nothing, a name loads its module.
+DEFERRED = {PACKAGE}
+
+Sources = Mapping[str, str]  # module name -> source
+
+
+def package_sources() -> dict[str, str]:
+    """Return the source of every module of the package, by dotted name."""
+    sources = {}
+    for path in sorted((ROOT / PACKAGE).rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        sources[name] = path.read_text(encoding="utf-8")
+    return sources
+
+
+def subpackage_inits() -> list[Path]:
+    """Return the `__init__.py` of every folder below the package's own."""
+    return sorted((ROOT / PACKAGE).glob("*/**/__init__.py"))
+
+
+def imported(node: ast.AST, importer: str, is_package: bool) -> Iterator[str]:
+    """Yield the dotted names that an import statement mentions, with the members of a `from`."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        above = importer.split(".")[: len(importer.split(".")) - node.level + is_package]
+        base = ".".join([*(above if node.level else []), *([node.module] if node.module else [])])
+        yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def resolve(name: str, modules: Sources) -> str | None:
+    """Return the module of the package that a dotted name means, or None for a foreign one."""
+    if name.split(".")[0] != PACKAGE:
+        return None
+    while name not in modules and "." in name:
+        name = name.rpartition(".")[0]
+    return name
+
+
+def import_graph(modules: Sources) -> dict[str, set[str]]:
+    """Return, for every module, the modules of the package that it imports."""
+    graph: dict[str, set[str]] = {}
+    for module, source in modules.items():
+        is_package = any(other.startswith(f"{module}.") for other in modules)
+        names = {
+            name
+            for node in ast.walk(ast.parse(source, module))
+            for name in imported(node, module, is_package)
+        }
+        graph[module] = {found for name in names if (found := resolve(name, modules))} - {module}
+    return graph
+
+
+def part(module: str) -> str:
+    """Return the folder or file directly below the package that a module belongs to."""
+    return module.split(".")[1] if "." in module else "__init__"
+
+
+def may_import(importer: str, target: str) -> bool:
+    """Tell whether one part of the package may import another."""
+    if importer == target or importer in BOTH_SIDES:
+        return True
+    if importer == RUNTIME or target not in FLOORS:
+        return target in GROUND
+    return FLOORS[target] < FLOORS[importer] or target in GROUND
+
+
+def floor_violations(modules: Sources) -> list[str]:
+    """Return one sentence for every import that climbs a floor or crosses the wall."""
+    return [
+        f"{module} imports {target}"
+        for module, targets in import_graph(modules).items()
+        for target in sorted(targets)
+        if not may_import(part(module), part(target))
+    ]
+
+
+def import_cycle(modules: Sources) -> list[str]:
+    """Return the modules of one import cycle, or nothing."""
+    try:
+        graphlib.TopologicalSorter(import_graph(modules)).prepare()
+    except graphlib.CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def is_deferred_import(node: ast.AST, module: str) -> bool:
+    """Tell whether a node of a function imports from the package, or by a computed name."""
+    if isinstance(node, ast.Call):
+        called = node.func
+        name = called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")
+        return name in {"import_module", "__import__"}
+    relative = isinstance(node, ast.ImportFrom) and node.level > 0
+    return relative or any(
+        name.split(".")[0] == PACKAGE for name in imported(node, module, is_package=False)
+    )
+
+
+def deferred_imports(modules: Sources) -> list[str]:
+    """Return one sentence for every import of the package that waits inside a function."""
+    return sorted(
+        {
+            f"{module}, line {node.lineno}"
+            for module, source in modules.items()
+            if module not in DEFERRED
+            for function in ast.walk(ast.parse(source, module))
+            if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+            for node in ast.walk(function)
+            if isinstance(node, ast.stmt | ast.expr) and is_deferred_import(node, module)
+        }
+    )
+
+
+def sympy_imports(modules: Sources) -> list[str]:
+    """Return the modules of the runtime and the ground that import SymPy, in functions too."""
+    return [
+        module
+        for module, source in modules.items()
+        if part(module) in GROUND | {RUNTIME}
+        for node in ast.walk(ast.parse(source, module))
+        for name in imported(node, module, is_package=False)
+        if name.split(".")[0] == "sympy"
+    ]
+
+
+def test_every_part_of_the_package_has_a_floor() -> None:
+    parts = {part(module) for module in package_sources()}
+    assert parts - {*FLOORS, RUNTIME, *BOTH_SIDES} == set()
+
+
+def test_imports_go_down_and_do_not_cross_the_wall() -> None:
+    assert floor_violations(package_sources()) == []
+
+
+def test_there_is_no_import_cycle() -> None:
+    assert import_cycle(package_sources()) == []
+
+
+def test_no_import_of_the_package_waits_inside_a_function() -> None:
+    assert deferred_imports(package_sources()) == []
+
+
+def test_sympy_is_not_imported_beyond_the_wall() -> None:
+    assert sympy_imports(package_sources()) == []
+
+
+@pytest.mark.parametrize("path", subpackage_inits(), ids=lambda path: path.parent.name)
+def test_a_subpackage_init_is_a_docstring_and_nothing_else(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    assert ast.get_docstring(tree), "say what the folder is for"
+    assert len(tree.body) == 1
+
+
+def test_the_runtime_does_not_load_sympy() -> None:
+    modules = [name for name in package_sources() if part(name) in {"__init__", RUNTIME, *GROUND}]
+    assert any(part(name) == RUNTIME for name in modules)
+    program = (
+        "import importlib, sys\n"
+        "for name in sys.argv[1:]:\n"
+        "    importlib.import_module(name)\n"
+        "    if 'sympy' in sys.modules:\n"
+        "        sys.exit(f'{name} loads SymPy')\n"
+    )
+    command = [sys.executable, "-c", program, *modules]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+# The checks above say "nothing found"; these see to it that something would be.
+
+CLEAN = {
+    "kincompile": "def __getattr__(name):\n    return importlib.import_module(name)",
+    "kincompile.errors": "",
+    "kincompile.model": "",
+    "kincompile.model.body": "from kincompile.errors import ModelError",
+    "kincompile.emit": "",
+    "kincompile.emit.numpy": "from kincompile.model import body",
+    "kincompile.runtime": "",
+    "kincompile.runtime.newton": "from kincompile.errors import SolveError\nimport numpy",
+    "kincompile.cli": "import kincompile.emit.numpy\nfrom kincompile.runtime import newton",
+}
+
+
+def test_a_clean_package_passes() -> None:
+    assert floor_violations(CLEAN) == []
+    assert import_cycle(CLEAN) == []
+    assert deferred_imports(CLEAN) == []
+    assert sympy_imports(CLEAN) == []
+
+
+@pytest.mark.parametrize(
+    ("module", "source", "violation"),
+    [
+        ("model.body", "from kincompile.emit.numpy import emit", "kincompile.emit.numpy"),
+        ("model.body", "from ..emit import numpy", "kincompile.emit.numpy"),
+        ("model", "from ..emit import numpy", "kincompile.emit.numpy"),
+        ("model.body", "import kincompile as kc", "kincompile"),
+        ("emit.numpy", "from kincompile.runtime.newton import solve", "kincompile.runtime.newton"),
+        ("emit.numpy", "def f():\n    import kincompile.cli", "kincompile.cli"),
+        ("runtime.newton", "from kincompile.model.body import Body", "kincompile.model.body"),
+        ("errors", "from kincompile.model import body", "kincompile.model.body"),
+    ],
+)
+def test_an_import_up_or_across_is_found(module: str, source: str, violation: str) -> None:
+    planted = {**CLEAN, f"kincompile.{module}": source}
+    assert floor_violations(planted) == [f"kincompile.{module} imports {violation}"]
+
+
+def test_a_cycle_is_found_even_if_it_is_for_types_only() -> None:
+    joint = "if TYPE_CHECKING:\n    from .body import Body"
+    body = "from kincompile.model.joint import Joint"
+    planted = {**CLEAN, "kincompile.model.joint": joint, "kincompile.model.body": body}
+    assert set(import_cycle(planted)) == {"kincompile.model.joint", "kincompile.model.body"}
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from kincompile.errors import ModelError",
+        "from . import mechanism",
+        "import kincompile.errors",
+        "importlib.import_module('kincompile.errors')",
+    ],
+)
+def test_an_import_inside_a_function_is_found(statement: str) -> None:
+    planted = {**CLEAN, "kincompile.model.body": f"def f():\n    {statement}"}
+    assert deferred_imports(planted) == ["kincompile.model.body, line 2"]
+
+
+def test_sympy_inside_a_function_of_the_runtime_is_found() -> None:
+    planted = {**CLEAN, "kincompile.runtime.newton": "def f():\n    from sympy import sin"}
+    assert sympy_imports(planted) == ["kincompile.runtime.newton"]
