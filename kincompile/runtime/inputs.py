@@ -1,0 +1,213 @@
+"""Reading what a caller gives to the solver; all that is wrong is said at once."""
+
+from __future__ import annotations
+
+import math
+import operator
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from kincompile.errors import InputError, StructuralError
+from kincompile.names import listed, suggestion
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Values: TypeAlias = ArrayLike | Mapping[str, float] | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inputs:
+    """What the solver works with, checked.
+
+    Attributes
+    ----------
+    module
+        An emitted module with as many equations as coordinates.
+    t : ndarray, shape (N,)
+        The time grid, finite and monotone.
+    p : ndarray, shape (k,)
+        A value for each parameter.
+    guess : ndarray, shape (n,)
+        Where Newton starts.
+    tolerance : float
+        Bound for the norm of the last correction, relative to 1 + ||q||.
+    max_iterations : int
+        Newton iterations after which an attempt is given up.
+    """
+
+    module: ModuleType
+    t: NDArray[np.float64]
+    p: NDArray[np.float64]
+    guess: NDArray[np.float64]
+    tolerance: float
+    max_iterations: int
+
+
+def read_inputs(
+    module: ModuleType, t: ArrayLike, p: Values, guess: Values, tolerance: Any, max_iterations: Any
+) -> Inputs:
+    """Check all inputs of the solver and bring them into the form in which it uses them.
+
+    Raises
+    ------
+    InputError
+        With everything that is wrong with the values, by name.
+    StructuralError
+        When the module has not as many equations as coordinates.
+    """
+    _require_module(module)
+    _require_square(module)
+    problems: list[str] = []
+    inputs = Inputs(
+        module,
+        _times(t, problems),
+        _values("parameter", module.PARAMETERS, module.DEFAULTS, p, problems),
+        _values("coordinate", module.COORDINATES, module.GUESS, guess, problems),
+        _tolerance(tolerance, problems),
+        _count(max_iterations, problems),
+    )
+    if problems:
+        raise InputError(problems)
+    return inputs
+
+
+def _require_module(module: object) -> None:
+    """Refuse what was not compiled or not loaded, with the step that is missing."""
+    if hasattr(module, "N_COORDINATES") and callable(getattr(module, "position", None)):
+        return
+    if isinstance(module, str | os.PathLike):
+        remedy = "load the file first: module = kc.load(path)"
+    else:
+        remedy = "compile the mechanism first: module = kc.compile(m)"
+    raise InputError(f"expected a compiled module, got a {type(module).__name__}: {remedy}.")
+
+
+def _require_square(module: ModuleType) -> None:
+    """Refuse a module whose equations cannot determine its coordinates."""
+    m, n = module.N_EQUATIONS, module.N_COORDINATES
+    if m == n:
+        return
+    if m < n:
+        remedy = f"add {n - m} more (joints or drivers), or hold coordinates that are free"
+    else:
+        remedy = f"remove {m - n} of them: {listed(module.EQUATIONS)}"
+    raise StructuralError(
+        f"{module.NAME} has {m} equations for {n} coordinates ({listed(module.COORDINATES)}), "
+        f"and the motion needs as many equations as coordinates: {remedy}."
+    )
+
+
+def _times(t: ArrayLike, problems: list[str]) -> NDArray[np.float64]:
+    """Read a time or a grid of times."""
+    times = _numbers("t", t, problems)
+    if times is None:
+        return np.empty(0)
+    if times.ndim > 1 or times.size == 0:
+        problems.append(
+            f"t has shape {times.shape}: give one time, or a 1-D grid of at least one time."
+        )
+        return times
+    times = np.atleast_1d(times)
+    if not np.isfinite(times).all():
+        index = int(np.argmin(np.isfinite(times)))
+        problems.append(f"t[{index}] is {times[index]}: times must be finite numbers.")
+    elif not (np.all(np.diff(times) >= 0) or np.all(np.diff(times) <= 0)):
+        problems.append("t goes back and forth: sort the times, up or down (t = np.sort(t)).")
+    return times
+
+
+def _values(
+    what: str,
+    names: tuple[str, ...],
+    defaults: NDArray[np.float64],
+    given: Values,
+    problems: list[str],
+) -> NDArray[np.float64]:
+    """Read a vector, or a mapping from names to values that overrides the defaults."""
+    if given is None:
+        return defaults
+    if isinstance(given, Mapping):
+        return _overridden(what, names, defaults, given, problems)
+    values = _numbers(f"the {what} vector", given, problems)
+    if values is None:
+        return defaults
+    if values.shape != defaults.shape:
+        problems.append(
+            f"the {what} vector has shape {values.shape}, expected {defaults.shape}: a value for "
+            f"each of {listed(names)}, or a dict of those that differ."
+        )
+        return defaults
+    for name, value in zip(names, values, strict=True):
+        _require_finite(what, name, float(value), problems)
+    return values
+
+
+def _overridden(
+    what: str,
+    names: tuple[str, ...],
+    defaults: NDArray[np.float64],
+    given: Mapping[str, Any],
+    problems: list[str],
+) -> NDArray[np.float64]:
+    """Replace the defaults that a mapping names."""
+    values = defaults.copy()
+    for name, value in given.items():
+        if name not in names:
+            near = suggestion(str(name), names)
+            problems.append(f"there is no {what} {name!r}{near}. The {what}s are {listed(names)}.")
+            continue
+        number = _numbers(f"{what} {name!r}", value, problems)
+        if number is None:
+            continue
+        if number.ndim:
+            problems.append(f"{what} {name!r} has shape {number.shape}: give one number.")
+            continue
+        _require_finite(what, name, float(number), problems)
+        values[names.index(name)] = number
+    return values
+
+
+def _numbers(what: str, given: object, problems: list[str]) -> NDArray[np.float64] | None:
+    """Turn anything into a new array of real numbers, or note why that is impossible."""
+    try:
+        array = np.asarray(given)
+    except (TypeError, ValueError):
+        problems.append(f"{what} is not a regular array: its parts have different lengths.")
+        return None
+    if array.dtype.kind not in "iuf" and array.size:
+        kind = type(given).__name__ if array.ndim == 0 else f"an array of {array.dtype}"
+        problems.append(f"{what} is {kind}: give real numbers.")
+        return None
+    return array.astype(np.float64)
+
+
+def _require_finite(what: str, name: str, value: float, problems: list[str]) -> None:
+    """Note a value that is NaN or infinite."""
+    if not math.isfinite(value):
+        problems.append(f"{what} {name!r} is {value}: give a finite number.")
+
+
+def _tolerance(tolerance: object, problems: list[str]) -> float:
+    """Read the tolerance: a positive number."""
+    if isinstance(tolerance, float | int | np.floating) and 0 < tolerance < math.inf:
+        return float(tolerance)
+    problems.append(f"tolerance is {tolerance!r}: give a positive number such as 1e-10.")
+    return math.nan
+
+
+def _count(max_iterations: Any, problems: list[str]) -> int:
+    """Read the cap on Newton's iterations: a positive integer."""
+    try:
+        count = operator.index(max_iterations)
+    except TypeError:
+        count = 0
+    if count < 1:
+        problems.append(f"max_iterations is {max_iterations!r}: give an integer of at least 1.")
+    return count

@@ -1,0 +1,108 @@
+"""From the text of an emitted module to a module that is known to keep the contract.
+
+An emitted module is a Python file and loading it runs it: load only files that you trust.
+"""
+
+from __future__ import annotations
+
+import linecache
+import zlib
+from importlib.util import decode_source
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from kincompile.errors import ContractError, InputError
+from kincompile.runtime.contract import REMEDY, check
+
+if TYPE_CHECKING:
+    import os
+
+
+def load(path: str | os.PathLike[str]) -> ModuleType:
+    """Load an emitted module from its file, and check that it keeps the contract.
+
+    The search path, the module cache and the file's folder stay as they are: two files of the same
+    name do not disturb each other, and a file that was emitted again a moment ago is read afresh.
+
+    Parameters
+    ----------
+    path : path-like
+        A .py file that ``kincompile compile`` or ``kc.emit`` wrote.
+
+    Returns
+    -------
+    module
+        With the names of the contract in docs/architecture.md.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read.
+    ContractError
+        When it is not an emitted module, or one that this version cannot use.
+    """
+    file = Path(path)
+    module = ModuleType(file.stem)
+    return _fill(module, _text(file), str(file.absolute()))
+
+
+def from_source(source: str, name: str) -> ModuleType:
+    """Make a module from emitted text, in memory, and check that it keeps the contract.
+
+    Tracebacks and `inspect.getsource` show the text as they would for a file.
+
+    Parameters
+    ----------
+    source : str
+        Text of an emitted module.
+    name : str
+        Name of the module, for messages and tracebacks.
+
+    Returns
+    -------
+    module
+        With the names of the contract in docs/architecture.md.
+
+    Raises
+    ------
+    ContractError
+        When the text is not an emitted module, or one that this version cannot use.
+    """
+    # The checksum keeps the lines of two mechanisms of one name apart; the same text takes the
+    # same place, so that compiling again and again does not fill the cache.
+    filename = f"<kincompile {name} {zlib.crc32(source.encode()):08x}>"
+    # Without a modification time `linecache.checkcache` leaves the entry alone.
+    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    return _fill(ModuleType(name), source, filename)
+
+
+def _text(file: Path) -> str:
+    """Read Python source with the encoding that it declares."""
+    try:
+        return decode_source(file.read_bytes())
+    except FileNotFoundError:
+        raise InputError(f"cannot load {file}: there is no such file. Check the path.") from None
+    except IsADirectoryError:
+        raise InputError(f"cannot load {file}: it is a folder. Give the .py file in it.") from None
+    except OSError as error:
+        raise InputError(f"cannot load {file}: {error.strerror}. Check the file.") from error
+    except (SyntaxError, UnicodeDecodeError) as error:
+        raise ContractError(f"{file} is not the text of a Python module. {REMEDY}") from error
+
+
+def _fill(module: ModuleType, source: str, filename: str) -> ModuleType:
+    """Run the text in the module and check the result."""
+    module.__file__ = filename
+    try:
+        exec(compile(source, filename, "exec"), module.__dict__)
+    except SyntaxError as error:
+        raise ContractError(
+            f"{filename} is not a Python module: {error.msg} in line {error.lineno}. {REMEDY}"
+        ) from error
+    except Exception as error:
+        raise ContractError(
+            f"{filename} cannot be loaded: {type(error).__name__}: {error}. {REMEDY}"
+        ) from error
+    check(module)
+    return module

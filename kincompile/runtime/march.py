@@ -1,0 +1,181 @@
+r"""From one point of the motion to the next.
+
+The position at the next time is predicted from velocity and acceleration (Haug, section 3.6)
+
+.. math:: q(t + h) \approx q + h\,\dot q + \tfrac12 h^2\,\ddot q
+
+and corrected by Newton's method. A step counts only when it stays on its branch: Newton converges,
+the prediction was good, Phi_q is not singular, and its determinant keeps its sign. Otherwise the
+step is halved, and doubled again once it succeeds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.runtime.newton import Attempt, assemble, iterate
+from kincompile.runtime.problem import Point, Problem, norm
+from kincompile.runtime.status import Status
+
+if TYPE_CHECKING:
+    from kincompile.runtime.inputs import Inputs
+    from kincompile.runtime.problem import Vector
+
+SMALLEST_PART = 2.0**-20
+"""A step of this part of the distance between two grid points is not halved again."""
+
+MAX_SUBSTEPS = 10_000
+"""Sub-steps between two grid points after which the march is given up, about a second."""
+
+ALLOWED_ERROR = 0.1
+"""Error of the prediction that is always good enough, in radians or sizes of the mechanism."""
+
+ALLOWED_PART = 0.25
+"""Error of the prediction that is good enough, as a part of the predicted movement."""
+
+SINGULAR_SENSITIVITY = 1e7
+"""Movement, in scales of the coordinates, for an error of one scale in the equations: beyond this
+rounding has taken half of the digits of q, and a double root cannot be told from two roots."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """A point of the motion, complete.
+
+    Attributes
+    ----------
+    t : float
+        Time.
+    point : Point
+        The position with Phi and Phi_q.
+    q_dot, q_ddot : ndarray, shape (n,)
+        Velocity and acceleration.
+    branch : float
+        Sign of det Phi_q.
+    """
+
+    t: float
+    point: Point
+    q_dot: Vector
+    q_ddot: Vector
+    branch: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What became of the way to a point in time.
+
+    Attributes
+    ----------
+    status : Status
+        CONVERGED, or why the point failed.
+    iterations : int
+        Newton iterations spent.
+    state : State or None
+        The point when converged; on failure the last good one on the way, if there is one.
+    position : Point or None
+        Where the mechanism is at that time, also when only velocity or acceleration failed.
+    attempt : Attempt or None
+        When the motion does not lead to that time: the try to assemble the mechanism there
+        nevertheless. If even that converges, the mechanism could only jump there.
+    """
+
+    status: Status
+    iterations: int
+    state: State | None
+    position: Point | None = None
+    attempt: Attempt | None = None
+
+
+def start(equations: Problem, t: float, inputs: Inputs) -> Outcome:
+    """Assemble the mechanism at the first time, from the guess."""
+    attempt = assemble(equations, t, inputs.guess, inputs.tolerance, inputs.max_iterations)
+    iterations = len(attempt.corrections)
+    if attempt.status is not Status.CONVERGED:
+        return Outcome(attempt.status, iterations, None, attempt=attempt)
+    state = complete(equations, t, attempt.last)
+    if isinstance(state, Status):
+        return Outcome(state, iterations, None, attempt.last)
+    return Outcome(Status.CONVERGED, iterations, state, attempt.last)
+
+
+def advance(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome:
+    """Follow the motion from a good point to time `t`, in sub-steps where need be."""
+    step, iterations = t - state.t, 0
+    smallest = abs(step) * SMALLEST_PART
+    status = Status.NOT_CONVERGED
+    for _ in range(MAX_SUBSTEPS):
+        whole = abs(step) >= abs(t - state.t)
+        outcome = _step(equations, state, t if whole else state.t + step, inputs)
+        iterations += outcome.iterations
+        status = outcome.status
+        if whole and outcome.position:
+            return Outcome(status, iterations, outcome.state or state, outcome.position)
+        if outcome.state:
+            state, step = outcome.state, 2 * step
+        elif abs(step) <= smallest:
+            break
+        else:
+            step /= 2
+    return _give_up(equations, state, t, inputs, status, iterations)
+
+
+def complete(equations: Problem, t: float, point: Point) -> State | Status:
+    """Solve for velocity and acceleration at a position, or say why they cannot be had."""
+    module, p, q, Phi_q = equations.module, equations.p, point.q, point.Phi_q
+    scale = equations.scale(q)
+    # A third right-hand side, of the size of the equations' own terms, costs nothing and shows how
+    # near to singular the matrix is.
+    sides = np.empty((q.size, 2))
+    sides[:, 1] = equations.terms(point) * equations.probe
+    try:
+        sides[:, 0] = module.nu(q, t, p)
+        q_dot, probe = np.linalg.solve(Phi_q, sides).T
+        sensitivity = float(np.max(np.abs(probe) / scale))
+        if not sensitivity < SINGULAR_SENSITIVITY:
+            return Status.SINGULAR if np.isfinite(Phi_q).all() else Status.NOT_FINITE
+        q_ddot = np.linalg.solve(Phi_q, module.gamma(q, q_dot, t, p))
+    except np.linalg.LinAlgError:
+        return Status.SINGULAR
+    except (ArithmeticError, ValueError):
+        return Status.NOT_FINITE
+    if not math.isfinite(norm(q_dot) + norm(q_ddot)):
+        return Status.NOT_FINITE
+    return State(t, point, q_dot, q_ddot, float(np.linalg.slogdet(Phi_q)[0]))
+
+
+def _step(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome:
+    """Predict, correct, and accept the point at `t` only when it continues the motion."""
+    h = t - state.t
+    move = h * state.q_dot + (h * h / 2) * state.q_ddot
+    predicted = state.point.q + move
+    attempt = iterate(equations, t, predicted, inputs.tolerance, inputs.max_iterations)
+    iterations = len(attempt.corrections)
+    if attempt.status is not Status.CONVERGED:
+        return Outcome(Status.NOT_CONVERGED, iterations, None)
+    point = attempt.last
+    error = np.max(np.abs(point.q - predicted) / equations.reference)
+    movement = np.max(np.abs(move) / equations.reference)
+    if error > max(ALLOWED_ERROR, ALLOWED_PART * movement):
+        return Outcome(Status.NOT_CONVERGED, iterations, None)
+    following = complete(equations, t, point)
+    if isinstance(following, Status):
+        return Outcome(following, iterations, None, point)
+    if following.branch != state.branch:  # a singular configuration lies between the two
+        return Outcome(Status.SINGULAR, iterations, None)
+    return Outcome(Status.CONVERGED, iterations, following, point)
+
+
+def _give_up(
+    equations: Problem, state: State, t: float, inputs: Inputs, status: Status, iterations: int
+) -> Outcome:
+    """Find out what is there at the time that the motion does not reach."""
+    attempt = assemble(equations, t, state.point.q, inputs.tolerance, inputs.max_iterations)
+    iterations += len(attempt.corrections)
+    if attempt.status is Status.NOT_FINITE:
+        status = Status.NOT_FINITE
+    return Outcome(status, iterations, state, attempt=attempt)

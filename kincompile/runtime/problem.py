@@ -1,0 +1,130 @@
+"""The equations at given parameters, and the scales by which their numbers are judged.
+
+Nothing here compares a length with an angle, or a residual with a fixed number: a coordinate is
+compared with its own scale (the size of the mechanism, or a radian), an equation with the sum of
+what its terms contribute at those scales. So a mechanism in millimetres and the same one in metres
+get the same verdicts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    Vector: TypeAlias = NDArray[np.float64]
+
+ROUNDING = 16 * float(np.finfo(np.float64).eps)
+"""A residual this small, relative to its terms, is all that floating point has to give."""
+
+SMALLEST_SIZE = 1e-6
+"""Stands in for the size of a mechanism whose lengths are all zero."""
+
+
+@dataclass(slots=True, eq=False)
+class Point:
+    """A position at which the equations were evaluated.
+
+    Attributes
+    ----------
+    q : ndarray, shape (n,)
+        The position.
+    Phi : ndarray, shape (n,)
+        The constraint vector there.
+    Phi_q : ndarray, shape (n, n)
+        The Jacobian there.
+    residual : float
+        Euclidean norm of Phi.
+    """
+
+    q: Vector
+    Phi: Vector
+    Phi_q: Vector
+    residual: float
+
+
+@dataclass(slots=True, eq=False)
+class Problem:
+    """An emitted module with its parameters set.
+
+    Attributes
+    ----------
+    module
+        The emitted module.
+    p : ndarray, shape (k,)
+        Parameters.
+    angular : ndarray of bool, shape (n,)
+        Which coordinates are angles.
+    reference : ndarray, shape (n,)
+        Scale of each coordinate: 1 rad for angles, the size of the mechanism for the others.
+    probe : ndarray, shape (n,)
+        Numbers of size 1/2 to 1 and either sign without a pattern, which no null vector of a
+        mechanism can be expected to be orthogonal to.
+    magnitude : ndarray, shape (n,)
+        What the terms of each equation contribute at a generic position.
+    """
+
+    module: ModuleType
+    p: Vector
+    angular: NDArray[np.bool_]
+    reference: Vector
+    probe: Vector
+    magnitude: Vector
+
+    def at(self, q: Vector, t: float) -> Point | None:
+        """Evaluate the equations, or give None where they have no finite value."""
+        try:
+            Phi, Phi_q = self.module.position(q, t, self.p)
+        except (ArithmeticError, ValueError):  # of math.sqrt, log, or 1/0; NaN or infinity in q
+            return None
+        residual = norm(Phi)
+        return Point(q, Phi, Phi_q, residual) if math.isfinite(residual) else None
+
+    def scale(self, q: Vector) -> Vector:
+        """Give the scale of each coordinate at a position."""
+        return np.maximum(self.reference, np.abs(q))
+
+    def terms(self, point: Point) -> Vector:
+        """Give what the terms of each equation contribute at the scales of the coordinates.
+
+        At a dead point a whole row of Phi_q may vanish. What it contributes elsewhere keeps the
+        equation from being measured by nothing.
+        """
+        return np.maximum(self.magnitude, np.abs(point.Phi_q) @ self.scale(point.q))
+
+    def holds(self, point: Point, tolerance: float) -> bool:
+        """Say whether every equation holds, relative to what its terms contribute."""
+        return bool(np.all(np.abs(point.Phi) <= tolerance * self.terms(point)))
+
+
+def problem(module: ModuleType, p: Vector, q: Vector, t: float) -> Problem:
+    """Set a module's parameters; position and guess tell the size of the mechanism."""
+    angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES], dtype=bool)
+    lengths = np.abs(np.where(angular, 0.0, (q, module.GUESS)))
+    size = max(float(np.max(lengths, initial=0.0)), SMALLEST_SIZE)
+    reference = np.where(angular, 1.0, size)
+    equations = Problem(module, p, angular, reference, _probe(q.size), np.zeros(q.size))
+    generic = equations.at(q + reference * equations.probe, t)
+    if generic is not None and np.isfinite(generic.Phi_q).all():
+        equations.magnitude = equations.terms(generic)
+    return equations
+
+
+def _probe(n: int) -> Vector:
+    """Give n numbers of size 1/2 to 1 and either sign: a quasi-random sequence."""
+    golden = (math.sqrt(5) - 1) / 2
+    sequence = np.arange(1, n + 1) * golden % 1
+    signs = np.where(sequence * 64 % 2 < 1, 1.0, -1.0)
+    return np.asarray(signs * (1 + sequence) / 2, dtype=np.float64)
+
+
+def norm(vector: Vector) -> float:
+    """Give the Euclidean norm; three times as fast as `numpy.linalg.norm`."""
+    return math.sqrt(vector @ vector)

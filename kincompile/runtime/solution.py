@@ -1,0 +1,100 @@
+"""The motion that `solve` found, point by point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.errors import InputError
+from kincompile.names import listed, rate, suggestion
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Solution:
+    """Position, velocity and acceleration over a time grid of N points, n coordinates.
+
+    ``solution["phi_rod"]``, ``solution["x_crank_dot"]`` and ``solution["x_crank_ddot"]`` give
+    columns by name.
+
+    Attributes
+    ----------
+    t : ndarray, shape (N,)
+        Time, in the order in which it was asked for.
+    q, q_dot, q_ddot : ndarray, shape (N, n)
+        Coordinates and their first and second time derivatives, in the units of `units` per second
+        and per second squared. NaN where they were not found: `status` then says why.
+    status : ndarray of int, shape (N,)
+        A `Status` per point; 0 where everything converged.
+    residual : ndarray, shape (N,)
+        Largest absolute value of Phi after the last correction; NaN where nothing was evaluated.
+    iterations : ndarray of int, shape (N,)
+        Newton iterations spent on the way from the point before, sub-steps included.
+    success : bool
+        Whether every point converged.
+    message : str
+        One sentence; on failure the time, the status, the equations with the largest residual and
+        what to do.
+    name : str
+        Name of the mechanism.
+    coordinates, equations : tuple of str
+        Names of the columns of q and of the rows of Phi.
+    units : dict
+        Unit of each coordinate and parameter, "" if none.
+    parameters : dict
+        Value of each parameter that was used.
+    """
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    q_dot: NDArray[np.float64]
+    q_ddot: NDArray[np.float64]
+    status: NDArray[np.int64]
+    residual: NDArray[np.float64]
+    iterations: NDArray[np.int64]
+    success: bool
+    message: str
+    name: str
+    coordinates: tuple[str, ...]
+    equations: tuple[str, ...]
+    units: dict[str, str]
+    parameters: dict[str, float]
+
+    def __getitem__(self, column: str) -> NDArray[np.float64]:
+        """Give the column of a coordinate, its rate or its second rate, shape (N,).
+
+        Raises
+        ------
+        InputError
+            When no column has this name; the message lists those that exist.
+        """
+        for order, values in enumerate((self.q, self.q_dot, self.q_ddot)):
+            names = columns(self.coordinates, order)
+            if column in names:
+                return values[:, names.index(column)]
+        known = [name for order in range(3) for name in columns(self.coordinates, order)]
+        raise InputError(
+            f"{self.name} has no column {column!r}{suggestion(str(column), known)}. The "
+            f"coordinates are {listed(self.coordinates)}; add _dot or _ddot for the rates."
+        )
+
+    def __repr__(self) -> str:
+        """Give the name, the grid and the outcome in one line."""
+        ends = f"t = {self.t[0]:g}" + (f" to {self.t[-1]:g}" if self.t.size > 1 else "")
+        points = f"{self.t.size} point" + ("s" if self.t.size > 1 else "")
+        return f"<Solution of {self.name}: {points}, {ends}; {self._outcome()}>"
+
+    def _outcome(self) -> str:
+        """Say in a few words how it went."""
+        if self.success:
+            return f"converged, largest residual {np.max(self.residual):.1e}"
+        return f"failed, {np.count_nonzero(self.status == 0)} points converged; see .message"
+
+
+def columns(coordinates: tuple[str, ...], order: int) -> tuple[str, ...]:
+    """Give the names of q, q_dot or q_ddot, for `order` 0, 1 or 2."""
+    return coordinates if order == 0 else tuple(rate(name, order) for name in coordinates)
