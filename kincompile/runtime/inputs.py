@@ -160,8 +160,8 @@ def _overridden(
     values = defaults.copy()
     for name, value in given.items():
         if name not in names:
-            near = suggestion(str(name), names)
-            problems.append(f"there is no {what} {name!r}{near}. The {what}s are {listed(names)}.")
+            near = suggestion(str(name), names) or "."
+            problems.append(f"there is no {what} {name!r}{near} The {what}s are {listed(names)}.")
             continue
         number = _numbers(f"{what} {name!r}", value, problems)
         if number is None:

@@ -31,11 +31,12 @@ SMALLEST_PART = 2.0**-20
 MAX_SUBSTEPS = 10_000
 """Sub-steps between two grid points after which the march is given up, about a second."""
 
-ALLOWED_ERROR = 0.1
-"""Error of the prediction that is always good enough, in radians or sizes of the mechanism."""
+SMALL_ERROR, LARGE_ERROR = 0.05, 0.5
+"""Errors of the prediction that are always and never good, in radians or sizes of the mechanism.
+Near a lock-up the predicted movement is tens of radians, and a part of it proves nothing."""
 
 ALLOWED_PART = 0.25
-"""Error of the prediction that is good enough, as a part of the predicted movement."""
+"""Error of the prediction, as a part of the predicted movement, that is good in between."""
 
 SINGULAR_SENSITIVITY = 1e7
 """Movement, in scales of the coordinates, for an error of one scale in the equations: beyond this
@@ -158,9 +159,7 @@ def _step(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome
     if attempt.status is not Status.CONVERGED:
         return Outcome(Status.NOT_CONVERGED, iterations, None)
     point = attempt.last
-    error = np.max(np.abs(point.q - predicted) / equations.reference)
-    movement = np.max(np.abs(move) / equations.reference)
-    if error > max(ALLOWED_ERROR, ALLOWED_PART * movement):
+    if not _predicted_well(equations, point.q - predicted, move, predicted):
         return Outcome(Status.NOT_CONVERGED, iterations, None)
     following = complete(equations, t, point)
     if isinstance(following, Status):
@@ -168,6 +167,14 @@ def _step(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome
     if following.branch != state.branch:  # a singular configuration lies between the two
         return Outcome(Status.SINGULAR, iterations, None)
     return Outcome(Status.CONVERGED, iterations, following, point)
+
+
+def _predicted_well(equations: Problem, error: Vector, move: Vector, predicted: Vector) -> bool:
+    """Say whether Newton ended near enough to the prediction to have stayed on the branch."""
+    spread = equations.spread(predicted)
+    movement = float(np.max(np.abs(move) / spread))
+    allowed = min(LARGE_ERROR, max(SMALL_ERROR, ALLOWED_PART * movement))
+    return bool(np.max(np.abs(error) / spread) <= allowed)
 
 
 def _give_up(

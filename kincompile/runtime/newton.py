@@ -195,6 +195,9 @@ def iterate(
         if _converged(equations, attempt, tolerance):
             attempt.status = Status.CONVERGED
             break
+    else:
+        if _crawls(attempt) and equations.holds(attempt.last, RESIDUAL_FACTOR * tolerance):
+            attempt.status = Status.SINGULAR
     return attempt
 
 
@@ -247,8 +250,7 @@ def _direction(equations: Problem, point: Point, weights: Vector) -> Vector | No
 
 def _clamp(equations: Problem, point: Point, correction: Vector) -> float:
     """Give the part of a correction that moves angles and lengths no further than is sensible."""
-    size = np.max(np.abs(np.where(equations.angular, 0.0, point.q)), initial=0.0)
-    limits = np.where(equations.angular, LARGEST_ANGLE, np.maximum(equations.reference, size))
+    limits = equations.spread(point.q) * np.where(equations.angular, LARGEST_ANGLE, 1.0)
     return min(1.0, 1.0 / float(np.max(np.abs(correction) / limits, initial=0.0) or 1.0))
 
 
@@ -258,8 +260,13 @@ def _converged(equations: Problem, attempt: Attempt, tolerance: float) -> bool:
     if correction <= tolerance * (1 + norm(point.q)):
         return equations.holds(point, max(RESIDUAL_FACTOR * tolerance, ROUNDING))
     # Near a singular configuration rounding alone keeps the corrections above any tolerance.
-    stalled = len(attempt.corrections) > 1 and correction > attempt.corrections[-2] / 2
-    return stalled and equations.holds(point, ROUNDING)
+    return _crawls(attempt) and equations.holds(point, ROUNDING)
+
+
+def _crawls(attempt: Attempt) -> bool:
+    """Say whether the corrections shrink no faster than towards a double root, by halves."""
+    corrections = attempt.corrections
+    return len(corrections) > 1 and corrections[-1] > corrections[-2] / 4
 
 
 def _result(attempt: Attempt, guess: Vector) -> NewtonResult:

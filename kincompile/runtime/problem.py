@@ -91,6 +91,14 @@ class Problem:
         """Give the scale of each coordinate at a position."""
         return np.maximum(self.reference, np.abs(q))
 
+    def spread(self, q: Vector) -> Vector:
+        """Give the distance that is large for each coordinate: 1 rad, or the size of the mechanism.
+
+        A mechanism that starts folded at the origin shows its size only later.
+        """
+        size = np.max(np.abs(np.where(self.angular, 0.0, q)), initial=0.0)
+        return np.where(self.angular, 1.0, np.maximum(self.reference, size))
+
     def terms(self, point: Point) -> Vector:
         """Give what the terms of each equation contribute at the scales of the coordinates.
 

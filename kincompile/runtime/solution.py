@@ -77,9 +77,10 @@ class Solution:
             if column in names:
                 return values[:, names.index(column)]
         known = [name for order in range(3) for name in columns(self.coordinates, order)]
+        near = suggestion(str(column), known) or "."
         raise InputError(
-            f"{self.name} has no column {column!r}{suggestion(str(column), known)}. The "
-            f"coordinates are {listed(self.coordinates)}; add _dot or _ddot for the rates."
+            f"{self.name} has no column {column!r}{near} The coordinates are "
+            f"{listed(self.coordinates)}; add _dot or _ddot for the rates."
         )
 
     def __repr__(self) -> str:

@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     Progress: TypeAlias = Callable[[int, int], object]
 
 
+NAMED_EQUATIONS = 3
+"""How many equations a message names."""
+
+
 def solve(
     module: ModuleType,
     t: ArrayLike,
@@ -89,10 +93,6 @@ def solve(
     return solution
 
 
-NAMED_EQUATIONS = 3
-"""How many equations a message names."""
-
-
 @dataclass(slots=True, eq=False)
 class _Motion:
     """The arrays of a solution while they are being filled."""
@@ -140,7 +140,8 @@ def _march(inputs: Inputs, motion: _Motion, progress: Progress | None) -> Outcom
     if progress:
         progress(1, len(times))
     # The guess may be rough: from here on the assembled mechanism gives the size.
-    equations = problem(inputs.module, inputs.p, motion.q[0], times[0])
+    assembled = inputs.guess if outcome.position is None else outcome.position.q
+    equations = problem(inputs.module, inputs.p, assembled, times[0])
     for index in range(1, len(times)):
         if outcome.status is not Status.CONVERGED or outcome.state is None:
             break
@@ -184,29 +185,32 @@ def _message(inputs: Inputs, motion: _Motion, outcome: Outcome) -> str:
     """Say in words how it went."""
     name, times = inputs.module.NAME, inputs.t
     if outcome.status is Status.CONVERGED:
-        largest = np.max(motion.residual)
-        return f"{name}: all {times.size} points converged; the largest residual is {largest:.2g}."
+        points = f"all {times.size} points" if times.size > 1 else "the point"
+        return f"{name}: {points} converged; the largest residual is {motion.residual.max():.2g}."
     index = int(np.argmax(motion.status != Status.CONVERGED))
     parts = [
         f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
         f" ({outcome.status.name}).",
-        _progressed(outcome, index),
-        _reason(inputs.module, outcome),
+        _before(outcome, index),
+        _there(inputs.module, outcome),
         outcome.status.sentence,
     ]
     return " ".join(part for part in parts if part)
 
 
-def _progressed(outcome: Outcome, index: int) -> str:
+def _before(outcome: Outcome, index: int) -> str:
     """Say how far the motion was followed."""
     if outcome.state is None:
         return ""
     good = f"The {index} points before it are good" if index > 1 else "The point before it is good"
-    return f"{good}, and the motion was followed to t = {outcome.state.t:.10g}."
+    reached = f"; the motion was followed to t = {outcome.state.t:.10g}"
+    return f"{good}{'' if outcome.position else reached}."
 
 
-def _reason(module: ModuleType, outcome: Outcome) -> str:
-    """Name the equations that do not hold, or say that the mechanism would have to jump."""
+def _there(module: ModuleType, outcome: Outcome) -> str:
+    """Name the equations that do not hold at the time of failure, or say what else is there."""
+    if outcome.position is not None:
+        return "The position there was found."
     if outcome.attempt is not None and outcome.attempt.status is Status.CONVERGED:
         return "A position exists at that time, but the motion does not lead there continuously."
     point = _unassembled(outcome)

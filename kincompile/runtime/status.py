@@ -26,10 +26,10 @@ class Status(IntEnum):
     CONVERGED = 0, "Position, velocity and acceleration were found, and the equations hold."
     NOT_CONVERGED = (
         1,
-        "No position was found that continues the motion. Either the mechanism cannot reach this "
-        "configuration (lock-up: shorten the drivers' range or change lengths), or it jumps there "
-        "(make the drivers continuous), or the guess is too far away (give one nearer to the "
-        "assembled mechanism).",
+        "No position was found, or none that continues the motion: the mechanism cannot be "
+        "assembled there (lock-up: shorten the range of the drivers or change lengths), or it "
+        "would have to jump (make the drivers continuous), or the guess is too far away (give one "
+        "nearer to the assembled mechanism).",
     )
     SINGULAR = (
         2,

@@ -1,0 +1,56 @@
+"""kincompile: a symbolic-to-numeric compiler for the kinematics of mechanisms.
+
+    import kincompile as kc
+
+Public names are loaded when they are first used, so that the runtime works without SymPy being imported.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_PUBLIC = {
+    "kincompile.compiler": ("compile", "emit"),
+    "kincompile.model.mechanism": ("Mechanism",),
+    "kincompile.model.system": ("ConstraintSystem",),
+    "kincompile.model.equation": ("Equation",),
+    "kincompile.model.absolute": ("AbsoluteX", "AbsoluteY", "AbsoluteAngle", "AbsoluteDistance"),
+    "kincompile.model.relative": ("RelativeX", "RelativeY", "RelativeAngle", "Distance"),
+    "kincompile.model.joints": (
+        "Revolute", "Translational", "RevoluteTranslational", "TranslationalDistance",
+    ),
+    "kincompile.model.gears": ("Gear", "RackAndPinion"),
+    "kincompile.model.cams": ("CamFollower", "CamFlatFollower", "PointFollower"),
+    "kincompile.model.expressions": ("t", "pi", "alpha"),
+    "kincompile.runtime.load": ("load",),
+    "kincompile.runtime.newton": ("newton",),
+    "kincompile.runtime.solve": ("solve",),
+    "kincompile.runtime.solution": ("Solution",),
+    "kincompile.runtime.status": ("Status",),
+    "kincompile.errors": (
+        "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError", "ContractError",
+        "InputError", "SolveError", "InternalError",
+        "SingularConfigurationWarning", "BranchSwitchWarning", "RedundantConstraintWarning",
+    ),
+}  # fmt: skip
+_HOME = {name: module for module, names in _PUBLIC.items() for name in names}
+_WITHOUT_SYMPY = ("kincompile.runtime", "kincompile.errors")
+
+__all__ = sorted(_HOME)
+__version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'kincompile' has no attribute {name!r}")
+    module = _HOME[name]
+    if not module.startswith(_WITHOUT_SYMPY):
+        # The compiling side is loaded as a whole at its first use, so that no later call pays for an import.
+        import_module("kincompile.compiler")
+    value = globals()[name] = getattr(import_module(module), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -1,0 +1,1 @@
+"""The language constraints are written in: scalars, planar vectors, rotations."""

@@ -1,0 +1,95 @@
+"""The symbols of the textbook, each under one name: coordinates of bodies i and j, attributes, drivers, profiles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kincompile.calculus.expressions import (
+    Basis,
+    Profile,
+    Scalar,
+    Symbol,
+    TimeFunction,
+    Vector,
+    VectorSymbol,
+    turned,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The frame of a body: position r, angle phi, and its rotation."""
+
+    index: str
+
+    @property
+    def r(self) -> VectorSymbol:
+        """The position of the body's origin."""
+        return VectorSymbol(f"r_{self.index}")
+
+    @property
+    def phi(self) -> Symbol:
+        """The angle of the body."""
+        return Symbol(f"phi_{self.index}")
+
+    @property
+    def r_dot(self) -> VectorSymbol:
+        """The velocity of the body's origin."""
+        return VectorSymbol(f"r_{self.index}_dot")
+
+    @property
+    def phi_dot(self) -> Symbol:
+        """The angular velocity of the body."""
+        return Symbol(f"phi_{self.index}_dot")
+
+    def A(self, vector: Vector) -> Vector:  # noqa: N802 - the rotation matrix of the textbook
+        """Turn a body-fixed vector into the global frame."""
+        return turned(self.phi, vector)
+
+    def point(self, fixed: Vector) -> Vector:
+        """Return the global position of a body-fixed point, r + A s."""
+        return self.r + self.A(fixed)
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """The contact parameter of a cam profile in polar form, a(alpha) = rho(alpha) u(alpha)."""
+
+    index: str
+
+    @property
+    def alpha(self) -> Symbol:
+        """The polar angle of the contact point, a generalised coordinate."""
+        return Symbol(f"alpha_{self.index}")
+
+    @property
+    def alpha_dot(self) -> Symbol:
+        """The rate of the contact parameter."""
+        return Symbol(f"alpha_{self.index}_dot")
+
+    def rho(self, order: int = 0) -> Profile:
+        """Return the polar radius, or its derivative of the given order."""
+        return Profile(f"rho_{self.index}", self.alpha, order)
+
+    @property
+    def a(self) -> Vector:
+        """The contact point from the profile's centre, in the body's frame."""
+        return self.rho() * unit(self.alpha)
+
+    @property
+    def g(self) -> Vector:
+        """The tangent a'(alpha), in the body's frame."""
+        return self.rho(1) * unit(self.alpha) + self.rho() * turned(self.alpha, Basis(), 1)
+
+
+def unit(angle: Scalar) -> Vector:
+    """Return u(angle) = (cos angle, sin angle)."""
+    return turned(angle, Basis())
+
+
+i, j = Frame("i"), Frame("j")
+contact_i, contact_j = Contact("i"), Contact("j")
+s_i, s_j, v_i, v_j = (VectorSymbol(name) for name in ("s_i", "s_j", "v_i", "v_j"))
+s_P, s_Q, c = (VectorSymbol(name) for name in ("s_P", "s_Q", "c"))
+R_i, R_j, theta_i, theta_j = (Symbol(name) for name in ("R_i", "R_j", "theta_i", "theta_j"))
+C = TimeFunction("C")

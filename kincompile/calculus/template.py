@@ -1,0 +1,51 @@
+"""The template of a constraint type: Phi of bodies i and j with every attribute symbolic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kincompile.calculus.expressions import Symbol, Vector
+
+if TYPE_CHECKING:
+    from kincompile.calculus.expressions import Expression, VectorSymbol
+    from kincompile.calculus.symbols import Contact, Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """Phi of a constraint type in vectors, with its generalised coordinates.
+
+    Attributes
+    ----------
+    type_name
+        Name of the constraint type, for instance ``Revolute``.
+    frames
+        Bodies i, or i and j.
+    contacts
+        Contact parameters of cam profiles.
+    Phi
+        One expression per row block: a vector is two equations, a scalar one.
+    """
+
+    type_name: str
+    frames: tuple[Frame, ...]
+    contacts: tuple[Contact, ...]
+    Phi: tuple[Expression, ...]
+
+    @property
+    def coordinates(self) -> tuple[VectorSymbol | Symbol, ...]:
+        """The generalised coordinates: r and phi of each body, then the contact parameters."""
+        bodies = [leaf for frame in self.frames for leaf in (frame.r, frame.phi)]
+        return (*bodies, *(contact.alpha for contact in self.contacts))
+
+    @property
+    def rates(self) -> tuple[VectorSymbol | Symbol, ...]:
+        """The rates of the generalised coordinates, in the same order."""
+        bodies = [leaf for frame in self.frames for leaf in (frame.r_dot, frame.phi_dot)]
+        return (*bodies, *(contact.alpha_dot for contact in self.contacts))
+
+    @property
+    def equation_count(self) -> int:
+        """Number of equations."""
+        return sum(2 if isinstance(block, Vector) else 1 for block in self.Phi)

@@ -1,0 +1,84 @@
+"""The compiler, stage by stage.
+
+mechanism  -> system()         ConstraintSystem   names and attributes checked, all problems at once
+system     -> lower            Program            kernels x instances; each constraint type derived once
+program    -> inline           InlineProgram      written out in one graph, where equal values meet
+pattern    -> require_square                      as many equations as coordinates, matched one to one
+program    -> emit_...         Emitted            the files of a target
+emitted    -> from_source      module             loaded, its contract checked
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.emit.numpy_target import emit_numpy
+from kincompile.errors import UnsupportedError
+from kincompile.ir.inline import inline
+from kincompile.ir.lower import lower
+from kincompile.names import listed
+from kincompile.runtime.load import from_source
+from kincompile.structure.counting import require_square
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from types import ModuleType
+
+    from kincompile.emit.target import Emitted, Target
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+TARGETS: Mapping[str, Target] = {"numpy": emit_numpy}
+
+
+def emit(model: Mechanism | ConstraintSystem, target: str = "numpy") -> Emitted:
+    """Compile a mechanism to source files.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system of free equations.
+    target
+        Language of the files: ``"numpy"``.
+
+    Returns
+    -------
+    Emitted
+        The files; ``.source`` is the text of the main one, ``.write(folder)`` writes them.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written; every problem is listed.
+    StructuralError
+        If the equations cannot determine the coordinates.
+    UnsupportedError
+        If there is no such target.
+    """
+    if target not in TARGETS:
+        raise UnsupportedError(f"there is no target {target!r}; targets are: {listed(TARGETS)}")
+    system = model.system()
+    code = inline(lower(system))
+    require_square(system, code.pattern())
+    return TARGETS[target](code)
+
+
+def compile(model: Mechanism | ConstraintSystem) -> ModuleType:  # noqa: A001 - the public name kc.compile
+    """Compile a mechanism and load the result.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system of free equations.
+
+    Returns
+    -------
+    module
+        The emitted NumPy module, with Phi, Phi_q, nu, gamma and their fused forms.
+
+    Raises
+    ------
+    ModelError, StructuralError
+        As `emit` does.
+    """
+    return from_source(emit(model).source, model.name)

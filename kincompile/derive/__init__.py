@@ -1,0 +1,1 @@
+"""Differentiation of Phi, with its recorded steps."""

@@ -1,0 +1,247 @@
+"""The NumPy target: one readable module that imports math and NumPy and nothing else."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from kincompile.emit.functions import EVALUATORS, Listing, schedule
+from kincompile.emit.layout import broken, labelled, quoted, table, wrapped
+from kincompile.emit.naming import NameTable
+from kincompile.emit.printers import PythonPrinter
+from kincompile.emit.target import Emitted
+from kincompile.emit.templates import fill
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from kincompile.ir.graph import Constant
+    from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.program import Program
+
+FORMAT = 1
+"""Version of the contract of an emitted module."""
+
+FUNCTIONS = {
+    "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2", "asinh": "np.arcsinh",
+    "acosh": "np.arccosh", "atanh": "np.arctanh", "pow": "np.power", "where": "np.where",
+    "cos_sin": "staticmethod(_cos_sin)",
+}  # fmt: skip
+"""NumPy's names of elementary functions where they are not those of `math`."""
+
+SCALAR_FUNCTIONS = {
+    "where": "staticmethod(lambda condition, a, b: a if condition else b)",
+    "cos_sin": "staticmethod(lambda angle, cos=math.cos, sin=math.sin: (cos(angle), sin(angle)))",
+}
+"""Functions that `math` does not have."""
+
+RESERVED = ("f", "q", "q_dot", "t", "p", "np", "math", "pi", "spline", *FUNCTIONS)
+RESERVED += ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
+
+
+def emit_numpy(code: InlineProgram) -> Emitted:
+    """Return a program as one NumPy module."""
+    program = code.program
+    table = NameTable((*RESERVED, *program.tables))
+    wanted = [item.name for item in program.coordinates]
+    wanted += [rate(name) for name in wanted] + [item.name for item in program.parameters]
+    names = {"t": "t", **{name: table.take(name) for name in wanted}}
+    kernels: list[str] = []
+    called: set[str] = set()
+    for name, quantities in EVALUATORS.items():
+        listing = schedule(code, quantities, names, table)
+        called |= set(listing.functions)
+        kernels += ["", "", *_function(name, quantities, code, listing, names)]
+    source = fill("numpy/module.py.jinja", _data(code, kernels, sorted(called)))
+    return Emitted(program.name, {f"{program.name}.py": source})
+
+
+def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[str, Any]:
+    program = code.program
+    names = [item.name for item in program.coordinates]
+    pattern = code.pattern()
+    entries = [entry for section in code.sections for entry in section.entries["Phi_q"]]
+    constants = [_number(code, entry.node) for entry in entries if code.is_constant(entry.node)]
+    fixed = [k for k, entry in enumerate(entries) if code.is_constant(entry.node)]
+    moving = [k for k, entry in enumerate(entries) if not code.is_constant(entry.node)]
+    return {
+        "title": program.name,
+        "header": "\n".join(_header(code)),
+        "name": program.name,
+        "format": FORMAT,
+        "fingerprint": program.fingerprint,
+        "n": len(names),
+        "m": len(program.equations),
+        "k": len(program.parameters),
+        "nonzeros": len(pattern),
+        "coordinates": _indented(quoted(names)),
+        "equations": _indented(quoted(program.equations)),
+        "parameters": _indented(quoted([item.name for item in program.parameters])),
+        "units": _indented(_units(program)),
+        "defaults": _indented(wrapped([repr(item.default) for item in program.parameters])),
+        "guess": _indented(wrapped([repr(item.guess) for item in program.coordinates])),
+        "pattern": _indented(wrapped([f"({row}, {column})" for row, column in pattern])),
+        "constants": _indented(wrapped([repr(float(value)) for value in constants])),
+        "fixed": _indented(wrapped([str(k) for k in fixed])),
+        "varying": _indented(wrapped([str(k) for k in moving])),
+        "tables": "\n".join(_tables(program)),
+        "scalar_functions": _indented(
+            [f"{name} = {SCALAR_FUNCTIONS.get(name, f'math.{name}')}" for name in called]
+        ),
+        "array_functions": _indented(
+            [f"{name} = {FUNCTIONS.get(name, f'np.{name}')}" for name in called]
+        ),
+        "kernels": "\n".join(kernels),
+    }
+
+
+def _indented(lines: Iterable[str]) -> str:
+    return "\n".join(f"    {line}" for line in lines)
+
+
+def _number(code: InlineProgram, node: int) -> Constant:
+    operation, value = code.nodes[node]
+    return -_number(code, value) if operation == "neg" else value
+
+
+def _units(program: Program) -> list[str]:
+    return [
+        f"{item.name!r}: {item.unit!r}," for item in (*program.coordinates, *program.parameters)
+    ]
+
+
+def _header(code: InlineProgram) -> list[str]:
+    """Return the docstring's tables: coordinates, parameters, rows."""
+    program = code.program
+    rows = [("row", "constraint", "", "source")]
+    for section in code.sections:
+        instance = section.instance
+        title = f'{instance.kernel.name} "{instance.name}"' + (
+            " (driver)" if instance.is_driver else ""
+        )
+        rows.append((_rows(section), title, " - ".join(instance.bodies), instance.source))
+    lines = labelled("q", [f"{item.name}{_unit(item.unit)}" for item in program.coordinates])
+    if program.parameters:
+        lines += labelled("p", [f"{item.name}{_unit(item.unit)}" for item in program.parameters])
+    return [*lines, "", *table(rows)]
+
+
+def _unit(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def _rows(section: Section) -> str:
+    first = section.instance.first_row
+    last = first + len(section.entries["Phi"]) - 1
+    return str(first) if first == last else f"{first}-{last}"
+
+
+def _tables(program: Program) -> list[str]:
+    lines = []
+    for name, table in program.tables.items():
+        lines += [f"{name} = (", "    np.array(("]
+        lines += [f"        {line}" for line in wrapped([repr(x) for x in table.breaks])]
+        lines += ["    )),", "    np.array(("]
+        lines += [f"        ({', '.join(repr(x) for x in row)})," for row in table.coefficients]
+        lines += ["    )),", ")"]
+    return lines
+
+
+def _function(
+    name: str,
+    quantities: Sequence[str],
+    code: InlineProgram,
+    listing: Listing,
+    names: Mapping[str, str],
+) -> list[str]:
+    """Return the lines of one function."""
+    states = "q, q_dot" if "gamma" in quantities else "q"
+    printer = PythonPrinter(code.nodes, listing.names)
+    body = [*_unpack(code.program, listing, names), *_frames(listing, printer)]
+    for section, assignments in listing.steps:
+        body.append(f"# {_title(section)}")
+        for item in assignments:
+            body += _assignment(item.name, printer.text(item.node, own=True))
+    body.append("return (")
+    for quantity, rows in listing.results:
+        if len(quantities) > 1:
+            body.append(f"    # {quantity}")
+        for section, entries in rows:
+            if entries:
+                body.append(f"    # {_title(section)}")
+            for entry in entries:
+                body += _element(printer.text(entry.node), _place(quantity, entry, code))
+    body.append(")")
+    if body[-2] == "return (":
+        body[-2:] = ["return ()"]
+    return [f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
+
+
+def _assignment(name: str, text: str) -> list[str]:
+    """Return a value with its name, a long one in parentheses."""
+    lines = broken(text)
+    if len(lines) == 1:
+        return [f"{name} = {text}"]
+    return [f"{name} = (", *(f"    {line}" for line in lines), ")"]
+
+
+def _element(text: str, comment: str) -> list[str]:
+    """Return an element of the returned tuple, a long one continued with deeper indentation."""
+    first, *rest = broken(text)
+    lines = [f"    {first}", *(f"        {line}" for line in rest)]
+    lines[-1] += f",{comment}"
+    return lines
+
+
+def _place(quantity: str, entry: Entry, code: InlineProgram) -> str:
+    """Return a comment that says which entry of Phi_q a line is."""
+    if quantity != "Phi_q":
+        return ""
+    equation = code.program.equations[entry.row]
+    return f"  # {equation} by {code.program.coordinates[entry.column].name}"
+
+
+def _title(section: Section) -> str:
+    instance = section.instance
+    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}": {instance.text}'
+
+
+def _unpack(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:
+    """Return the lines that give the inputs their names: all of a vector, or the few that are read."""
+    coordinates = [item.name for item in program.coordinates]
+    vectors = {
+        "q": coordinates,
+        "q_dot": [rate(name) for name in coordinates],
+        "p": [item.name for item in program.parameters],
+    }
+    lines = []
+    for vector, members in vectors.items():
+        read = [k for k, name in enumerate(members) if name in listing.inputs]
+        if 2 * len(read) > len(members):
+            lines.append(f"{_targets(names[name] for name in members)} = {vector}")
+        elif read:
+            left = ", ".join(names[members[k]] for k in read)
+            lines.append(f"{left} = {', '.join(f'{vector}[{k}]' for k in read)}")
+    if listing.functions:
+        called = ", ".join(listing.functions)
+        lines.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
+    return lines
+
+
+def _targets(names: Iterable[str]) -> str:
+    listed = list(names)
+    return f"({listed[0]},)" if len(listed) == 1 else ", ".join(listed)
+
+
+def _frames(listing: Listing, printer: PythonPrinter) -> list[str]:
+    """Return the cosine and sine of each body's angle, a line a body."""
+    if not listing.frames:
+        return []
+    lines = ["# body frames: A = [[c, -s], [s, c]]"]
+    for frame in listing.frames:
+        left = ", ".join(item.name for item in frame.values)
+        if len(frame.values) == 2:
+            lines.append(f"{left} = cos_sin({printer.text(frame.angle)})")
+        else:
+            lines.append(f"{left} = {printer.text(frame.values[0].node, own=True)}")
+    return lines

@@ -1,0 +1,71 @@
+"""Nodes as text of a target language."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from kincompile.ir.graph import Constant, Node
+
+SUM, PRODUCT, SIGN, POWER, ATOM = range(5)
+"""Binding strengths, loosest first."""
+
+
+class PythonPrinter:
+    """Prints nodes as Python expressions; a node with a name is printed as its name."""
+
+    powers: ClassVar[str] = "{0}**2"
+
+    def __init__(self, nodes: Sequence[Node], names: Mapping[int, str]) -> None:
+        self._nodes = nodes
+        self._names = names
+
+    def text(self, node: int, *, own: bool = False) -> str:
+        """Return a node as text; with `own`, its definition although it has a name."""
+        return self._print(node, own=own)[0]
+
+    def _print(self, node: int, *, own: bool = False) -> tuple[str, int]:
+        if node in self._names and not own:
+            return self._names[node], ATOM
+        match self._nodes[node]:
+            case ("const", value):
+                return self.number(value)
+            case ("pi",):
+                return "pi", ATOM
+            case ("add", a, b):
+                return f"{self._at(a, SUM)} + {self._at(b, PRODUCT)}", SUM
+            case ("sub", a, b):
+                return f"{self._at(a, SUM)} - {self._at(b, PRODUCT)}", SUM
+            case ("mul", a, b):
+                return f"{self._at(a, PRODUCT)} * {self._at(b, SIGN)}", PRODUCT
+            case ("div", a, b):
+                return f"{self._at(a, PRODUCT)} / {self._at(b, POWER)}", PRODUCT
+            case ("neg", a):
+                return f"-{self._at(a, PRODUCT)}", PRODUCT
+            case ("square", a):
+                return self.powers.format(self._at(a, ATOM)), POWER
+            case ("call", name, *arguments):
+                return f"{name}({', '.join(self.text(k) for k in arguments)})", ATOM
+            case ("select", condition, a, b):
+                return f"where({self.text(condition)}, {self.text(a)}, {self.text(b)})", ATOM
+            case ("compare", relation, a, b):
+                return f"({self.text(a)} {relation} {self.text(b)})", ATOM
+            case ("logic", connective, a, b):
+                return f"({self.text(a)} {connective} {self.text(b)})", ATOM
+            case ("table", name, order, a):
+                return f"spline({name}, {order}, {self.text(a)})", ATOM
+        raise TypeError(f"cannot print {self._nodes[node]!r}")
+
+    def _at(self, node: int, strength: int) -> str:
+        """Return a node as an operand, in parentheses where it binds too loosely."""
+        text, own = self._print(node)
+        return text if own >= strength else f"({text})"
+
+    def number(self, value: Constant) -> tuple[str, int]:
+        """Return a non-negative number as text."""
+        if isinstance(value, Fraction):
+            return f"{value.numerator} / {value.denominator}", PRODUCT
+        return repr(value), ATOM

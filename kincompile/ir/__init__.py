@@ -1,0 +1,1 @@
+"""The program: kernels and instances, straight-line code, and its interpreter."""

@@ -1,0 +1,122 @@
+"""SymPy expressions as straight-line code."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import sympy
+from sympy.core.relational import Relational
+
+from kincompile.errors import InternalError
+from kincompile.model.spline import PeriodicSpline
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from kincompile.ir.graph import Graph
+    from kincompile.model.expressions import Scalar
+
+FUNCTIONS = {
+    sympy.sin: "sin", sympy.cos: "cos", sympy.tan: "tan", sympy.asin: "asin", sympy.acos: "acos",
+    sympy.atan: "atan", sympy.atan2: "atan2", sympy.sinh: "sinh", sympy.cosh: "cosh", sympy.tanh: "tanh",
+    sympy.asinh: "asinh", sympy.acosh: "acosh", sympy.atanh: "atanh", sympy.exp: "exp", sympy.log: "log",
+}  # fmt: skip
+RECIPROCALS = {sympy.cot: "tan", sympy.sec: "cos", sympy.csc: "sin"}
+
+
+class Converter:
+    """Writes SymPy expressions into a graph; `leaf` gives the node of a symbol by name."""
+
+    def __init__(self, graph: Graph, leaf: Callable[[str], int]) -> None:
+        self._graph = graph
+        self._leaf = leaf
+        self._done: dict[Any, int] = {}
+
+    def convert(self, value: Scalar) -> int:
+        """Return the node of a number or expression."""
+        if not isinstance(value, sympy.Basic):
+            return self._graph.const(value)
+        if value not in self._done:
+            self._done[value] = self._convert(value)
+        return self._done[value]
+
+    def _convert(self, value: Any) -> int:
+        graph = self._graph
+        if isinstance(value, sympy.Symbol):
+            return self._leaf(value.name)
+        if isinstance(value, sympy.Number):
+            return self._number(value)
+        if isinstance(value, sympy.NumberSymbol):
+            return graph.pi() if value is sympy.pi else graph.const(float(value))
+        if isinstance(value, sympy.Add):
+            return self._add(value)
+        if isinstance(value, sympy.Mul):
+            return self._mul(value)
+        if isinstance(value, sympy.Pow):
+            return self._pow(value.base, value.exp)
+        if isinstance(value, sympy.Piecewise):
+            return self._piecewise(value)
+        return self._function(value)
+
+    def _number(self, value: sympy.Number) -> int:
+        if isinstance(value, sympy.Rational):
+            return self._graph.const(Fraction(int(value.p), int(value.q)))
+        return self._graph.const(float(value))
+
+    def _add(self, value: sympy.Add) -> int:
+        """Add the terms in reading order, a positive one first."""
+        terms = value.as_ordered_terms()
+        terms.sort(key=lambda term: bool(term.could_extract_minus_sign()))
+        total = self.convert(terms[0])
+        for term in terms[1:]:
+            total = self._graph.add(total, self.convert(term))
+        return total
+
+    def _mul(self, value: sympy.Mul) -> int:
+        """Multiply: one number in front, and one division at most."""
+        graph = self._graph
+        coefficient, rest = value.as_coeff_Mul()
+        above, below = graph.const(1), graph.const(1)
+        for factor in rest.as_ordered_factors():
+            base, exponent = factor.as_base_exp()
+            if exponent.is_Rational and exponent.is_negative:
+                below = graph.mul(below, self._pow(base, -exponent))
+            else:
+                above = graph.mul(above, self.convert(factor))
+        return graph.div(graph.mul(self._number(coefficient), above), below)
+
+    def _pow(self, base: Any, exponent: Any) -> int:
+        graph = self._graph
+        if exponent.is_Integer:
+            return graph.pow(self.convert(base), int(exponent))
+        if exponent.is_Rational and exponent.q == 2:
+            return graph.pow(graph.call("sqrt", self.convert(base)), int(exponent.p))
+        return graph.call("pow", self.convert(base), self.convert(exponent))
+
+    def _piecewise(self, value: sympy.Piecewise) -> int:
+        *pieces, last = value.args
+        node = self.convert(last.expr)
+        for piece in reversed(pieces):
+            node = self._graph.select(self._condition(piece.cond), self.convert(piece.expr), node)
+        return node
+
+    def _condition(self, value: Any) -> int:
+        graph = self._graph
+        if isinstance(value, Relational):
+            return graph.compare(value.rel_op, self.convert(value.lhs), self.convert(value.rhs))
+        if isinstance(value, sympy.And | sympy.Or):
+            connective = "&" if isinstance(value, sympy.And) else "|"
+            return graph.logic(connective, *(self._condition(item) for item in value.args))
+        raise InternalError(f"the condition {value} passed the checks but cannot be compiled")
+
+    def _function(self, value: Any) -> int:
+        graph = self._graph
+        if isinstance(value, PeriodicSpline):
+            return graph.table(value.table_name, value.order, self.convert(value.args[0]))
+        if value.func in FUNCTIONS:
+            return graph.call(FUNCTIONS[value.func], *(self.convert(item) for item in value.args))
+        if value.func in RECIPROCALS:
+            inner = graph.call(RECIPROCALS[value.func], self.convert(value.args[0]))
+            return graph.div(graph.const(1), inner)
+        raise InternalError(f"{value} passed the checks but cannot be compiled")

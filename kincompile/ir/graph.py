@@ -1,0 +1,271 @@
+"""Straight-line code as a hash-consed graph: an expression written twice is one node (value numbering).
+
+A node is a tuple ``(operation, *operands)``; operands of arithmetic are the numbers of earlier nodes. The constructors
+fold constants, zeros and ones and carry signs outward, so that an attribute that happens to be zero costs nothing in the
+emitted code, and ``a - b`` and ``b - a`` share their work.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import isqrt
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+Node = tuple[Any, ...]
+Constant = int | float | Fraction
+
+
+class Graph:
+    """A growing table of nodes, each value once."""
+
+    def __init__(self, nodes: Sequence[Node] = ()) -> None:
+        self.nodes: list[Node] = []
+        self._index: dict[Node, int] = {}
+        for node in nodes:
+            self._intern(node)
+
+    def _intern(self, node: Node) -> int:
+        found = self._index.get(node)
+        if found is None:
+            found = self._index[node] = len(self.nodes)
+            self.nodes.append(node)
+        return found
+
+    def const(self, value: Constant) -> int:
+        """Return a number; a whole number is kept as an int, a fraction exactly."""
+        if value == (whole := int(value)):
+            value = whole
+        if value < 0:
+            return self._intern(("neg", self._intern(("const", -value))))
+        return self._intern(("const", value))
+
+    def pi(self) -> int:
+        """Return pi."""
+        return self._intern(("pi",))
+
+    def input(self, name: str) -> int:
+        """Return a named input."""
+        return self._intern(("input", name))
+
+    def value_of(self, node: int) -> Constant | None:
+        """Return the number a node stands for, None where it is not a plain number."""
+        operation, *operands = self.nodes[node]
+        if operation == "const":
+            value: Constant = operands[0]
+            return value
+        if operation == "neg":
+            inner = self.value_of(operands[0])
+            return None if inner is None else -inner
+        return None
+
+    def add(self, a: int, b: int) -> int:
+        """Return a + b."""
+        x, y = self.value_of(a), self.value_of(b)
+        if x is not None and y is not None:
+            return self.const(x + y)
+        if x == 0:
+            return b
+        if y == 0:
+            return a
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_b is not None:
+            return self.sub(a, minus_b)
+        if minus_a is not None:
+            return self.sub(b, minus_a)
+        swapped = self._index.get(("add", b, a))
+        return self._intern(("add", a, b)) if swapped is None else swapped
+
+    def sub(self, a: int, b: int) -> int:
+        """Return a - b."""
+        if a == b:
+            return self.const(0)
+        x, y = self.value_of(a), self.value_of(b)
+        if x is not None and y is not None:
+            return self.const(x - y)
+        if y == 0:
+            return a
+        if x == 0:
+            return self.neg(b)
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_b is not None:
+            return self.add(a, minus_b)
+        if minus_a is not None:
+            return self.neg(self.add(minus_a, b))
+        reverse = self._index.get(("sub", b, a))
+        return self._intern(("sub", a, b)) if reverse is None else self.neg(reverse)
+
+    def neg(self, a: int) -> int:
+        """Return -a."""
+        inner = self._negated(a)
+        if inner is not None:
+            return inner
+        if self.nodes[a] == ("const", 0):
+            return a
+        return self._intern(("neg", a))
+
+    def mul(self, a: int, b: int) -> int:
+        """Return a b."""
+        x, y = self.value_of(a), self.value_of(b)
+        if x is not None and y is not None:
+            return self.const(x * y)
+        if 0 in (x, y):
+            return self.const(0)
+        if x == 1:
+            return b
+        if y == 1:
+            return a
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_a is not None:
+            return self.neg(self.mul(minus_a, b))
+        if minus_b is not None:
+            return self.neg(self.mul(a, minus_b))
+        if y is not None:
+            a, b, x = b, a, y
+        if x is not None:
+            return self._scale(x, a, b)
+        if a == b:
+            return self._intern(("square", a))
+        swapped = self._index.get(("mul", b, a))
+        return self._intern(("mul", a, b)) if swapped is None else swapped
+
+    def _scale(self, value: Constant, number: int, b: int) -> int:
+        """Multiply by a positive number, gathering it with a number already in front."""
+        operation, *operands = self.nodes[b]
+        if operation == "mul" and (inner := self.value_of(operands[0])) is not None:
+            return self.mul(self.const(value * inner), operands[1])
+        if operation == "div" and (inner := self.value_of(operands[1])) is not None:
+            if isinstance(inner, int) and isinstance(value, int | Fraction):
+                return self.mul(self.const(Fraction(value) / inner), operands[0])
+        if isinstance(value, Fraction):
+            return self.div(self.mul(self.const(value.numerator), b), self.const(value.denominator))
+        return self._intern(("mul", number, b))
+
+    def div(self, a: int, b: int) -> int:
+        """Return a / b."""
+        x, y = self.value_of(a), self.value_of(b)
+        if x == 0 and y != 0:
+            return a
+        if y == 1:
+            return a
+        if x is not None and y:
+            exact = isinstance(x, int | Fraction) and isinstance(y, int | Fraction)
+            return self.const(Fraction(x) / Fraction(y) if exact else x / y)
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_a is not None:
+            return self.neg(self.div(minus_a, b))
+        if minus_b is not None:
+            return self.neg(self.div(a, minus_b))
+        return self._intern(("div", a, b))
+
+    def pow(self, a: int, exponent: int) -> int:
+        """Return a to an integer power, by repeated squaring."""
+        if exponent < 0:
+            return self.div(self.const(1), self.pow(a, -exponent))
+        if exponent == 0:
+            return self.const(1)
+        if exponent == 1:
+            return a
+        square = self.square(self.pow(a, exponent // 2))
+        return self.mul(square, a) if exponent % 2 else square
+
+    def square(self, a: int) -> int:
+        """Return a squared."""
+        inner = self._negated(a)
+        a = a if inner is None else inner
+        value = self.value_of(a)
+        return self._intern(("square", a)) if value is None else self.const(value * value)
+
+    def call(self, name: str, *arguments: int) -> int:
+        """Return an elementary function of its arguments."""
+        if len(arguments) == 1:
+            value = self.value_of(arguments[0])
+            if value == 0 and name in AT_ZERO:
+                return self.const(AT_ZERO[name])
+            if value is not None and name == "sqrt" and (root := _exact_root(value)) is not None:
+                return self.const(root)
+        return self._intern(("call", name, *arguments))
+
+    def select(self, condition: int, a: int, b: int) -> int:
+        """Return a where the condition holds, else b."""
+        return a if a == b else self._intern(("select", condition, a, b))
+
+    def compare(self, relation: str, a: int, b: int) -> int:
+        """Return the truth of ``a relation b``."""
+        return self._intern(("compare", relation, a, b))
+
+    def logic(self, connective: str, *operands: int) -> int:
+        """Return a conjunction or disjunction, ``&`` or ``|``."""
+        first, *rest = operands
+        for operand in rest:
+            first = self._intern(("logic", connective, first, operand))
+        return first
+
+    def table(self, name: str, order: int, a: int) -> int:
+        """Return a tabulated function, or its derivative of the given order, at a."""
+        return self._intern(("table", name, order, a))
+
+    def _negated(self, a: int) -> int | None:
+        operation, *operands = self.nodes[a]
+        return operands[0] if operation == "neg" else None
+
+    def instantiate(self, nodes: Sequence[Node], inputs: dict[str, int]) -> list[int]:
+        """Copy code into this graph with its inputs bound; return the new number of each node.
+
+        Copying runs through the folding constructors: this is where an attribute that is zero removes its terms.
+        """
+        new: list[int] = []
+        for operation, *operands in nodes:
+            if operation == "input":
+                new.append(inputs[operands[0]])
+            elif operation == "const":
+                new.append(self.const(operands[0]))
+            elif operation in ("add", "sub", "mul", "div"):
+                apply: Callable[[int, int], int] = getattr(self, operation)
+                new.append(apply(new[operands[0]], new[operands[1]]))
+            elif operation in ("neg", "square"):
+                new.append(getattr(self, operation)(new[operands[0]]))
+            else:
+                new.append(self._copy(operation, operands, new))
+        return new
+
+    def _copy(self, operation: str, operands: list[Any], new: list[int]) -> int:
+        match operation, operands:
+            case "pi", _:
+                return self.pi()
+            case "call" | "logic", [name, *arguments]:
+                return int(getattr(self, operation)(name, *(new[k] for k in arguments)))
+            case "compare", [relation, a, b]:
+                return self.compare(relation, new[a], new[b])
+            case "select", [condition, a, b]:
+                return self.select(new[condition], new[a], new[b])
+            case "table", [name, order, a]:
+                return self.table(name, order, new[a])
+        raise TypeError(f"unknown operation {operation!r}")
+
+
+AT_ZERO = {"cos": 1, "sin": 0, "tan": 0, "sqrt": 0, "exp": 1, "sinh": 0, "cosh": 1, "tanh": 0}
+"""Elementary functions that are exact numbers at zero."""
+
+
+def operands_of(node: Node) -> tuple[int, ...]:
+    """Return the nodes a node depends on."""
+    match node:
+        case ("const" | "pi" | "input", *_):
+            return ()
+        case ("call" | "compare" | "logic", _, *operands):
+            return tuple(operands)
+        case ("table", _, _, a):
+            return (a,)
+        case (_, *operands):
+            return tuple(operands)
+    raise TypeError(f"not a node: {node!r}")
+
+
+def _exact_root(value: Constant) -> int | Fraction | None:
+    if value < 0 or isinstance(value, float):
+        return None
+    root = Fraction(isqrt(value.numerator), isqrt(value.denominator))
+    return root if root * root == value else None

@@ -1,0 +1,117 @@
+"""The program written out: every instance copied into one graph, where equal values of the whole mechanism meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kincompile.ir.graph import Graph, Node
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from kincompile.ir.program import Instance, Program
+
+QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One number of a result: its place in the emitted array, and the node that computes it."""
+
+    row: int
+    column: int
+    node: int
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """The rows of one constraint."""
+
+    instance: Instance
+    entries: Mapping[str, tuple[Entry, ...]]
+    """Entries by quantity; of Phi_q those that are not identically zero, row by row."""
+
+
+@dataclass(frozen=True, slots=True)
+class InlineProgram:
+    """One graph for the whole mechanism.
+
+    Attributes
+    ----------
+    nodes
+        The code.
+    sections
+        One a constraint, in order of rows.
+    hints
+        Speaking names of nodes.
+    """
+
+    program: Program
+    nodes: tuple[Node, ...]
+    sections: tuple[Section, ...]
+    hints: Mapping[int, str]
+
+    def pattern(self) -> tuple[tuple[int, int], ...]:
+        """Return row and column of every entry of Phi_q that is not identically zero, row by row."""
+        return tuple(
+            (entry.row, entry.column)
+            for section in self.sections
+            for entry in section.entries["Phi_q"]
+        )
+
+    def is_constant(self, node: int) -> bool:
+        """Return whether a node is a plain number."""
+        operation, *operands = self.nodes[node]
+        return operation == "const" or (operation == "neg" and self.is_constant(operands[0]))
+
+
+def inline(program: Program) -> InlineProgram:
+    """Write a program out as one graph."""
+    graph = Graph(program.values)
+    hints: dict[int, str] = {}
+    for body, column in program.frames:
+        angle = graph.input(program.coordinates[column].name)
+        hints[graph.call("cos", angle)] = f"c_{body}"
+        hints[graph.call("sin", angle)] = f"s_{body}"
+    for item in program.coordinates:
+        hints[graph.square(graph.input(rate(item.name)))] = f"{rate(item.name)}_sq"
+    sections = []
+    for instance in program.instances:
+        kernel = instance.kernel
+        inputs = dict(zip(kernel.inputs, instance.bindings, strict=True))
+        new = graph.instantiate(kernel.nodes, inputs)
+        for node, stem in kernel.hints:
+            if graph.nodes[new[node]][0] not in ("neg", "const", "input"):
+                hints.setdefault(new[node], _spoken(stem, instance))
+        sections.append(Section(instance, _entries(instance, new, graph)))
+    return InlineProgram(program, tuple(graph.nodes), tuple(sections), hints)
+
+
+def _entries(instance: Instance, new: list[int], graph: Graph) -> dict[str, tuple[Entry, ...]]:
+    first, kernel = instance.first_row, instance.kernel
+    Phi_q = []
+    for row, local, node in kernel.Phi_q:
+        column = instance.columns[local]
+        if column is not None and graph.value_of(new[node]) != 0:
+            Phi_q.append(Entry(first + row, column, new[node]))
+    vectors = {"Phi": kernel.Phi, "nu": kernel.nu, "gamma": kernel.gamma}
+    entries = {
+        name: tuple(Entry(first + row, 0, new[node]) for row, node in enumerate(nodes))
+        for name, nodes in vectors.items()
+    }
+    return {**entries, "Phi_q": tuple(sorted(Phi_q, key=lambda entry: (entry.row, entry.column)))}
+
+
+def _spoken(stem: str, instance: Instance) -> str:
+    """Return the name of a vector component: `B_crank_x` for A s of joint B on the crank, `B_d_x` for d.
+
+    The stem is the textbook's symbol: ``s_i.x``, ``v_j.y``, ``d_dot.x``.
+    """
+    symbol, axis = stem.split(".")
+    letter, _, index = symbol.partition("_")
+    if index in ("i", "j") and letter in ("s", "v"):
+        body = instance.bodies["ij".index(index)]
+        symbol = body if letter == "s" else f"axis_{body}"
+    return f"{instance.name}_{symbol}_{axis}"

@@ -1,0 +1,1 @@
+"""What a person writes: bodies, joints, drivers, cams, free equations."""

@@ -1,0 +1,72 @@
+"""Cams and followers. A profile is given in polar form about its centre; contact parameters are coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from kincompile.calculus.expressions import Expression, dot, perpendicular
+from kincompile.calculus.symbols import contact_i, contact_j, i, j, s_i, s_j, v_j
+from kincompile.model.constraint import CamConstraint, Kind, argument
+
+
+@dataclass(frozen=True)
+class CamFollower(CamConstraint):
+    """Two profiles touch: a common point and a common tangent."""
+
+    source = "Haug 3.4"
+    row_names = ("x", "y", "tangent")
+    contacts = (contact_i, contact_j)
+    i: Any = argument(Kind.BODY, "i")
+    centre_i: Any = argument(Kind.POINT, "s_i")
+    profile_i: Any = argument(Kind.PROFILE, "rho_i")
+    j: Any = argument(Kind.BODY, "j")
+    centre_j: Any = argument(Kind.POINT, "s_j")
+    profile_j: Any = argument(Kind.PROFILE, "rho_j")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return r_i + A_i (s_i + a_i) - r_j - A_j (s_j + a_j) and (A_i R g_i)^T A_j g_j."""
+        gap = i.point(s_i + contact_i.a) - j.point(s_j + contact_j.a)
+        return gap, dot(perpendicular(i.A(contact_i.g)), j.A(contact_j.g))
+
+
+@dataclass(frozen=True)
+class CamFlatFollower(CamConstraint):
+    """A cam (body i) touches a flat face of the follower (body j): the line through a point along an axis."""
+
+    source = "Haug 3.4"
+    row_names = ("contact", "tangent")
+    contacts = (contact_i,)
+    cam: Any = argument(Kind.BODY, "i")
+    centre: Any = argument(Kind.POINT, "s_i")
+    profile: Any = argument(Kind.PROFILE, "rho_i")
+    follower: Any = argument(Kind.BODY, "j")
+    point: Any = argument(Kind.POINT, "s_j")
+    axis: Any = argument(Kind.AXIS, "v_j")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return (A_j R v_j)^T d and (A_j R v_j)^T A_i g_i, with d from the contact point to the face."""
+        normal = perpendicular(j.A(v_j))
+        d = j.point(s_j) - i.point(s_i + contact_i.a)
+        return dot(normal, d), dot(normal, i.A(contact_i.g))
+
+
+@dataclass(frozen=True)
+class PointFollower(CamConstraint):
+    """A point of body i runs on a profile of body j: a pin in a curved slot."""
+
+    source = "Haug 3.4.32"
+    row_names = ("x", "y")
+    contacts = (contact_j,)
+    i: Any = argument(Kind.BODY, "i")
+    point_i: Any = argument(Kind.POINT, "s_i")
+    j: Any = argument(Kind.BODY, "j")
+    centre_j: Any = argument(Kind.POINT, "s_j")
+    profile_j: Any = argument(Kind.PROFILE, "rho_j")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return r_i + A_i s_i - r_j - A_j (s_j + a_j)."""
+        return (i.point(s_i) - j.point(s_j + contact_j.a),)

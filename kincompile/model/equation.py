@@ -1,0 +1,33 @@
+"""Free equations Phi(q, t) = 0 in SymPy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, init=False)
+class Equation:
+    """One or more free SymPy equations, each understood as ``expression = 0``.
+
+    Parameters
+    ----------
+    name
+        Name of the equation; of several, the rows are called ``name.1``, ``name.2``, ...
+    *expressions
+        SymPy expressions, or `sympy.Eq`, in coordinates, parameters and `t`.
+    """
+
+    name: str
+    expressions: tuple[Any, ...]
+
+    def __init__(self, name: str, *expressions: Any) -> None:
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "expressions", expressions)
+
+    @property
+    def equation_names(self) -> tuple[str, ...]:
+        """Names of the rows."""
+        if len(self.expressions) == 1:
+            return (self.name,)
+        return tuple(f"{self.name}.{k}" for k in range(1, len(self.expressions) + 1))

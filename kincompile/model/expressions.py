@@ -1,0 +1,146 @@
+"""Numbers and SymPy expressions as users give them, and what may stand in them."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Rational, Real
+from typing import TYPE_CHECKING
+
+import sympy
+from sympy.core.function import AppliedUndef
+from sympy.logic.boolalg import BooleanAtom, BooleanFunction
+
+from kincompile.model.spline import PeriodicSpline
+from kincompile.names import listed, suggestion
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable
+
+t = sympy.Symbol("t")
+"""Time. The same symbol as `sympy.physics.mechanics.dynamicsymbols._t`."""
+
+pi = sympy.pi
+
+alpha = sympy.Symbol("alpha")
+"""The polar angle of a cam profile rho(alpha)."""
+
+Scalar = int | float | sympy.Expr
+
+SMOOTH = (
+    sympy.sin, sympy.cos, sympy.tan, sympy.cot, sympy.sec, sympy.csc,
+    sympy.asin, sympy.acos, sympy.atan, sympy.atan2,
+    sympy.sinh, sympy.cosh, sympy.tanh, sympy.asinh, sympy.acosh, sympy.atanh,
+    sympy.exp, sympy.log, sympy.Piecewise, PeriodicSpline,
+)  # fmt: skip
+"""Functions that can be differentiated as often as needed and printed by every target."""
+
+NOT_SMOOTH = (
+    sympy.Abs, sympy.sign, sympy.floor, sympy.ceiling, sympy.frac, sympy.Heaviside, sympy.DiracDelta,
+    sympy.Min, sympy.Max, sympy.Mod,
+)  # fmt: skip
+
+
+class NotAnExpressionError(ValueError):
+    """A value that is neither a finite real number nor a SymPy expression; the message says what it is."""
+
+
+def as_expression(value: object) -> Scalar:
+    """Return a number as int or float, anything else as a SymPy expression."""
+    if isinstance(value, bool):
+        raise NotAnExpressionError(f"{value} is a truth value, not a number")
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Rational):
+        return sympy.Rational(value.numerator, value.denominator)
+    if isinstance(value, Real) and not isinstance(value, sympy.Expr):
+        if not math.isfinite(value):
+            raise NotAnExpressionError(f"{float(value)} is not finite")
+        return float(value)
+    if isinstance(value, sympy.Eq):
+        value = value.lhs - value.rhs
+    if not isinstance(value, sympy.Expr):
+        raise NotAnExpressionError(f"{value!r} is not a number or a SymPy expression")
+    if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
+        raise NotAnExpressionError(f"{value} is not finite")
+    if value.has(sympy.I):
+        raise NotAnExpressionError(f"{value} is not real")
+    return _by_name(value)
+
+
+def _by_name(expression: sympy.Expr) -> sympy.Expr:
+    """Replace symbols with assumptions, and functions of time, by plain symbols of the same name."""
+    functions = {
+        applied: sympy.Symbol(applied.func.__name__) for applied in _functions_of_time(expression)
+    }
+    if functions:
+        expression = expression.xreplace(functions)
+    plain = {symbol: sympy.Symbol(symbol.name) for symbol in expression.free_symbols}
+    changed = {symbol: other for symbol, other in plain.items() if symbol != other}
+    return expression.xreplace(changed) if changed else expression
+
+
+def _functions_of_time(expression: sympy.Expr) -> set[AppliedUndef]:
+    """Return x(t), ... outside of derivatives: Derivative(x(t), t) stays, so that it can be refused."""
+    if expression.has(sympy.Derivative):
+        return set()
+    return {applied for applied in expression.atoms(AppliedUndef) if str(applied.args) == "(t,)"}
+
+
+def symbol_names(value: Scalar) -> set[str]:
+    """Return the names of the symbols in an expression."""
+    if not isinstance(value, sympy.Expr):
+        return set()
+    return {symbol.name for symbol in value.free_symbols}
+
+
+def smoothness_problem(value: Scalar) -> str | None:
+    """Say which function in an expression cannot be differentiated or emitted, or return None."""
+    if not isinstance(value, sympy.Expr):
+        return None
+    if value.has(sympy.Derivative):
+        return f"{value} contains a time derivative; a constraint Phi(q, t) may contain coordinates and time only"
+    for node in sympy.preorder_traversal(value):
+        if isinstance(node, NOT_SMOOTH):
+            return (
+                f"{node} has no continuous derivative; write a smooth function, or a sympy.Piecewise whose pieces meet "
+                "with equal value and slope"
+            )
+        if isinstance(node, AppliedUndef):
+            return f"the function {node} is not defined; give it as an expression"
+        if isinstance(node, sympy.Function) and not isinstance(node, SMOOTH):
+            return f"the function {node.func.__name__} is not supported; write it with elementary functions"
+        if isinstance(node, sympy.Basic) and not isinstance(node, _KNOWN):
+            return f"{type(node).__name__} in {value} is not supported; write it with elementary functions"
+    return None
+
+
+_KNOWN = (
+    sympy.Symbol, sympy.Number, sympy.NumberSymbol, sympy.Add, sympy.Mul, sympy.Pow, sympy.Function,
+    sympy.core.relational.Relational, BooleanFunction, BooleanAtom, sympy.functions.elementary.piecewise.ExprCondPair,
+)  # fmt: skip
+
+
+def unknown_problem(value: Scalar, declared: Collection[str], what: str) -> str | None:
+    """Say which symbols nobody declared, or return None."""
+    unknown = sorted(symbol_names(value) - set(declared))
+    if not unknown:
+        return None
+    return (
+        f"{what} contains {listed(unknown)}, which nobody declared{suggestion(unknown[0], declared)}; "
+        f"declare it as a parameter or use one of: {listed(sorted(declared))}"
+    )
+
+
+def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
+    """Return the number an expression has at given values of its symbols; None where it has none."""
+    if not isinstance(value, sympy.Expr):
+        return float(value)
+    if symbol_names(value) - set(values):
+        return None
+    number = value.subs({sympy.Symbol(name): number for name, number in values.items()}).evalf()
+    return float(number) if number.is_number and number.is_real and number.is_finite else None
+
+
+def depends_on(value: Scalar, names: Iterable[str]) -> bool:
+    """Return whether any of the names occurs in an expression."""
+    return not symbol_names(value).isdisjoint(names)

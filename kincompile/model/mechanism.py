@@ -1,0 +1,104 @@
+"""`Mechanism`: the builder a person writes with."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import sympy
+
+from kincompile.model.bodies import GROUND, Body, Parameter
+from kincompile.model.constraint import Constraint
+from kincompile.model.equation import Equation
+from kincompile.model.matrices import MatrixViews
+from kincompile.model.system import ConstraintSystem
+
+Item = TypeVar("Item", bound=Constraint | Equation)
+
+
+class Mechanism(MatrixViews):
+    """Bodies, parameters and constraints, collected one by one.
+
+    Nothing is checked while building; `system` checks everything at once, so that all mistakes are reported together.
+
+    Parameters
+    ----------
+    name
+        Name of the mechanism; it becomes the name of the emitted module.
+    length_unit
+        Unit of lengths, for documentation.
+    end, points
+        Default time grid of an analysis: `points` equally spaced times from 0 to `end`.
+
+    Attributes
+    ----------
+    ground
+        The fixed frame.
+    """
+
+    def __init__(
+        self, name: str, *, length_unit: str = "m", end: float = 1.0, points: int = 101
+    ) -> None:
+        self.name = name
+        self.length_unit = length_unit
+        self.end = end
+        self.points = points
+        self.ground = GROUND
+        self.bodies: list[Body] = []
+        self.parameters: list[Parameter] = []
+        self.constraints: list[Constraint | Equation] = []
+
+    def parameter(self, name: str, default: float | None = None, unit: str = "") -> sympy.Symbol:
+        """Declare a parameter and return its symbol, to be used in attributes and drivers.
+
+        Parameters
+        ----------
+        name
+            Name of the parameter.
+        default
+            Its value where none is given at run time.
+        unit
+            Its unit, for documentation.
+        """
+        self.parameters.append(Parameter(name, default, unit))
+        return sympy.Symbol(name)
+
+    def body(self, name: str, guess: Any = (0, 0, 0)) -> Body:
+        """Add a body with coordinates (x, y, phi) and return it.
+
+        Parameters
+        ----------
+        name
+            Name of the body.
+        guess
+            Start values of x, y [length] and phi [rad] for Newton's method, numbers or expressions of parameters.
+        """
+        body = Body(name, guess)
+        self.bodies.append(body)
+        return body
+
+    def add(self, constraint: Item) -> Item:
+        """Add a joint, a driver or a free equation, and return it."""
+        self.constraints.append(constraint)
+        return constraint
+
+    def system(self) -> ConstraintSystem:
+        """Check the mechanism and return it as a frozen `ConstraintSystem`.
+
+        Raises
+        ------
+        ModelError
+            If it cannot be used as written; every problem is listed.
+        """
+        return ConstraintSystem(
+            self.name,
+            equations=self.constraints,
+            parameters=self.parameters,
+            bodies=self.bodies,
+            length_unit=self.length_unit,
+            end=self.end,
+            points=self.points,
+        )
+
+    def __repr__(self) -> str:
+        """Return name and sizes."""
+        return f"<Mechanism {self.name!r}: {len(self.bodies)} bodies, {len(self.constraints)} constraints>"

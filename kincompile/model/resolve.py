@@ -1,0 +1,333 @@
+"""From constraints as written to constraints that are known to be good: every problem is collected, none raised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import sympy
+
+from kincompile.model.bodies import GROUND, Body, Parameter
+from kincompile.model.constraint import Constraint, Kind
+from kincompile.model.expressions import (
+    NotAnExpressionError,
+    Scalar,
+    alpha,
+    as_expression,
+    depends_on,
+    evaluate,
+    smoothness_problem,
+    symbol_names,
+    unknown_problem,
+)
+from kincompile.model.spline import PeriodicSpline, fit
+from kincompile.names import body_coordinates, listed, suggestion
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from kincompile.calculus.template import Template
+    from kincompile.model.equation import Equation
+
+Point = tuple[Scalar, Scalar]
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A constraint of a known type with its attributes resolved.
+
+    Attributes
+    ----------
+    template
+        Phi of the type.
+    bodies
+        Body i, or i and j.
+    scalars, points, profiles
+        Attributes by their symbol in the template. The value C(t) is among the scalars; a profile is an expression of
+        `alpha`.
+    columns
+        Names of the coordinates in the order of the template, None for those of the ground.
+    source
+        Where the textbook has the constraint.
+    text
+        The constraint in words, for comments: bodies, points, values.
+    """
+
+    name: str
+    template: Template
+    bodies: tuple[Body, ...]
+    scalars: Mapping[str, Scalar]
+    points: Mapping[str, Point]
+    profiles: Mapping[str, sympy.Expr]
+    columns: tuple[str | None, ...]
+    equation_names: tuple[str, ...]
+    source: str
+    text: str
+
+    @property
+    def is_driver(self) -> bool:
+        """Whether its value is a function of time."""
+        return depends_on(self.scalars.get("C", 0), ("t",))
+
+
+@dataclass(frozen=True, slots=True)
+class FreeEquation:
+    """A free equation in plain symbols, with the coordinates that occur in it."""
+
+    name: str
+    expressions: tuple[sympy.Expr, ...]
+    columns: tuple[str, ...]
+    equation_names: tuple[str, ...]
+    source: str = "free equation"
+
+    @property
+    def text(self) -> str:
+        """The equation in words, for comments."""
+        return "; ".join(f"{expression} = 0" for expression in self.expressions)
+
+    @property
+    def is_driver(self) -> bool:
+        """Whether it depends on time."""
+        return any(depends_on(expression, ("t",)) for expression in self.expressions)
+
+
+@dataclass
+class Scope:
+    """The names that may be used, and the problems found so far."""
+
+    bodies: Mapping[str, Body]
+    coordinates: Sequence[str]
+    parameters: Mapping[str, Parameter]
+    problems: list[str] = field(default_factory=list)
+
+    @property
+    def defaults(self) -> dict[str, float]:
+        """Parameters with a default."""
+        values = self.parameters.values()
+        return {item.name: item.default for item in values if item.default is not None}
+
+
+def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
+    """Check a free equation against the names that exist."""
+    before = len(scope.problems)
+    if not equation.expressions:
+        scope.problems.append(f"Equation {equation.name!r} has no expression; give at least one")
+    declared = {*scope.coordinates, *scope.parameters, "t"}
+    expressions = []
+    for name, given in zip(equation.equation_names, equation.expressions, strict=True):
+        where = f"equation {name!r}"
+        value = _expression(given, where, declared, scope)
+        if value is not None and not depends_on(value, scope.coordinates):
+            scope.problems.append(
+                f"{where} contains no coordinate, so it cannot constrain anything; coordinates are: "
+                f"{listed(scope.coordinates)}"
+            )
+        expressions.append(sympy.sympify(0 if value is None else value))
+    if len(scope.problems) > before:
+        return None
+    occurring = set().union(*(symbol_names(expression) for expression in expressions))
+    columns = tuple(name for name in scope.coordinates if name in occurring)
+    return FreeEquation(equation.name, tuple(expressions), columns, equation.equation_names)
+
+
+def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
+    """Check the arguments of a constraint of a known type."""
+    before = len(scope.problems)
+    bodies: list[Body] = []
+    scalars: dict[str, Scalar] = {}
+    points: dict[str, Point] = {}
+    profiles: dict[str, sympy.Expr] = {}
+    for name, item in constraint.arguments().items():
+        given, where = (
+            getattr(constraint, name),
+            f"{type(constraint).__name__} {constraint.name!r}, {name}",
+        )
+        if item.kind is Kind.BODY:
+            bodies.append(_body(given, where, scope))
+        elif item.kind in (Kind.POINT, Kind.AXIS):
+            points[item.symbol] = _point(given, item.kind, where, scope)
+        elif item.kind is Kind.PROFILE:
+            table_name = f"{item.symbol}_{constraint.name}"
+            profiles[item.symbol] = _profile(given, table_name, where, scope)
+        else:
+            scalars[item.symbol] = _scalar(given, item.kind, where, scope)
+    _check_bodies(constraint, bodies, scope)
+    _check_whole(constraint, scalars, points, scope)
+    if len(scope.problems) > before:
+        return None
+    return Joint(
+        constraint.name,
+        constraint.template(),
+        tuple(bodies),
+        scalars,
+        points,
+        profiles,
+        (*(name for body in bodies for name in _columns(body)), *constraint.contact_names),
+        constraint.equation_names,
+        constraint.source,
+        _text(constraint),
+    )
+
+
+def _columns(body: Body) -> tuple[str | None, ...]:
+    return (None, None, None) if body.is_ground else body_coordinates(body.name)
+
+
+def _body(given: Any, where: str, scope: Scope) -> Body:
+    name = given.name if isinstance(given, Body) else given
+    if name == GROUND.name or given is GROUND:
+        return GROUND
+    if not isinstance(name, str) or name not in scope.bodies:
+        hint = suggestion(name, scope.bodies) if isinstance(name, str) else ""
+        scope.problems.append(
+            f"{where}: there is no body {name!r} in this mechanism{hint}; bodies are: ground, {listed(scope.bodies)}"
+        )
+        return GROUND
+    return scope.bodies[name]
+
+
+def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> None:
+    what = f"{type(constraint).__name__} {constraint.name!r}"
+    if len(bodies) == 2 and bodies[0] == bodies[1]:
+        found_missing = any(what in problem for problem in scope.problems)
+        if not found_missing:
+            scope.problems.append(
+                f"{what}: bodies i and j are both {bodies[0].name!r}; a joint connects two different bodies"
+            )
+    elif (
+        len(bodies) == 1
+        and bodies[0].is_ground
+        and not any(what in problem for problem in scope.problems)
+    ):
+        scope.problems.append(
+            f"{what}: the ground cannot be constrained; name a body of the mechanism"
+        )
+
+
+def _expression(given: Any, where: str, declared: set[str], scope: Scope) -> Scalar | None:
+    """Return a checked expression, or None where a problem was noted."""
+    try:
+        value = as_expression(given)
+    except NotAnExpressionError as error:
+        scope.problems.append(f"{where}: {error}; give a finite number or a SymPy expression")
+        return None
+    problem = smoothness_problem(value)
+    if problem is not None:
+        scope.problems.append(f"{where}: {problem}")
+        return None
+    problem = unknown_problem(value, declared, where)
+    if problem is not None:
+        scope.problems.append(problem)
+        return None
+    return value
+
+
+def _attribute(given: Any, where: str, scope: Scope) -> Scalar:
+    """Return an attribute: a number or an expression of parameters."""
+    value = _expression(given, where, {*scope.parameters, *scope.coordinates, "t"}, scope)
+    if value is not None and depends_on(value, (*scope.coordinates, "t")):
+        scope.problems.append(
+            f"{where}: {value} depends on {listed(sorted(symbol_names(value) - set(scope.parameters)))}; an attribute is "
+            "fixed in its body, so only parameters may occur in it"
+        )
+        return 1
+    return 1 if value is None else value
+
+
+def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
+    if kind in (Kind.SCALAR, Kind.RADIUS):
+        value = _attribute(given, where, scope)
+        if kind is Kind.RADIUS and evaluate(value, scope.defaults) == 0:
+            scope.problems.append(
+                f"{where}: the radius is zero; give the pitch radius (negative for an internal gear)"
+            )
+        return value
+    value_or_none = _expression(given, where, {*scope.parameters, *scope.coordinates, "t"}, scope)
+    if value_or_none is None:
+        return 1
+    if depends_on(value_or_none, scope.coordinates):
+        scope.problems.append(
+            f"{where}: the value {value_or_none} depends on {listed(sorted(symbol_names(value_or_none) & set(scope.coordinates)))}; "
+            "a driver is a function of t and parameters only; write a coordinate-dependent condition as an Equation"
+        )
+        return 1
+    number = evaluate(value_or_none, scope.defaults)
+    if kind is Kind.DISTANCE and number is not None and number <= 0:
+        scope.problems.append(
+            f"{where}: the distance is {number:g}, but must be positive: at distance 0 the Jacobian row 2 d^T [I, B s] "
+            "vanishes; to make the two points coincide use a Revolute (or AbsoluteX and AbsoluteY)"
+        )
+    return value_or_none
+
+
+def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
+    try:
+        xi, eta = given
+    except (TypeError, ValueError):
+        scope.problems.append(
+            f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame"
+        )
+        return 1, 1
+    point = _attribute(xi, where, scope), _attribute(eta, where, scope)
+    if kind is Kind.AXIS and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
+        scope.problems.append(f"{where}: the axis has length zero; give a direction such as (1, 0)")
+    return point
+
+
+def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Expr:
+    """Return rho as an expression of alpha: from an expression, a function of a symbol, or a table."""
+    if isinstance(given, sympy.Lambda) or (callable(given) and not isinstance(given, sympy.Basic)):
+        given = given(alpha)
+    elif isinstance(given, tuple | list) and len(given) == 2:
+        try:
+            given = PeriodicSpline.of(table_name, fit(*given))(alpha)
+        except (TypeError, ValueError) as error:
+            scope.problems.append(f"{where}: {error}")
+            return sympy.Integer(1)
+    others = symbol_names(given) - set(scope.parameters) if isinstance(given, sympy.Expr) else set()
+    if len(others) == 1:
+        given = given.subs(
+            {symbol: alpha for symbol in given.free_symbols if symbol.name in others}
+        )
+    value = _expression(given, where, {*scope.parameters, alpha.name}, scope)
+    return sympy.sympify(1 if value is None else value)
+
+
+def _check_whole(
+    constraint: Constraint, scalars: Mapping[str, Scalar], points: Mapping[str, Point], scope: Scope
+) -> None:
+    """Check what involves several arguments of a constraint."""
+    what = f"{type(constraint).__name__} {constraint.name!r}"
+    if {"R_i", "R_j"} <= scalars.keys():
+        radii = [evaluate(scalars[symbol], scope.defaults) for symbol in ("R_i", "R_j")]
+        if None not in radii and sum(radii) == 0:
+            scope.problems.append(
+                f"{what}: the radii {radii[0]:g} and {radii[1]:g} add to zero; an internal gear needs two different radii"
+            )
+    if {"s_P", "s_Q"} <= points.keys():
+        p, q = (
+            [evaluate(value, scope.defaults) for value in points[symbol]]
+            for symbol in ("s_P", "s_Q")
+        )
+        if p == q and None not in p:
+            scope.problems.append(
+                f"{what}: point_p and point_q are equal; two different points fix the pitch line"
+            )
+
+
+def _text(constraint: Constraint) -> str:
+    """Return a constraint's arguments as a short line, for instance `ground (0, 0) - crank (-a/2, 0)`."""
+    parts: list[str] = []
+    for name, item in constraint.arguments().items():
+        given = getattr(constraint, name)
+        if item.kind is Kind.BODY:
+            body = given.name if isinstance(given, Body) else given
+            parts.append(f"- {body}" if parts else body)
+        elif item.kind in (Kind.POINT, Kind.AXIS):
+            text = "({}, {})".format(*given)
+            parts.append(text if item.kind is Kind.POINT else f"axis {text}")
+        elif item.kind is Kind.PROFILE:
+            parts.append("profile table" if isinstance(given, tuple | list) else "profile")
+        else:
+            parts.append(f"{name} {given}")
+    return " ".join(parts)

@@ -1,0 +1,287 @@
+"""`ConstraintSystem`: coordinates, parameters and constraints as a checked, frozen value."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import sympy
+
+from kincompile.errors import ModelError
+from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter
+from kincompile.model.constraint import CamConstraint, Constraint
+from kincompile.model.equation import Equation
+from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
+from kincompile.model.matrices import MatrixViews
+from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
+from kincompile.names import body_coordinates, listed, name_problem, rate
+
+
+class ConstraintSystem(MatrixViews):
+    """Constraint equations Phi(q, t) = 0, checked.
+
+    Parameters
+    ----------
+    name
+        Name of the system.
+    coordinates
+        Names of free coordinates, as one string or a sequence of strings, SymPy symbols or `dynamicsymbols`.
+    equations
+        SymPy expressions (each understood as ``expression = 0``), `Equation` or other constraints.
+    parameters
+        Default values by name, or a sequence of `Parameter`.
+    guess
+        Start values of the free coordinates for Newton's method, shape (n,), or by name.
+    bodies
+        Bodies, whose coordinates come first.
+    length_unit, end, points
+        As for `Mechanism`.
+
+    Attributes
+    ----------
+    coordinates : tuple of Coordinate
+    parameters : tuple of Parameter
+    constraints : tuple of Joint or FreeEquation
+
+    Raises
+    ------
+    ModelError
+        If anything is wrong; every problem is listed.
+    """
+
+    __slots__ = (
+        "bodies", "constraints", "coordinates", "end", "length_unit", "name", "parameters", "points",
+    )  # fmt: skip
+
+    name: str
+    bodies: tuple[Body, ...]
+    coordinates: tuple[Coordinate, ...]
+    parameters: tuple[Parameter, ...]
+    constraints: tuple[Joint | FreeEquation, ...]
+
+    def __init__(
+        self,
+        name: str,
+        coordinates: str | Iterable[Any] = (),
+        equations: Iterable[Any] = (),
+        *,
+        parameters: Mapping[Any, float] | Iterable[Parameter] = (),
+        guess: Sequence[float] | Mapping[Any, float] | None = None,
+        bodies: Iterable[Body] = (),
+        length_unit: str = "m",
+        end: float = 1.0,
+        points: int = 101,
+    ) -> None:
+        bodies = tuple(bodies)
+        written = [_as_constraint(item, k) for k, item in enumerate(equations, 1)]
+        problems: list[str] = []
+        declared = _parameters(parameters, problems)
+        defaults = {item.name: item.default for item in declared if item.default is not None}
+        found = [
+            *_body_coordinates(bodies, length_unit, defaults, problems),
+            *_free_coordinates(coordinates, guess, defaults, problems),
+            *_contact_coordinates(written, defaults, problems),
+        ]
+        _check_names(name, bodies, found, declared, written, problems)
+        scope = Scope(
+            {body.name: body for body in bodies},
+            [item.name for item in found],
+            {item.name: item for item in declared},
+            problems,
+        )
+        resolved = [
+            resolve_equation(item, scope)
+            if isinstance(item, Equation)
+            else resolve_joint(item, scope)
+            for item in written
+        ]
+        if not written:
+            problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
+        if not found and not bodies:
+            problems.append(f"{name!r} has no coordinates; add a body, or name coordinates")
+        if problems:
+            raise ModelError(list(dict.fromkeys(problems)))
+        values = {
+            "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
+            "constraints": tuple(item for item in resolved if item is not None),
+            "length_unit": length_unit, "end": end, "points": points,
+        }  # fmt: skip
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
+
+    def __setattr__(self, key: str, value: object) -> None:
+        raise AttributeError(f"a ConstraintSystem is frozen; make a new one to change {key!r}")
+
+    def system(self) -> ConstraintSystem:
+        """Return the system itself."""
+        return self
+
+    @property
+    def equations(self) -> tuple[str, ...]:
+        """Names of the equations, in order."""
+        return tuple(name for item in self.constraints for name in item.equation_names)
+
+    @property
+    def row_offsets(self) -> tuple[int, ...]:
+        """First row of each constraint, counted from 0: an exclusive prefix scan of the equation counts."""
+        offsets, total = [], 0
+        for item in self.constraints:
+            offsets.append(total)
+            total += len(item.equation_names)
+        return tuple(offsets)
+
+    def __repr__(self) -> str:
+        """Return name and sizes."""
+        return f"<ConstraintSystem {self.name!r}: {len(self.coordinates)} coordinates, {len(self.equations)} equations>"
+
+
+def _as_constraint(item: Any, number: int) -> Constraint | Equation:
+    if isinstance(item, Constraint | Equation):
+        return item
+    return Equation(f"equation_{number}", item)
+
+
+def _name_of(item: Any) -> str:
+    """Return the name of a symbol, of a function of time, or of itself."""
+    if isinstance(item, sympy.Symbol):
+        return str(item.name)
+    return str(item.func.__name__) if isinstance(item, sympy.Function) else str(item)
+
+
+def _number(given: Any, where: str, values: dict[str, float], problems: list[str]) -> float:
+    """Return a finite number from a number or an expression of parameters."""
+    try:
+        number = evaluate(as_expression(given), values)
+    except NotAnExpressionError as error:
+        problems.append(f"{where}: {error}; give a finite number")
+        return 0.0
+    if number is None:
+        problems.append(
+            f"{where}: {given} is not a number at the default parameters; give a finite number"
+        )
+        return 0.0
+    return number
+
+
+def _parameters(
+    given: Mapping[Any, float] | Iterable[Parameter], problems: list[str]
+) -> tuple[Parameter, ...]:
+    if isinstance(given, Mapping):
+        given = [Parameter(_name_of(key), value) for key, value in given.items()]
+    checked = []
+    for item in given:
+        default = item.default
+        if default is None:
+            problems.append(
+                f"parameter {item.name!r} has no value; give a default: parameter({item.name!r}, 1.0)"
+            )
+        else:
+            default = _number(default, f"parameter {item.name!r}", {}, problems)
+        checked.append(Parameter(item.name, default, item.unit))
+    return tuple(checked)
+
+
+def _body_coordinates(
+    bodies: tuple[Body, ...], unit: str, values: dict[str, float], problems: list[str]
+) -> list[Coordinate]:
+    found = []
+    for body in bodies:
+        try:
+            guess = tuple(body.guess)
+        except TypeError:
+            guess = ()
+        if len(guess) != 3:
+            problems.append(f"body {body.name!r}: the guess {body.guess!r} is not (x, y, phi)")
+            guess = (0, 0, 0)
+        for name, value, kind in zip(
+            body_coordinates(body.name), guess, (unit, unit, "rad"), strict=True
+        ):
+            found.append(
+                Coordinate(name, _number(value, f"guess of {name}", values, problems), kind)
+            )
+    return found
+
+
+def _free_coordinates(
+    given: str | Iterable[Any],
+    guess: Sequence[float] | Mapping[Any, float] | None,
+    values: dict[str, float],
+    problems: list[str],
+) -> list[Coordinate]:
+    items = given.replace(",", " ").split() if isinstance(given, str) else list(given)
+    names = [_name_of(item) for item in items]
+    if guess is None:
+        guess = [0.0] * len(names)
+    if isinstance(guess, Mapping):
+        by_name = {_name_of(key): value for key, value in guess.items()}
+        unknown = sorted(set(by_name) - set(names))
+        if unknown:
+            problems.append(f"the guess names {listed(unknown)}; coordinates are: {listed(names)}")
+        guess = [by_name.get(name, 0.0) for name in names]
+    if len(guess) != len(names):
+        problems.append(
+            f"the guess has {len(guess)} values for {len(names)} coordinates ({listed(names)}); give one for each"
+        )
+        guess = [0.0] * len(names)
+    return [
+        Coordinate(name, _number(value, f"guess of {name}", values, problems))
+        for name, value in zip(names, guess, strict=True)
+    ]
+
+
+def _contact_coordinates(
+    constraints: list[Constraint | Equation], values: dict[str, float], problems: list[str]
+) -> list[Coordinate]:
+    found = []
+    for item in constraints:
+        if not isinstance(item, CamConstraint):
+            continue
+        names = item.contact_names
+        guess = (0.0,) * len(names) if item.guess is None else item.guess
+        guess = tuple(guess) if isinstance(guess, tuple | list) else (guess,)
+        if len(guess) != len(names):
+            problems.append(
+                f"{type(item).__name__} {item.name!r}: the guess has {len(guess)} values; give one for each of {listed(names)}"
+            )
+            guess = (0.0,) * len(names)
+        for name, value in zip(names, guess, strict=True):
+            found.append(
+                Coordinate(name, _number(value, f"guess of {name}", values, problems), "rad")
+            )
+    return found
+
+
+def _check_names(
+    name: str,
+    bodies: tuple[Body, ...],
+    coordinates: list[Coordinate],
+    parameters: tuple[Parameter, ...],
+    constraints: list[Constraint | Equation],
+    problems: list[str],
+) -> None:
+    """Check that names are well formed, and that each means one thing."""
+    named = [("the system", name)]
+    named += [("a body", body.name) for body in bodies]
+    named += [("a parameter", item.name) for item in parameters]
+    named += [("a coordinate", item.name) for item in coordinates]
+    named += [("a constraint", item.name) for item in constraints]
+    problems += [problem for what, text in named if (problem := name_problem(text, what))]
+    problems += [
+        f"body {body.name!r}: this is the name of the fixed frame; use m.ground, or another name"
+        for body in bodies
+        if body.name == GROUND.name
+    ]
+    _check_unique("bodies", [body.name for body in bodies], problems)
+    _check_unique("constraints", [item.name for item in constraints], problems)
+    symbols = [item.name for item in parameters]
+    if len(set(body.name for body in bodies)) == len(bodies):
+        symbols += [item.name for item in coordinates]
+        symbols += [rate(item.name, order) for item in coordinates for order in (1, 2)]
+    _check_unique("coordinates, rates and parameters", symbols, problems)
+
+
+def _check_unique(what: str, names: list[Any], problems: list[str]) -> None:
+    for name, count in Counter(names).items():
+        if count > 1:
+            problems.append(f"{count} {what} are named {name!r}; give each a name of its own")

@@ -1,0 +1,53 @@
+"""Naming rules: what may be a name, and how coordinates, rates and equations are called."""
+
+from __future__ import annotations
+
+import re
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+RESERVED = frozenset({"t", "pi", "alpha"})
+"""Names with a meaning of their own in every expression."""
+
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def name_problem(name: object, what: str) -> str | None:
+    """Say what is wrong with a name, or return None.
+
+    A name is a letter followed by letters, digits and underscores, so that it can appear in generated code of every
+    target.
+    """
+    if not isinstance(name, str) or not _IDENTIFIER.fullmatch(name):
+        return f"{what} is named {name!r}: a name is an ASCII letter followed by letters, digits or underscores; rename it"
+    if name in RESERVED:
+        return f"{what} is named {name!r}, which is reserved (t is time, pi the number, alpha a cam's angle); rename it"
+    return None
+
+
+def rate(name: str, order: int = 1) -> str:
+    """Return the name of a coordinate's first or second time derivative."""
+    return f"{name}_{'d' * order}ot"
+
+
+def body_coordinates(body: str) -> tuple[str, str, str]:
+    """Return the names of a body's coordinates."""
+    return f"x_{body}", f"y_{body}", f"phi_{body}"
+
+
+def listed(names: Iterable[object], most: int = 12) -> str:
+    """Write names as a short list for a message."""
+    names = [str(name) for name in names]
+    if not names:
+        return "none"
+    rest = len(names) - most
+    return ", ".join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return "; did you mean ...?" where a known name is close, else nothing."""
+    close = get_close_matches(name, list(known), n=1)
+    return f"; did you mean {close[0]!r}?" if close else ""

@@ -1,0 +1,1 @@
+"""Counts, matching and what they say of a mechanism."""

@@ -1,0 +1,82 @@
+"""Counts: do the equations suffice to determine the coordinates, and which coordinates can they determine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching
+
+from kincompile.errors import StructuralError
+from kincompile.names import listed
+
+if TYPE_CHECKING:
+    from kincompile.model.system import ConstraintSystem
+
+Pattern = Sequence[tuple[int, int]]
+"""Row and column of each entry of Phi_q that is not identically zero."""
+
+
+def unmatched(system: ConstraintSystem, pattern: Pattern) -> tuple[list[str], list[str]]:
+    """Return the equations and the coordinates left over by a maximum matching of one to the other."""
+    names = [item.name for item in system.coordinates]
+    shape = len(system.equations), len(names)
+    rows, columns = np.array(pattern, dtype=np.intp).reshape(-1, 2).T
+    matrix = csr_array((np.ones(len(rows)), (rows, columns)), shape=shape)
+    column_of = maximum_bipartite_matching(matrix, perm_type="column").tolist()
+    lonely = [name for name, column in zip(system.equations, column_of, strict=True) if column < 0]
+    return lonely, [name for column, name in enumerate(names) if column not in set(column_of)]
+
+
+def require_square(system: ConstraintSystem, pattern: Pattern) -> None:
+    """Check that there are as many equations as coordinates, and that each can determine one.
+
+    Raises
+    ------
+    StructuralError
+        With the counts, the coordinates that nothing determines or the equations that are too many, and what to do.
+    """
+    n, m = len(system.coordinates), len(system.equations)
+    equations, coordinates = unmatched(system, pattern)
+    if n == m and not equations:
+        return
+    count = f"{system.name!r} has {m} equations for {n} coordinates"
+    drivers = [item.name for item in system.constraints if item.is_driver]
+    counted = f"{count} (drivers: {listed(drivers)}; {_counts(system)})"
+    if m < n:
+        raise StructuralError(_too_few(counted, n - m, coordinates))
+    if m > n:
+        raise StructuralError(_too_many(counted, m - n, equations))
+    raise StructuralError(_mismatch(counted, equations, coordinates))
+
+
+def _counts(system: ConstraintSystem) -> str:
+    parts = [f"{item.name} {len(item.equation_names)}" for item in system.constraints]
+    return f"equations of each constraint: {listed(parts, most=40)}"
+
+
+def _too_few(counted: str, missing: int, coordinates: Sequence[str]) -> str:
+    return (
+        f"{counted}: {missing} more {_equations(missing)} needed before it can be analysed. Nothing determines, for "
+        f"instance, {listed(coordinates)}; add a joint or a driver there (a driver is a constraint whose value is a function of kc.t)"
+    )
+
+
+def _too_many(counted: str, surplus: int, equations: Sequence[str]) -> str:
+    return (
+        f"{counted}: {surplus} {_equations(surplus)} too many. Candidates to remove: {listed(equations)}; remove a driver or a "
+        "redundant joint, or replace a Revolute by a constraint with fewer equations"
+    )
+
+
+def _mismatch(counted: str, equations: Sequence[str], coordinates: Sequence[str]) -> str:
+    return (
+        f"{counted}, but they cannot determine them: the equations {listed(equations)} only repeat what others fix, and nothing "
+        f"determines {listed(coordinates)}; move a driver or a joint from the first to the second"
+    )
+
+
+def _equations(count: int) -> str:
+    return "equation is" if count == 1 else "equations are"
