@@ -105,13 +105,16 @@ def _entries(instance: Instance, new: list[int], graph: Graph) -> dict[str, tupl
 
 
 def _spoken(stem: str, instance: Instance) -> str:
-    """Return the name of a vector component: `B_crank_x` for A s of joint B on the crank, `B_d_x` for d.
+    """Return the name of a vector component.
 
-    The stem is the textbook's symbol: ``s_i.x``, ``v_j.y``, ``d_dot.x``.
+    ``B_crank_x`` is A s of joint B on the crank, ``B_crank_w2_x`` the same times the square of the
+    angular velocity, ``B_axis_crank_x`` an axis, ``B_d_x`` the vector d. The stem is the textbook's
+    symbol and the component: ``s_i.x``, ``s_i w2.x``, ``v_j.y``, ``d_dot.x``.
     """
-    symbol, axis = stem.split(".")
+    vector, axis = stem.split(".")
+    symbol, *factor = vector.split()
     letter, _, index = symbol.partition("_")
     if index in ("i", "j") and letter in ("s", "v"):
         body = instance.bodies["ij".index(index)]
         symbol = body if letter == "s" else f"axis_{body}"
-    return f"{instance.name}_{symbol}_{axis}"
+    return "_".join((instance.name, symbol, *factor, axis))

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING
 import sympy
 
 from kincompile.calculus.expand import Expansion, Pair, Value
-from kincompile.calculus.expressions import Scalar, Symbol, Turned, Vector, VectorSum, VectorSymbol
+from kincompile.calculus.expressions import (
+    Power,
+    Scalar,
+    Scaled,
+    Symbol,
+    Turned,
+    Vector,
+    VectorSum,
+    VectorSymbol,
+)
 from kincompile.derive.derivation import derive
 from kincompile.derive.equations import derive_equation
 from kincompile.ir.from_sympy import Converter
@@ -139,7 +148,10 @@ def constraint_kernel(template: Template) -> Kernel:
 
 
 def _hints(expansion: Expansion) -> tuple[tuple[int, str], ...]:
-    """Name the components of vectors that a reader knows from the textbook: A_i s_i, d and its rate."""
+    """Name the components of vectors that a reader knows from the textbook.
+
+    They are A_i s_i, the centripetal A_i s_i w_i^2, d and its rate.
+    """
     found = []
     for vector, pair in expansion.vectors.items():
         stem = _stem(vector)
@@ -152,6 +164,8 @@ def _stem(vector: Vector) -> str | None:
     match vector:
         case Turned(Symbol(), VectorSymbol(name), 0):
             return name
+        case Scaled(Power(Symbol(), 2), Turned(Symbol(), VectorSymbol(name), 0)):
+            return f"{name} w2"
         case VectorSum(terms):
             names = {term.name for term in terms if isinstance(term, VectorSymbol)}
             if "r_j" in names or names == {"r_i", "c"}:
