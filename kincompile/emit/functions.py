@@ -76,7 +76,7 @@ def varying(inline: InlineProgram, section: Section, quantity: str) -> tuple[Ent
     entries = section.entries[quantity]
     if quantity != "Phi_q":
         return entries
-    return tuple(entry for entry in entries if not inline.is_constant(entry.node))
+    return tuple(entry for entry in entries if inline.number(entry.node) is None)
 
 
 def schedule(

@@ -61,9 +61,10 @@ def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[st
     names = [item.name for item in program.coordinates]
     pattern = code.pattern()
     entries = [entry for section in code.sections for entry in section.entries["Phi_q"]]
-    constants = [_number(code, entry.node) for entry in entries if code.is_constant(entry.node)]
-    fixed = [k for k, entry in enumerate(entries) if code.is_constant(entry.node)]
-    moving = [k for k, entry in enumerate(entries) if not code.is_constant(entry.node)]
+    values = [code.number(entry.node) for entry in entries]
+    constants = [value for value in values if value is not None]
+    fixed = [k for k, value in enumerate(values) if value is not None]
+    moving = [k for k, value in enumerate(values) if value is None]
     return {
         "title": program.name,
         "header": "\n".join(_header(code)),
@@ -97,11 +98,6 @@ def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[st
 
 def _indented(lines: Iterable[str]) -> str:
     return "\n".join(f"    {line}" for line in lines)
-
-
-def _number(code: InlineProgram, node: int) -> Constant:
-    operation, value = code.nodes[node]
-    return -_number(code, value) if operation == "neg" else value
 
 
 def _units(program: Program) -> list[str]:

@@ -52,14 +52,7 @@ class Graph:
 
     def value_of(self, node: int) -> Constant | None:
         """Return the number a node stands for, None where it is not a plain number."""
-        operation, *operands = self.nodes[node]
-        if operation == "const":
-            value: Constant = operands[0]
-            return value
-        if operation == "neg":
-            inner = self.value_of(operands[0])
-            return None if inner is None else -inner
-        return None
+        return number_of(self.nodes, node)
 
     def add(self, a: int, b: int) -> int:
         """Return a + b."""
@@ -207,6 +200,14 @@ class Graph:
         """Return a tabulated function, or its derivative of the given order, at a."""
         return self._intern(("table", name, order, a))
 
+    def linear(self, name: str, size: int, index: int, operands: Sequence[int]) -> int:
+        """Return a component of a small linear system's solution, or its determinant.
+
+        ``name`` is ``"solve"`` or ``"determinant"``; the operands are the matrix row by row, and for
+        ``"solve"`` the right side behind it.
+        """
+        return self._intern(("linear", name, size, index, *operands))
+
     def _negated(self, a: int) -> int | None:
         operation, *operands = self.nodes[a]
         return operands[0] if operation == "neg" else None
@@ -250,6 +251,18 @@ AT_ZERO = {"cos": 1, "sin": 0, "tan": 0, "sqrt": 0, "exp": 1, "sinh": 0, "cosh":
 """Elementary functions that are exact numbers at zero."""
 
 
+def number_of(nodes: Sequence[Node], node: int) -> Constant | None:
+    """Return the number a node stands for, None where it is not a plain number."""
+    operation, *operands = nodes[node]
+    if operation == "const":
+        value: Constant = operands[0]
+        return value
+    if operation == "neg":
+        inner = number_of(nodes, operands[0])
+        return None if inner is None else -inner
+    return None
+
+
 def operands_of(node: Node) -> tuple[int, ...]:
     """Return the nodes a node depends on."""
     match node:
@@ -259,6 +272,8 @@ def operands_of(node: Node) -> tuple[int, ...]:
             return tuple(operands)
         case ("table", _, _, a):
             return (a,)
+        case ("linear", _, _, _, *operands):
+            return tuple(operands)
         case (_, *operands):
             return tuple(operands)
     raise TypeError(f"not a node: {node!r}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kincompile.ir.graph import Graph, Node
+from kincompile.ir.graph import Constant, Graph, Node, number_of
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -61,10 +61,9 @@ class InlineProgram:
             for entry in section.entries["Phi_q"]
         )
 
-    def is_constant(self, node: int) -> bool:
-        """Return whether a node is a plain number."""
-        operation, *operands = self.nodes[node]
-        return operation == "const" or (operation == "neg" and self.is_constant(operands[0]))
+    def number(self, node: int) -> Constant | None:
+        """Return the number a node stands for, None where it is not a plain number."""
+        return number_of(self.nodes, node)
 
 
 def inline(program: Program) -> InlineProgram:

@@ -1,0 +1,201 @@
+"""The linear solve of Phi_q x = b, planned at compile time.
+
+Most pivots of Phi_q are plain numbers, +1 or -1 from joints and drivers. Elimination with those is safe for every q, t and
+p, costs few operations, and leaves a small system that falls into blocks: a four-bar of nine equations leaves one of two.
+Blocks of up to three are solved in closed form, larger ones by LAPACK. The code is a graph like any other: what depends
+on Phi_q alone is the factorization, shared by all right sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kincompile.ir.graph import Graph, Node
+from kincompile.structure.blocks import Block, block_triangular
+
+if TYPE_CHECKING:
+    from kincompile.ir.inline import InlineProgram
+
+Matrix = dict[int, dict[int, int]]
+"""Nodes of the entries by row and column."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pivot:
+    """An elimination step: an equation used to express one coordinate by the others."""
+
+    row: int
+    column: int
+
+
+@dataclass(frozen=True, slots=True)
+class SolvePlan:
+    """Straight-line code that solves Phi_q x = b.
+
+    Attributes
+    ----------
+    nodes
+        The code.
+    entries
+        ``(row, column, node)`` of the entries of Phi_q that vary, row by row: inputs of the code.
+    right
+        Node of each component of b: inputs of the code.
+    pivots
+        Elimination steps in order.
+    blocks
+        What is left, in the order of solution.
+    determinants
+        Node of each block's determinant.
+    solution
+        Node of each coordinate.
+    """
+
+    nodes: tuple[Node, ...]
+    entries: tuple[tuple[int, int, int], ...]
+    right: tuple[int, ...]
+    pivots: tuple[Pivot, ...]
+    blocks: tuple[Block, ...]
+    determinants: tuple[int, ...]
+    solution: tuple[int, ...]
+
+
+def plan_solve(code: InlineProgram) -> SolvePlan | None:
+    """Plan the solve of a square system; None where it is structurally singular."""
+    graph = Graph()
+    matrix: Matrix = {row: {} for row in range(len(code.program.equations))}
+    varying = []
+    for section in code.sections:
+        for entry in section.entries["Phi_q"]:
+            value = code.number(entry.node)
+            node = (
+                graph.input(f"Phi_q[{entry.row}, {entry.column}]") if value is None else graph.const(value)
+            )
+            matrix[entry.row][entry.column] = node
+            if value is None:
+                varying.append((entry.row, entry.column, node))
+    right = {row: graph.input(f"b[{row}]") for row in matrix}
+    given = tuple(right.values())
+    pivots, eliminated = _eliminate(graph, matrix, right)
+    rows = sorted(matrix)
+    columns = sorted(set(range(len(code.program.coordinates))) - {pivot.column for pivot in pivots})
+    if len(rows) != len(columns):
+        return None
+    pattern = [(row, column) for row in rows for column in sorted(matrix[row])]
+    blocks = block_triangular(rows, columns, pattern)
+    if blocks is None:
+        return None
+    solution: dict[int, int] = {}
+    determinants = [_solve_block(graph, block, matrix, right, solution) for block in blocks]
+    for pivot in reversed(pivots):
+        row, rest = eliminated[pivot.row], right[pivot.row]
+        for column in sorted(row.keys() - {pivot.column}):
+            rest = graph.sub(rest, graph.mul(row[column], solution[column]))
+        solution[pivot.column] = graph.div(rest, row[pivot.column])
+    return SolvePlan(
+        tuple(graph.nodes),
+        tuple(varying),
+        given,
+        tuple(pivots),
+        blocks,
+        tuple(determinants),
+        tuple(solution[column] for column in sorted(solution)),
+    )
+
+
+def _eliminate(graph: Graph, matrix: Matrix, right: dict[int, int]) -> tuple[list[Pivot], Matrix]:
+    """Eliminate with plain numbers as long as there are any; return the pivots and their rows, taken out of the matrix."""
+    pivots: list[Pivot] = []
+    eliminated: Matrix = {}
+    while (pivot := _cheapest(graph, matrix)) is not None:
+        row = matrix.pop(pivot.row)
+        for other, entries in matrix.items():
+            if pivot.column not in entries:
+                continue
+            factor = graph.div(entries.pop(pivot.column), row[pivot.column])
+            for column, node in row.items():
+                if column == pivot.column:
+                    continue
+                change = graph.mul(factor, node)
+                updated = graph.sub(entries[column], change) if column in entries else graph.neg(change)
+                entries[column] = updated
+                if graph.value_of(updated) == 0:
+                    del entries[column]
+            right[other] = graph.sub(right[other], graph.mul(factor, right[pivot.row]))
+        pivots.append(pivot)
+        eliminated[pivot.row] = row
+    return pivots, eliminated
+
+
+def _cheapest(graph: Graph, matrix: Matrix) -> Pivot | None:
+    """Return the constant entry with the least fill (Markowitz), the first of equals."""
+    in_column: dict[int, int] = {}
+    for entries in matrix.values():
+        for column in entries:
+            in_column[column] = in_column.get(column, 0) + 1
+    best: tuple[int, int, int] | None = None
+    for row, entries in matrix.items():
+        for column, node in entries.items():
+            if graph.value_of(node) is None:
+                continue
+            rank = ((len(entries) - 1) * (in_column[column] - 1), row, column)
+            if best is None or rank < best:
+                best = rank
+    return None if best is None else Pivot(best[1], best[2])
+
+
+def _solve_block(
+    graph: Graph, block: Block, matrix: Matrix, right: dict[int, int], solution: dict[int, int]
+) -> int:
+    """Add the solution of a block to what is known; return the node of its determinant."""
+    zero = graph.const(0)
+    size = len(block.rows)
+    a = [[matrix[row].get(column, zero) for column in block.columns] for row in block.rows]
+    b = []
+    for row in block.rows:
+        rest = right[row]
+        for column in sorted(matrix[row].keys() - set(block.columns)):
+            rest = graph.sub(rest, graph.mul(matrix[row][column], solution[column]))
+        b.append(rest)
+    if size > LARGEST_CLOSED_FORM:
+        entries = [node for row in a for node in row]
+        for k, column in enumerate(block.columns):
+            solution[column] = graph.linear("solve", size, k, (*entries, *b))
+        return graph.linear("determinant", size, 0, entries)
+    adjugate, determinant = _adjugate(graph, a)
+    inverse = graph.div(graph.const(1), determinant)
+    for column, cofactors in zip(block.columns, adjugate, strict=True):
+        total = graph.mul(cofactors[0], b[0])
+        for cofactor, value in zip(cofactors[1:], b[1:], strict=True):
+            total = graph.add(total, graph.mul(cofactor, value))
+        solution[column] = graph.mul(total, inverse)
+    return determinant
+
+
+LARGEST_CLOSED_FORM = 3
+"""Blocks up to this size are solved by their adjugate, as Cramer's rule does."""
+
+
+def _adjugate(graph: Graph, a: list[list[int]]) -> tuple[list[list[int]], int]:
+    """Return the transposed cofactors of a matrix of one to three rows, and its determinant."""
+    size = len(a)
+    if size == 1:
+        return [[graph.const(1)]], a[0][0]
+    if size == 2:
+        (p, q), (r, s) = a
+        determinant = graph.sub(graph.mul(p, s), graph.mul(q, r))
+        return [[s, graph.neg(q)], [graph.neg(r), p]], determinant
+    cofactors = [[_cofactor(graph, a, row, column) for row in range(3)] for column in range(3)]
+    determinant = graph.const(0)
+    for column in range(3):
+        determinant = graph.add(determinant, graph.mul(a[0][column], cofactors[column][0]))
+    return cofactors, determinant
+
+
+def _cofactor(graph: Graph, a: list[list[int]], row: int, column: int) -> int:
+    """Return a cofactor of a matrix of three rows; cyclic indices carry the sign."""
+    below, under = (row + 1) % 3, (row + 2) % 3
+    right, beyond = (column + 1) % 3, (column + 2) % 3
+    return graph.sub(
+        graph.mul(a[below][right], a[under][beyond]), graph.mul(a[below][beyond], a[under][right])
+    )
