@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING, Any
 from kincompile.emit.functions import EVALUATORS, Listing, schedule
 from kincompile.emit.layout import broken, labelled, quoted, table, wrapped
 from kincompile.emit.naming import NameTable
+from kincompile.emit.numpy_solve import solve_functions
 from kincompile.emit.printers import PythonPrinter
+from kincompile.emit.solving import schedule_solve
 from kincompile.emit.target import Emitted
 from kincompile.emit.templates import fill
+from kincompile.ir.elimination import plan_solve
 from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from kincompile.ir.graph import Constant
     from kincompile.ir.inline import Entry, InlineProgram, Section
     from kincompile.ir.program import Program
 
@@ -36,6 +38,7 @@ SCALAR_FUNCTIONS = {
 """Functions that `math` does not have."""
 
 RESERVED = ("f", "q", "q_dot", "t", "p", "np", "math", "pi", "spline", *FUNCTIONS)
+RESERVED_IN_SOLVE = ("f", "J", "F", "b")
 RESERVED += ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
 
 
@@ -52,7 +55,17 @@ def emit_numpy(code: InlineProgram) -> Emitted:
         listing = schedule(code, quantities, names, table)
         called |= set(listing.functions)
         kernels += ["", "", *_function(name, quantities, code, listing, names)]
-    source = fill("numpy/module.py.jinja", _data(code, kernels, sorted(called)))
+    plan = plan_solve(code)
+    lanes = list(EVALUATORS)
+    if plan is not None:
+        solving = schedule_solve(code, plan, NameTable(RESERVED_IN_SOLVE))
+        kernels += ["", "", *solve_functions(code, solving)]
+        lanes += ["factor", "solve"]
+    data = _data(code, kernels, sorted(called))
+    data["lanes"] = _indented(f'"{name}": _{name},' for name in lanes)
+    data["is_planned"] = plan is not None
+    data["has_large_blocks"] = plan is not None and plan.has_large_blocks
+    source = fill("numpy/module.py.jinja", data)
     return Emitted(program.name, {f"{program.name}.py": source})
 
 

@@ -59,6 +59,11 @@ class SolvePlan:
     determinants: tuple[int, ...]
     solution: tuple[int, ...]
 
+    @property
+    def has_large_blocks(self) -> bool:
+        """Whether there is a block that LAPACK solves."""
+        return any(len(block.rows) > LARGEST_CLOSED_FORM for block in self.blocks)
+
 
 def plan_solve(code: InlineProgram) -> SolvePlan | None:
     """Plan the solve of a square system; None where it is structurally singular."""
@@ -69,7 +74,9 @@ def plan_solve(code: InlineProgram) -> SolvePlan | None:
         for entry in section.entries["Phi_q"]:
             value = code.number(entry.node)
             node = (
-                graph.input(f"Phi_q[{entry.row}, {entry.column}]") if value is None else graph.const(value)
+                graph.input(f"Phi_q[{entry.row}, {entry.column}]")
+                if value is None
+                else graph.const(value)
             )
             matrix[entry.row][entry.column] = node
             if value is None:
@@ -117,7 +124,9 @@ def _eliminate(graph: Graph, matrix: Matrix, right: dict[int, int]) -> tuple[lis
                 if column == pivot.column:
                     continue
                 change = graph.mul(factor, node)
-                updated = graph.sub(entries[column], change) if column in entries else graph.neg(change)
+                updated = (
+                    graph.sub(entries[column], change) if column in entries else graph.neg(change)
+                )
                 entries[column] = updated
                 if graph.value_of(updated) == 0:
                     del entries[column]

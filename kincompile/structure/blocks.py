@@ -43,7 +43,9 @@ def matching(pattern: Iterable[tuple[int, int]], shape: tuple[int, int]) -> list
     return matched
 
 
-def block_triangular(rows: Sequence[int], columns: Sequence[int], pattern: Iterable[tuple[int, int]]) -> tuple[Block, ...] | None:
+def block_triangular(
+    rows: Sequence[int], columns: Sequence[int], pattern: Iterable[tuple[int, int]]
+) -> tuple[Block, ...] | None:
     """Split a square system into blocks in the order in which they can be solved.
 
     The blocks are the strong components of the matched equations (Dulmage and Mendelsohn): each needs the results of

@@ -1,0 +1,130 @@
+"""The planned solve as two functions: the factorization, from Phi_q alone, and the solution for a right side."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kincompile.emit.naming import content_name
+from kincompile.ir.graph import number_of, operands_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from kincompile.emit.naming import NameTable
+    from kincompile.ir.elimination import SolvePlan
+    from kincompile.ir.inline import InlineProgram
+
+
+@dataclass(frozen=True, slots=True)
+class SolveListing:
+    """The planned solve with names.
+
+    Attributes
+    ----------
+    entries
+        Names of the varying entries of Phi_q, in order: the input of the factorization.
+    factors
+        Nodes that the solution reads from the factorization.
+    factor_steps, solve_steps
+        Nodes to be computed one after the other, in each function.
+    names
+        Names of all nodes that have one.
+    """
+
+    plan: SolvePlan
+    entries: tuple[int, ...]
+    factors: tuple[int, ...]
+    factor_steps: tuple[int, ...]
+    solve_steps: tuple[int, ...]
+    names: Mapping[int, str]
+
+
+def schedule_solve(code: InlineProgram, plan: SolvePlan, table: NameTable) -> SolveListing:
+    """Arrange the planned solve: what depends on Phi_q alone is computed once and kept.
+
+    `table` knows the names that the target reserves; coordinates and equations are free here.
+    """
+    nodes = plan.nodes
+    variable = _depending_on(plan, plan.right)
+    needed = _needed(plan, (*plan.solution, *plan.determinants))
+    uses = _count_uses(plan, needed)
+    factors = [
+        node
+        for node in sorted(needed - variable)
+        if number_of(nodes, node) is None and _is_read(plan, node, needed, variable)
+    ]
+    equations, coordinates = (
+        code.program.equations,
+        [item.name for item in code.program.coordinates],
+    )
+    names = {
+        node: table.take(f"{equations[row].replace('.', '_')}_{coordinates[column]}")
+        for row, column, node in plan.entries
+    }
+    names.update(
+        {
+            node: table.take(name.replace(".", "_"))
+            for node, name in zip(plan.right, equations, strict=True)
+        }
+    )
+    solved = dict(zip(plan.solution, coordinates, strict=True))
+    numbers = {node: nodes[node][1] for node in needed if nodes[node][0] == "const"}
+    steps: dict[bool, list[int]] = {True: [], False: []}
+    for node in sorted(needed):
+        is_factor = node in factors or (node not in variable and node in plan.determinants)
+        is_result = node in solved or nodes[node][0] == "linear"
+        if node in names or number_of(nodes, node) is not None:
+            continue
+        if is_factor or is_result or (uses[node] > 1 and nodes[node][0] != "neg"):
+            wanted = solved.get(node) or content_name(nodes[node], names, numbers)
+            letter = "b" if node in variable else "k"
+            names[node] = table.take(wanted or f"{letter}_{len(steps[node in variable]) + 1}")
+            steps[node in variable].append(node)
+    return SolveListing(
+        plan,
+        tuple(node for _, _, node in plan.entries),
+        tuple(factors),
+        tuple(steps[False]),
+        tuple(steps[True]),
+        names,
+    )
+
+
+def _depending_on(plan: SolvePlan, inputs: Iterable[int]) -> set[int]:
+    """Return the nodes that depend on any of the inputs."""
+    found = set(inputs)
+    for node, content in enumerate(plan.nodes):
+        if not found.isdisjoint(operands_of(content)):
+            found.add(node)
+    return found
+
+
+def _needed(plan: SolvePlan, outputs: Sequence[int]) -> set[int]:
+    """Return the nodes that the outputs depend on, themselves included."""
+    found = set(outputs)
+    for node in range(len(plan.nodes) - 1, -1, -1):
+        if node in found:
+            found |= set(operands_of(plan.nodes[node]))
+    return found
+
+
+def _count_uses(plan: SolvePlan, needed: set[int]) -> Counter[int]:
+    """Count how often each value is used; a changed sign is no value of its own, a result is a use."""
+    signs = {node for node in needed if plan.nodes[node][0] == "neg"}
+    uses = Counter(k for node in needed - signs for k in _signless_operands(plan, node))
+    return uses + Counter(plan.nodes[node][1] for node in plan.solution if node in signs)
+
+
+def _signless_operands(plan: SolvePlan, node: int) -> list[int]:
+    """Return the operands of a node; of a changed sign, what it changes."""
+    found = operands_of(plan.nodes[node])
+    return [plan.nodes[k][1] if plan.nodes[k][0] == "neg" else k for k in found]
+
+
+def _is_read(plan: SolvePlan, node: int, needed: set[int], variable: set[int]) -> bool:
+    """Return whether the solution for a right side reads this value of the factorization."""
+    if plan.nodes[node][0] == "neg":
+        return False
+    return any(node in _signless_operands(plan, user) for user in needed & variable)
