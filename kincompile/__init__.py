@@ -2,7 +2,8 @@
 
     import kincompile as kc
 
-Public names are loaded when they are first used, so that the runtime works without SymPy being imported.
+Public names are loaded when they are first used, so that the runtime works without SymPy being
+imported.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ _PUBLIC = {
     "kincompile.runtime.solution": ("Solution",),
     "kincompile.runtime.status": ("Status",),
     "kincompile.errors": (
-        "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError", "ContractError",
-        "InputError", "SolveError", "InternalError",
+        "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError",
+        "ContractError", "InputError", "SolveError", "InternalError",
         "SingularConfigurationWarning", "BranchSwitchWarning", "RedundantConstraintWarning",
     ),
 }  # fmt: skip
@@ -48,7 +49,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'kincompile' has no attribute {name!r}")
     module = _HOME[name]
     if not module.startswith(_WITHOUT_SYMPY):
-        # The compiling side is loaded as a whole at its first use, so that no later call pays for an import.
+        # The compiling side is loaded as a whole at its first use, so that no later call pays for
+        # an import.
         import_module("kincompile.compiler")
     value = globals()[name] = getattr(import_module(module), name)
     return value

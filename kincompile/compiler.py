@@ -1,11 +1,11 @@
 """The compiler, stage by stage.
 
-mechanism  -> system()         ConstraintSystem   names and attributes checked, all problems at once
-system     -> lower            Program            kernels x instances; each constraint type derived once
-program    -> inline           InlineProgram      written out in one graph, where equal values meet
-pattern    -> require_square                      as many equations as coordinates, matched one to one
-program    -> emit_...         Emitted            the files of a target
-emitted    -> from_source      module             loaded, its contract checked
+mechanism -> system()        ConstraintSystem  names and attributes checked, all problems at once
+system    -> lower           Program           kernels x instances; each type derived once
+program   -> inline          InlineProgram     written out in one graph, where equal values meet
+pattern   -> require_square                    as many equations as coordinates, matched one to one
+program   -> emit_...        Emitted           the files of a target
+emitted   -> from_source     module            loaded, its contract checked
 """
 
 from __future__ import annotations

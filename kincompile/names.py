@@ -18,13 +18,19 @@ _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 def name_problem(name: object, what: str) -> str | None:
     """Say what is wrong with a name, or return None.
 
-    A name is a letter followed by letters, digits and underscores, so that it can appear in generated code of every
-    target.
+    A name is a letter followed by letters, digits and underscores, so that it can appear in
+    generated code of every target.
     """
     if not isinstance(name, str) or not _IDENTIFIER.fullmatch(name):
-        return f"{what} is named {name!r}: a name is an ASCII letter followed by letters, digits or underscores; rename it"
+        return (
+            f"{what} is named {name!r}: a name is an ASCII letter followed by letters, digits or "
+            "underscores; rename it"
+        )
     if name in RESERVED:
-        return f"{what} is named {name!r}, which is reserved (t is time, pi the number, alpha a cam's angle); rename it"
+        return (
+            f"{what} is named {name!r}, which is reserved (t is time, pi the number, alpha a cam's "
+            "angle); rename it"
+        )
     return None
 
 
@@ -40,11 +46,11 @@ def body_coordinates(body: str) -> tuple[str, str, str]:
 
 def listed(names: Iterable[object], most: int = 12) -> str:
     """Write names as a short list for a message."""
-    names = [str(name) for name in names]
-    if not names:
+    written = [str(name) for name in names]
+    if not written:
         return "none"
-    rest = len(names) - most
-    return ", ".join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
+    rest = len(written) - most
+    return ", ".join(written[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
