@@ -1,0 +1,193 @@
+r"""A whole time grid at once: a coarse march, interpolation, and Newton's method on all points together.
+
+Between two points of the coarse march every coordinate is interpolated by the polynomial of fifth degree through
+:math:`q, \dot q, \ddot q` at both ends (Hermite). That is so near that the first correction already leaves rounding errors,
+and the second shows it. Nothing is taken on trust: a point counts only if its corrections became small, its
+equations hold, it stayed near the interpolation, and det Phi_q kept its sign.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.runtime.coarse import Node, coarse_march
+from kincompile.runtime.lanes import LaneCode
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+BLOCK = 2048
+"""Points at a time, so that intermediate arrays stay in the cache."""
+
+LARGEST_DISPLACEMENT = 1e-3
+"""Distance from the interpolation, in radians or sizes of the mechanism, beyond which a point is not trusted."""
+
+SMALLEST_DETERMINANT = 1e-6
+"""Determinant, relative to the largest of the coarse march, below which a point is left to the careful march."""
+
+LAST_CORRECTION = 1e-11
+"""Norm of the second correction, relative to 1 + ||q||, up to which Phi_q before it serves velocity and acceleration."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GridResult:
+    """What was found on a grid.
+
+    Attributes
+    ----------
+    q, q_dot, q_ddot : ndarray, shape (n, N)
+        The motion; each coordinate is a row.
+    residual : ndarray, shape (N,)
+        Largest absolute value of Phi before the last, smallest correction.
+    good : ndarray of bool, shape (N,)
+        Which points can be trusted.
+    """
+
+    q: Array
+    q_dot: Array
+    q_ddot: Array
+    residual: Array
+    good: NDArray[np.bool_]
+
+
+def solve_grid(
+    module: ModuleType,
+    p: Array,
+    times: Array,
+    first: Node,
+    spread: Array,
+    allowed: Array,
+    tolerance: float,
+) -> GridResult:
+    """Solve as much of a time grid as can be trusted.
+
+    Parameters
+    ----------
+    module
+        An emitted module with a planned solve.
+    p : ndarray, shape (k,)
+        Parameters.
+    times : ndarray, shape (N,)
+        The grid.
+    first
+        The point at its start.
+    spread : ndarray, shape (n,)
+        The distance that is large for each coordinate.
+    allowed : ndarray, shape (n,)
+        The residual that is allowed in each equation.
+    tolerance
+        Bound of the last correction, relative to 1 + ||q||.
+    """
+    code = LaneCode(module, module.FLOATS, p.tolist())
+    nodes = coarse_march(code, first, times.tolist(), spread.tolist(), tolerance)
+    n, count = len(first.q), times.size
+    result = GridResult(*np.empty((3, n, count)), np.empty(count), np.zeros(count, dtype=bool))
+    reached = nodes[-1].index + 1
+    _interpolate(nodes, times[:reached], result.q)
+    largest = max(abs(node.determinant) for node in nodes)
+    limits = _Limits(
+        tolerance,
+        LARGEST_DISPLACEMENT * spread,
+        allowed,
+        math.copysign(SMALLEST_DETERMINANT * largest, first.determinant),
+    )
+    code = LaneCode(module, module.ARRAYS, p.tolist())
+    blocks = max(1, round(reached / BLOCK))
+    edges = np.linspace(0, reached, blocks + 1).astype(int).tolist()
+    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        _solve_block(code, times[start:stop], result, slice(start, stop), limits)
+    return result
+
+
+@dataclass(frozen=True, slots=True)
+class _Limits:
+    """What a point must keep to be trusted."""
+
+    correction: float
+    displacement: Array
+    residual: Array
+    determinant: float
+
+
+def _interpolate(nodes: list[Node], times: Array, q: Array) -> None:
+    """Write the Hermite polynomials of fifth degree between the nodes into q, shape (n, N)."""
+    index = np.array([node.index for node in nodes])
+    at = times[index]
+    steps = np.diff(at)
+    counts = np.diff(index)
+    h = np.repeat(steps, counts)
+    s = (times[:-1] - np.repeat(at[:-1], counts)) / h
+    basis = _hermite(s)
+    data = np.array([(node.q, node.q_dot, node.q_ddot) for node in nodes]).transpose(0, 2, 1)
+    for k, step in enumerate(steps.tolist()):
+        powers = np.array((1.0, step, step * step))
+        both = np.concatenate((data[k] * powers, data[k + 1] * powers), axis=1)
+        part = slice(nodes[k].index, nodes[k + 1].index)
+        q[:, part] = both @ basis[:, part]
+    q[:, nodes[-1].index] = nodes[-1].q
+
+
+def _hermite(s: Array) -> Array:
+    """Return the basis of quintic Hermite interpolation at s in [0, 1], shape (6, N).
+
+    In the order q, h q_dot, h^2 q_ddot at the left end, then at the right end.
+    """
+    r = 1 - s
+    s3, r3 = s * s * s, r * r * r
+    return np.array((
+        r3 * (1 + s * (3 + 6 * s)),
+        r3 * s * (1 + 3 * s),
+        0.5 * r3 * s * s,
+        s3 * (1 + r * (3 + 6 * r)),
+        -s3 * r * (1 + 3 * r),
+        0.5 * s3 * r * r,
+    ))  # fmt: skip
+
+
+def _solve_block(
+    code: LaneCode, t: Array, result: GridResult, block: slice, limits: _Limits
+) -> None:
+    """Correct a block of interpolated positions twice, and solve for velocity and acceleration."""
+    q = result.q[:, block]
+    good = result.good[block]
+    good[:] = True
+    at = code.position(q, t)
+    for row, change, limit in zip(
+        q, code.solve(at, at.Phi), limits.displacement.tolist(), strict=True
+    ):
+        row -= change
+        # Nearly always all is well, and two reductions cost less than a mask.
+        if not (np.max(change) <= limit and np.min(change) >= -limit):
+            good &= np.abs(change) <= limit
+    at = code.position(q, t)
+    square: Any = 0.0
+    for row, change in zip(q, code.solve(at, at.Phi), strict=True):
+        row -= change
+        square = square + change * change
+    if not np.max(square) <= limits.correction**2:
+        good &= square <= limits.correction**2
+    residual = result.residual[block]
+    residual[:] = 0.0
+    for value, limit in zip(at.Phi, limits.residual.tolist(), strict=True):
+        size = np.abs(value)
+        np.maximum(residual, size, out=residual)
+        if not np.max(size) <= limit:
+            good &= size <= limit
+    determinant = math.prod(at.determinants) / limits.determinant
+    if not np.min(determinant) > 1:
+        good &= determinant > 1
+    total: Any = 0.0
+    for rows, values in zip((result.q_dot, result.q_ddot), code.rates(at, q, t), strict=True):
+        for row, value in zip(rows, values, strict=True):
+            row[block] = value
+            total = total + value
+    if not np.isfinite(np.sum(total)):
+        good &= np.isfinite(total)
