@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 
 from kincompile.errors import InputError
@@ -46,25 +45,16 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
 def _replace(target: Path, data: bytes) -> None:
     """Write a temporary neighbour of `target` and move it into place."""
     destination = target.resolve()  # through a symbolic link, so that the link itself stays
-    handle, name = tempfile.mkstemp(dir=destination.parent, prefix=f".{target.name}.")
-    temporary = Path(name)
+    temporary = destination.with_name(f".{destination.name}.{os.urandom(4).hex()}")
     try:
-        with os.fdopen(handle, "wb") as file:
+        with temporary.open("xb") as file:
             file.write(data)
-        temporary.chmod(_mode(destination))
+        if destination.exists():
+            temporary.chmod(destination.stat().st_mode & 0o7777)
         temporary.replace(destination)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-
-
-def _mode(destination: Path) -> int:
-    """Give the permissions of the file to be replaced, or those a new file would get."""
-    if destination.exists():
-        return destination.stat().st_mode & 0o7777
-    mask = os.umask(0)  # the mask can only be read by setting it
-    os.umask(mask)
-    return 0o666 & ~mask
 
 
 def _explanation(target: Path, error: OSError) -> str:
@@ -77,5 +67,5 @@ def _explanation(target: Path, error: OSError) -> str:
     elif isinstance(error, PermissionError):
         remedy = f"no permission to write in {folder}. Choose a folder you may write to."
     else:
-        remedy = f"{error.strerror or error}. Free some space or choose another folder."
+        remedy = f"{error.strerror or error}. Free some space, or choose another name or folder."
     return f"cannot write {target}: {remedy}"

@@ -132,7 +132,7 @@ def complete(equations: Problem, t: float, point: Point) -> State | Status:
     # A third right-hand side, of the size of the equations' own terms, costs nothing and shows how
     # near to singular the matrix is.
     sides = np.empty((q.size, 2))
-    sides[:, 1] = equations.terms(point) * equations.probe
+    sides[:, 1] = equations.terms(point, scale) * equations.probe
     try:
         sides[:, 0] = module.nu(q, t, p)
         q_dot, probe = np.linalg.solve(Phi_q, sides).T
@@ -183,6 +183,6 @@ def _give_up(
     """Find out what is there at the time that the motion does not reach."""
     attempt = assemble(equations, t, state.point.q, inputs.tolerance, inputs.max_iterations)
     iterations += len(attempt.corrections)
-    if attempt.status is Status.NOT_FINITE:
-        status = Status.NOT_FINITE
+    if attempt.status is not Status.CONVERGED:
+        status = attempt.status  # what is wrong there, rather than on the way
     return Outcome(status, iterations, state, attempt=attempt)

@@ -41,6 +41,9 @@ BEND = 0.01
 of random four-bars and six-bars that plain Newton fails from, 0.01 rescues 155, 0.1 133, 0.001 149,
 and Newton's own direction 100."""
 
+NUDGE = 0.3
+"""How far the last attempt starts from the guess, in radians and sizes of the mechanism."""
+
 SUFFICIENT = 1e-4
 """Armijo's constant: the part of the decrease promised by the linear model that must come true."""
 
@@ -165,7 +168,13 @@ def assemble(
     plain = iterate(equations, t, guess, tolerance, max_iterations)
     if plain.status is Status.CONVERGED or not plain.points:
         return plain
-    return iterate(equations, t, guess, tolerance, max_iterations, safeguarded_step)
+    careful = iterate(equations, t, guess, tolerance, max_iterations, safeguarded_step)
+    if careful.status is Status.CONVERGED:
+        return careful
+    # With all bodies on a line no equation tells which way to bend: so it is for a guess of zeros.
+    bent = guess + NUDGE * equations.reference * equations.probe
+    nudged = iterate(equations, t, bent, tolerance, max_iterations, safeguarded_step)
+    return nudged if nudged.status is Status.CONVERGED else careful
 
 
 def iterate(
@@ -213,7 +222,7 @@ def plain_step(equations: Problem, t: float, point: Point) -> tuple[Point, float
 
 def safeguarded_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
     """Apply as much of the correction as keeps the angles near and lowers the residual."""
-    terms = equations.terms(point)
+    terms = equations.terms(point, equations.scale(point.q))
     weights = 1 / np.where(terms > 0, terms, 1.0)  # equations of different units count alike
     correction = _direction(equations, point, weights)
     if correction is None:
@@ -257,10 +266,11 @@ def _clamp(equations: Problem, point: Point, correction: Vector) -> float:
 def _converged(equations: Problem, attempt: Attempt, tolerance: float) -> bool:
     """Say whether the last correction was small, or rounding forbids better, and Phi is zero."""
     point, correction = attempt.last, attempt.corrections[-1]
-    if correction <= tolerance * (1 + norm(point.q)):
-        return equations.holds(point, max(RESIDUAL_FACTOR * tolerance, ROUNDING))
+    small = correction <= tolerance * (1 + norm(point.q))
+    if small and equations.holds(point, RESIDUAL_FACTOR * tolerance):
+        return True
     # Near a singular configuration rounding alone keeps the corrections above any tolerance.
-    return _crawls(attempt) and equations.holds(point, ROUNDING)
+    return (small or _crawls(attempt)) and equations.holds_to_rounding(point)
 
 
 def _crawls(attempt: Attempt) -> bool:

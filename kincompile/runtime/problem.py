@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 ROUNDING = 16 * float(np.finfo(np.float64).eps)
 """A residual this small, relative to its terms, is all that floating point has to give."""
 
-SMALLEST_SIZE = 1e-6
-"""Stands in for the size of a mechanism whose lengths are all zero."""
+WILD = 1e3
+"""A coordinate beyond this many references is an iterate gone wild, not a larger scale."""
+
+NO_SIZE = 1e-12
+"""Lengths up to this are taken for rounding errors of zero; the unit then stands for the size."""
 
 
 @dataclass(slots=True, eq=False)
@@ -89,7 +92,7 @@ class Problem:
 
     def scale(self, q: Vector) -> Vector:
         """Give the scale of each coordinate at a position."""
-        return np.maximum(self.reference, np.abs(q))
+        return np.clip(np.abs(q), self.reference, WILD * self.reference)
 
     def spread(self, q: Vector) -> Vector:
         """Give the distance that is large for each coordinate: 1 rad, or the size of the mechanism.
@@ -99,30 +102,57 @@ class Problem:
         size = np.max(np.abs(np.where(self.angular, 0.0, q)), initial=0.0)
         return np.where(self.angular, 1.0, np.maximum(self.reference, size))
 
-    def terms(self, point: Point) -> Vector:
+    def terms(self, point: Point, scale: Vector) -> Vector:
         """Give what the terms of each equation contribute at the scales of the coordinates.
 
         At a dead point a whole row of Phi_q may vanish. What it contributes elsewhere keeps the
         equation from being measured by nothing.
         """
-        return np.maximum(self.magnitude, np.abs(point.Phi_q) @ self.scale(point.q))
+        return np.maximum(self.magnitude, np.abs(point.Phi_q) @ scale)
 
     def holds(self, point: Point, tolerance: float) -> bool:
-        """Say whether every equation holds, relative to what its terms contribute."""
-        return bool(np.all(np.abs(point.Phi) <= tolerance * self.terms(point)))
+        """Say whether every equation holds, relative to what its terms contribute.
+
+        The reference is the scale here: a wild iterate must not become a solution because its own
+        coordinates are huge.
+        """
+        terms = self.terms(point, self.reference)
+        return bool(np.all(np.abs(point.Phi) <= tolerance * terms))
+
+    def holds_to_rounding(self, point: Point) -> bool:
+        """Say whether every equation holds as well as floating point permits."""
+        terms = self.terms(point, self.scale(point.q))
+        return bool(np.all(np.abs(point.Phi) <= ROUNDING * terms))
 
 
 def problem(module: ModuleType, p: Vector, q: Vector, t: float) -> Problem:
     """Set a module's parameters; position and guess tell the size of the mechanism."""
     angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES], dtype=bool)
+    equations = Problem(module, p, angular, np.ones(q.size), _probe(q.size), np.zeros(q.size))
     lengths = np.abs(np.where(angular, 0.0, (q, module.GUESS)))
-    size = max(float(np.max(lengths, initial=0.0)), SMALLEST_SIZE)
-    reference = np.where(angular, 1.0, size)
-    equations = Problem(module, p, angular, reference, _probe(q.size), np.zeros(q.size))
-    generic = equations.at(q + reference * equations.probe, t)
+    size = np.max(lengths, initial=0.0)
+    if size <= NO_SIZE and (point := equations.at(q, t)) is not None:
+        size = _size_in_equations(point, angular)
+    if size > NO_SIZE:
+        equations.reference = np.where(angular, 1.0, size)
+    generic = equations.at(q + equations.reference * equations.probe, t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
-        equations.magnitude = equations.terms(generic)
+        equations.magnitude = equations.terms(generic, equations.reference)
     return equations
+
+
+def _size_in_equations(point: Point, angular: NDArray[np.bool_]) -> float:
+    """Give the largest length that the equations show where all coordinates are zero.
+
+    Divided by the derivative with respect to a length, a residual is a distance still to go and
+    the derivative with respect to an angle is a lever arm.
+    """
+    slopes = np.abs(point.Phi_q)
+    along = np.max(slopes, axis=1, where=~angular, initial=0.0)
+    shown = np.abs(point.Phi) + np.max(slopes, axis=1, where=angular, initial=0.0)
+    rows = along > 0
+    size = float(np.max(shown[rows] / along[rows], initial=0.0))
+    return size if math.isfinite(size) else 0.0
 
 
 def _probe(n: int) -> Vector:

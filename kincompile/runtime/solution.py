@@ -93,7 +93,8 @@ class Solution:
         """Say in a few words how it went."""
         if self.success:
             return f"converged, largest residual {np.max(self.residual):.1e}"
-        return f"failed, {np.count_nonzero(self.status == 0)} points converged; see .message"
+        good = np.count_nonzero(self.status == 0)
+        return f"failed, {good} of {self.t.size} points converged; see .message"
 
 
 def columns(coordinates: tuple[str, ...], order: int) -> tuple[str, ...]:
