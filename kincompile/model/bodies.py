@@ -26,12 +26,12 @@ class Body:
 
     def _coordinate(self, index: int) -> sympy.Expr:
         if self.is_ground:
-            return sympy.Integer(0)
+            return sympy.S.Zero
         return sympy.Symbol(body_coordinates(self.name)[index])
 
     def _rate(self, index: int) -> sympy.Expr:
         if self.is_ground:
-            return sympy.Integer(0)
+            return sympy.S.Zero
         return sympy.Symbol(rate(body_coordinates(self.name)[index]))
 
     @property

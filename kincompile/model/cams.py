@@ -1,4 +1,7 @@
-"""Cams and followers. A profile is given in polar form about its centre; contact parameters are coordinates."""
+"""Cams and followers.
+
+A profile is given in polar form about its centre; the contact parameters are coordinates.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,10 @@ class CamFollower(CamConstraint):
 
 @dataclass(frozen=True)
 class CamFlatFollower(CamConstraint):
-    """A cam (body i) touches a flat face of the follower (body j): the line through a point along an axis."""
+    """A cam (body i) touches a flat face of the follower (body j).
+
+    The face is the line through a point of the follower along an axis.
+    """
 
     source = "Haug 3.4"
     row_names = ("contact", "tangent")
@@ -47,7 +53,7 @@ class CamFlatFollower(CamConstraint):
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
-        """Return (A_j R v_j)^T d and (A_j R v_j)^T A_i g_i, with d from the contact point to the face."""
+        """Return (A_j R v_j)^T d and (A_j R v_j)^T A_i g_i, d from the contact to the face."""
         normal = perpendicular(j.A(v_j))
         d = j.point(s_j) - i.point(s_i + contact_i.a)
         return dot(normal, d), dot(normal, i.A(contact_i.g))

@@ -1,4 +1,4 @@
-"""What a constraint type is made of: its arguments, the template of its Phi, the names of its rows."""
+"""What a constraint type is made of: its arguments, its Phi as a template, names of its rows."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def argument(kind: Kind, symbol: str) -> Any:
 class Constraint:
     """A joint, or a driver where its value is a function of `t`. Every type is a subclass.
 
-    A subclass declares its attributes as fields, in the book's order, and its Phi in vectors. Nothing else: Phi_q, nu and
-    gamma follow by differentiation.
+    A subclass declares its attributes as fields, in the book's order, and its Phi in vectors.
+    Nothing else: Phi_q, nu and gamma follow by differentiation.
     """
 
     name: str

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import sympy
 from sympy.core.function import AppliedUndef
+from sympy.core.relational import Relational
+from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from kincompile.model.spline import PeriodicSpline
@@ -35,13 +37,18 @@ SMOOTH = (
 """Functions that can be differentiated as often as needed and printed by every target."""
 
 NOT_SMOOTH = (
-    sympy.Abs, sympy.sign, sympy.floor, sympy.ceiling, sympy.frac, sympy.Heaviside, sympy.DiracDelta,
-    sympy.Min, sympy.Max, sympy.Mod,
+    sympy.Abs, sympy.sign, sympy.floor, sympy.ceiling, sympy.frac, sympy.Heaviside,
+    sympy.DiracDelta, sympy.Min, sympy.Max, sympy.Mod,
+)  # fmt: skip
+
+_KNOWN = (
+    sympy.Symbol, sympy.Number, sympy.NumberSymbol, sympy.Add, sympy.Mul, sympy.Pow,
+    sympy.Function, Relational, BooleanFunction, BooleanAtom, ExprCondPair,
 )  # fmt: skip
 
 
 class NotAnExpressionError(ValueError):
-    """A value that is neither a finite real number nor a SymPy expression; the message says what it is."""
+    """A value that is neither a finite real number nor a SymPy expression; it says what it is."""
 
 
 def as_expression(value: object) -> Scalar:
@@ -51,7 +58,8 @@ def as_expression(value: object) -> Scalar:
     if isinstance(value, Integral):
         return int(value)
     if isinstance(value, Rational):
-        return sympy.Rational(value.numerator, value.denominator)
+        fraction: sympy.Rational = sympy.Rational(value.numerator, value.denominator)
+        return fraction
     if isinstance(value, Real) and not isinstance(value, sympy.Expr):
         if not math.isfinite(value):
             raise NotAnExpressionError(f"{float(value)} is not finite")
@@ -68,19 +76,24 @@ def as_expression(value: object) -> Scalar:
 
 
 def _by_name(expression: sympy.Expr) -> sympy.Expr:
-    """Replace symbols with assumptions, and functions of time, by plain symbols of the same name."""
+    """Replace symbols with assumptions, and functions of time, by plain symbols of their names."""
     functions = {
         applied: sympy.Symbol(applied.func.__name__) for applied in _functions_of_time(expression)
     }
     if functions:
         expression = expression.xreplace(functions)
-    plain = {symbol: sympy.Symbol(symbol.name) for symbol in expression.free_symbols}
+    plain = {symbol: sympy.Symbol(symbol.name) for symbol in _symbols(expression)}
     changed = {symbol: other for symbol, other in plain.items() if symbol != other}
     return expression.xreplace(changed) if changed else expression
 
 
+def _symbols(expression: sympy.Expr) -> set[sympy.Symbol]:
+    """Return the scalars among the free symbols; matrices and indexed names are refused later."""
+    return {symbol for symbol in expression.free_symbols if isinstance(symbol, sympy.Symbol)}
+
+
 def _functions_of_time(expression: sympy.Expr) -> set[AppliedUndef]:
-    """Return x(t), ... outside of derivatives: Derivative(x(t), t) stays, so that it can be refused."""
+    """Return x(t), ... where there are no derivatives: Derivative(x(t), t) stays, to be refused."""
     if expression.has(sympy.Derivative):
         return set()
     return {applied for applied in expression.atoms(AppliedUndef) if str(applied.args) == "(t,)"}
@@ -90,7 +103,10 @@ def symbol_names(value: Scalar) -> set[str]:
     """Return the names of the symbols in an expression."""
     if not isinstance(value, sympy.Expr):
         return set()
-    return {symbol.name for symbol in value.free_symbols}
+    return {symbol.name for symbol in _symbols(value)}
+
+
+_ELEMENTARY = "write it with elementary functions"
 
 
 def smoothness_problem(value: Scalar) -> str | None:
@@ -98,26 +114,23 @@ def smoothness_problem(value: Scalar) -> str | None:
     if not isinstance(value, sympy.Expr):
         return None
     if value.has(sympy.Derivative):
-        return f"{value} contains a time derivative; a constraint Phi(q, t) may contain coordinates and time only"
+        return (
+            f"{value} contains a time derivative; a constraint Phi(q, t) may contain coordinates "
+            "and time only"
+        )
     for node in sympy.preorder_traversal(value):
         if isinstance(node, NOT_SMOOTH):
             return (
-                f"{node} has no continuous derivative; write a smooth function, or a sympy.Piecewise whose pieces meet "
-                "with equal value and slope"
+                f"{node} has no continuous derivative; write a smooth function, or a "
+                "sympy.Piecewise whose pieces meet with equal value and slope"
             )
         if isinstance(node, AppliedUndef):
             return f"the function {node} is not defined; give it as an expression"
         if isinstance(node, sympy.Function) and not isinstance(node, SMOOTH):
-            return f"the function {node.func.__name__} is not supported; write it with elementary functions"
-        if isinstance(node, sympy.Basic) and not isinstance(node, _KNOWN):
-            return f"{type(node).__name__} in {value} is not supported; write it with elementary functions"
+            return f"the function {node.func.__name__} is not supported; {_ELEMENTARY}"
+        if not isinstance(node, _KNOWN):
+            return f"{type(node).__name__} in {value} is not supported; {_ELEMENTARY}"
     return None
-
-
-_KNOWN = (
-    sympy.Symbol, sympy.Number, sympy.NumberSymbol, sympy.Add, sympy.Mul, sympy.Pow, sympy.Function,
-    sympy.core.relational.Relational, BooleanFunction, BooleanAtom, sympy.functions.elementary.piecewise.ExprCondPair,
-)  # fmt: skip
 
 
 def unknown_problem(value: Scalar, declared: Collection[str], what: str) -> str | None:
@@ -126,13 +139,14 @@ def unknown_problem(value: Scalar, declared: Collection[str], what: str) -> str 
     if not unknown:
         return None
     return (
-        f"{what} contains {listed(unknown)}, which nobody declared{suggestion(unknown[0], declared)}; "
-        f"declare it as a parameter or use one of: {listed(sorted(declared))}"
+        f"{what} contains {listed(unknown)}, which nobody declared"
+        f"{suggestion(unknown[0], declared)}; declare it as a parameter or use one of: "
+        f"{listed(sorted(declared))}"
     )
 
 
 def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
-    """Return the number an expression has at given values of its symbols; None where it has none."""
+    """Return the number an expression is at given values of its symbols; None where it is none."""
     if not isinstance(value, sympy.Expr):
         return float(value)
     if symbol_names(value) - set(values):

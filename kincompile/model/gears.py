@@ -5,13 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from kincompile.calculus.expressions import (
-    Expression,
-    Norm,
-    Pi,
-    dot,
-    perpendicular,
-)
+from kincompile.calculus.expressions import Expression, Norm, Pi, dot, perpendicular
 from kincompile.calculus.symbols import R_i, R_j, i, j, s_j, s_P, s_Q, theta_i, theta_j, unit
 from kincompile.model.constraint import Constraint, Kind, argument
 from kincompile.model.relative import separation
@@ -36,14 +30,17 @@ class Gear(Constraint):
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
-        """Return d^T R u(theta), theta the direction of the line of centres that rolling asks for."""
+        """Return d^T R u(theta), theta the direction of the centre line that rolling asks for."""
         rolled = R_i * (i.phi + theta_i) + R_j * (j.phi + theta_j) - R_j * Pi()
         return (dot(separation(), perpendicular(unit(rolled / (R_i + R_j)))),)
 
 
 @dataclass(frozen=True)
 class RackAndPinion(Constraint):
-    """A pinion (body j) rolls on the pitch line of a rack (body i), which passes through points P and Q."""
+    """A pinion (body j) rolls on the pitch line of a rack (body i).
+
+    The pitch line passes through the points P and Q of the rack.
+    """
 
     source = "Haug 3.4"
     row_names = ("roll", "pitch")
@@ -58,11 +55,14 @@ class RackAndPinion(Constraint):
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
-        """Return d_Q^T V - L R_j angle and d_P^T R V - L R_j, with V = A_i v and v, L from P to Q."""
+        """Return d_Q^T A_i v - L R_j angle and d_P^T R A_i v - L R_j, v from P to Q, L = |v|."""
         v = s_Q - s_P
-        V = i.A(v)
+        pitch_line = i.A(v)
         reach = Norm(v) * R_j
         angle = i.phi + theta_i - j.phi - theta_j + 3 * Pi() / 2
         from_q = j.point(s_j) - i.point(s_Q)
         from_p = j.point(s_j) - i.point(s_P)
-        return dot(from_q, V) - reach * angle, dot(from_p, perpendicular(V)) - reach
+        return (
+            dot(from_q, pitch_line) - reach * angle,
+            dot(from_p, perpendicular(pitch_line)) - reach,
+        )

@@ -50,7 +50,7 @@ class Translational(Constraint):
 
 @dataclass(frozen=True)
 class RevoluteTranslational(Constraint):
-    """A point on body j keeps the distance C from an axis of body i, counted to the left of the axis."""
+    """A point on body j keeps the distance C from an axis of body i, counted to its left."""
 
     source = "Haug 3.3"
     i: Any = argument(Kind.BODY, "i")

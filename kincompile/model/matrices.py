@@ -1,4 +1,4 @@
-"""The assembled system as SymPy matrices: Phi, Phi_q, nu and gamma with every name as the user wrote it."""
+"""The assembled system as SymPy matrices: Phi, Phi_q, nu, gamma, in the names the user wrote."""
 
 from __future__ import annotations
 

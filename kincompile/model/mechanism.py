@@ -18,7 +18,8 @@ Item = TypeVar("Item", bound=Constraint | Equation)
 class Mechanism(MatrixViews):
     """Bodies, parameters and constraints, collected one by one.
 
-    Nothing is checked while building; `system` checks everything at once, so that all mistakes are reported together.
+    Nothing is checked while building; `system` checks everything at once, so that all mistakes are
+    reported together.
 
     Parameters
     ----------
@@ -70,7 +71,8 @@ class Mechanism(MatrixViews):
         name
             Name of the body.
         guess
-            Start values of x, y [length] and phi [rad] for Newton's method, numbers or expressions of parameters.
+            Start values of x, y [length] and phi [rad] for Newton's method, numbers or expressions
+            of parameters.
         """
         body = Body(name, guess)
         self.bodies.append(body)
@@ -101,4 +103,5 @@ class Mechanism(MatrixViews):
 
     def __repr__(self) -> str:
         """Return name and sizes."""
-        return f"<Mechanism {self.name!r}: {len(self.bodies)} bodies, {len(self.constraints)} constraints>"
+        sizes = f"{len(self.bodies)} bodies, {len(self.constraints)} constraints"
+        return f"<Mechanism {self.name!r}: {sizes}>"

@@ -11,7 +11,7 @@ from kincompile.model.constraint import Constraint, Kind, argument
 
 
 def separation() -> Vector:
-    """Return d_ij = r_j + A_j s_j - r_i - A_i s_i, from the point on body i to the point on body j."""
+    """Return d = r_j + A_j s_j - r_i - A_i s_i, from the point on body i to that on body j."""
     return j.point(s_j) - i.point(s_i)
 
 

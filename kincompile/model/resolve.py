@@ -1,4 +1,7 @@
-"""From constraints as written to constraints that are known to be good: every problem is collected, none raised."""
+"""From constraints as written to constraints that are known to be good.
+
+Every problem is collected, none is raised.
+"""
 
 from __future__ import annotations
 
@@ -43,8 +46,8 @@ class Joint:
     bodies
         Body i, or i and j.
     scalars, points, profiles
-        Attributes by their symbol in the template. The value C(t) is among the scalars; a profile is an expression of
-        `alpha`.
+        Attributes by their symbol in the template. The value C(t) is among the scalars; a profile
+        is an expression of `alpha`.
     columns
         Names of the coordinates in the order of the template, None for those of the ground.
     source
@@ -119,8 +122,8 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
         value = _expression(given, where, declared, scope)
         if value is not None and not depends_on(value, scope.coordinates):
             scope.problems.append(
-                f"{where} contains no coordinate, so it cannot constrain anything; coordinates are: "
-                f"{listed(scope.coordinates)}"
+                f"{where} contains no coordinate, so it cannot constrain anything; coordinates "
+                f"are: {listed(scope.coordinates)}"
             )
         expressions.append(sympy.sympify(0 if value is None else value))
     if len(scope.problems) > before:
@@ -138,10 +141,7 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
     for name, item in constraint.arguments().items():
-        given, where = (
-            getattr(constraint, name),
-            f"{type(constraint).__name__} {constraint.name!r}, {name}",
-        )
+        given, where = getattr(constraint, name), f"{_title(constraint)}, {name}"
         if item.kind is Kind.BODY:
             bodies.append(_body(given, where, scope))
         elif item.kind in (Kind.POINT, Kind.AXIS):
@@ -169,6 +169,10 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     )
 
 
+def _title(constraint: Constraint) -> str:
+    return f"{type(constraint).__name__} {constraint.name!r}"
+
+
 def _columns(body: Body) -> tuple[str | None, ...]:
     return (None, None, None) if body.is_ground else body_coordinates(body.name)
 
@@ -180,25 +184,24 @@ def _body(given: Any, where: str, scope: Scope) -> Body:
     if not isinstance(name, str) or name not in scope.bodies:
         hint = suggestion(name, scope.bodies) if isinstance(name, str) else ""
         scope.problems.append(
-            f"{where}: there is no body {name!r} in this mechanism{hint}; bodies are: ground, {listed(scope.bodies)}"
+            f"{where}: there is no body {name!r} in this mechanism{hint}; bodies are: ground, "
+            f"{listed(scope.bodies)}"
         )
         return GROUND
     return scope.bodies[name]
 
 
 def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> None:
-    what = f"{type(constraint).__name__} {constraint.name!r}"
+    """Check that a joint has something to constrain; where a body is missing, that was said."""
+    what = _title(constraint)
+    if any(what in problem for problem in scope.problems):
+        return
     if len(bodies) == 2 and bodies[0] == bodies[1]:
-        found_missing = any(what in problem for problem in scope.problems)
-        if not found_missing:
-            scope.problems.append(
-                f"{what}: bodies i and j are both {bodies[0].name!r}; a joint connects two different bodies"
-            )
-    elif (
-        len(bodies) == 1
-        and bodies[0].is_ground
-        and not any(what in problem for problem in scope.problems)
-    ):
+        scope.problems.append(
+            f"{what}: bodies i and j are both {bodies[0].name!r}; a joint connects two different "
+            "bodies"
+        )
+    elif len(bodies) == 1 and bodies[0].is_ground:
         scope.problems.append(
             f"{what}: the ground cannot be constrained; name a body of the mechanism"
         )
@@ -225,13 +228,16 @@ def _expression(given: Any, where: str, declared: set[str], scope: Scope) -> Sca
 def _attribute(given: Any, where: str, scope: Scope) -> Scalar:
     """Return an attribute: a number or an expression of parameters."""
     value = _expression(given, where, {*scope.parameters, *scope.coordinates, "t"}, scope)
-    if value is not None and depends_on(value, (*scope.coordinates, "t")):
+    if value is None:
+        return 1
+    varying = sorted(symbol_names(value) - set(scope.parameters))
+    if varying:
         scope.problems.append(
-            f"{where}: {value} depends on {listed(sorted(symbol_names(value) - set(scope.parameters)))}; an attribute is "
-            "fixed in its body, so only parameters may occur in it"
+            f"{where}: {value} depends on {listed(varying)}; an attribute is fixed in its body, so "
+            "only parameters may occur in it"
         )
         return 1
-    return 1 if value is None else value
+    return value
 
 
 def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
@@ -239,23 +245,27 @@ def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
         value = _attribute(given, where, scope)
         if kind is Kind.RADIUS and evaluate(value, scope.defaults) == 0:
             scope.problems.append(
-                f"{where}: the radius is zero; give the pitch radius (negative for an internal gear)"
+                f"{where}: the radius is zero; give the pitch radius "
+                "(negative for an internal gear)"
             )
         return value
     value_or_none = _expression(given, where, {*scope.parameters, *scope.coordinates, "t"}, scope)
     if value_or_none is None:
         return 1
-    if depends_on(value_or_none, scope.coordinates):
+    coordinates = sorted(symbol_names(value_or_none) & set(scope.coordinates))
+    if coordinates:
         scope.problems.append(
-            f"{where}: the value {value_or_none} depends on {listed(sorted(symbol_names(value_or_none) & set(scope.coordinates)))}; "
-            "a driver is a function of t and parameters only; write a coordinate-dependent condition as an Equation"
+            f"{where}: the value {value_or_none} depends on {listed(coordinates)}; a driver is a "
+            "function of t and parameters only; write a coordinate-dependent condition as an "
+            "Equation"
         )
         return 1
     number = evaluate(value_or_none, scope.defaults)
     if kind is Kind.DISTANCE and number is not None and number <= 0:
         scope.problems.append(
-            f"{where}: the distance is {number:g}, but must be positive: at distance 0 the Jacobian row 2 d^T [I, B s] "
-            "vanishes; to make the two points coincide use a Revolute (or AbsoluteX and AbsoluteY)"
+            f"{where}: the distance is {number:g}, but must be positive: at distance 0 the "
+            "Jacobian row 2 d^T [I, B s] vanishes; to make the two points coincide use a Revolute "
+            "(or AbsoluteX and AbsoluteY)"
         )
     return value_or_none
 
@@ -275,7 +285,7 @@ def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
 
 
 def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Expr:
-    """Return rho as an expression of alpha: from an expression, a function of a symbol, or a table."""
+    """Return rho as an expression of alpha: from an expression, a function, or a table."""
     if isinstance(given, sympy.Lambda) or (callable(given) and not isinstance(given, sympy.Basic)):
         given = given(alpha)
     elif isinstance(given, tuple | list) and len(given) == 2:
@@ -283,26 +293,28 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
             given = PeriodicSpline.of(table_name, fit(*given))(alpha)
         except (TypeError, ValueError) as error:
             scope.problems.append(f"{where}: {error}")
-            return sympy.Integer(1)
+            return sympy.S.One
     others = symbol_names(given) - set(scope.parameters) if isinstance(given, sympy.Expr) else set()
     if len(others) == 1:
         given = given.subs(
             {symbol: alpha for symbol in given.free_symbols if symbol.name in others}
         )
     value = _expression(given, where, {*scope.parameters, alpha.name}, scope)
-    return sympy.sympify(1 if value is None else value)
+    rho: sympy.Expr = sympy.sympify(1 if value is None else value)
+    return rho
 
 
 def _check_whole(
     constraint: Constraint, scalars: Mapping[str, Scalar], points: Mapping[str, Point], scope: Scope
 ) -> None:
     """Check what involves several arguments of a constraint."""
-    what = f"{type(constraint).__name__} {constraint.name!r}"
+    what = _title(constraint)
     if {"R_i", "R_j"} <= scalars.keys():
-        radii = [evaluate(scalars[symbol], scope.defaults) for symbol in ("R_i", "R_j")]
-        if None not in radii and sum(radii) == 0:
+        first, second = (evaluate(scalars[symbol], scope.defaults) for symbol in ("R_i", "R_j"))
+        if first is not None and second is not None and first + second == 0:
             scope.problems.append(
-                f"{what}: the radii {radii[0]:g} and {radii[1]:g} add to zero; an internal gear needs two different radii"
+                f"{what}: the radii {first:g} and {second:g} add to zero; an internal gear needs "
+                "two different radii"
             )
     if {"s_P", "s_Q"} <= points.keys():
         p, q = (
@@ -316,7 +328,7 @@ def _check_whole(
 
 
 def _text(constraint: Constraint) -> str:
-    """Return a constraint's arguments as a short line, for instance `ground (0, 0) - crank (-a/2, 0)`."""
+    """Return a constraint's arguments in a line, for instance `ground (0, 0) - crank (-a/2, 0)`."""
     parts: list[str] = []
     for name, item in constraint.arguments().items():
         given = getattr(constraint, name)

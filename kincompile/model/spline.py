@@ -1,4 +1,7 @@
-"""A table of radii as a periodic quintic spline: four continuous derivatives, one more than a pair of cams needs."""
+"""A table of radii as a periodic quintic spline.
+
+It has four continuous derivatives, one more than a pair of cams needs.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +39,11 @@ class SplineTable:
         return float(np.polyval(np.polyder(self.coefficients[k], order), angle - self.breaks[k]))
 
 
-class PeriodicSpline(sympy.Function):  # type: ignore[misc]  # SymPy's Function has no types
-    """A spline as a SymPy function of one angle; each table and order of derivative has a subclass of its own."""
+class PeriodicSpline(sympy.Function):
+    """A spline as a SymPy function of one angle.
+
+    Each table and order of derivative has a subclass of its own.
+    """
 
     nargs = 1
     table: ClassVar[SplineTable]
@@ -54,15 +60,15 @@ class PeriodicSpline(sympy.Function):  # type: ignore[misc]  # SymPy's Function 
     def fdiff(self, argindex: int = 1) -> sympy.Expr:
         """Return the derivative: the same table, one order higher."""
         del argindex
-        return PeriodicSpline.of(self.table_name, self.table, self.order + 1)(self.args[0])
+        slope = PeriodicSpline.of(self.table_name, self.table, self.order + 1)
+        value: sympy.Expr = slope(self.args[0])
+        return value
 
-    def _eval_evalf(self, prec: int) -> Any:
-        angle = self.args[0].evalf()
-        return (
-            sympy.Float(self.table(float(angle), self.order), prec=prec)
-            if angle.is_number
-            else None
-        )
+    def _eval_evalf(self, prec: int) -> sympy.Float | None:
+        angle = self.args[0]
+        if not isinstance(angle, sympy.Expr) or not angle.is_number:
+            return None
+        return sympy.Float(self.table(float(angle), self.order), precision=prec)
 
 
 def fit(angles: Any, radii: Any) -> SplineTable:
@@ -71,8 +77,8 @@ def fit(angles: Any, radii: Any) -> SplineTable:
     Parameters
     ----------
     angles
-        Strictly increasing polar angles within one revolution, shape (M,), in rad, M at least 6. The first angle plus
-        2 pi may be repeated as the last, with the same radius.
+        Strictly increasing polar angles within one revolution, shape (M,), in rad, M at least 6.
+        The first angle plus 2 pi may be repeated as the last, with the same radius.
     radii
         Radii at these angles, shape (M,).
 
@@ -81,7 +87,7 @@ def fit(angles: Any, radii: Any) -> SplineTable:
     ValueError
         If the table is not of this form; the message says which point is wrong.
     """
-    # SciPy's interpolation takes a quarter of a second to import, and only table-driven cams need it.
+    # SciPy's interpolation takes a quarter of a second to import, and only tables need it.
     from scipy.interpolate import PPoly, make_interp_spline
 
     x, y = np.asarray(angles, dtype=float), np.asarray(radii, dtype=float)
@@ -99,7 +105,10 @@ def fit(angles: Any, radii: Any) -> SplineTable:
 
 def _table_problem(x: np.ndarray, y: np.ndarray) -> str | None:
     if x.ndim != 1 or x.shape != y.shape:
-        return f"angles and radii must be two lists of equal length, not of shapes {x.shape} and {y.shape}"
+        return (
+            f"angles and radii must be two lists of equal length, not of shapes {x.shape} "
+            f"and {y.shape}"
+        )
     if len(x) < 6:
         return f"a table needs at least 6 points, not {len(x)}"
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
@@ -111,5 +120,8 @@ def _table_problem(x: np.ndarray, y: np.ndarray) -> str | None:
     if turn > 2 * np.pi + 1e-9:
         return f"the angles span {turn:g} rad, more than one revolution (are they in degrees?)"
     if turn > 2 * np.pi - 1e-9 and not np.isclose(y[0], y[-1], rtol=1e-12, atol=0):
-        return f"the table closes after one revolution, but its radius there is {y[-1]:g}, not {y[0]:g}"
+        return (
+            f"the table closes after one revolution, but its radius there is {y[-1]:g}, "
+            f"not {y[0]:g}"
+        )
     return None

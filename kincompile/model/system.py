@@ -26,7 +26,8 @@ class ConstraintSystem(MatrixViews):
     name
         Name of the system.
     coordinates
-        Names of free coordinates, as one string or a sequence of strings, SymPy symbols or `dynamicsymbols`.
+        Names of free coordinates, as one string or a sequence of strings, SymPy symbols or
+        `dynamicsymbols`.
     equations
         SymPy expressions (each understood as ``expression = 0``), `Equation` or other constraints.
     parameters
@@ -51,7 +52,8 @@ class ConstraintSystem(MatrixViews):
     """
 
     __slots__ = (
-        "bodies", "constraints", "coordinates", "end", "length_unit", "name", "parameters", "points",
+        "bodies", "constraints", "coordinates", "end", "length_unit", "name", "parameters",
+        "points",
     )  # fmt: skip
 
     name: str
@@ -124,7 +126,7 @@ class ConstraintSystem(MatrixViews):
 
     @property
     def row_offsets(self) -> tuple[int, ...]:
-        """First row of each constraint, counted from 0: an exclusive prefix scan of the equation counts."""
+        """First row of each constraint, from 0: the exclusive prefix scan of equation counts."""
         offsets, total = [], 0
         for item in self.constraints:
             offsets.append(total)
@@ -133,7 +135,8 @@ class ConstraintSystem(MatrixViews):
 
     def __repr__(self) -> str:
         """Return name and sizes."""
-        return f"<ConstraintSystem {self.name!r}: {len(self.coordinates)} coordinates, {len(self.equations)} equations>"
+        sizes = f"{len(self.coordinates)} coordinates, {len(self.equations)} equations"
+        return f"<ConstraintSystem {self.name!r}: {sizes}>"
 
 
 def _as_constraint(item: Any, number: int) -> Constraint | Equation:
@@ -174,7 +177,8 @@ def _parameters(
         default = item.default
         if default is None:
             problems.append(
-                f"parameter {item.name!r} has no value; give a default: parameter({item.name!r}, 1.0)"
+                f"parameter {item.name!r} has no value; give a default: "
+                f"parameter({item.name!r}, 1.0)"
             )
         else:
             default = _number(default, f"parameter {item.name!r}", {}, problems)
@@ -221,7 +225,8 @@ def _free_coordinates(
         guess = [by_name.get(name, 0.0) for name in names]
     if len(guess) != len(names):
         problems.append(
-            f"the guess has {len(guess)} values for {len(names)} coordinates ({listed(names)}); give one for each"
+            f"the guess has {len(guess)} values for {len(names)} coordinates ({listed(names)}); "
+            "give one for each"
         )
         guess = [0.0] * len(names)
     return [
@@ -242,7 +247,8 @@ def _contact_coordinates(
         guess = tuple(guess) if isinstance(guess, tuple | list) else (guess,)
         if len(guess) != len(names):
             problems.append(
-                f"{type(item).__name__} {item.name!r}: the guess has {len(guess)} values; give one for each of {listed(names)}"
+                f"{type(item).__name__} {item.name!r}: the guess has {len(guess)} values; give one "
+                f"for each of {listed(names)}"
             )
             guess = (0.0,) * len(names)
         for name, value in zip(names, guess, strict=True):
@@ -275,7 +281,7 @@ def _check_names(
     _check_unique("bodies", [body.name for body in bodies], problems)
     _check_unique("constraints", [item.name for item in constraints], problems)
     symbols = [item.name for item in parameters]
-    if len(set(body.name for body in bodies)) == len(bodies):
+    if len({body.name for body in bodies}) == len(bodies):
         symbols += [item.name for item in coordinates]
         symbols += [rate(item.name, order) for item in coordinates for order in (1, 2)]
     _check_unique("coordinates, rates and parameters", symbols, problems)
