@@ -1,7 +1,19 @@
-"""What every test shares: fixed seeds, and the option that rewrites the goldens."""
+"""What every test shares: fixed seeds, the option that rewrites the goldens, and the examples."""
+
+import runpy
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
 
 import hypothesis
+import numpy as np
 import pytest
+
+import kincompile as kc
+
+EXAMPLES = sorted((Path(__file__).resolve().parents[1] / "examples").glob("*.py"))
 
 # The same examples on every run and every machine, nothing written into the checkout, and no
 # deadline: a slow machine is not a wrong result.
@@ -18,3 +30,45 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="rewrite generated/ from the examples, remove strays, list both and fail the run",
     )
+
+
+@dataclass(frozen=True)
+class Example:
+    """An example, emitted, compiled and solved when a test first asks for it."""
+
+    path: Path
+    model: Any
+
+    @cached_property
+    def source(self) -> Any:
+        """The emitted NumPy module as text."""
+        return kc.emit(self.model).source
+
+    @cached_property
+    def module(self) -> Any:
+        """The emitted NumPy module."""
+        return kc.compile(self.model)
+
+    @cached_property
+    def solution(self) -> Any:
+        """The motion over the example's own time grid."""
+        return kc.solve(self.module, np.linspace(0, self.model.end, self.model.points))
+
+
+@cache
+def load_example(path: Path) -> Example:
+    """Run an example's file, once a session, and take its model."""
+    names = runpy.run_path(str(path))
+    return Example(path, names["mechanism"] if "mechanism" in names else names["system"])
+
+
+@pytest.fixture(scope="session", params=EXAMPLES, ids=lambda path: path.stem)
+def example(request: pytest.FixtureRequest) -> Example:
+    """Each of the examples in turn."""
+    return load_example(request.param)
+
+
+@pytest.fixture(scope="session")
+def example_named() -> Callable[[str], Example]:
+    """Return the function that gives an example by name."""
+    return lambda name: load_example(EXAMPLES[0].with_name(f"{name}.py"))
