@@ -14,7 +14,8 @@ from types import ModuleType
 from typing import Any
 
 _PUBLIC = {
-    "kincompile.compiler": ("compile", "emit"),
+    "kincompile.compiler": ("compile", "emit", "inspect"),
+    "kincompile.model.files": ("read_model",),
     "kincompile.model.mechanism": ("Mechanism",),
     "kincompile.model.system": ("ConstraintSystem",),
     "kincompile.model.equation": ("Equation",),
@@ -27,6 +28,7 @@ _PUBLIC = {
     "kincompile.model.cams": ("CamFollower", "CamFlatFollower", "PointFollower"),
     "kincompile.model.expressions": ("t", "pi", "alpha"),
     "kincompile.runtime.load": ("load",),
+    "kincompile.runtime.results": ("write",),
     "kincompile.runtime.newton": ("newton",),
     "kincompile.runtime.solve": ("solve",),
     "kincompile.runtime.solution": ("Solution",),

@@ -19,6 +19,7 @@ from kincompile.ir.lower import lower
 from kincompile.names import listed
 from kincompile.runtime.load import from_source
 from kincompile.structure.counting import require_square
+from kincompile.structure.report import inspect_system
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from kincompile.emit.target import Emitted, Target
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
+    from kincompile.structure.report import Inspection
 
 TARGETS: Mapping[str, Target] = {"numpy": emit_numpy}
 
@@ -82,3 +84,26 @@ def compile(model: Mechanism | ConstraintSystem) -> ModuleType:  # noqa: A001 - 
         As `emit` does.
     """
     return from_source(emit(model).source, model.name)
+
+
+def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
+    """Count what a mechanism is made of, also where it cannot be compiled yet.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system of free equations, with too few or too many equations perhaps.
+
+    Returns
+    -------
+    Inspection
+        Bodies, constraints, rows and columns, mobility, structural rank and pattern of Phi_q; as
+        text, tables of them.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written; every problem is listed.
+    """
+    system = model.system()
+    return inspect_system(system, inline(lower(system)).pattern())

@@ -12,7 +12,8 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
     """Write `content` to `path` in one step: the old file stays whole until the new one is.
 
     The content goes to a temporary file in the same folder, which then replaces `path`. Text is
-    written as UTF-8 with the line ends as given, so the bytes are the same on every system.
+    written as UTF-8 with the line ends as given, so the bytes are the same on every system. A
+    device or a pipe, such as /dev/stdout, is written to as it is: it must not be replaced.
 
     Parameters
     ----------
@@ -36,7 +37,10 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
     if target.is_dir():
         raise InputError(f"cannot write {target}: it is a folder. Give the name of a file in it.")
     try:
-        _replace(target, data)
+        if target.exists() and not target.is_file():
+            target.write_bytes(data)
+        else:
+            _replace(target, data)
     except OSError as error:
         raise InputError(_explanation(target, error)) from error
     return target

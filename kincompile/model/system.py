@@ -61,6 +61,9 @@ class ConstraintSystem(MatrixViews):
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Parameter, ...]
     constraints: tuple[Joint | FreeEquation, ...]
+    length_unit: str
+    end: float
+    points: int
 
     def __init__(
         self,

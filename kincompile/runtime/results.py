@@ -43,10 +43,20 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
     InputError
         When the suffix is another, or the file cannot be written.
     """
-    writer = _WRITERS.get(Path(path).suffix.lower())
-    if writer is None:
+    require_known_suffix(path)
+    return write_atomically(path, _WRITERS[Path(path).suffix.lower()](solution))
+
+
+def require_known_suffix(path: str | os.PathLike[str]) -> None:
+    """Refuse a name whose suffix says no format: to be called before work that takes long.
+
+    Raises
+    ------
+    InputError
+        When the suffix is not one that `write` knows.
+    """
+    if Path(path).suffix.lower() not in _WRITERS:
         raise InputError(f"cannot write {path}: end its name in {', '.join(_WRITERS)}.")
-    return write_atomically(path, writer(solution))
 
 
 def _csv(solution: Solution) -> str:

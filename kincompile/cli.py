@@ -1,0 +1,283 @@
+"""The command line: `kincompile compile | run | inspect MODEL`.
+
+stdout is data, stderr messages. Exit codes: 0 done; 2 wrong usage or model, or a file that cannot
+be read or written; 3 the motion did not converge; 130 interrupted. Code 1 is kept for `compare`.
+No traceback reaches a user, unless the environment variable KINCOMPILE_TRACEBACK asks for one.
+
+SymPy is loaded by the names of `kc` that need it, so that `--help` does not wait for it.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import os
+import signal
+import sys
+import time
+import traceback
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+import numpy as np
+
+import kincompile as kc
+from kincompile.errors import InputError, InternalError, KincompileError
+from kincompile.files import write_atomically
+from kincompile.runtime.results import require_known_suffix
+from kincompile.runtime.summary import summary
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from kincompile.emit.target import Emitted
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+USAGE_OR_MODEL, NOT_CONVERGED, INTERRUPTED = 2, 3, 130
+"""Exit codes."""
+
+TRACEBACK = "KINCOMPILE_TRACEBACK"
+"""The environment variable that shows where an error comes from."""
+
+PATIENCE = 0.5
+"""Seconds after which a progress bar appears."""
+
+
+class _Shell(click.Group):
+    """A group of commands that turns every exception into a message and an exit code."""
+
+    def invoke(self, context: click.Context) -> Any:
+        """Run a command."""
+        try:
+            return super().invoke(context)
+        except (click.ClickException, click.exceptions.Exit, click.Abort):
+            raise
+        except KeyboardInterrupt:
+            _end("Interrupted.", INTERRUPTED)
+        except MemoryError:
+            _end("Error: there is not enough memory; ask for fewer points", USAGE_OR_MODEL)
+        except KincompileError as error:
+            _end(f"Error: {error}", USAGE_OR_MODEL)
+        except Exception as error:
+            bug = InternalError(f"{type(error).__name__}: {error}.")
+            _end(f"Error: {bug} {TRACEBACK}=1 shows where it happened.", USAGE_OR_MODEL)
+
+
+def _end(message: str, code: int) -> NoReturn:
+    """Write a message to stderr, after the traceback if one is wanted, and end."""
+    if os.environ.get(TRACEBACK, "0") not in ("", "0"):
+        traceback.print_exc()
+    click.echo(message, err=True)
+    raise click.exceptions.Exit(code)
+
+
+@click.group(
+    cls=_Shell,
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
+    epilog=f"Set {TRACEBACK}=1 to see where an error comes from.",
+)
+@click.version_option(kc.__version__, message="%(prog)s %(version)s")
+def cli() -> None:
+    """Compile planar mechanisms to numerical code, and run it.
+
+    MODEL is a Python file with one Mechanism or ConstraintSystem at module level; of several, the
+    one called mechanism, system or m. The file is run: use only what you trust.
+    """
+
+
+@cli.command("compile")
+@click.argument("model")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="FILE",
+    help="File to write, or a folder, or - for stdout.",
+)
+@click.option("--target", default="numpy", metavar="NAME", help="What to emit.")
+def compile_command(model: str, output: str, target: str) -> None:
+    """Write Phi, Phi_q, nu and gamma of MODEL as a module.
+
+    The module imports NumPy and nothing else: it runs where kincompile is not installed.
+    """
+    emitted = kc.emit(_read(model), target)
+    if output == "-":
+        _print(emitted.source)
+        return
+    path = _destination(output, emitted)
+    if path.exists() and path.samefile(model):
+        raise InputError(f"{path} is the model itself; give -o another name")
+    write_atomically(path, emitted.source)
+    click.echo(f"Wrote {path}", err=True)
+
+
+def _destination(output: str, emitted: Emitted) -> Path:
+    """Return the file to write: the one named, or the usual name in the folder named."""
+    path = Path(output)
+    return path / next(iter(emitted.files)) if path.is_dir() else path
+
+
+@cli.command()
+@click.argument("model")
+@click.option("--end", type=float, help="Last time.  [default: the model's own]")
+@click.option(
+    "--points",
+    type=click.IntRange(min=1),
+    help="Number of equally spaced times from 0 to the end.  [default: the model's own]",
+)
+@click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Value of a parameter; may be given several times.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write the motion: .csv, .npz or .json.")
+@click.pass_context
+def run(
+    context: click.Context,
+    model: str,
+    end: float | None,
+    points: int | None,
+    assignments: tuple[str, ...],
+    output: str | None,
+) -> None:
+    """Solve the motion of MODEL over time and summarise it.
+
+    Position, velocity and acceleration are solved at equally spaced times, from 0 to the end. The
+    summary goes to stdout, or to stderr where a file is written. Where the motion does not
+    converge, what was found is written nevertheless, and the exit code is 3.
+    """
+    if output is not None:
+        require_known_suffix(output)
+    values = _values(assignments)
+    mechanism = _read(model)
+    times = _times(mechanism, end, points)
+    module = kc.compile(mechanism)
+    with _progress() as progress:
+        solution = kc.solve(module, times, values, progress=progress)
+    if output is None:
+        _print(summary(solution) + "\n")
+    else:
+        kc.write(solution, output)
+        click.echo(f"{summary(solution)}\nWrote {output}", err=True)
+    if not solution.success:
+        click.echo(f"Error: {solution.message}", err=True)
+        context.exit(NOT_CONVERGED)
+
+
+@cli.command()
+@click.argument("model")
+def inspect(model: str) -> None:
+    """Show what MODEL is made of, and whether it can be compiled.
+
+    Bodies, parameters, constraints, rows and columns of Phi_q, mobility, structural rank and the
+    pattern of Phi_q. Rows and columns count from 0.
+    """
+    _print(f"{kc.inspect(_read(model))}\n")
+
+
+def _read(model: str) -> Mechanism | ConstraintSystem:
+    """Read a model; what its file prints is a message, not data."""
+    with redirect_stdout(sys.stderr):
+        read: Mechanism | ConstraintSystem = kc.read_model(model)
+    return read
+
+
+def _values(assignments: tuple[str, ...]) -> dict[str, float]:
+    """Return the parameters that are set; the last one counts where one is set twice."""
+    values, problems = {}, []
+    for assignment in assignments:
+        name, _, text = assignment.partition("=")
+        try:
+            values[name.strip()] = float(text)
+        except ValueError:
+            problems.append(f"--set {assignment}: give NAME=VALUE with a number, such as a=0.25")
+    if problems:
+        raise InputError(problems)
+    return values
+
+
+def _times(
+    model: Mechanism | ConstraintSystem, end: float | None, points: int | None
+) -> NDArray[np.float64]:
+    """Return the time grid: the options before the model's own."""
+    try:
+        end_time = float(model.end if end is None else end)
+        count = operator.index(model.points if points is None else points)
+    except (TypeError, ValueError):
+        end_time, count = math.nan, 0
+    if not math.isfinite(end_time) or count < 1:
+        given = f"end = {model.end!r}, points = {model.points!r}" if end is None else f"--end {end}"
+        raise InputError(f"{given}: give a finite time, and a whole number of points from 1 up")
+    if count == 1 and end:
+        raise InputError("one point is the time 0 alone: give --points 2 or more to reach the end")
+    return np.linspace(0.0, end_time, count)
+
+
+def _print(text: str) -> None:
+    """Write data to stdout, or say why that is impossible."""
+    try:
+        click.echo(text.encode(), nl=False)
+    except OSError as error:
+        # What is left in the buffer would fail once more, at the end of the process.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise InputError(f"cannot write to stdout: {error.strerror}") from error
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[int, int], None] | None]:
+    """Give a progress bar on stderr for work that takes long, and nothing where nobody looks."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    bar = _Bar()
+    try:
+        yield bar
+    finally:
+        bar.close()
+
+
+class _Bar:
+    """A progress bar that appears when work has lasted longer than `PATIENCE`, and then goes."""
+
+    def __init__(self) -> None:
+        self._appears = time.monotonic() + PATIENCE
+        self._shown: Any = None
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show how many points are done."""
+        if self._shown is None:
+            if time.monotonic() < self._appears:
+                return
+            self._shown = _shown_bar(total)
+        self._shown.update(self._shown.task_ids[0], completed=done)
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._shown is not None:
+            self._shown.stop()
+
+
+def _shown_bar(total: int) -> Any:
+    """Show a bar; rich is loaded here, because few runs last long enough to need it."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    bar = Progress(console=Console(stderr=True), transient=True)
+    bar.add_task("solving", total=total)
+    bar.start()
+    return bar
+
+
+def main() -> None:
+    """Run the command line as a process."""
+    if hasattr(signal, "SIGPIPE"):
+        # A reader that has seen enough (`| head`) ends this process as it ends any other filter.
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    cli(prog_name="kincompile")
