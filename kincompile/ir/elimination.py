@@ -1,9 +1,10 @@
 """The linear solve of Phi_q x = b, planned at compile time.
 
-Most pivots of Phi_q are plain numbers, +1 or -1 from joints and drivers. Elimination with those is safe for every q, t and
-p, costs few operations, and leaves a small system that falls into blocks: a four-bar of nine equations leaves one of two.
-Blocks of up to three are solved in closed form, larger ones by LAPACK. The code is a graph like any other: what depends
-on Phi_q alone is the factorization, shared by all right sides.
+Most pivots of Phi_q are plain numbers, +1 or -1 from joints and drivers. Elimination with those is
+safe for every q, t and p, costs few operations, and leaves a small system that falls into blocks:
+a four-bar of nine equations leaves one of two. Blocks of up to three are solved in closed form,
+larger ones by LAPACK. The code is a graph like any other: what depends on Phi_q alone is the
+factorization, shared by all right sides.
 """
 
 from __future__ import annotations
@@ -111,7 +112,10 @@ def plan_solve(code: InlineProgram) -> SolvePlan | None:
 
 
 def _eliminate(graph: Graph, matrix: Matrix, right: dict[int, int]) -> tuple[list[Pivot], Matrix]:
-    """Eliminate with plain numbers as long as there are any; return the pivots and their rows, taken out of the matrix."""
+    """Eliminate with plain numbers as long as there are any.
+
+    Return the pivots and their rows, which are taken out of the matrix.
+    """
     pivots: list[Pivot] = []
     eliminated: Matrix = {}
     while (pivot := _cheapest(graph, matrix)) is not None:

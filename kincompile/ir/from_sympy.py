@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 import sympy
 from sympy.core.relational import Relational
@@ -14,15 +14,22 @@ from kincompile.model.spline import PeriodicSpline
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from sympy.functions.elementary.piecewise import ExprCondPair
+
     from kincompile.ir.graph import Graph
     from kincompile.model.expressions import Scalar
 
 FUNCTIONS = {
-    sympy.sin: "sin", sympy.cos: "cos", sympy.tan: "tan", sympy.asin: "asin", sympy.acos: "acos",
-    sympy.atan: "atan", sympy.atan2: "atan2", sympy.sinh: "sinh", sympy.cosh: "cosh", sympy.tanh: "tanh",
-    sympy.asinh: "asinh", sympy.acosh: "acosh", sympy.atanh: "atanh", sympy.exp: "exp", sympy.log: "log",
+    sympy.sin: "sin", sympy.cos: "cos", sympy.tan: "tan",
+    sympy.asin: "asin", sympy.acos: "acos", sympy.atan: "atan", sympy.atan2: "atan2",
+    sympy.sinh: "sinh", sympy.cosh: "cosh", sympy.tanh: "tanh",
+    sympy.asinh: "asinh", sympy.acosh: "acosh", sympy.atanh: "atanh",
+    sympy.exp: "exp", sympy.log: "log",
 }  # fmt: skip
 RECIPROCALS = {sympy.cot: "tan", sympy.sec: "cos", sympy.csc: "sin"}
+RELATIONS = {
+    sympy.Lt: "<", sympy.Le: "<=", sympy.Gt: ">", sympy.Ge: ">=", sympy.Eq: "==", sympy.Ne: "!=",
+}  # fmt: skip
 
 
 class Converter:
@@ -31,9 +38,9 @@ class Converter:
     def __init__(self, graph: Graph, leaf: Callable[[str], int]) -> None:
         self._graph = graph
         self._leaf = leaf
-        self._done: dict[Any, int] = {}
+        self._done: dict[sympy.Basic, int] = {}
 
-    def convert(self, value: Scalar) -> int:
+    def convert(self, value: Scalar | sympy.Basic) -> int:
         """Return the node of a number or expression."""
         if not isinstance(value, sympy.Basic):
             return self._graph.const(value)
@@ -41,7 +48,7 @@ class Converter:
             self._done[value] = self._convert(value)
         return self._done[value]
 
-    def _convert(self, value: Any) -> int:
+    def _convert(self, value: sympy.Basic) -> int:
         graph = self._graph
         if isinstance(value, sympy.Symbol):
             return self._leaf(value.name)
@@ -86,31 +93,32 @@ class Converter:
                 above = graph.mul(above, self.convert(factor))
         return graph.div(graph.mul(self._number(coefficient), above), below)
 
-    def _pow(self, base: Any, exponent: Any) -> int:
+    def _pow(self, base: sympy.Expr, exponent: sympy.Expr) -> int:
         graph = self._graph
-        if exponent.is_Integer:
+        if isinstance(exponent, sympy.Integer):
             return graph.pow(self.convert(base), int(exponent))
-        if exponent.is_Rational and exponent.q == 2:
+        if isinstance(exponent, sympy.Rational) and exponent.q == 2:
             return graph.pow(graph.call("sqrt", self.convert(base)), int(exponent.p))
         return graph.call("pow", self.convert(base), self.convert(exponent))
 
     def _piecewise(self, value: sympy.Piecewise) -> int:
-        *pieces, last = value.args
+        *pieces, last = cast("tuple[ExprCondPair, ...]", value.args)
         node = self.convert(last.expr)
         for piece in reversed(pieces):
             node = self._graph.select(self._condition(piece.cond), self.convert(piece.expr), node)
         return node
 
-    def _condition(self, value: Any) -> int:
+    def _condition(self, value: sympy.Basic) -> int:
         graph = self._graph
         if isinstance(value, Relational):
-            return graph.compare(value.rel_op, self.convert(value.lhs), self.convert(value.rhs))
+            relation = RELATIONS[value.func]
+            return graph.compare(relation, self.convert(value.lhs), self.convert(value.rhs))
         if isinstance(value, sympy.And | sympy.Or):
             connective = "&" if isinstance(value, sympy.And) else "|"
             return graph.logic(connective, *(self._condition(item) for item in value.args))
         raise InternalError(f"the condition {value} passed the checks but cannot be compiled")
 
-    def _function(self, value: Any) -> int:
+    def _function(self, value: sympy.Basic) -> int:
         graph = self._graph
         if isinstance(value, PeriodicSpline):
             return graph.table(value.table_name, value.order, self.convert(value.args[0]))

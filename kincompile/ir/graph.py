@@ -1,8 +1,9 @@
-"""Straight-line code as a hash-consed graph: an expression written twice is one node (value numbering).
+"""Straight-line code as a hash-consed graph: an expression written twice is one node.
 
-A node is a tuple ``(operation, *operands)``; operands of arithmetic are the numbers of earlier nodes. The constructors
-fold constants, zeros and ones and carry signs outward, so that an attribute that happens to be zero costs nothing in the
-emitted code, and ``a - b`` and ``b - a`` share their work.
+This is value numbering. A node is a tuple ``(operation, *operands)``; operands of arithmetic are
+the numbers of earlier nodes. The constructors fold constants, zeros and ones and carry signs
+outward, so that an attribute that happens to be zero costs nothing in the emitted code, and
+``a - b`` and ``b - a`` share their work.
 """
 
 from __future__ import annotations
@@ -129,8 +130,9 @@ class Graph:
         operation, *operands = self.nodes[b]
         if operation == "mul" and (inner := self.value_of(operands[0])) is not None:
             return self.mul(self.const(value * inner), operands[1])
-        if operation == "div" and (inner := self.value_of(operands[1])) is not None:
-            if isinstance(inner, int) and isinstance(value, int | Fraction):
+        if operation == "div" and isinstance(value, int | Fraction):
+            inner = self.value_of(operands[1])
+            if isinstance(inner, int):
                 return self.mul(self.const(Fraction(value) / inner), operands[0])
         if isinstance(value, Fraction):
             return self.div(self.mul(self.const(value.numerator), b), self.const(value.denominator))
@@ -203,8 +205,8 @@ class Graph:
     def linear(self, name: str, size: int, index: int, operands: Sequence[int]) -> int:
         """Return a component of a small linear system's solution, or its determinant.
 
-        ``name`` is ``"solve"`` or ``"determinant"``; the operands are the matrix row by row, and for
-        ``"solve"`` the right side behind it.
+        ``name`` is ``"solve"`` or ``"determinant"``; the operands are the matrix row by row, and
+        for ``"solve"`` the right side behind it.
         """
         return self._intern(("linear", name, size, index, *operands))
 
@@ -215,7 +217,8 @@ class Graph:
     def instantiate(self, nodes: Sequence[Node], inputs: dict[str, int]) -> list[int]:
         """Copy code into this graph with its inputs bound; return the new number of each node.
 
-        Copying runs through the folding constructors: this is where an attribute that is zero removes its terms.
+        Copying runs through the folding constructors: this is where an attribute that is zero
+        removes its terms.
         """
         new: list[int] = []
         for operation, *operands in nodes:

@@ -1,4 +1,4 @@
-"""The program written out: every instance copied into one graph, where equal values of the whole mechanism meet."""
+"""The program written out: all instances in one graph, where equal values of the mechanism meet."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class InlineProgram:
     hints: Mapping[int, str]
 
     def pattern(self) -> tuple[tuple[int, int], ...]:
-        """Return row and column of every entry of Phi_q that is not identically zero, row by row."""
+        """Return row and column of each entry of Phi_q not identically zero, row by row."""
         return tuple(
             (entry.row, entry.column)
             for section in self.sections

@@ -93,7 +93,7 @@ class KernelEnvironment:
         return self._input(derivative_name(name, order))
 
     def cos_sin(self, angle: Scalar, expand: Expansion) -> Pair:
-        """Return cosine and sine: inputs for a body's angle, whose frame is shared, else computed here."""
+        """Return cosine and sine: inputs for a body's angle, whose frame is shared, else code."""
         if angle in self._frame_angles:
             assert isinstance(angle, Symbol)
             return self._input(f"cos {angle.name}"), self._input(f"sin {angle.name}")

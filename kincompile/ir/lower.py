@@ -1,4 +1,4 @@
-"""From a constraint system to a program: each constraint becomes an instance of the kernel of its type."""
+"""From a constraint system to a program: each constraint is an instance of its type's kernel."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kincompile.ir.program import Instance, Kernel, Program
 from kincompile.model.expressions import alpha, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.spline import PeriodicSpline, SplineTable
-from kincompile.names import rate
+from kincompile.names import body_coordinates, rate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -52,9 +52,9 @@ def lower(system: ConstraintSystem) -> Program:
                 first_row,
                 own,
                 bindings,
-            )  # fmt: skip
+            )
         )
-    frames = tuple((body.name, columns[str(body.phi)]) for body in system.bodies)
+    frames = tuple((body.name, columns[body_coordinates(body.name)[2]]) for body in system.bodies)
     return Program(
         system.name,
         system.coordinates,
@@ -107,7 +107,7 @@ def _bind(joint: Joint, kernel: Kernel, graph: Graph) -> tuple[int, ...]:
 
 
 def _coordinate_nodes(joint: Joint, graph: Graph) -> dict[str, int]:
-    """Return coordinates, rates and frames of the template as nodes of the system's own coordinates."""
+    """Return the template's coordinates, rates and frames as nodes of the system's coordinates."""
     known: dict[str, int] = {}
     for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
         known.update(_body_nodes(frame.index, body, graph))
@@ -120,24 +120,25 @@ def _coordinate_nodes(joint: Joint, graph: Graph) -> dict[str, int]:
 
 
 def _body_nodes(index: str, body: Body, graph: Graph) -> dict[str, int]:
-    def node(symbol: sympy.Expr) -> int:
-        return graph.const(0) if body.is_ground else graph.input(symbol.name)
+    def node(name: str) -> int:
+        return graph.const(0) if body.is_ground else graph.input(name)
 
-    phi = node(body.phi)
+    x, y, phi = body_coordinates(body.name)
+    angle = node(phi)
     return {
-        f"r_{index}.x": node(body.x),
-        f"r_{index}.y": node(body.y),
-        f"phi_{index}": phi,
-        f"r_{index}_dot.x": node(body.x_dot),
-        f"r_{index}_dot.y": node(body.y_dot),
-        f"phi_{index}_dot": node(body.phi_dot),
-        f"cos phi_{index}": graph.call("cos", phi),
-        f"sin phi_{index}": graph.call("sin", phi),
+        f"r_{index}.x": node(x),
+        f"r_{index}.y": node(y),
+        f"phi_{index}": angle,
+        f"r_{index}_dot.x": node(rate(x)),
+        f"r_{index}_dot.y": node(rate(y)),
+        f"phi_{index}_dot": node(rate(phi)),
+        f"cos phi_{index}": graph.call("cos", angle),
+        f"sin phi_{index}": graph.call("sin", angle),
     }
 
 
 def _function_nodes(joint: Joint, convert: Callable[..., int]) -> Callable[[str], int]:
-    """Return what gives the node of C, C', C'' or of rho and its derivatives at the contact parameter."""
+    """Return what gives the node of C, C', C'', or of rho and its derivatives at the contact."""
     contacts = _contact_symbols(joint.template, joint.columns)
 
     def node(name: str) -> int:

@@ -20,13 +20,15 @@ class Kernel:
     Attributes
     ----------
     inputs
-        Names of what it reads: coordinates, rates, cosine and sine of body angles, attributes, C(t), rho(alpha).
+        Names of what it reads: coordinates, rates, cosine and sine of body angles, attributes,
+        C(t), rho(alpha).
     nodes
         The code; outputs below are numbers of nodes.
     Phi, nu, gamma
         One node an equation.
     Phi_q
-        ``(row, column, node)`` of each entry that can differ from zero; the column counts the type's own coordinates.
+        ``(row, column, node)`` of each entry that can differ from zero; the column counts the
+        type's own coordinates.
     hints
         ``(node, stem)``: what a vector component is in the textbook's formula, for speaking names.
     """
@@ -77,7 +79,8 @@ class Program:
     frames
         ``(body, column of its angle)`` of each body: cosine and sine are computed once a body.
     values
-        Shared code in coordinates, rates, parameters and t that feeds the instances: attributes, drivers, profiles, frames.
+        Shared code in coordinates, rates, parameters and t that feeds the instances: attributes,
+        drivers, profiles, frames.
     tables
         Splines by name.
     fingerprint
