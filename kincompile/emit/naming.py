@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from kincompile.ir.graph import Constant
+
 
 class NameTable:
     """Gives out names; the first who asks for a name gets it, later ones get it with a number.
@@ -38,11 +40,11 @@ class NameTable:
 
 
 def content_name(
-    node: tuple[object, ...], names: Mapping[int, str], numbers: Mapping[int, int]
+    node: tuple[object, ...], names: Mapping[int, str], numbers: Mapping[int, Constant]
 ) -> str | None:
     """Return a name that says what a small node is: `a_2` for a/2, `sin_theta`, `a_c_crank` for a c_crank."""
     match node:
-        case ("div", int(a), int(b)) if a in names and b in numbers:
+        case ("div", int(a), int(b)) if a in names and isinstance(numbers.get(b), int):
             return f"{names[a]}_{numbers[b]}"
         case ("square", int(a)) if a in names:
             return f"{names[a]}_sq"
