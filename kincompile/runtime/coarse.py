@@ -1,7 +1,8 @@
 r"""A coarse march: a few points of the time grid, as far apart as the prediction is good.
 
-The same steps as `march.advance`, on plain floats and with the planned solve, so that one costs as much as a few calls of
-NumPy. It takes no decision of its own: where anything is out of the ordinary it stops, and the careful march goes on.
+The same steps as `march.advance`, on plain floats and with the planned solve, so that one costs as
+much as a few calls of NumPy. It takes no decision of its own: where anything is out of the ordinary
+it stops, and the careful march goes on.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from kincompile.runtime.lanes import LaneCode
+    from kincompile.runtime.lanes import LaneCode, Lanes
 
 TARGET_ERROR = 0.0006
-"""Error of the prediction aimed at, in radians or sizes of the mechanism. It falls with the third power of the step, the
-interpolation's with the sixth: this one leaves the fine points about 1e-6 from their place."""
+"""Error of the prediction aimed at, in radians or sizes of the mechanism. It falls with the third
+power of the step, the interpolation's with the sixth: this one leaves the fine points about 1e-6
+from their place."""
 
 LARGEST_ERROR = 0.0015
 """Error of the prediction above which a coarse step is not trusted."""
@@ -44,9 +46,9 @@ class Node:
     """
 
     index: int
-    q: Sequence[float]
-    q_dot: Sequence[float]
-    q_ddot: Sequence[float]
+    q: Lanes
+    q_dot: Lanes
+    q_ddot: Lanes
     determinant: float
 
 
@@ -101,7 +103,7 @@ def _step(
     spread: Sequence[float],
     tolerance: float,
 ) -> tuple[Node, float] | None:
-    """Return the point at `index` and the error of its prediction, None where Newton does not converge."""
+    """Return the point at `index` and the error of its prediction; None without convergence."""
     t = times[index]
     h = t - times[node.index]
     predicted = [

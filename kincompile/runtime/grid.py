@@ -1,13 +1,15 @@
-r"""A whole time grid at once: a coarse march, interpolation, and Newton's method on all points together.
+r"""A whole time grid at once: a coarse march, interpolation, and Newton on all points together.
 
-Between two points of the coarse march every coordinate is interpolated by the polynomial of fifth degree through
-:math:`q, \dot q, \ddot q` at both ends (Hermite). That is so near that the first correction already leaves rounding errors,
-and the second shows it. Nothing is taken on trust: a point counts only if its corrections became small, its
-equations hold, it stayed near the interpolation, and det Phi_q kept its sign.
+Between two points of the coarse march every coordinate is interpolated by the polynomial of fifth
+degree through :math:`q, \dot q, \ddot q` at both ends (Hermite). That is so near that the first
+correction already leaves rounding errors, and the second shows it. Nothing is taken on trust: a
+point counts only if its corrections became small, its equations hold, it stayed near the
+interpolation, and det Phi_q kept its sign.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -16,25 +18,32 @@ import numpy as np
 
 from kincompile.runtime.coarse import Node, coarse_march
 from kincompile.runtime.lanes import LaneCode
+from kincompile.runtime.newton import RESIDUAL_FACTOR
 
 if TYPE_CHECKING:
-    from types import ModuleType
+    from typing import TypeAlias
 
     from numpy.typing import NDArray
 
-    Array = NDArray[np.float64]
+    from kincompile.runtime.march import State
+    from kincompile.runtime.problem import Problem
+
+    Array: TypeAlias = NDArray[np.float64]
 
 BLOCK = 2048
 """Points at a time, so that intermediate arrays stay in the cache."""
 
 LARGEST_DISPLACEMENT = 1e-3
-"""Distance from the interpolation, in radians or sizes of the mechanism, beyond which a point is not trusted."""
+"""Distance from the interpolation, in radians or sizes of the mechanism, that is still trusted."""
 
 SMALLEST_DETERMINANT = 1e-6
-"""Determinant, relative to the largest of the coarse march, below which a point is left to the careful march."""
+"""Determinant, relative to the largest of the coarse march, that is still trusted."""
+
+CORRECTIONS_ON_GRID = 2
+"""Newton corrections of every point."""
 
 LAST_CORRECTION = 1e-11
-"""Norm of the second correction, relative to 1 + ||q||, up to which Phi_q before it serves velocity and acceleration."""
+"""Norm of the second correction up to which Phi_q before it serves velocity and acceleration."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +55,7 @@ class GridResult:
     q, q_dot, q_ddot : ndarray, shape (n, N)
         The motion; each coordinate is a row.
     residual : ndarray, shape (N,)
-        Largest absolute value of Phi before the last, smallest correction.
+        Largest absolute value of Phi at the last position but one, a rounding error away.
     good : ndarray of bool, shape (N,)
         Which points can be trusted.
     """
@@ -59,52 +68,48 @@ class GridResult:
 
 
 def solve_grid(
-    module: ModuleType,
-    p: Array,
-    times: Array,
-    first: Node,
-    spread: Array,
-    allowed: Array,
-    tolerance: float,
-) -> GridResult:
-    """Solve as much of a time grid as can be trusted.
+    equations: Problem, times: Array, first: State, tolerance: float, result: GridResult
+) -> int:
+    """Solve as much of a time grid as can be trusted, into the arrays of `result`.
 
     Parameters
     ----------
-    module
-        An emitted module with a planned solve.
-    p : ndarray, shape (k,)
-        Parameters.
+    equations
+        A module with a planned solve, its parameters and scales.
     times : ndarray, shape (N,)
         The grid.
     first
         The point at its start.
-    spread : ndarray, shape (n,)
-        The distance that is large for each coordinate.
-    allowed : ndarray, shape (n,)
-        The residual that is allowed in each equation.
     tolerance
-        Bound of the last correction, relative to 1 + ||q||.
+        Bound of the last correction.
+
+    Returns
+    -------
+    int
+        Number of points in the coarse march.
     """
-    code = LaneCode(module, module.FLOATS, p.tolist())
-    nodes = coarse_march(code, first, times.tolist(), spread.tolist(), tolerance)
-    n, count = len(first.q), times.size
-    result = GridResult(*np.empty((3, n, count)), np.empty(count), np.zeros(count, dtype=bool))
+    module, p = equations.module, equations.p.tolist()
+    code = LaneCode(module, module.FLOATS, p)
+    q = first.point.q.tolist()
+    determinant = math.prod(code.position(q, first.t).determinants)
+    node = Node(0, q, first.q_dot.tolist(), first.q_ddot.tolist(), determinant)
+    spread = equations.spread(first.point.q)
+    nodes = coarse_march(code, node, times.tolist(), spread.tolist(), tolerance)
     reached = nodes[-1].index + 1
     _interpolate(nodes, times[:reached], result.q)
     largest = max(abs(node.determinant) for node in nodes)
     limits = _Limits(
-        tolerance,
+        min(tolerance, LAST_CORRECTION),
         LARGEST_DISPLACEMENT * spread,
-        allowed,
-        math.copysign(SMALLEST_DETERMINANT * largest, first.determinant),
+        RESIDUAL_FACTOR * tolerance * equations.magnitude,
+        math.copysign(SMALLEST_DETERMINANT * largest, determinant),
     )
-    code = LaneCode(module, module.ARRAYS, p.tolist())
+    code = LaneCode(module, module.ARRAYS, p)
     blocks = max(1, round(reached / BLOCK))
     edges = np.linspace(0, reached, blocks + 1).astype(int).tolist()
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in itertools.pairwise(edges):
         _solve_block(code, times[start:stop], result, slice(start, stop), limits)
-    return result
+    return len(nodes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The code of an emitted module on its lanes: each coordinate a number or an array of its own, and the planned solve."""
+"""The code of an emitted module on its lanes: each coordinate a number or an array of its own."""
 
 from __future__ import annotations
 
@@ -6,12 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 if TYPE_CHECKING:
     from types import ModuleType
 
 Lane = Any
 """A float, or an array (N,) over a batch."""
-Lanes = Sequence[Lane]
+Lanes = Sequence[Lane] | NDArray[np.float64]
+"""One lane a coordinate or an equation; an array holds one a row."""
 
 
 @dataclass(frozen=True, slots=True)

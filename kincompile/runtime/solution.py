@@ -47,6 +47,9 @@ class Solution:
         Unit of each coordinate and parameter, "" if none.
     parameters : dict
         Value of each parameter that was used.
+    statistics : dict
+        How it was found: ``coarse``, points of the coarse march of a grid; ``marched``, points that
+        were followed one by one with a pivoted solve.
     """
 
     t: NDArray[np.float64]
@@ -63,6 +66,7 @@ class Solution:
     equations: tuple[str, ...]
     units: dict[str, str]
     parameters: dict[str, float]
+    statistics: dict[str, int]
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
         """Give the column of a coordinate, its rate or its second rate, shape (N,).

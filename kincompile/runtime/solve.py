@@ -2,7 +2,8 @@
 
 inputs    checked, in the solver's form          inputs.read_inputs
   -> assemble the first point from the guess     march.start      (newton.assemble)
-  -> follow the motion from point to point       march.advance    (newton.iterate)
+  -> solve all points together                   grid.solve_grid  (coarse.coarse_march)
+  -> follow what cannot be trusted point by point  march.advance  (newton.iterate)
   -> say how it went                             _message
 """
 
@@ -13,10 +14,12 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.errors import SolveError
+from kincompile.errors import InputError, SolveError
+from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
-from kincompile.runtime.march import Outcome, advance, start
-from kincompile.runtime.problem import problem
+from kincompile.runtime.lanes import has_planned_solve
+from kincompile.runtime.march import SMALL_ERROR, Outcome, State, advance, complete, start
+from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.solution import Solution
 from kincompile.runtime.status import Status
 
@@ -27,10 +30,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from kincompile.runtime.inputs import Values
-    from kincompile.runtime.problem import Point, Vector
+    from kincompile.runtime.problem import Problem, Vector
 
     Progress: TypeAlias = Callable[[int, int], object]
 
+
+SMALLEST_GRID = 32
+"""Points from which on a grid is faster than a march."""
 
 NAMED_EQUATIONS = 3
 """How many equations a message names."""
@@ -44,6 +50,7 @@ def solve(
     *,
     tolerance: float = 1e-10,
     max_iterations: int = 25,
+    method: str | None = None,
     throw: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
@@ -64,6 +71,9 @@ def solve(
         Norm of Newton's correction, relative to 1 + ||q||, at which to stop.
     max_iterations : int
         Cap on Newton's iterations in one attempt.
+    method : {"grid", "march"}, optional
+        ``"march"`` goes from point to point; ``"grid"`` solves all points together and leaves to
+        the march what it cannot trust. Both give the same; without a choice the faster is taken.
     throw : bool
         Raise `SolveError` unless every point converged.
     progress : callable, optional
@@ -84,9 +94,10 @@ def solve(
         With `throw`, when a point failed; `.solution` holds what was found.
     """
     inputs = read_inputs(module, t, p, guess, tolerance, max_iterations)
+    on_grid = _takes_grid(module, inputs.t.size, method)
     motion = _Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
-        outcome = _march(inputs, motion, progress)
+        outcome = _follow(inputs, motion, on_grid, progress)
     solution = _solution(inputs, motion, outcome)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
@@ -103,25 +114,36 @@ class _Motion:
     status: NDArray[np.int64]
     residual: Vector
     iterations: NDArray[np.int64]
+    statistics: dict[str, int]
 
     @classmethod
     def over(cls, inputs: Inputs) -> _Motion:
         """Make the arrays for a time grid, with nothing reached."""
         points = inputs.t.size
-        shape = (points, inputs.guess.size)
+        # Each coordinate is contiguous in memory, as the code of a grid wants it.
+        q, q_dot, q_ddot = np.full((3, inputs.guess.size, points), np.nan)
         return cls(
-            np.full(shape, np.nan),
-            np.full(shape, np.nan),
-            np.full(shape, np.nan),
+            q.T,
+            q_dot.T,
+            q_ddot.T,
             np.full(points, int(Status.NOT_REACHED)),
             np.full(points, np.nan),
             np.zeros(points, dtype=np.int64),
+            {"coarse": 0, "marched": 0},
         )
+
+    def forget(self, index: int) -> None:
+        """Clear what a grid left behind the last point reached."""
+        for values in (self.q, self.q_dot, self.q_ddot, self.residual):
+            values[index:] = np.nan
+        self.iterations[index:] = 0
 
     def put(self, index: int, outcome: Outcome) -> None:
         """Write down what became of a point."""
         self.status[index] = outcome.status
         self.iterations[index] = outcome.iterations
+        self.q[index] = self.q_dot[index] = self.q_ddot[index] = np.nan
+        self.residual[index] = np.nan
         if outcome.position is not None:
             self.q[index] = outcome.position.q
             self.residual[index] = np.max(np.abs(outcome.position.Phi))
@@ -132,7 +154,18 @@ class _Motion:
             self.q_ddot[index] = outcome.state.q_ddot
 
 
-def _march(inputs: Inputs, motion: _Motion, progress: Progress | None) -> Outcome:
+def _takes_grid(module: ModuleType, points: int, method: str | None) -> bool:
+    """Say whether the points of a grid are solved together."""
+    if method not in (None, "grid", "march"):
+        raise InputError(f"method is {method!r}: give 'grid', 'march', or nothing.")
+    if method == "grid" and not has_planned_solve(module):
+        raise InputError(f"{module.NAME} has no planned solve for method='grid': use 'march'.")
+    return method == "grid" or (
+        method is None and points >= SMALLEST_GRID and has_planned_solve(module)
+    )
+
+
+def _follow(inputs: Inputs, motion: _Motion, on_grid: bool, progress: Progress | None) -> Outcome:
     """Go through the grid up to its end, or to the first point that fails."""
     times = inputs.t.tolist()
     outcome = start(problem(inputs.module, inputs.p, inputs.guess, times[0]), times[0], inputs)
@@ -142,14 +175,69 @@ def _march(inputs: Inputs, motion: _Motion, progress: Progress | None) -> Outcom
     # The guess may be rough: from here on the assembled mechanism gives the size.
     assembled = inputs.guess if outcome.position is None else outcome.position.q
     equations = problem(inputs.module, inputs.p, assembled, times[0])
-    for index in range(1, len(times)):
-        if outcome.status is not Status.CONVERGED or outcome.state is None:
+    trusted = np.zeros(len(times), dtype=bool)
+    if on_grid and outcome.state is not None:
+        trusted = _grid(equations, inputs, motion, outcome.state)
+    index = 1
+    while index < len(times) and outcome.status is Status.CONVERGED:
+        state = outcome.state
+        if state is None:
             break
-        outcome = advance(equations, outcome.state, times[index], inputs)
-        motion.put(index, outcome)
+        stop = _end_of_run(trusted, index)
+        if stop > index and _continues(equations, motion, state, index):
+            motion.status[index:stop] = Status.CONVERGED
+            outcome = _taken_up(equations, motion, times[stop - 1], stop - 1)
+            index = stop
+        else:
+            outcome = advance(equations, state, times[index], inputs)
+            motion.put(index, outcome)
+            motion.statistics["marched"] += 1
+            index += 1
         if progress:
-            progress(index + 1, len(times))
+            progress(index, len(times))
+    motion.forget(index)
     return outcome
+
+
+def _grid(equations: Problem, inputs: Inputs, motion: _Motion, first: State) -> NDArray[np.bool_]:
+    """Solve all points together, and tell which of them can be trusted."""
+    trusted = np.zeros(inputs.t.size, dtype=bool)
+    result = GridResult(motion.q.T, motion.q_dot.T, motion.q_ddot.T, motion.residual, trusted)
+    motion.statistics["coarse"] = solve_grid(equations, inputs.t, first, inputs.tolerance, result)
+    motion.iterations[1:] = CORRECTIONS_ON_GRID
+    return trusted
+
+
+def _end_of_run(trusted: NDArray[np.bool_], index: int) -> int:
+    """Return where a run of trusted points that begins at an index ends."""
+    rest = trusted[index:]
+    return index + (rest.size if rest.all() else int(np.argmin(rest)))
+
+
+def _continues(equations: Problem, motion: _Motion, state: State, index: int) -> bool:
+    """Say whether a point of the grid lies on the branch that the march came by.
+
+    After trusted points it does. Where the march went on by itself, the grid's next point must be
+    near its prediction.
+    """
+    if motion.status[index - 1] == Status.CONVERGED and motion.statistics["marched"] == 0:
+        return True
+    distance = np.abs(motion.q[index] - state.point.q) / equations.spread(state.point.q)
+    return bool(np.max(distance) <= SMALL_ERROR)
+
+
+def _taken_up(equations: Problem, motion: _Motion, t: float, index: int) -> Outcome:
+    """Return a point of the grid as one from which the march can go on."""
+    if index == motion.status.size - 1:
+        point = Point(motion.q[index], np.empty(0), np.empty((0, 0)), 0.0)
+        state = State(t, point, motion.q_dot[index], motion.q_ddot[index], 0.0)
+        return Outcome(Status.CONVERGED, 0, state, point)
+    at = equations.at(np.ascontiguousarray(motion.q[index]), t)
+    assert at is not None  # it was evaluated on the grid
+    following = complete(equations, t, at)
+    if isinstance(following, Status):
+        return Outcome(following, 0, None, at)
+    return Outcome(Status.CONVERGED, 0, following, at)
 
 
 def _unassembled(outcome: Outcome) -> Point | None:
@@ -178,6 +266,7 @@ def _solution(inputs: Inputs, motion: _Motion, outcome: Outcome) -> Solution:
         equations=module.EQUATIONS,
         units=dict(module.UNITS),
         parameters=dict(zip(module.PARAMETERS, inputs.p.tolist(), strict=True)),
+        statistics=motion.statistics,
     )
 
 
