@@ -53,6 +53,8 @@ class NotAnExpressionError(ValueError):
 
 def as_expression(value: object) -> Scalar:
     """Return a number as int or float, anything else as a SymPy expression."""
+    if type(value) is float and math.isfinite(value):  # the common case, and the cheapest
+        return value
     if isinstance(value, bool):
         raise NotAnExpressionError(f"{value} is a truth value, not a number")
     if isinstance(value, Integral):

@@ -6,6 +6,7 @@ Every problem is collected, none is raised.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import sympy
@@ -27,7 +28,7 @@ from kincompile.model.spline import PeriodicSpline, fit
 from kincompile.names import body_coordinates, listed, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from kincompile.calculus.template import Template
     from kincompile.model.equation import Equation
@@ -103,7 +104,17 @@ class Scope:
     parameters: Mapping[str, Parameter]
     problems: list[str] = field(default_factory=list)
 
-    @property
+    @cached_property
+    def declared(self) -> frozenset[str]:
+        """Every name that may occur in an expression."""
+        return frozenset((*self.coordinates, *self.parameters, "t"))
+
+    @cached_property
+    def coordinate_names(self) -> frozenset[str]:
+        """The coordinates, for membership."""
+        return frozenset(self.coordinates)
+
+    @cached_property
     def defaults(self) -> dict[str, float]:
         """Parameters with a default."""
         values = self.parameters.values()
@@ -115,12 +126,11 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
     before = len(scope.problems)
     if not equation.expressions:
         scope.problems.append(f"Equation {equation.name!r} has no expression; give at least one")
-    declared = {*scope.coordinates, *scope.parameters, "t"}
     expressions = []
     for name, given in zip(equation.equation_names, equation.expressions, strict=True):
         where = f"equation {name!r}"
-        value = _expression(given, where, declared, scope)
-        if value is not None and not depends_on(value, scope.coordinates):
+        value = _expression(given, where, scope.declared, scope)
+        if value is not None and not depends_on(value, scope.coordinate_names):
             scope.problems.append(
                 f"{where} contains no coordinate, so it cannot constrain anything; coordinates "
                 f"are: {listed(scope.coordinates)}"
@@ -207,13 +217,17 @@ def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> N
         )
 
 
-def _expression(given: Any, where: str, declared: set[str], scope: Scope) -> Scalar | None:
+def _expression(
+    given: Any, where: str, declared: Collection[str], scope: Scope
+) -> Scalar | None:
     """Return a checked expression, or None where a problem was noted."""
     try:
         value = as_expression(given)
     except NotAnExpressionError as error:
         scope.problems.append(f"{where}: {error}; give a finite number or a SymPy expression")
         return None
+    if not isinstance(value, sympy.Expr):
+        return value
     problem = smoothness_problem(value)
     if problem is not None:
         scope.problems.append(f"{where}: {problem}")
@@ -227,9 +241,11 @@ def _expression(given: Any, where: str, declared: set[str], scope: Scope) -> Sca
 
 def _attribute(given: Any, where: str, scope: Scope) -> Scalar:
     """Return an attribute: a number or an expression of parameters."""
-    value = _expression(given, where, {*scope.parameters, *scope.coordinates, "t"}, scope)
+    value = _expression(given, where, scope.declared, scope)
     if value is None:
         return 1
+    if not isinstance(value, sympy.Expr):
+        return value
     varying = sorted(symbol_names(value) - set(scope.parameters))
     if varying:
         scope.problems.append(
@@ -249,10 +265,10 @@ def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
                 "(negative for an internal gear)"
             )
         return value
-    value_or_none = _expression(given, where, {*scope.parameters, *scope.coordinates, "t"}, scope)
+    value_or_none = _expression(given, where, scope.declared, scope)
     if value_or_none is None:
         return 1
-    coordinates = sorted(symbol_names(value_or_none) & set(scope.coordinates))
+    coordinates = sorted(symbol_names(value_or_none) & scope.coordinate_names)
     if coordinates:
         scope.problems.append(
             f"{where}: the value {value_or_none} depends on {listed(coordinates)}; a driver is a "
