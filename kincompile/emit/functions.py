@@ -1,4 +1,4 @@
-"""One function of the emitted module: which values get a name, in which order, and the rows that are returned."""
+"""One function of the emitted module: which values get a name, in which order, what it returns."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EVALUATORS: Mapping[str, tuple[str, ...]] = {
     "acceleration": ("Phi_q", "gamma"),
     "kinematics": ("Phi", "Phi_q", "nu", "gamma"),
 }
-"""The functions of a module and the quantities each returns; the later four share work between theirs."""
+"""The functions of a module and the quantities each returns; the last four share work."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ def schedule(
     steps = []
     numbers = {node: content[1] for node in uses if (content := inline.nodes[node])[0] == "const"}
     for position, section in enumerate(inline.sections):
-        own = []
+        own: list[Assignment] = []
         starts = [entry.node for _, rows in results for entry in rows[position][1]]
         for node in _in_order(inline, starts, names):
             if uses[node] > 1 and node not in names and _deserves_name(inline, node):
@@ -162,7 +162,7 @@ def _count_uses(inline: InlineProgram, outputs: Iterable[int]) -> Counter[int]:
 
 
 def _in_order(inline: InlineProgram, starts: Iterable[int], known: Mapping[int, str]) -> list[int]:
-    """Return what the starts depend on, operands before their users, stopping at values that have a name."""
+    """Return what the starts depend on, operands before their users, down to what has a name."""
     order: dict[int, None] = {}
     stack = [(node, False) for node in reversed(list(starts))]
     while stack:
@@ -176,7 +176,10 @@ def _in_order(inline: InlineProgram, starts: Iterable[int], known: Mapping[int, 
 
 
 def _deserves_name(inline: InlineProgram, node: int) -> bool:
-    """Return whether a value costs anything: not an input, a number, a number times pi, or a changed sign."""
+    """Return whether a value costs anything.
+
+    An input, a number, a number times pi and a changed sign do not.
+    """
     operation = inline.nodes[node][0]
     if operation in ("input", "const", "pi", "neg"):
         return False

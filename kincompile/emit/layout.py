@@ -43,7 +43,7 @@ def table(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def broken(text: str, width: int = WIDTH) -> list[str]:
-    """Return a long expression in lines, broken before a plus or minus that stands outside all parentheses."""
+    """Return a long expression in lines, broken before a plus or minus outside all parentheses."""
     if len(text) <= width:
         return [text]
     pieces, depth, start = [], 0, 0

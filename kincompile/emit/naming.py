@@ -42,7 +42,10 @@ class NameTable:
 def content_name(
     node: tuple[object, ...], names: Mapping[int, str], numbers: Mapping[int, Constant]
 ) -> str | None:
-    """Return a name that says what a small node is: `a_2` for a/2, `sin_theta`, `a_c_crank` for a c_crank."""
+    """Return a name that says what a small node is.
+
+    It is `a_2` for a/2, `sin_theta`, `a_c_crank` for a c_crank; None for a larger node.
+    """
     match node:
         case ("div", int(a), int(b)) if a in names and isinstance(numbers.get(b), int):
             return f"{names[a]}_{numbers[b]}"

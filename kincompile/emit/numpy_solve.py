@@ -53,7 +53,7 @@ def _explained(code: InlineProgram, listing: SolveListing) -> list[str]:
 
 
 def _steps(nodes: Iterable[int], listing: SolveListing, printer: PythonPrinter) -> list[str]:
-    """Return an assignment for each node; the components of a larger block's solution come from one call."""
+    """Return an assignment for each node; a larger block's solution comes from one call."""
     lines: list[str] = []
     done: set[tuple[int, ...]] = set()
     for node in nodes:

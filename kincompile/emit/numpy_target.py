@@ -25,9 +25,9 @@ FORMAT = 1
 """Version of the contract of an emitted module."""
 
 FUNCTIONS = {
-    "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2", "asinh": "np.arcsinh",
-    "acosh": "np.arccosh", "atanh": "np.arctanh", "pow": "np.power", "where": "np.where",
-    "cos_sin": "staticmethod(_cos_sin)",
+    "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2",
+    "asinh": "np.arcsinh", "acosh": "np.arccosh", "atanh": "np.arctanh",
+    "pow": "np.power", "where": "np.where", "cos_sin": "staticmethod(_cos_sin)",
 }  # fmt: skip
 """NumPy's names of elementary functions where they are not those of `math`."""
 
@@ -114,9 +114,9 @@ def _indented(lines: Iterable[str]) -> str:
 
 
 def _units(program: Program) -> list[str]:
-    return [
-        f"{item.name!r}: {item.unit!r}," for item in (*program.coordinates, *program.parameters)
-    ]
+    units = {item.name: item.unit for item in program.coordinates}
+    units.update({item.name: item.unit for item in program.parameters})
+    return [f"{name!r}: {unit!r}," for name, unit in units.items()]
 
 
 def _header(code: InlineProgram) -> list[str]:
@@ -147,11 +147,11 @@ def _rows(section: Section) -> str:
 
 def _tables(program: Program) -> list[str]:
     lines = []
-    for name, table in program.tables.items():
+    for name, spline in program.tables.items():
         lines += [f"{name} = (", "    np.array(("]
-        lines += [f"        {line}" for line in wrapped([repr(x) for x in table.breaks])]
+        lines += [f"        {line}" for line in wrapped([repr(x) for x in spline.breaks])]
         lines += ["    )),", "    np.array(("]
-        lines += [f"        ({', '.join(repr(x) for x in row)})," for row in table.coefficients]
+        lines += [f"        ({', '.join(repr(x) for x in row)})," for row in spline.coefficients]
         lines += ["    )),", ")"]
     return lines
 
@@ -216,7 +216,7 @@ def _title(section: Section) -> str:
 
 
 def _unpack(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:
-    """Return the lines that give the inputs their names: all of a vector, or the few that are read."""
+    """Return the lines that name the inputs: all of a vector, or the few that are read."""
     coordinates = [item.name for item in program.coordinates]
     vectors = {
         "q": coordinates,

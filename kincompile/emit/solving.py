@@ -1,4 +1,4 @@
-"""The planned solve as two functions: the factorization, from Phi_q alone, and the solution for a right side."""
+"""The planned solve as two functions: factorization, from Phi_q alone, and solution."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def _needed(plan: SolvePlan, outputs: Sequence[int]) -> set[int]:
 
 
 def _count_uses(plan: SolvePlan, needed: set[int]) -> Counter[int]:
-    """Count how often each value is used; a changed sign is no value of its own, a result is a use."""
+    """Count how often each value is used; a changed sign is not a value, a result is a use."""
     signs = {node for node in needed if plan.nodes[node][0] == "neg"}
     uses = Counter(k for node in needed - signs for k in _signless_operands(plan, node))
     return uses + Counter(plan.nodes[node][1] for node in plan.solution if node in signs)

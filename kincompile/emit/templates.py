@@ -1,4 +1,4 @@
-"""Templates: found in the installed package or in a checkout, and filled so that nothing is missing or left over."""
+"""Templates: found in the package or a checkout, filled with nothing missing or left over."""
 
 from __future__ import annotations
 
