@@ -1,0 +1,193 @@
+"""The committed modules of generated/numpy/ are what the examples emit today, and they run alone.
+
+`pytest -k golden --update-goldens` rewrites them and fails the run, so that nothing passes by
+updating. The bytes are those of the pinned SymPy; on another one the numbers must agree.
+"""
+
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.compiler import TARGETS
+
+ROOT = Path(__file__).resolve().parents[2]
+GENERATED = ROOT / "generated" / "numpy"
+EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
+PINNED = re.search(
+    r"^sympy==(\S+)$", (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE
+)
+QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
+
+# Runs a golden in an interpreter in which neither kincompile nor SymPy can be imported.
+ALONE = """
+import json, runpy, sys
+
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("kincompile", "sympy", "scipy", "jinja2"):
+            raise ImportError(f"an emitted module must not import {name}")
+
+sys.meta_path.insert(0, Blocked())
+import numpy as np
+
+results = {}
+for path in sys.argv[1:]:
+    module = runpy.run_path(path)
+    rng = np.random.default_rng(7)
+    q, q_dot = rng.uniform(-1, 1, (2, module["N_COORDINATES"]))
+    values = module["kinematics"](q, q_dot, 0.4)
+    results[module["NAME"]] = [value.tolist() for value in values]
+print(json.dumps(results))
+"""
+
+# Emits every example and prints the digest of each.
+EMIT = """
+import hashlib, runpy, sys
+import kincompile as kc
+
+for path in sys.argv[1:]:
+    names = runpy.run_path(path)
+    source = kc.emit(names["mechanism"] if "mechanism" in names else names["system"]).source
+    print(path, hashlib.sha256(source.encode()).hexdigest())
+"""
+
+
+def is_pinned() -> bool:
+    """Return whether this SymPy is the one whose bytes are committed."""
+    assert PINNED is not None
+    return PINNED[1] == sympy.__version__
+
+
+def read_text(path: Path) -> str:
+    """Return a file's text as it is: line ends count."""
+    return path.read_bytes().decode("utf-8")
+
+
+def run(*arguments: str, **environment: str) -> str:
+    """Run Python and return what it prints."""
+    result = subprocess.run(
+        [sys.executable, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+@pytest.fixture(scope="module", autouse=True)
+def rewritten(request, example_named):
+    """With --update-goldens rewrite them first, and return what was changed."""
+    if not request.config.getoption("--update-goldens"):
+        return []
+    return update(GENERATED, {name: example_named(name).source for name in EXAMPLES})
+
+
+def update(folder: Path, sources: dict[str, str]) -> list[str]:
+    """Bring a folder of goldens up to date; return what was changed."""
+    wanted = {folder / f"{name}.py": source for name, source in sources.items()}
+    changes = []
+    for path in sorted(file for file in folder.rglob("*") if file.is_file()):
+        if path not in wanted:
+            path.unlink()
+            changes.append(f"removed {path.relative_to(folder)}")
+    for path, source in wanted.items():
+        if not path.exists() or read_text(path) != source:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(source.encode())
+            changes.append(f"wrote {path.relative_to(folder)}")
+    return changes or ["nothing had changed"]
+
+
+def test_that_this_run_does_not_rewrite_them(rewritten):
+    assert not rewritten, "--update-goldens fails by design: " + "; ".join(rewritten)
+
+
+def test_that_nothing_is_missing_and_nothing_extra():
+    assert sorted(path.name for path in GENERATED.parent.iterdir()) == sorted(TARGETS)
+    found = [path for path in GENERATED.rglob("*") if "__pycache__" not in path.parts]
+    assert sorted(found) == [GENERATED / f"{name}.py" for name in EXAMPLES]
+
+
+@pytest.mark.skipif(not is_pinned(), reason="the bytes are those of the pinned SymPy")
+def test_that_the_text_is_what_is_emitted_today(example):
+    path = GENERATED / f"{example.path.stem}.py"
+    assert read_text(path) == example.source, "make update-goldens rewrites it, if it is meant"
+
+
+def test_that_the_numbers_are_those_of_today(example):
+    golden = kc.load(GENERATED / f"{example.path.stem}.py")
+    module = example.module
+    for constant in ("COORDINATES", "EQUATIONS", "PARAMETERS", "UNITS"):
+        assert getattr(golden, constant) == getattr(module, constant)
+    np.testing.assert_array_equal(golden.PATTERN, module.PATTERN)
+    rng = np.random.default_rng(7)
+    q, q_dot = rng.uniform(-1, 1, (2, 5, module.N_COORDINATES))
+    for here, there in zip(
+        module.kinematics(q, q_dot, 0.4), golden.kinematics(q, q_dot, 0.4), strict=True
+    ):
+        np.testing.assert_allclose(there, here, rtol=1e-12, atol=1e-12)
+
+
+def test_that_they_run_where_kincompile_and_sympy_cannot_be_imported(example_named):
+    paths = [str(GENERATED / f"{name}.py") for name in EXAMPLES]
+    results = json.loads(run("-I", "-c", ALONE, *paths))
+    assert sorted(results) == EXAMPLES
+    for name, values in results.items():
+        module = example_named(name).module
+        q, q_dot = np.random.default_rng(7).uniform(-1, 1, (2, module.N_COORDINATES))
+        expected = module.kinematics(q, q_dot, 0.4)
+        for quantity, here, there in zip(QUANTITIES, expected, values, strict=True):
+            np.testing.assert_allclose(there, here, rtol=1e-12, atol=1e-12, err_msg=quantity)
+
+
+def test_that_the_block_on_imports_does_block():
+    code = ALONE.replace("import numpy as np", "import sympy", 1)
+    with pytest.raises(AssertionError, match="must not import sympy"):
+        run("-I", "-c", code)
+
+
+@pytest.mark.parametrize("seed", ["0", "1", "4242"])
+def test_that_the_bytes_do_not_depend_on_the_hash_seed(example_named, seed):
+    paths = [str(example_named(name).path) for name in EXAMPLES]
+    printed = run("-c", EMIT, *paths, PYTHONHASHSEED=seed)
+    digests = dict(line.rsplit(" ", 1) for line in printed.splitlines())
+    for name, path in zip(EXAMPLES, paths, strict=True):
+        here = hashlib.sha256(example_named(name).source.encode()).hexdigest()
+        assert digests[path] == here, name
+
+
+def test_that_they_have_no_errors_of_style():
+    pytest.importorskip("ruff", reason="ruff comes with the extra `lint`")
+    run("-m", "ruff", "check", "--isolated", "--no-cache", "--select", "E9,F", str(GENERATED))
+
+
+def test_that_updating_rewrites_and_removes(tmp_path):
+    folder = tmp_path / "numpy"
+    folder.mkdir()
+    (folder / "kept.py").write_bytes(b"same\n")
+    (folder / "old.py").write_bytes(b"old\n")
+    (folder / "stray.py").write_bytes(b"stray\n")
+    sources = {"kept": "same\n", "old": "new\n", "added": "added\n"}
+    changes = update(folder, sources)
+    assert changes == ["removed stray.py", "wrote old.py", "wrote added.py"]
+    assert {path.stem: read_text(path) for path in folder.iterdir()} == sources
+    assert update(folder, sources) == ["nothing had changed"]
+
+
+@pytest.mark.parametrize(
+    "volatile", [r"/work|/home|/tmp", r"\b20\d\d-\d\d-\d\d\b", r"0x[0-9a-f]{6}"]
+)
+def test_that_they_hold_nothing_volatile(volatile):
+    for name in EXAMPLES:
+        assert not re.search(volatile, read_text(GENERATED / f"{name}.py")), name
