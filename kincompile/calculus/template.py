@@ -33,6 +33,10 @@ class Template:
     contacts: tuple[Contact, ...]
     Phi: tuple[Expression, ...]
 
+    def __hash__(self) -> int:
+        # Templates are keys of the kernel cache; walking the whole expression each time is slow.
+        return hash(self.type_name)
+
     @property
     def coordinates(self) -> tuple[VectorSymbol | Symbol, ...]:
         """The generalised coordinates: r and phi of each body, then the contact parameters."""

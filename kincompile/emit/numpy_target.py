@@ -126,9 +126,9 @@ def _header(code: InlineProgram) -> list[str]:
     for section in code.sections:
         instance = section.instance
         title = f'{instance.kernel.name} "{instance.name}"' + (
-            " (driver)" if instance.is_driver else ""
+            " (driver)" if instance.constraint.is_driver else ""
         )
-        rows.append((_rows(section), title, " - ".join(instance.bodies), instance.source))
+        rows.append((_rows(section), title, " - ".join(instance.bodies), instance.constraint.source))
     lines = labelled("q", [f"{item.name}{_unit(item.unit)}" for item in program.coordinates])
     if program.parameters:
         lines += labelled("p", [f"{item.name}{_unit(item.unit)}" for item in program.parameters])
@@ -212,7 +212,7 @@ def _place(quantity: str, entry: Entry, code: InlineProgram) -> str:
 
 def _title(section: Section) -> str:
     instance = section.instance
-    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}": {instance.text}'
+    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}": {instance.constraint.text}'
 
 
 def _unpack(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 from typing import TYPE_CHECKING
 
 import sympy
@@ -28,32 +29,19 @@ def lower(system: ConstraintSystem) -> Program:
     """Return the program of a system: kernels x instances."""
     columns = {item.name: column for column, item in enumerate(system.coordinates)}
     graph = Graph()
+    binder = _Binder(graph)
     instances = []
     tables: dict[str, SplineTable] = {}
     for first_row, constraint in zip(system.row_offsets, system.constraints, strict=True):
         if isinstance(constraint, FreeEquation):
             kernel = equation_kernel(constraint)
             bindings = tuple(graph.input(name) for name in kernel.inputs)
-            bodies: tuple[str, ...] = ()
         else:
             kernel = constraint_kernel(constraint.template)
-            bindings = _bind(constraint, kernel, graph)
-            bodies = tuple(body.name for body in constraint.bodies)
+            bindings = binder.bind(constraint, kernel)
             tables.update(_tables(constraint))
         own = tuple(None if name is None else columns[name] for name in constraint.columns)
-        instances.append(
-            Instance(
-                kernel,
-                constraint.name,
-                constraint.source,
-                constraint.text,
-                constraint.is_driver,
-                bodies,
-                first_row,
-                own,
-                bindings,
-            )
-        )
+        instances.append(Instance(kernel, constraint, first_row, own, bindings))
     frames = tuple((body.name, columns[body_coordinates(body.name)[2]]) for body in system.bodies)
     return Program(
         system.name,
@@ -74,13 +62,24 @@ def _fingerprint(
     instances: list[Instance],
     tables: dict[str, SplineTable],
 ) -> str:
+    kernels = {instance.kernel.name: instance.kernel for instance in instances if instance.bodies}
     content = (
         system.name,
         system.coordinates,
         system.parameters,
         system.equations,
         graph.nodes,
-        instances,
+        sorted(kernels.items()),
+        [
+            (
+                instance.name,
+                # A free equation is a kernel of its own.
+                instance.kernel.name if instance.bodies else instance.kernel,
+                instance.bindings,
+                instance.columns,
+            )
+            for instance in instances
+        ],
         sorted(tables.items()),
     )
     return hashlib.sha256(repr(content).encode()).hexdigest()[:32]
@@ -93,60 +92,69 @@ def _tables(joint: Joint) -> dict[str, SplineTable]:
     return {item.table_name: item.table for item in splines}
 
 
-def _bind(joint: Joint, kernel: Kernel, graph: Graph) -> tuple[int, ...]:
-    """Return the node of each of the kernel's inputs."""
-    convert = Converter(graph, graph.input).convert
-    known = _coordinate_nodes(joint, graph)
-    known.update(
-        {symbol: convert(value) for symbol, value in joint.scalars.items() if symbol != "C"}
-    )
-    for symbol, (x, y) in joint.points.items():
-        known[f"{symbol}.x"], known[f"{symbol}.y"] = convert(x), convert(y)
-    functions = _function_nodes(joint, convert)
-    return tuple(known[name] if name in known else functions(name) for name in kernel.inputs)
+class _Binder:
+    """Gives the nodes of kernels' inputs; those of a body are made once for all its joints."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._convert = Converter(graph, graph.input).convert
+        self._bodies: dict[str, tuple[int, ...]] = {}
+
+    def bind(self, joint: Joint, kernel: Kernel) -> tuple[int, ...]:
+        """Return the node of each of the kernel's inputs."""
+        known = self._coordinates(joint)
+        for symbol, value in joint.scalars.items():
+            if symbol != "C":
+                known[symbol] = self._convert(value)
+        for symbol, (x, y) in joint.points.items():
+            known[f"{symbol}.x"], known[f"{symbol}.y"] = self._convert(x), self._convert(y)
+        functions = _function_nodes(joint, self._convert)
+        return tuple(known[name] if name in known else functions(name) for name in kernel.inputs)
+
+    def _coordinates(self, joint: Joint) -> dict[str, int]:
+        """Return the template's coordinates, rates and frames as nodes of the system's own."""
+        known: dict[str, int] = {}
+        for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
+            known.update(zip(_frame_inputs(frame.index), self._body(body), strict=True))
+        names = joint.columns[3 * len(joint.bodies) :]
+        for contact, name in zip(joint.template.contacts, names, strict=True):
+            assert name is not None
+            known[contact.alpha.name] = self._graph.input(name)
+            known[contact.alpha_dot.name] = self._graph.input(rate(name))
+        return known
+
+    def _body(self, body: Body) -> tuple[int, ...]:
+        """Return a body's coordinates, rates, cosine and sine; of the ground they are numbers."""
+        if body.name not in self._bodies:
+            graph, coordinates = self._graph, body_coordinates(body.name)
+            if body.is_ground:
+                nodes = [graph.const(0)] * 6
+            else:
+                rates = [rate(name) for name in coordinates]
+                nodes = [graph.input(name) for name in (*coordinates, *rates)]
+            angle = nodes[2]
+            self._bodies[body.name] = (*nodes, graph.call("cos", angle), graph.call("sin", angle))
+        return self._bodies[body.name]
 
 
-def _coordinate_nodes(joint: Joint, graph: Graph) -> dict[str, int]:
-    """Return the template's coordinates, rates and frames as nodes of the system's coordinates."""
-    known: dict[str, int] = {}
-    for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
-        known.update(_body_nodes(frame.index, body, graph))
-    names = joint.columns[3 * len(joint.bodies) :]
-    for contact, name in zip(joint.template.contacts, names, strict=True):
-        assert name is not None
-        known[contact.alpha.name] = graph.input(name)
-        known[contact.alpha_dot.name] = graph.input(rate(name))
-    return known
-
-
-def _body_nodes(index: str, body: Body, graph: Graph) -> dict[str, int]:
-    def node(name: str) -> int:
-        return graph.const(0) if body.is_ground else graph.input(name)
-
-    x, y, phi = body_coordinates(body.name)
-    angle = node(phi)
-    return {
-        f"r_{index}.x": node(x),
-        f"r_{index}.y": node(y),
-        f"phi_{index}": angle,
-        f"r_{index}_dot.x": node(rate(x)),
-        f"r_{index}_dot.y": node(rate(y)),
-        f"phi_{index}_dot": node(rate(phi)),
-        f"cos phi_{index}": graph.call("cos", angle),
-        f"sin phi_{index}": graph.call("sin", angle),
-    }
+@cache
+def _frame_inputs(index: str) -> tuple[str, ...]:
+    """Return the names of a body's coordinates, rates, cosine and sine as a kernel's inputs."""
+    coordinates = f"r_{index}.x", f"r_{index}.y", f"phi_{index}"
+    rates = f"r_{index}_dot.x", f"r_{index}_dot.y", f"phi_{index}_dot"
+    return *coordinates, *rates, f"cos phi_{index}", f"sin phi_{index}"
 
 
 def _function_nodes(joint: Joint, convert: Callable[..., int]) -> Callable[[str], int]:
     """Return what gives the node of C, C', C'', or of rho and its derivatives at the contact."""
-    contacts = _contact_symbols(joint.template, joint.columns)
 
     def node(name: str) -> int:
         symbol, order = name.rstrip("'"), name.count("'")
         assert derivative_name(symbol, order) == name
         if symbol in joint.profiles:
             rho = joint.profiles[symbol].diff(alpha, order)
-            return convert(rho.subs(alpha, contacts[symbol]))
+            contact = _contact_symbols(joint.template, joint.columns)[symbol]
+            return convert(rho.subs(alpha, contact))
         value = joint.scalars[symbol]
         return convert(value if order == 0 else sympy.sympify(value).diff(t, order))
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from kincompile.ir.graph import Node
     from kincompile.model.bodies import Coordinate, Parameter
+    from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.spline import SplineTable
 
 
@@ -49,8 +50,8 @@ class Instance:
 
     Attributes
     ----------
-    bodies
-        Names of body i and body j, as far as the type has them.
+    constraint
+        The constraint, for names and comments.
     first_row
         Row offset in the system.
     columns
@@ -60,14 +61,20 @@ class Instance:
     """
 
     kernel: Kernel
-    name: str
-    source: str
-    text: str
-    is_driver: bool
-    bodies: tuple[str, ...]
+    constraint: Joint | FreeEquation
     first_row: int
     columns: tuple[int | None, ...]
     bindings: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """The constraint's name."""
+        return self.constraint.name
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of body i and body j, as far as the type has them."""
+        return tuple(body.name for body in self.constraint.bodies)
 
 
 @dataclass(frozen=True, slots=True)

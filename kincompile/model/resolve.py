@@ -51,22 +51,37 @@ class Joint:
         is an expression of `alpha`.
     columns
         Names of the coordinates in the order of the template, None for those of the ground.
-    source
-        Where the textbook has the constraint.
-    text
-        The constraint in words, for comments: bodies, points, values.
+    written
+        The constraint as the user wrote it.
     """
 
-    name: str
+    written: Constraint
     template: Template
     bodies: tuple[Body, ...]
     scalars: Mapping[str, Scalar]
     points: Mapping[str, Point]
     profiles: Mapping[str, sympy.Expr]
     columns: tuple[str | None, ...]
-    equation_names: tuple[str, ...]
-    source: str
-    text: str
+
+    @property
+    def name(self) -> str:
+        """Name of the constraint."""
+        return self.written.name
+
+    @property
+    def equation_names(self) -> tuple[str, ...]:
+        """Names of its rows."""
+        return self.written.equation_names
+
+    @property
+    def source(self) -> str:
+        """Where the textbook has it."""
+        return self.written.source
+
+    @property
+    def text(self) -> str:
+        """The constraint in words, for comments: bodies, points, values."""
+        return _text(self.written)
 
     @property
     def is_driver(self) -> bool:
@@ -83,6 +98,11 @@ class FreeEquation:
     columns: tuple[str, ...]
     equation_names: tuple[str, ...]
     source: str = "free equation"
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """A free equation names coordinates, not bodies."""
+        return ()
 
     @property
     def text(self) -> str:
@@ -166,16 +186,13 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     if len(scope.problems) > before:
         return None
     return Joint(
-        constraint.name,
+        constraint,
         constraint.template(),
         tuple(bodies),
         scalars,
         points,
         profiles,
         (*(name for body in bodies for name in _columns(body)), *constraint.contact_names),
-        constraint.equation_names,
-        constraint.source,
-        _text(constraint),
     )
 
 

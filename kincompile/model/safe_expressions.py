@@ -89,7 +89,10 @@ class ExpressionError(NotAnExpressionError):
 
 
 def parse_expression(
-    text: str, names: Mapping[str, sympy.Expr], place: Place | None = None
+    text: str,
+    names: Mapping[str, sympy.Expr],
+    place: Place | None = None,
+    refused: Mapping[str, str] | None = None,
 ) -> sympy.Expr:
     """Read one expression.
 
@@ -102,6 +105,8 @@ def parse_expression(
         What each name stands for.
     place
         Where the text begins in its file, for messages.
+    refused
+        Names that exist and may not stand here, each with the reason.
 
     Returns
     -------
@@ -124,7 +129,7 @@ def parse_expression(
     source.check_characters()
     source.check_brackets()
     try:
-        value = _Reader(source, names).read(source.tree())
+        value = _Reader(source, names, refused or {}).read(source.tree())
         return sympy.sympify(as_expression(value), strict=True)
     except ExpressionError:
         raise
@@ -226,9 +231,12 @@ def unbalanced_bracket(text: str) -> tuple[str, int] | None:
 class _Reader:
     """Rebuilds a syntax tree in SymPy, node by node."""
 
-    def __init__(self, source: _Source, names: Mapping[str, sympy.Expr]) -> None:
+    def __init__(
+        self, source: _Source, names: Mapping[str, sympy.Expr], refused: Mapping[str, str]
+    ) -> None:
         self._source = source
         self._names = names
+        self._refused = refused
         self._nodes = 0
 
     def read(self, node: ast.expr, depth: int = 0) -> sympy.Expr:
@@ -276,6 +284,8 @@ class _Reader:
         name = node.id
         if name in self._names:
             return self._names[name]
+        if name in self._refused:
+            raise self._error(f"{name!r} cannot stand here: {self._refused[name]}", node)
         if name in CONSTANTS:
             return CONSTANTS[name]
         if name in FUNCTIONS:
@@ -314,7 +324,8 @@ class _Reader:
                 raise self._error("this divides by zero", link.right)
             return sympy.Mul(left, sympy.Pow(right, -1))
         self._check_exponent(right, link.right)
-        return sympy.Pow(left, right)
+        power: sympy.Expr = sympy.Pow(left, right)
+        return power
 
     def _check_exponent(self, exponent: sympy.Expr, node: ast.expr) -> None:
         if exponent.is_number and not abs(exponent) <= MAX_EXPONENT:
