@@ -1,7 +1,7 @@
-"""Expansion of a vector expression to components, over any kind of value that can be added and multiplied.
+"""Expansion of a vector expression to components, over any values that add and multiply.
 
-The same walk gives SymPy expressions (`ConstraintSystem.Phi`), straight-line code (the kernels) and plain numbers: what
-the leaves are is the environment's business.
+The same walk gives SymPy expressions (`ConstraintSystem.Phi`), straight-line code (the kernels) and
+plain numbers: what the leaves are is the environment's business.
 """
 
 from __future__ import annotations

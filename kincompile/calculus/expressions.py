@@ -1,9 +1,10 @@
-"""Scalars, planar vectors and rotations: the nodes of a constraint written as the textbook writes it.
+"""Scalars, planar vectors and rotations: the nodes of a constraint as the textbook writes it.
 
-An expression is a small immutable tree. The functions below build one and keep it tidy (flat sums, numeric coefficients
-in front, zeros dropped), so that a derivative reads like one written by hand. Rotations are the whole point: with
-R = [[0, -1], [1, 0]] and A(phi) the rotation matrix, every turned vector is ``R^k A(phi) v`` with k = 0 or 1, since
-R R = -I; ``A_i v`` has k = 0 and ``B_i v = R A_i v`` has k = 1.
+An expression is a small immutable tree. The functions below build one and keep it tidy (flat sums,
+numeric coefficients in front, zeros dropped), so that a derivative reads like one written by hand.
+Rotations are the whole point: with R = [[0, -1], [1, 0]] and A(phi) the rotation matrix, every
+turned vector is ``R^k A(phi) v`` with k = 0 or 1, since R R = -I; ``A_i v`` has k = 0 and
+``B_i v = R A_i v`` has k = 1.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The symbols of the textbook, each under one name: coordinates of bodies i and j, attributes, drivers, profiles."""
+"""The symbols of the textbook: coordinates of bodies i and j, attributes, drivers, profiles."""
 
 from __future__ import annotations
 

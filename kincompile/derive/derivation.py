@@ -38,8 +38,9 @@ class RowBlock:
     Phi
         The constraint.
     Phi_q
-        Its derivative by each coordinate of the template. By a position r: the number k of the block k I where Phi is a
-        vector, the row (d/dx, d/dy) as a vector where Phi is a scalar. By an angle: a vector or a scalar, as Phi is.
+        Its derivative by each coordinate of the template. By a position r: the number k of the
+        block k I where Phi is a vector, the row (d/dx, d/dy) as a vector where Phi is a scalar. By
+        an angle: a vector or a scalar, as Phi is.
     nu
         :math:`-\Phi_t`.
     gamma_terms

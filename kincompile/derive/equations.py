@@ -1,4 +1,4 @@
-"""Phi_q, nu and gamma of free SymPy equations, differentiated only by the symbols that occur in them."""
+"""Phi_q, nu and gamma of free SymPy equations, differentiated by the symbols that occur in them."""
 
 from __future__ import annotations
 

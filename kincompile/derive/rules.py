@@ -1,4 +1,7 @@
-"""The rules of differentiation: dA/dphi = B = R A, dB/dphi = -A, sum, product and chain rule, on scalars and vectors."""
+"""The rules of differentiation, on scalars and vectors.
+
+They are dA/dphi = B = R A, dB/dphi = -A, and the sum, product and chain rule.
+"""
 
 from __future__ import annotations
 
@@ -43,8 +46,9 @@ TIME = Symbol("t")
 def derivative(expression: Scalar, direction: Direction) -> Scalar:
     """Differentiate a scalar along a direction.
 
-    With ``{phi_i: 1}`` it is the partial derivative by phi_i; with ``{r_i: r_i_dot, phi_i: phi_i_dot, ...}`` it is
-    Phi_q q_dot; a driver C(t) differentiates to its next order where the direction holds the time.
+    With ``{phi_i: 1}`` it is the partial derivative by phi_i; with the rates,
+    ``{r_i: r_i_dot, phi_i: phi_i_dot, ...}``, it is Phi_q q_dot; a driver C(t) differentiates to
+    its next order where the direction holds the time.
     """
     match expression:
         case Sum(terms):

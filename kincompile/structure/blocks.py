@@ -1,4 +1,4 @@
-"""Block triangular form: a square system split into small ones that can be solved one after the other."""
+"""Block triangular form: a square system as small ones that are solved one after the other."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ def block_triangular(
 ) -> tuple[Block, ...] | None:
     """Split a square system into blocks in the order in which they can be solved.
 
-    The blocks are the strong components of the matched equations (Dulmage and Mendelsohn): each needs the results of
-    earlier blocks only.
+    The blocks are the strong components of the matched equations (Dulmage and Mendelsohn): each
+    needs the results of earlier blocks only.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def block_triangular(
     Returns
     -------
     tuple of Block or None
-        None where the equations cannot be matched with the coordinates: the system is structurally singular.
+        None where the equations cannot be matched with the coordinates: the system is structurally
+        singular.
     """
     row_number = {row: k for k, row in enumerate(rows)}
     column_number = {column: k for k, column in enumerate(columns)}

@@ -1,16 +1,13 @@
-"""Counts: do the equations suffice to determine the coordinates, and which coordinates can they determine."""
+"""Counts: do the equations suffice to determine the coordinates, and which do they leave open."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import maximum_bipartite_matching
-
 from kincompile.errors import StructuralError
 from kincompile.names import listed
+from kincompile.structure.blocks import matching
 
 if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
@@ -20,14 +17,12 @@ Pattern = Sequence[tuple[int, int]]
 
 
 def unmatched(system: ConstraintSystem, pattern: Pattern) -> tuple[list[str], list[str]]:
-    """Return the equations and the coordinates left over by a maximum matching of one to the other."""
+    """Return the names of equations and coordinates that a maximum matching leaves over."""
     names = [item.name for item in system.coordinates]
-    shape = len(system.equations), len(names)
-    rows, columns = np.array(pattern, dtype=np.intp).reshape(-1, 2).T
-    matrix = csr_array((np.ones(len(rows)), (rows, columns)), shape=shape)
-    column_of = maximum_bipartite_matching(matrix, perm_type="column").tolist()
-    lonely = [name for name, column in zip(system.equations, column_of, strict=True) if column < 0]
-    return lonely, [name for column, name in enumerate(names) if column not in set(column_of)]
+    matched = matching(pattern, (len(system.equations), len(names)))
+    equations = [name for name, column in zip(system.equations, matched, strict=True) if column < 0]
+    taken = set(matched)
+    return equations, [name for column, name in enumerate(names) if column not in taken]
 
 
 def require_square(system: ConstraintSystem, pattern: Pattern) -> None:
@@ -36,7 +31,8 @@ def require_square(system: ConstraintSystem, pattern: Pattern) -> None:
     Raises
     ------
     StructuralError
-        With the counts, the coordinates that nothing determines or the equations that are too many, and what to do.
+        With the counts, the coordinates that nothing determines or the equations that are too
+        many, and what to do.
     """
     n, m = len(system.coordinates), len(system.equations)
     equations, coordinates = unmatched(system, pattern)
@@ -59,22 +55,25 @@ def _counts(system: ConstraintSystem) -> str:
 
 def _too_few(counted: str, missing: int, coordinates: Sequence[str]) -> str:
     return (
-        f"{counted}: {missing} more {_equations(missing)} needed before it can be analysed. Nothing determines, for "
-        f"instance, {listed(coordinates)}; add a joint or a driver there (a driver is a constraint whose value is a function of kc.t)"
+        f"{counted}: {missing} more {_equations(missing)} needed before it can be analysed. Nothing "
+        f"determines, for instance, {listed(coordinates)}; add a joint or a driver there (a driver "
+        "is a constraint whose value is a function of kc.t)"
     )
 
 
 def _too_many(counted: str, surplus: int, equations: Sequence[str]) -> str:
     return (
-        f"{counted}: {surplus} {_equations(surplus)} too many. Candidates to remove: {listed(equations)}; remove a driver or a "
-        "redundant joint, or replace a Revolute by a constraint with fewer equations"
+        f"{counted}: {surplus} {_equations(surplus)} too many. Candidates to remove: "
+        f"{listed(equations)}; remove a driver or a redundant joint, or replace a Revolute by a "
+        "constraint with fewer equations"
     )
 
 
 def _mismatch(counted: str, equations: Sequence[str], coordinates: Sequence[str]) -> str:
     return (
-        f"{counted}, but they cannot determine them: the equations {listed(equations)} only repeat what others fix, and nothing "
-        f"determines {listed(coordinates)}; move a driver or a joint from the first to the second"
+        f"{counted}, but they cannot determine them: the equations {listed(equations)} only "
+        f"repeat what others fix, and nothing determines {listed(coordinates)}; move a driver or "
+        "a joint from the first to the second"
     )
 
 
