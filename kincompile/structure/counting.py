@@ -55,9 +55,9 @@ def _counts(system: ConstraintSystem) -> str:
 
 def _too_few(counted: str, missing: int, coordinates: Sequence[str]) -> str:
     return (
-        f"{counted}: {missing} more {_equations(missing)} needed before it can be analysed. Nothing "
-        f"determines, for instance, {listed(coordinates)}; add a joint or a driver there (a driver "
-        "is a constraint whose value is a function of kc.t)"
+        f"{counted}: {missing} more {_equations(missing)} needed before it can be analysed. "
+        f"Nothing determines, for instance, {listed(coordinates)}; add a joint or a driver there "
+        "(a driver is a constraint whose value is a function of kc.t)"
     )
 
 
