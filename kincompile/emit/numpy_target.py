@@ -124,11 +124,10 @@ def _header(code: InlineProgram) -> list[str]:
     program = code.program
     rows = [("row", "constraint", "", "source")]
     for section in code.sections:
-        instance = section.instance
-        title = f'{instance.kernel.name} "{instance.name}"' + (
-            " (driver)" if instance.constraint.is_driver else ""
-        )
-        rows.append((_rows(section), title, " - ".join(instance.bodies), instance.constraint.source))
+        instance, constraint = section.instance, section.instance.constraint
+        driver = " (driver)" if constraint.is_driver else ""
+        title = f'{instance.kernel.name} "{instance.name}"{driver}'
+        rows.append((_rows(section), title, " - ".join(instance.bodies), constraint.source))
     lines = labelled("q", [f"{item.name}{_unit(item.unit)}" for item in program.coordinates])
     if program.parameters:
         lines += labelled("p", [f"{item.name}{_unit(item.unit)}" for item in program.parameters])

@@ -234,9 +234,7 @@ def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> N
         )
 
 
-def _expression(
-    given: Any, where: str, declared: Collection[str], scope: Scope
-) -> Scalar | None:
+def _expression(given: Any, where: str, declared: Collection[str], scope: Scope) -> Scalar | None:
     """Return a checked expression, or None where a problem was noted."""
     try:
         value = as_expression(given)
