@@ -577,17 +577,17 @@ def _solve(f, F, b):
 
 def Phi(q, t, p=DEFAULTS):
     """Constraint vector Phi(q, t), shape (..., 9)."""
-    return _evaluate(_Phi, (_PHI,), t, p, q)[0]
+    return _evaluate(_Phi, _PHI, t, p, q)
 
 
 def Phi_q(q, t, p=DEFAULTS):
     """Jacobian of Phi by q, shape (..., 9, 9)."""
-    return _evaluate(_Phi_q, (_PHI_Q,), t, p, q)[0]
+    return _evaluate(_Phi_q, _PHI_Q, t, p, q)
 
 
 def nu(q, t, p=DEFAULTS):
     """Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, shape (..., 9)."""
-    return _evaluate(_nu, (_NU,), t, p, q)[0]
+    return _evaluate(_nu, _NU, t, p, q)
 
 
 def gamma(q, q_dot, t, p=DEFAULTS):
@@ -595,32 +595,32 @@ def gamma(q, q_dot, t, p=DEFAULTS):
 
     gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt
     """
-    return _evaluate(_gamma, (_GAMMA,), t, p, q, q_dot)[0]
+    return _evaluate(_gamma, _GAMMA, t, p, q, q_dot)
 
 
 def Phi_q_nonzeros(q, t, p=DEFAULTS):
     """Entries of Phi_q in the order of PATTERN, shape (..., 20)."""
-    return _evaluate(_Phi_q, (_NONZEROS,), t, p, q)[0]
+    return _evaluate(_Phi_q, _NONZEROS, t, p, q)
 
 
 def position(q, t, p=DEFAULTS):
     """Phi and Phi_q in one go: a step of Newton's method."""
-    return _evaluate(_position, (_PHI, _PHI_Q), t, p, q)
+    return _evaluate_together(_position, (_PHI, _PHI_Q), t, p, q)
 
 
 def velocity(q, t, p=DEFAULTS):
     """Phi_q and nu in one go: the velocity equation."""
-    return _evaluate(_velocity, (_PHI_Q, _NU), t, p, q)
+    return _evaluate_together(_velocity, (_PHI_Q, _NU), t, p, q)
 
 
 def acceleration(q, q_dot, t, p=DEFAULTS):
     """Phi_q and gamma in one go: the acceleration equation."""
-    return _evaluate(_acceleration, (_PHI_Q, _GAMMA), t, p, q, q_dot)
+    return _evaluate_together(_acceleration, (_PHI_Q, _GAMMA), t, p, q, q_dot)
 
 
 def kinematics(q, q_dot, t, p=DEFAULTS):
     """Phi, Phi_q, nu and gamma in one go."""
-    return _evaluate(_kinematics, (_PHI, _PHI_Q, _NU, _GAMMA), t, p, q, q_dot)
+    return _evaluate_together(_kinematics, (_PHI, _PHI_Q, _NU, _GAMMA), t, p, q, q_dot)
 
 
 def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
@@ -671,14 +671,12 @@ class InputError(ValueError):
 def _cos_sin(angle):
     """Cosine and sine of an array through t = tan(angle / 2): half the time of np.cos and np.sin.
 
-    With R = 1 / (1 + t^2) they are (1 - t^2) R and 2 t R. No angle is out of reach, since a float
-    is never exactly pi: there t is about 1e16, and t^2 far from overflow. The error is at most
-    3e-16.
+    With R = 2 / (1 + t^2) they are R - 1 and t R. No angle is out of reach, since a float is never
+    exactly pi: there t is about 1e16, and t^2 far from overflow. The error is at most 4e-16.
     """
     t = np.tan(0.5 * angle)
-    square = t * t
-    reciprocal = 1.0 / (1.0 + square)
-    return (1.0 - square) * reciprocal, (t + t) * reciprocal
+    R = 2.0 / (1.0 + t * t)
+    return R - 1.0, t * R
 
 
 class _Floats:
@@ -703,20 +701,35 @@ class _Quantity:
     def __init__(self, shape, places, fixed=(), constants=()):
         self.shape = shape
         self.size = math.prod(shape)
-        self.places = tuple(int(place) for place in places)
-        self.fixed = tuple((int(place), value) for place, value in zip(fixed, constants))
-        self.start = np.zeros(shape)
-        self.start.put(fixed, constants)
-        self.index = np.array(self.places, dtype=int)
-        self.is_full = shape == (len(self.places),)
+        self.index = np.array(places, dtype=int)
+        self.places = self.index.tolist()
+        self.count = len(self.places)
+        self.fixed = np.array(fixed, dtype=int)
+        self.constants = np.reshape(constants, (-1, 1))
+        self.start = np.zeros(self.size)
+        self.start[self.fixed] = constants
+        self.is_full = shape == (self.count,)
 
     def at_point(self, values):
-        """Return the array of one point."""
+        """Return the array of one point; of an iterator, as many values are taken as are needed."""
+        computed = np.fromiter(values, float, self.count)
         if self.is_full:
-            return np.array(values)
+            return computed
         result = self.start.copy()
-        result.put(self.index, values)
-        return result
+        result[self.index] = computed
+        return result.reshape(self.shape)
+
+    def for_batch(self, count, dtype):
+        """Return an array (size, N) with the constant entries in place.
+
+        If there are any, it lies in memory point by point: where most entries are constant, that
+        takes less time than to turn the array round when it is filled.
+        """
+        if self.is_full:
+            return np.empty((self.size, count), dtype)
+        result = np.empty((count, self.size), dtype)
+        result[:] = self.start
+        return result.T
 
 
 FLOATS, ARRAYS = _Floats, _Arrays
@@ -725,6 +738,7 @@ _FLAT = PATTERN @ (N_COORDINATES, 1)
 _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), _FLAT[_VARYING], _FLAT[_FIXED], _CONSTANTS)
 _NONZEROS = _Quantity((len(PATTERN),), _VARYING, _FIXED, _CONSTANTS)
 _STATES = ("q", "q_dot")
+_SHAPE = (N_COORDINATES,)
 _REAL = np.dtype(float)
 _BLOCK = 2000  # points at a time, so that intermediate arrays stay in the cache
 _PARAMETER_LIST = DEFAULTS.tolist()
@@ -732,8 +746,8 @@ for _array in (DEFAULTS, GUESS, PATTERN):
     _array.flags.writeable = False
 
 
-def _evaluate(kernel, quantities, t, p, *states):
-    """Run a kernel on one point with floats, or on a batch with arrays."""
+def _evaluate(kernel, quantity, t, p, *states):
+    """Return one quantity: of one point with floats, or of a batch with arrays."""
     point = _point(t, p, states)
     if point is not None:
         try:
@@ -741,23 +755,32 @@ def _evaluate(kernel, quantities, t, p, *states):
         except (ArithmeticError, ValueError):
             pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
         else:
-            if len(quantities) == 1:
-                return (quantities[0].at_point(values),)
-            results, start = [], 0
-            for quantity in quantities:
-                stop = start + len(quantity.places)
-                results.append(quantity.at_point(values[start:stop]))
-                start = stop
-            return tuple(results)
+            return quantity.at_point(values)
+    return _evaluate_batch(kernel, (quantity,), t, p, states)[0]
+
+
+def _evaluate_together(kernel, quantities, t, p, *states):
+    """Return several quantities that share work."""
+    point = _point(t, p, states)
+    if point is not None:
+        try:
+            values = iter(kernel(*point))
+        except (ArithmeticError, ValueError):
+            pass
+        else:
+            return tuple([quantity.at_point(values) for quantity in quantities])
+    return _evaluate_batch(kernel, quantities, t, p, states)
+
+
+def _evaluate_batch(kernel, quantities, t, p, states):
+    """Run a kernel on a batch whose axes are the first ones."""
     states, t, p, shape = _batch(t, p, states)
-    count = math.prod(shape)
-    results = [np.empty((count, quantity.size), states[0].dtype) for quantity in quantities]
-    for quantity, result in zip(quantities, results):
-        if not quantity.is_full:
-            result[:] = quantity.start.ravel()
-    _fill([result.T for result in results], kernel, quantities, t, p, states)
+    dtype = states[0].dtype
+    results = [quantity.for_batch(math.prod(shape), dtype) for quantity in quantities]
+    _fill(results, kernel, quantities, t, p, states)
     return tuple(
-        result.reshape(shape + quantity.shape) for quantity, result in zip(quantities, results)
+        np.ascontiguousarray(result.T).reshape(shape + quantity.shape)
+        for quantity, result in zip(quantities, results)
     )
 
 
@@ -771,58 +794,70 @@ def _evaluate_batch_last(kernel, quantities, t, p, *states):
         raise InputError(
             f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis"
         )
-    results = [np.empty((quantity.size, count), states[0].dtype) for quantity in quantities]
-    for quantity, result in zip(quantities, results):
-        for place, value in quantity.fixed:
-            result[place] = value
+    # One array for all: the memory of several goes back to the system and is fetched again with
+    # every call.
+    size = sum([quantity.size for quantity in quantities])
+    memory = np.empty((size, count), np.result_type(*states, t, p))
+    results, start = [], 0
+    for quantity in quantities:
+        result = memory[start:start + quantity.size]
+        if not quantity.is_full:
+            result[quantity.fixed] = quantity.constants
+        results.append(result)
+        start += quantity.size
     _fill(results, kernel, quantities, t, p, states)
     return tuple(results)
 
 
 def _fill(results, kernel, quantities, t, p, states):
-    """Run a kernel block by block and put its values into arrays (size, N)."""
+    """Run a kernel, block by block, and put its values into arrays (size, N)."""
+    count = results[0].shape[1]
+    if count > _BLOCK:
+        for start in range(0, count, _BLOCK):
+            block = ..., slice(start, start + _BLOCK)
+            at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
+            parts = [result[block] for result in results]
+            _fill(parts, kernel, quantities, at, parameters, [state[block] for state in states])
+        return
     with np.errstate(all="ignore"):
-        for start in range(0, results[0].shape[1], _BLOCK):
-            block = slice(start, start + _BLOCK)
-            arguments = [np.ascontiguousarray(state[:, block]) for state in states]
-            at = t if t.ndim == 0 else t[block]
-            parameters = p if p.ndim == 1 else p[:, block]
-            values = iter(kernel(_Arrays, *arguments, at, parameters))
-            for quantity, result in zip(quantities, results):
-                for place, value in zip(quantity.places, values):
-                    result[place, block] = value
+        values = iter(kernel(_Arrays, *states, t, p))
+        for quantity, result in zip(quantities, results):
+            for place, value in zip(quantity.places, values):
+                result[place] = value
 
 
 def _point(t, p, states):
-    """Return the arguments as floats where they are one finite point, else None."""
+    """Return a kernel's arguments with floats where they are one finite point, else None."""
+    if type(t) is not float:
+        if not isinstance(t, (float, int)):
+            return None
+        t = float(t)
     if p is DEFAULTS:
-        parameters, total = _PARAMETER_LIST, 0.0
+        parameters, total = _PARAMETER_LIST, t
     elif type(p) is np.ndarray and p.shape == DEFAULTS.shape and p.dtype is _REAL:
         parameters = p.tolist()
-        total = sum(parameters)
+        total = t + sum(parameters)
     else:
         return None
-    if not isinstance(t, (float, int)):
-        return None
-    t = float(t)
     arguments = [_Floats]
     for state in states:
-        if type(state) is not np.ndarray or state.shape != GUESS.shape or state.dtype is not _REAL:
+        if type(state) is not np.ndarray or state.shape != _SHAPE or state.dtype is not _REAL:
             return None
         values = state.tolist()
         total += sum(values)
         arguments.append(values)
-    arguments += (t, parameters)
+    arguments += t, parameters
     # A sum is finite only if its terms are; where it is not, the batch form finds out which.
-    return arguments if math.isfinite(total + t) else None
+    return arguments if math.isfinite(total) else None
 
 
 def _batch(t, p, states):
     """Check the arguments; return states (n, N), t () or (N,), p (k,) or (k, N), batch shape."""
     states = [_checked(name, state, COORDINATES) for name, state in zip(_STATES, states)]
     t, p = _checked("t", t), _checked("p", p, PARAMETERS)
+    leading = {t.shape, p.shape[:-1], *(state.shape[:-1] for state in states)} - {()}
     try:
-        shape = np.broadcast_shapes(*(state.shape[:-1] for state in states), t.shape, p.shape[:-1])
+        shape = leading.pop() if len(leading) == 1 else np.broadcast_shapes(*leading)
     except ValueError:
         shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
         raise InputError(
@@ -831,7 +866,7 @@ def _batch(t, p, states):
         ) from None
     dtype = np.result_type(*states, t, p)
     states = [_rows(state, shape).astype(dtype, copy=False) for state in states]
-    t = t if t.ndim == 0 else np.broadcast_to(t, shape).reshape(-1)
+    t = t if t.ndim == 0 else _spread(t, shape).reshape(-1)
     p = p if p.ndim == 1 else _rows(p, shape)
     return states, t, p, shape
 
@@ -839,11 +874,18 @@ def _batch(t, p, states):
 def _rows(array, shape):
     """Return an array (..., n), broadcast to a batch's shape, as (n, N)."""
     size = array.shape[-1]
-    return np.broadcast_to(array, (*shape, size)).reshape(math.prod(shape), size).T
+    return _spread(array, (*shape, size)).reshape(math.prod(shape), size).T
+
+
+def _spread(array, shape):
+    """Return np.broadcast_to(array, shape), which is slow even where nothing is to be done."""
+    return array if array.shape == shape else np.broadcast_to(array, shape)
 
 
 def _checked(name, value, entries=None, axis=-1):
     """Return an argument as a finite array of real numbers, or complex ones for complex steps."""
+    if value is DEFAULTS:
+        return DEFAULTS
     try:
         array = np.asarray(value)
         array = array.astype(complex if array.dtype.kind == "c" else float, copy=False)
@@ -854,12 +896,11 @@ def _checked(name, value, entries=None, axis=-1):
             f"{NAME}: {name} has shape {array.shape}, but its {'first' if axis == 0 else 'last'} "
             f"axis must hold {len(entries)} numbers: {', '.join(entries) or 'none'}"
         )
-    # A sum is finite if its terms are; only where it is not, each term is looked at.
-    if not np.isfinite(array.sum()) and not np.isfinite(array).all():
-        bad = ~np.isfinite(array)
+    finite = np.isfinite(array)
+    if not finite.all():
         found = [name]
         if entries is not None:
-            rows = np.moveaxis(bad, axis, 0).reshape(len(entries), -1)
-            found = [entry for entry, row in zip(entries, rows) if row.any()]
+            rows = np.moveaxis(finite, axis, 0).reshape(len(entries), -1)
+            found = [entry for entry, row in zip(entries, rows) if not row.all()]
         raise InputError(f"{NAME}: {name} is not finite in {', '.join(found)}; give finite numbers")
     return array

@@ -211,8 +211,8 @@ class Graph:
         return self._intern(("linear", name, size, index, *operands))
 
     def _negated(self, a: int) -> int | None:
-        operation, *operands = self.nodes[a]
-        return operands[0] if operation == "neg" else None
+        content = self.nodes[a]
+        return content[1] if content[0] == "neg" else None
 
     def instantiate(self, nodes: Sequence[Node], inputs: dict[str, int]) -> list[int]:
         """Copy code into this graph with its inputs bound; return the new number of each node.
@@ -256,30 +256,25 @@ AT_ZERO = {"cos": 1, "sin": 0, "tan": 0, "sqrt": 0, "exp": 1, "sinh": 0, "cosh":
 
 def number_of(nodes: Sequence[Node], node: int) -> Constant | None:
     """Return the number a node stands for, None where it is not a plain number."""
-    operation, *operands = nodes[node]
-    if operation == "const":
-        value: Constant = operands[0]
+    content = nodes[node]
+    if content[0] == "const":
+        value: Constant = content[1]
         return value
-    if operation == "neg":
-        inner = number_of(nodes, operands[0])
+    if content[0] == "neg":
+        inner = number_of(nodes, content[1])
         return None if inner is None else -inner
     return None
 
 
+_FIRST_OPERAND = {
+    "const": 2, "input": 2, "call": 2, "compare": 2, "logic": 2, "table": 3, "linear": 4,
+}  # fmt: skip
+"""Where the operands begin, if not behind the operation's name."""
+
+
 def operands_of(node: Node) -> tuple[int, ...]:
     """Return the nodes a node depends on."""
-    match node:
-        case ("const" | "pi" | "input", *_):
-            return ()
-        case ("call" | "compare" | "logic", _, *operands):
-            return tuple(operands)
-        case ("table", _, _, a):
-            return (a,)
-        case ("linear", _, _, _, *operands):
-            return tuple(operands)
-        case (_, *operands):
-            return tuple(operands)
-    raise TypeError(f"not a node: {node!r}")
+    return node[_FIRST_OPERAND.get(node[0], 1) :]
 
 
 def _exact_root(value: Constant) -> int | Fraction | None:

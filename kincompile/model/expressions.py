@@ -151,9 +151,11 @@ def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
     """Return the number an expression is at given values of its symbols; None where it is none."""
     if not isinstance(value, sympy.Expr):
         return float(value)
-    if symbol_names(value) - set(values):
+    symbols = value.free_symbols
+    if any(symbol.name not in values for symbol in symbols):
         return None
-    number = value.subs({sympy.Symbol(name): number for name, number in values.items()}).evalf()
+    numbers = {symbol: sympy.Float(values[symbol.name]) for symbol in symbols}
+    number = value.xreplace(numbers).evalf()
     return float(number) if number.is_number and number.is_real and number.is_finite else None
 
 
