@@ -151,10 +151,10 @@ def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
     """Return the number an expression is at given values of its symbols; None where it is none."""
     if not isinstance(value, sympy.Expr):
         return float(value)
-    symbols = value.free_symbols
-    if any(symbol.name not in values for symbol in symbols):
+    names = symbol_names(value)
+    if names - set(values):
         return None
-    numbers = {symbol: sympy.Float(values[symbol.name]) for symbol in symbols}
+    numbers = {sympy.Symbol(name): sympy.Float(values[name]) for name in names}
     number = value.xreplace(numbers).evalf()
     return float(number) if number.is_number and number.is_real and number.is_finite else None
 
