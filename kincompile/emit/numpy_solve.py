@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.emit.layout import broken, wrapped
 from kincompile.emit.printers import PythonPrinter
+from kincompile.emit.solving import components, explained
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -28,28 +29,16 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     return [
         "def _factor(f, J):",
         '    """Return what a solve needs of Phi_q, and the determinants of its blocks."""',
-        *(f"    {line}" for line in (*_explained(code, listing), *factor)),
+        *(
+            f"    {line}"
+            for line in (*(f"# {line}" for line in explained(code, listing.plan)), *factor)
+        ),
         "",
         "",
         "def _solve(f, F, b):",
         '    """Return x of Phi_q x = b."""',
         *(f"    {line}" for line in solve),
     ]
-
-
-def _explained(code: InlineProgram, listing: SolveListing) -> list[str]:
-    """Return comments that say how the system is taken apart."""
-    equations = code.program.equations
-    coordinates = [item.name for item in code.program.coordinates]
-    pivots = [
-        f"{coordinates[item.column]} by {equations[item.row]}" for item in listing.plan.pivots
-    ]
-    lines = [f"# {line}" for line in wrapped(["eliminated:", *pivots])] if pivots else []
-    for block in listing.plan.blocks:
-        rows = ", ".join(equations[row] for row in block.rows)
-        columns = ", ".join(coordinates[column] for column in block.columns)
-        lines.append(f"# block: {columns} by {rows}")
-    return [line.replace("eliminated:,", "eliminated:").rstrip(",") for line in lines]
 
 
 def _steps(nodes: Iterable[int], listing: SolveListing, printer: PythonPrinter) -> list[str]:
@@ -89,12 +78,7 @@ def _block_call(
     """Return the call of LAPACK for a block: its solution, or its determinant."""
     left = [listing.names[node]]
     if name == "solve":
-        same = [
-            k
-            for k, content in enumerate(listing.plan.nodes)
-            if content[:3] == ("linear", "solve", size) and list(content[4:]) == operands
-        ]
-        left = [listing.names[k] for k in sorted(same, key=lambda k: listing.plan.nodes[k][3])]
+        left = [listing.names[k] for k in components(listing.plan, node)]
     matrix, right = operands[: size * size], operands[size * size :]
     lines = [f"{', '.join(left)} = f.block_{name}({size}, (", *_indented(matrix, printer)]
     if right:

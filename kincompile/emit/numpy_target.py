@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from kincompile.emit.functions import EVALUATORS, Listing, schedule
-from kincompile.emit.layout import broken, labelled, quoted, table, wrapped
+from kincompile.emit.headings import header, place, title
+from kincompile.emit.layout import broken, quoted, wrapped
 from kincompile.emit.naming import NameTable
 from kincompile.emit.numpy_solve import solve_functions
 from kincompile.emit.printers import PythonPrinter
@@ -18,7 +19,7 @@ from kincompile.names import rate
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
 
 FORMAT = 1
@@ -80,7 +81,7 @@ def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[st
     moving = [k for k, value in enumerate(values) if value is None]
     return {
         "title": program.name,
-        "header": "\n".join(_header(code)),
+        "header": "\n".join(header(code)),
         "name": program.name,
         "format": FORMAT,
         "fingerprint": program.fingerprint,
@@ -119,31 +120,6 @@ def _units(program: Program) -> list[str]:
     return [f"{name!r}: {unit!r}," for name, unit in units.items()]
 
 
-def _header(code: InlineProgram) -> list[str]:
-    """Return the docstring's tables: coordinates, parameters, rows."""
-    program = code.program
-    rows = [("row", "constraint", "", "source")]
-    for section in code.sections:
-        instance, constraint = section.instance, section.instance.constraint
-        driver = " (driver)" if constraint.is_driver else ""
-        title = f'{instance.kernel.name} "{instance.name}"{driver}'
-        rows.append((_rows(section), title, " - ".join(instance.bodies), constraint.source))
-    lines = labelled("q", [f"{item.name}{_unit(item.unit)}" for item in program.coordinates])
-    if program.parameters:
-        lines += labelled("p", [f"{item.name}{_unit(item.unit)}" for item in program.parameters])
-    return [*lines, "", *table(rows)]
-
-
-def _unit(unit: str) -> str:
-    return f" [{unit}]" if unit else ""
-
-
-def _rows(section: Section) -> str:
-    first = section.instance.first_row
-    last = first + len(section.entries["Phi"]) - 1
-    return str(first) if first == last else f"{first}-{last}"
-
-
 def _tables(program: Program) -> list[str]:
     lines = []
     for name, spline in program.tables.items():
@@ -167,7 +143,7 @@ def _function(
     printer = PythonPrinter(code.nodes, listing.names)
     body = [*_unpack(code.program, listing, names), *_frames(listing, printer)]
     for section, assignments in listing.steps:
-        body.append(f"# {_title(section)}")
+        body.append(f"# {title(section)}")
         for item in assignments:
             body += _assignment(item.name, printer.text(item.node, own=True))
     body.append("return (")
@@ -176,9 +152,9 @@ def _function(
             body.append(f"    # {quantity}")
         for section, entries in rows:
             if entries:
-                body.append(f"    # {_title(section)}")
+                body.append(f"    # {title(section)}")
             for entry in entries:
-                body += _element(printer.text(entry.node), _place(quantity, entry, code))
+                body += _element(printer.text(entry.node), place(quantity, entry, code))
     body.append(")")
     if body[-2] == "return (":
         body[-2:] = ["return ()"]
@@ -197,21 +173,8 @@ def _element(text: str, comment: str) -> list[str]:
     """Return an element of the returned tuple, a long one continued with deeper indentation."""
     first, *rest = broken(text)
     lines = [f"    {first}", *(f"        {line}" for line in rest)]
-    lines[-1] += f",{comment}"
+    lines[-1] += f",  # {comment}" if comment else ","
     return lines
-
-
-def _place(quantity: str, entry: Entry, code: InlineProgram) -> str:
-    """Return a comment that says which entry of Phi_q a line is."""
-    if quantity != "Phi_q":
-        return ""
-    equation = code.program.equations[entry.row]
-    return f"  # {equation} by {code.program.coordinates[entry.column].name}"
-
-
-def _title(section: Section) -> str:
-    instance = section.instance
-    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}": {instance.constraint.text}'
 
 
 def _unpack(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:

@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kincompile.emit.layout import wrapped
 from kincompile.emit.naming import content_name
 from kincompile.ir.graph import number_of, operands_of
 
@@ -128,3 +129,27 @@ def _is_read(plan: SolvePlan, node: int, needed: set[int], variable: set[int]) -
     if plan.nodes[node][0] == "neg":
         return False
     return any(node in _signless_operands(plan, user) for user in needed & variable)
+
+
+def explained(code: InlineProgram, plan: SolvePlan) -> list[str]:
+    """Return lines of a comment that say how the system is taken apart."""
+    equations = code.program.equations
+    coordinates = [item.name for item in code.program.coordinates]
+    pivots = [f"{coordinates[item.column]} by {equations[item.row]}" for item in plan.pivots]
+    lines = wrapped(["eliminated:", *pivots]) if pivots else []
+    for block in plan.blocks:
+        rows = ", ".join(equations[row] for row in block.rows)
+        columns = ", ".join(coordinates[column] for column in block.columns)
+        lines.append(f"block: {columns} by {rows}")
+    return [line.replace("eliminated:,", "eliminated:").rstrip(",") for line in lines]
+
+
+def components(plan: SolvePlan, node: int) -> list[int]:
+    """Return the nodes of all components of the solution that a node is one of, in order."""
+    _, _, size, _, *operands = plan.nodes[node]
+    same = [
+        k
+        for k, content in enumerate(plan.nodes)
+        if content[:3] == ("linear", "solve", size) and list(content[4:]) == operands
+    ]
+    return sorted(same, key=lambda k: int(plan.nodes[k][3]))
