@@ -1,0 +1,58 @@
+"""The comparison with the oracle can fail: one wrong sign or term in the text is found out."""
+
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from kincompile.runtime.load import from_source
+
+BODY = re.compile(r"^def _kinematics\(.*?^    \)$", re.MULTILINE | re.DOTALL)
+WRONG = {" + ": (" - ", " + 0 * "), " - ": (" + ", " - 0 * "), "**2": ("",), "-": ("",)}
+"""What goes in place of an operator: another sign, nothing of the next factor, no square."""
+OPERATOR = re.compile(r" [+-] |\*\*2|(?<=[ (])-(?=[a-z(])")
+
+
+def mutants(source: str) -> Iterator[tuple[str, str]]:
+    """Yield the emitted text with one operator of the fused function wrong, and the line."""
+    body = BODY.search(source)
+    assert body is not None
+    start = body.start()
+    for line in body[0].splitlines(keepends=True):
+        code = line.partition("#")[0]
+        for found in OPERATOR.finditer(code):
+            for wrong in WRONG[found[0]]:
+                text = code[: found.start()] + wrong + code[found.end() :]
+                yield text.strip(), source[:start] + text + source[start + len(code) :]
+        start += len(line)
+
+
+def test_that_every_wrong_sign_and_missing_term_is_found(generic_case: Any) -> None:
+    found = [
+        (line, generic_case.deviation(from_source(text, "mutant").kinematics))
+        for line, text in mutants(generic_case.source)
+    ]
+    assert [line for line, deviation in found if deviation < 1e-6] == []
+    assert found
+
+
+def test_that_a_missing_centripetal_term_is_found(case_of: Callable[..., Any]) -> None:
+    case = case_of("Revolute")
+    broken = re.sub(r"phi_i_dot_sq = .*", "phi_i_dot_sq = 0.0", case.source)
+    assert broken != case.source
+    assert case.deviation(from_source(broken, "mutant").kinematics) > 1e-3
+
+
+def test_that_a_changed_sign_in_the_jacobian_is_found(case_of: Callable[..., Any]) -> None:
+    case = case_of("Gear")
+    lines = [line for line in case.source.splitlines() if line.endswith("# k by phi_i")]
+    assert lines
+    broken = case.source
+    for line in lines:
+        broken = broken.replace(line, re.sub(r"^( +)(.*),  #", r"\1-(\2),  #", line))
+    module = from_source(broken, "mutant")
+    assert case.deviation(module.kinematics) > 1e-3
+
+
+def test_that_the_text_as_emitted_passes(generic_case: Any) -> None:
+    module = from_source(generic_case.source, "untouched")
+    assert generic_case.deviation(module.kinematics) < 1e-12
