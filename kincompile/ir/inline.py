@@ -27,11 +27,19 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """The rows of one constraint."""
+    """The rows of one constraint.
+
+    Attributes
+    ----------
+    text
+        The constraint in words, kept because printing its arguments takes its time.
+    entries
+        Entries by quantity; of Phi_q those that are not identically zero, row by row.
+    """
 
     instance: Instance
+    text: str
     entries: Mapping[str, tuple[Entry, ...]]
-    """Entries by quantity; of Phi_q those that are not identically zero, row by row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +92,7 @@ def inline(program: Program) -> InlineProgram:
         for node, stem in kernel.hints:
             if graph.nodes[new[node]][0] not in ("neg", "const", "input"):
                 hints.setdefault(new[node], _spoken(stem, instance))
-        sections.append(Section(instance, _entries(instance, new, graph)))
+        sections.append(Section(instance, instance.constraint.text, _entries(instance, new, graph)))
     return InlineProgram(program, tuple(graph.nodes), tuple(sections), hints)
 
 
