@@ -25,7 +25,7 @@ import numpy as np
 
 import kincompile as kc
 from kincompile.errors import InputError, InternalError, KincompileError
-from kincompile.files import write_atomically
+from kincompile.files import require_writable, write_atomically
 from kincompile.runtime.results import require_known_suffix
 from kincompile.runtime.summary import summary
 
@@ -63,6 +63,8 @@ class _Shell(click.Group):
             _end("Error: there is not enough memory; ask for fewer points", USAGE_OR_MODEL)
         except KincompileError as error:
             _end(f"Error: {error}", USAGE_OR_MODEL)
+        except OSError as error:
+            _end(f"Error: the system says: {error}; check the paths", USAGE_OR_MODEL)
         except Exception as error:
             bug = InternalError(f"{type(error).__name__}: {error}.")
             _end(f"Error: {bug} {TRACEBACK}=1 shows where it happened.", USAGE_OR_MODEL)
@@ -155,11 +157,12 @@ def run(
     """
     if output is not None:
         require_known_suffix(output)
+        require_writable(output)
     values = _values(assignments)
     mechanism = _read(model)
     times = _times(mechanism, end, points)
     module = kc.compile(mechanism)
-    with _progress() as progress:
+    with progress_bar() as progress:
         solution = kc.solve(module, times, values, progress=progress)
     if output is None:
         _print(summary(solution) + "\n")
@@ -208,16 +211,16 @@ def _times(
 ) -> NDArray[np.float64]:
     """Return the time grid: the options before the model's own."""
     try:
-        end_time = float(model.end if end is None else end)
+        last = float(model.end if end is None else end)
         count = operator.index(model.points if points is None else points)
     except (TypeError, ValueError):
-        end_time, count = math.nan, 0
-    if not math.isfinite(end_time) or count < 1:
+        last, count = math.nan, 0
+    if not math.isfinite(last) or count < 1:
         given = f"end = {model.end!r}, points = {model.points!r}" if end is None else f"--end {end}"
-        raise InputError(f"{given}: give a finite time, and a whole number of points from 1 up")
+        raise InputError(f"{given}: give a finite time, and at least one point")
     if count == 1 and end:
         raise InputError("one point is the time 0 alone: give --points 2 or more to reach the end")
-    return np.linspace(0.0, end_time, count)
+    return np.linspace(0.0, last, count)
 
 
 def _print(text: str) -> None:
@@ -231,7 +234,7 @@ def _print(text: str) -> None:
 
 
 @contextmanager
-def _progress() -> Iterator[Callable[[int, int], None] | None]:
+def progress_bar() -> Iterator[Callable[[int, int], None] | None]:
     """Give a progress bar on stderr for work that takes long, and nothing where nobody looks."""
     if not sys.stderr.isatty():
         yield None

@@ -34,16 +34,45 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
     """
     target = Path(path)
     data = content.encode("utf-8") if isinstance(content, str) else content
-    if target.is_dir():
-        raise InputError(f"cannot write {target}: it is a folder. Give the name of a file in it.")
+    require_writable(target)
     try:
-        if target.exists() and not target.is_file():
+        if _is_device(target):
             target.write_bytes(data)
         else:
             _replace(target, data)
     except OSError as error:
         raise InputError(_explanation(target, error)) from error
     return target
+
+
+def require_writable(path: str | os.PathLike[str]) -> None:
+    """Refuse a file that cannot be written, before the work whose result it is to hold.
+
+    Raises
+    ------
+    InputError
+        As `write_atomically`, as far as it can be known beforehand.
+    """
+    target = Path(path)
+    try:
+        _require_place(target)
+    except OSError as error:
+        raise InputError(_explanation(target, error)) from error
+
+
+def _require_place(target: Path) -> None:
+    """Raise the error that writing `target` would raise, as far as it can be known."""
+    if target.is_dir():
+        raise IsADirectoryError
+    folder = target.resolve().parent
+    if _is_device(target):
+        return
+    if not folder.exists():
+        raise FileNotFoundError
+    if not folder.is_dir():
+        raise NotADirectoryError
+    if not os.access(folder, os.W_OK):
+        raise PermissionError
 
 
 def _replace(target: Path, data: bytes) -> None:
@@ -61,10 +90,16 @@ def _replace(target: Path, data: bytes) -> None:
         raise
 
 
+def _is_device(target: Path) -> bool:
+    return target.exists() and not target.is_file()
+
+
 def _explanation(target: Path, error: OSError) -> str:
     """Say which file could not be written, why, and what to do."""
     folder = target.parent
-    if isinstance(error, FileNotFoundError):
+    if isinstance(error, IsADirectoryError):
+        remedy = "it is a folder. Give the name of a file in it."
+    elif isinstance(error, FileNotFoundError):
         remedy = f"the folder {folder} does not exist. Create it first, or choose another folder."
     elif isinstance(error, NotADirectoryError):
         remedy = f"{folder} is a file, not a folder. Choose another folder."

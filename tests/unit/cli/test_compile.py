@@ -1,0 +1,69 @@
+import subprocess
+import sys
+
+import numpy as np
+
+import kincompile as kc
+
+
+def test_that_the_module_written_is_the_one_that_emit_gives(kincompile, pendulum, tmp_path):
+    done = kincompile("compile", pendulum, "-o", tmp_path / "out.py")
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert done.stderr == f"Wrote {tmp_path / 'out.py'}\n"
+    assert (tmp_path / "out.py").read_text() == kc.emit(kc.read_model(pendulum)).source
+
+
+def test_that_a_folder_gets_a_file_with_the_name_of_the_mechanism(kincompile, pendulum, tmp_path):
+    (tmp_path / "out").mkdir()
+    assert kincompile("compile", pendulum, "-o", tmp_path / "out").exit_code == 0
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["pendulum.py"]
+
+
+def test_that_a_dash_is_stdout(kincompile, pendulum, tmp_path):
+    done = kincompile("compile", pendulum, "-o", "-")
+    assert done.stdout == kc.emit(kc.read_model(pendulum)).source
+    assert done.stderr == ""
+
+
+def test_that_the_target_may_be_named(kincompile, pendulum):
+    done = kincompile("compile", pendulum, "--target", "numpy", "-o", "-")
+    assert done.exit_code == 0
+    assert "def Phi(" in done.stdout
+
+
+def test_that_the_model_is_never_overwritten(kincompile, pendulum, tmp_path):
+    text = pendulum.read_text()
+    link = tmp_path / "link.py"
+    link.symlink_to(pendulum)
+    for output in (pendulum, tmp_path, link):
+        done = kincompile("compile", pendulum, "-o", output)
+        assert done.exit_code == 2
+        assert "is the model itself; give -o another name" in done.stderr
+        assert pendulum.read_text() == text
+
+
+def test_that_a_failure_leaves_an_existing_file_alone(kincompile, tmp_path):
+    (tmp_path / "model.py").write_text("1 / 0")
+    (tmp_path / "out.py").write_text("precious")
+    assert kincompile("compile", tmp_path / "model.py", "-o", tmp_path / "out.py").exit_code == 2
+    assert (tmp_path / "out.py").read_text() == "precious"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_that_nothing_but_the_output_is_written(kincompile, pendulum, tmp_path):
+    kincompile("compile", pendulum, "-o", tmp_path / "out.py")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.py", "pendulum.py"]
+
+
+def test_that_a_compiled_module_runs_without_kincompile(process, pendulum, tmp_path):
+    process("compile", pendulum, "-o", tmp_path / "out.py")
+    program = (
+        "import sys; sys.modules['kincompile'] = sys.modules['sympy'] = None\n"
+        "import out\n"
+        "print(*out.Phi(out.GUESS, 0.0))"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    # The bob at (1, 0), angle 0.5: the pin is off by (1 - cos 0.5, -sin 0.5), the motor holds.
+    expected = [1 - np.cos(0.5), -np.sin(0.5), 0]
+    np.testing.assert_allclose([float(part) for part in done.stdout.split()], expected, atol=1e-15)

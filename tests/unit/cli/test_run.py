@@ -1,0 +1,113 @@
+import csv
+import json
+
+import numpy as np
+import pytest
+
+
+def rows_of(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_that_the_summary_is_data_where_no_file_is_written(kincompile, pendulum):
+    done = kincompile("run", pendulum)
+    assert (done.exit_code, done.stderr) == (0, "")
+    lines = [line.split() for line in done.stdout.splitlines()]
+    phi = next(line for line in lines if line and line[0] == "phi_bob")
+    # phi = 0.5 + 2 t over t = 0 ... 2
+    assert phi == ["phi_bob", "rad", "0.5", "0", "4.5", "2", "2", "0"]
+    assert "5 points from t = 0 to 2: 5 CONVERGED" in done.stdout
+
+
+def test_that_the_summary_is_a_message_where_a_file_is_written(kincompile, pendulum, tmp_path):
+    done = kincompile("run", pendulum, "-o", tmp_path / "out.csv")
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert "5 CONVERGED" in done.stderr
+    assert done.stderr.endswith(f"Wrote {tmp_path / 'out.csv'}\n")
+
+
+def test_that_the_numbers_in_the_csv_are_the_motion(kincompile, pendulum, tmp_path):
+    kincompile("run", pendulum, "-o", tmp_path / "out.csv")
+    rows = rows_of(tmp_path / "out.csv")
+    t = np.array([float(row["t"]) for row in rows])
+    np.testing.assert_array_equal(t, [0, 0.5, 1, 1.5, 2])
+    angle = 0.5 + 2 * t
+    columns = {"x_bob": np.cos(angle), "x_bob_dot": -2 * np.sin(angle), "phi_bob_dot": 2 + 0 * t}
+    for name, expected in columns.items():
+        found = [float(row[name]) for row in rows]
+        np.testing.assert_allclose(found, expected, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".json", ".CSV"])
+def test_that_every_format_is_written(kincompile, pendulum, tmp_path, suffix):
+    path = tmp_path / f"out{suffix}"
+    assert kincompile("run", pendulum, "-o", path).exit_code == 0
+    if suffix == ".npz":
+        with np.load(path) as arrays:
+            assert arrays["q"].shape == (5, 3)
+    elif suffix == ".json":
+        assert json.loads(path.read_text(encoding="utf-8"))["success"] is True
+    else:
+        assert len(rows_of(path)) == 5
+
+
+def test_that_options_come_before_the_time_grid_of_the_model(kincompile, pendulum, tmp_path):
+    kincompile("run", pendulum, "--end", "-1", "--points", "3", "-o", tmp_path / "out.csv")
+    assert [row["t"] for row in rows_of(tmp_path / "out.csv")] == ["0.0", "-0.5", "-1.0"]
+
+
+def test_that_one_point_is_the_time_zero(kincompile, pendulum):
+    done = kincompile("run", pendulum, "--points", "1")
+    assert (done.exit_code, "1 point from t = 0 to 0" in done.stdout) == (0, True)
+
+
+def test_that_a_parameter_is_set_and_the_last_one_counts(kincompile, pendulum, tmp_path):
+    settings = ("--set", "length=2", "--set", "length = 3e0")
+    assert kincompile("run", pendulum, *settings, "-o", tmp_path / "out.csv").exit_code == 0
+    row = rows_of(tmp_path / "out.csv")[0]
+    assert float(row["x_bob"]) == pytest.approx(3 * np.cos(0.5))
+
+
+def test_that_a_failed_run_writes_what_was_found_and_says_where_it_ended(
+    kincompile, stopping, tmp_path
+):
+    done = kincompile("run", stopping, "-o", tmp_path / "out.csv")
+    assert (done.exit_code, done.stdout) == (3, "")
+    assert "Error: stops failed at t = 1.2, point 4 of 6" in done.stderr
+    assert "3 CONVERGED" in done.stderr
+    assert "2 NOT_REACHED" in done.stderr
+    rows = rows_of(tmp_path / "out.csv")
+    assert [row["status"] for row in rows][:3] == ["0", "0", "0"]
+    assert [row["x"] for row in rows][3:] == ["nan", "nan", "nan"]
+    assert float(rows[1]["x"]) == pytest.approx(np.sqrt(0.6))
+
+
+def test_that_the_summary_of_a_failed_run_is_still_data(kincompile, stopping):
+    done = kincompile("run", stopping)
+    assert done.exit_code == 3
+    assert "3 CONVERGED" in done.stdout
+    assert done.stderr.startswith("Error: stops failed at t = 1.2")
+
+
+def test_that_a_run_without_any_position_has_a_summary(kincompile, tmp_path):
+    (tmp_path / "model.py").write_text(
+        "import kincompile as kc\n"
+        "x = kc.Mechanism('nowhere').parameter('x')\n"
+        "system = kc.ConstraintSystem('nowhere', [x], [x**2 + 1 + kc.t**2], guess=(1,))\n"
+    )
+    done = kincompile("run", tmp_path / "model.py", "-o", tmp_path / "out.json")
+    assert done.exit_code == 3
+    assert "1 NOT_CONVERGED, 100 NOT_REACHED" in done.stderr
+    assert json.loads((tmp_path / "out.json").read_text())["q"] == [[None]] * 101
+
+
+def test_that_a_result_replaces_an_existing_file_whole_or_not_at_all(
+    kincompile, pendulum, tmp_path
+):
+    path = tmp_path / "out.csv"
+    path.write_text("precious")
+    assert kincompile("run", pendulum, "--set", "size=1", "-o", path).exit_code == 2
+    assert path.read_text() == "precious"
+    assert kincompile("run", pendulum, "-o", path).exit_code == 0
+    assert len(rows_of(path)) == 5

@@ -1,0 +1,80 @@
+import dataclasses
+
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.runtime.summary import summary
+from kincompile.tables import counted, indented, table
+
+NAN = float("nan")
+
+
+@pytest.fixture(scope="module")
+def solution():
+    """Return a function that gives a solution of one coordinate with made-up numbers."""
+    x = sympy.Symbol("x")
+    module = kc.compile(kc.ConstraintSystem("made_up", [x], [x - kc.t], guess=(0,)))
+
+    def made_up(q, q_dot, q_ddot, status):
+        motion = {"q": q, "q_dot": q_dot, "q_ddot": q_ddot}
+        return dataclasses.replace(
+            kc.solve(module, np.arange(len(q))),
+            **{name: np.array([values], dtype=float).T for name, values in motion.items()},
+            status=np.array(status),
+            residual=np.array([1e-12] + [1e-3] * (len(q) - 1)),
+            iterations=np.full(len(q), 2),
+            success=not any(status),
+            units={"x": "m"},
+        )
+
+    return made_up
+
+
+def test_the_extremes_with_their_times_and_the_largest_absolute_rates(solution):
+    text = summary(solution([1, -2, 3], [-4, 1, 2], [0, 5, -6], [0, 0, 0]))
+    assert text.splitlines()[1].split() == ["x", "m", "-2", "1", "3", "2", "4", "6"]
+
+
+def test_that_points_that_were_not_found_do_not_count(solution):
+    text = summary(solution([1, 2, NAN], [3, NAN, NAN], [4, NAN, NAN], [0, 1, 4]))
+    assert text.splitlines()[1].split() == ["x", "m", "1", "0", "2", "1", "3", "4"]
+    assert "3 points from t = 0 to 2: 1 CONVERGED, 1 NOT_CONVERGED, 1 NOT_REACHED" in text
+    assert text.endswith("6 Newton iterations, largest residual 1e-12")
+
+
+def test_that_a_motion_of_which_nothing_was_found_has_dashes(solution):
+    text = summary(solution([NAN, NAN], [NAN, NAN], [NAN, NAN], [1, 4]))
+    assert text.splitlines()[1].split() == ["x", "m", "-", "-", "-", "-", "-", "-"]
+    assert text.endswith("largest residual -")
+
+
+@pytest.mark.parametrize(("small", "shown"), [(1e-15, "0"), (1e-9, "1e-09")])
+def test_that_rounding_errors_are_shown_as_zero_and_small_numbers_as_they_are(
+    solution, small, shown
+):
+    text = summary(solution([small, 1.0], [1.0, 1.0], [1.0, 1.0], [0, 0]))
+    assert text.splitlines()[1].split()[2] == shown
+
+
+def test_that_a_table_is_aligned_and_has_no_blanks_at_the_end():
+    lines = table(("name", "value"), [["a", "1"], ["bcdef", "22"]], right=("value",))
+    assert lines == ["name   value", "a          1", "bcdef     22"]
+    assert table(("name", "note"), [["a", ""]]) == ["name  note", "a"]
+
+
+def test_that_a_table_without_rows_is_its_titles():
+    assert table(("name", "value"), []) == ["name  value"]
+
+
+def test_that_empty_lines_stay_empty_where_lines_are_indented():
+    assert indented(["a", ""]) == ["  a", ""]
+
+
+def test_that_a_noun_follows_its_number():
+    assert (counted(1, "row"), counted(0, "row"), counted(2, "row")) == (
+        "1 row",
+        "0 rows",
+        "2 rows",
+    )
