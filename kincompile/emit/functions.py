@@ -152,13 +152,16 @@ def _functions(
 
 def _count_uses(inline: InlineProgram, outputs: Iterable[int]) -> Counter[int]:
     """Count how often each value is used; a changed sign is no value of its own."""
-    uses = Counter(outputs)
-    for node in range(len(inline.nodes) - 1, -1, -1):
+    uses = [0] * len(inline.nodes)
+    for node in outputs:
+        uses[node] += 1
+    for node in range(len(uses) - 1, -1, -1):
         if uses[node]:
-            weight = uses[node] if inline.nodes[node][0] == "neg" else 1
-            for operand in operands_of(inline.nodes[node]):
+            content = inline.nodes[node]
+            weight = uses[node] if content[0] == "neg" else 1
+            for operand in operands_of(content):
                 uses[operand] += weight
-    return Counter({node: count for node, count in uses.items() if count})
+    return Counter({node: count for node, count in enumerate(uses) if count})
 
 
 def _in_order(inline: InlineProgram, starts: Iterable[int], known: Mapping[int, str]) -> list[int]:

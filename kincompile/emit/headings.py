@@ -28,7 +28,7 @@ def header(code: InlineProgram) -> list[str]:
 def title(section: Section) -> str:
     """Return rows, type, name and points of a constraint, for a comment above its code."""
     instance = section.instance
-    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}": {instance.constraint.text}'
+    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}": {section.text}'
 
 
 def place(quantity: str, entry: Entry, code: InlineProgram) -> str:

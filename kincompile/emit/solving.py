@@ -51,11 +51,8 @@ def schedule_solve(code: InlineProgram, plan: SolvePlan, table: NameTable) -> So
     variable = _depending_on(plan, plan.right)
     needed = _needed(plan, (*plan.solution, *plan.determinants))
     uses = _count_uses(plan, needed)
-    factors = [
-        node
-        for node in sorted(needed - variable)
-        if number_of(nodes, node) is None and _is_read(plan, node, needed, variable)
-    ]
+    read = {k for node in needed & variable for k in _signless_operands(plan, node)}
+    factors = [node for node in sorted(read - variable) if number_of(nodes, node) is None]
     equations, coordinates = (
         code.program.equations,
         [item.name for item in code.program.coordinates],
@@ -122,13 +119,6 @@ def _signless_operands(plan: SolvePlan, node: int) -> list[int]:
     """Return the operands of a node; of a changed sign, what it changes."""
     found = operands_of(plan.nodes[node])
     return [plan.nodes[k][1] if plan.nodes[k][0] == "neg" else k for k in found]
-
-
-def _is_read(plan: SolvePlan, node: int, needed: set[int], variable: set[int]) -> bool:
-    """Return whether the solution for a right side reads this value of the factorization."""
-    if plan.nodes[node][0] == "neg":
-        return False
-    return any(node in _signless_operands(plan, user) for user in needed & variable)
 
 
 def explained(code: InlineProgram, plan: SolvePlan) -> list[str]:
