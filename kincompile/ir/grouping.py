@@ -1,0 +1,249 @@
+"""The program by groups: constraints of one type and one shape run together, each number an array over them.
+
+Two constraints are of one shape when the same attributes are zero and the same bodies are the ground. A group has one piece of
+straight-line code, folded for its shape, and index arrays that say where its inputs come from and where its results go.
+Its size does not depend on the number of constraints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.ir.graph import Graph, Node, number_of
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from kincompile.ir.program import Instance, Kernel, Program
+
+    Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where an input of a group comes from.
+
+    Attributes
+    ----------
+    kind
+        ``"q"``, ``"q_dot"``, ``"cos"`` and ``"sin"`` (of body angles), ``"number"`` (an attribute) or ``"value"`` (computed from t, p
+        and contact parameters).
+    index
+        Index for each constraint, into the vector of that kind.
+    """
+
+    kind: str
+    index: Index
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Constraints that run together.
+
+    Attributes
+    ----------
+    name
+        Name of the code, for instance ``Revolute_2``.
+    kernel
+        The kernel of their type.
+    nodes
+        Its code, folded for the shape of the group.
+    inputs
+        Where each input that is left comes from.
+    Phi, nu, gamma
+        Nodes, one an equation.
+    Phi_q
+        ``(row, column, node)`` in the constraint's own count.
+    rows
+        First row of each constraint, shape (L,).
+    columns
+        Column of each of the type's coordinates for each constraint, shape (L, c); -1 on the ground.
+    """
+
+    name: str
+    kernel: Kernel
+    nodes: tuple[Node, ...]
+    inputs: Mapping[str, Source]
+    Phi: tuple[int, ...]
+    Phi_q: tuple[tuple[int, int, int], ...]
+    nu: tuple[int, ...]
+    gamma: tuple[int, ...]
+    rows: Index
+    columns: Index
+
+    def number(self, node: int) -> Any:
+        """Return the number a node stands for, None where it is not a plain number."""
+        return number_of(self.nodes, node)
+
+
+@dataclass(frozen=True, slots=True)
+class GroupedProgram:
+    """A program by groups.
+
+    Attributes
+    ----------
+    groups
+        The groups, in the order of their first constraint.
+    numbers
+        Attributes that are plain numbers, shape (K,).
+    values
+        Nodes of `program.values` that depend on t, p or contact parameters.
+    angles
+        Columns of the body angles whose cosine and sine are needed.
+    """
+
+    program: Program
+    groups: tuple[Group, ...]
+    numbers: NDArray[np.float64]
+    values: tuple[int, ...]
+    angles: tuple[int, ...]
+
+
+KINDS = ("q", "q_dot", "cos", "sin", "number", "value")
+
+
+@dataclass(frozen=True, slots=True)
+class _Nodes:
+    """Kind and index of every node of `program.values`, and its number where it is a plain one.
+
+    Attributes
+    ----------
+    kind : ndarray of int, shape (nodes,)
+        Position in `KINDS`.
+    index : ndarray of int, shape (nodes,)
+        Index into the vector of that kind; for computed values the node itself.
+    number : ndarray, shape (nodes,)
+        NaN where a node is not a plain number.
+    """
+
+    kind: Index
+    index: Index
+    number: NDArray[np.float64]
+
+
+def _classify(program: Program) -> _Nodes:
+    names = [item.name for item in program.coordinates]
+    places = {name: (0, k) for k, name in enumerate(names)}
+    places.update({rate(name): (1, k) for k, name in enumerate(names)})
+    angle_number = {names[column]: k for k, (_, column) in enumerate(program.frames)}
+    nodes = program.values
+    kind = np.full(len(nodes), KINDS.index("value"))
+    index = np.arange(len(nodes))
+    number = np.full(len(nodes), np.nan)
+    for node, (operation, *operands) in enumerate(nodes):
+        if operation == "input" and operands[0] in places:
+            kind[node], index[node] = places[operands[0]]
+        elif operation == "const":
+            number[node] = operands[0]
+        elif operation == "neg":
+            number[node] = -number[operands[0]]
+        elif operation == "call" and operands[0] in ("cos", "sin"):
+            inner = nodes[operands[1]]
+            if inner[0] == "input" and inner[1] in angle_number:
+                kind[node], index[node] = KINDS.index(operands[0]), angle_number[inner[1]]
+    kind[~np.isnan(number)] = KINDS.index("number")
+    return _Nodes(kind, index, number)
+
+
+def group(program: Program) -> GroupedProgram:
+    """Arrange a program by groups."""
+    by_kernel: dict[int, list[Instance]] = {}
+    for instance in program.instances:
+        by_kernel.setdefault(id(instance.kernel), []).append(instance)
+    nodes = _classify(program)
+    builder = _Builder(nodes)
+    groups: list[Group] = []
+    for instances in by_kernel.values():
+        groups += builder.groups(instances)
+    groups.sort(key=lambda item: int(item.rows[0]))
+    return GroupedProgram(
+        program,
+        tuple(groups),
+        np.array(builder.numbers),
+        tuple(builder.values),
+        tuple(column for _, column in program.frames),
+    )
+
+
+class _Builder:
+    """Makes groups, and collects the numbers and computed values that they read."""
+
+    def __init__(self, nodes: _Nodes) -> None:
+        self._nodes = nodes
+        self._counts: dict[str, int] = {}
+        self._values: dict[int, int] = {}
+        self.numbers: list[float] = []
+        self.values: list[int] = []
+
+    def groups(self, instances: list[Instance]) -> list[Group]:
+        """Split the constraints of one kernel by their shape."""
+        bindings = np.array([instance.bindings for instance in instances])
+        columns = np.array(
+            [[-1 if c is None else c for c in instance.columns] for instance in instances]
+        )
+        rows = np.array([instance.first_row for instance in instances])
+        numbers = self._nodes.number[bindings]
+        # What shapes the code: attributes that are zero, and what stands for the ground.
+        shapes = np.where((numbers == 0) | (numbers == 1), numbers, -1)
+        # One byte string a constraint compares faster than a row of numbers.
+        key = np.concatenate((shapes, columns < 0), axis=1).astype(np.int8)
+        _, which = np.unique(key.view(f"V{key.shape[1]}").reshape(-1), return_inverse=True)
+        found = []
+        for number in dict.fromkeys(which.tolist()):
+            members = np.flatnonzero(which == number)
+            part = bindings[members], columns[members], rows[members]
+            found.append(self._group(instances[0].kernel, shapes[members[0]], *part))
+        return found
+
+    def _group(
+        self, kernel: Kernel, shape: NDArray[np.float64], bindings: Index, columns: Index, rows: Index
+    ) -> Group:
+        graph = Graph()
+        inputs: dict[str, int] = {}
+        sources: dict[str, Source] = {}
+        for name, folded, nodes in zip(kernel.inputs, shape.tolist(), bindings.T, strict=True):
+            if folded >= 0:
+                inputs[name] = graph.const(int(folded))
+            else:
+                inputs[name] = graph.input(name)
+                sources[name] = self._source(nodes)
+        new = graph.instantiate(kernel.nodes, inputs)
+        self._counts[kernel.name] = self._counts.get(kernel.name, 0) + 1
+        return Group(
+            f"{kernel.name}_{self._counts[kernel.name]}",
+            kernel,
+            tuple(graph.nodes),
+            sources,
+            tuple(new[node] for node in kernel.Phi),
+            tuple(
+                (row, column, new[node])
+                for row, column, node in kernel.Phi_q
+                if columns[0, column] >= 0 and graph.value_of(new[node]) != 0
+            ),
+            tuple(new[node] for node in kernel.nu),
+            tuple(new[node] for node in kernel.gamma),
+            rows,
+            columns,
+        )
+
+    def _source(self, nodes: Index) -> Source:
+        """Return where an input comes from; numbers here and expressions there are all computed."""
+        kinds = np.unique(self._nodes.kind[nodes])
+        kind = KINDS[kinds[0]] if kinds.size == 1 else "value"
+        if kind == "number":
+            first = len(self.numbers)
+            self.numbers += self._nodes.number[nodes].tolist()
+            return Source(kind, np.arange(first, len(self.numbers)))
+        if kind == "value":
+            for node in nodes.tolist():
+                if node not in self._values:
+                    self._values[node] = len(self.values)
+                    self.values.append(node)
+            return Source(kind, np.array([self._values[node] for node in nodes.tolist()]))
+        return Source(kind, self._nodes.index[nodes])
