@@ -154,6 +154,11 @@ def test_that_a_long_sum_is_one_level() -> None:
     assert parse_expression("+".join(["x"] * 1000), NAMES) == 1000 * x
 
 
+def test_that_a_refused_name_comes_with_its_reason() -> None:
+    with pytest.raises(ExpressionError, match="column 5: 'a' cannot stand here: no accelerations"):
+        parse_expression("x + a", NAMES, refused={"a": "no accelerations"})
+
+
 def test_that_places_count_from_where_the_text_begins() -> None:
     with pytest.raises(ExpressionError, match="line 7, column 14") as first:
         parse_expression("x + zeta", NAMES, Place(7, 10))
