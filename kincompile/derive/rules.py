@@ -117,6 +117,8 @@ def gradient(expression: Scalar, position: VectorSymbol) -> Vector:
                     for k, factor in enumerate(factors)
                 )
             )
+        case Power(base, exponent):
+            return scaled(exponent * power_of(base, exponent - 1), gradient(base, position))
         case Dot(left, right) if left == right:
             return scaled(2 * coefficient(right, position), left)
         case Dot(left, right):
