@@ -80,14 +80,14 @@ def _Phi(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
+    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_2 = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
     contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_2_contact_4 = contact_2 * contact_4
+    contact_5 = contact_2 * contact_4
     contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_2_contact_6 = contact_2 * contact_6
+    contact_7 = contact_2 * contact_6
     contact_8 = lift * sin_alpha_contact / 2
     return (
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
@@ -97,10 +97,10 @@ def _Phi(f, q, t, p):
         -x_follower,
         s_follower,
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        c_follower * (y_follower - y_cam - contact_2_contact_4)
-            - s_follower * (x_follower - x_cam - contact_2_contact_6),
-        s_follower * (contact_2_contact_4 - contact_8 * contact_6)
-            + c_follower * (contact_8 * contact_4 + contact_2_contact_6),
+        c_follower * (y_follower - y_cam - contact_5)
+            - s_follower * (x_follower - x_cam - contact_7),
+        s_follower * (contact_5 - contact_8 * contact_6)
+            + c_follower * (contact_8 * contact_4 + contact_7),
         # 6  AbsoluteAngle "motor": cam angle omega*t
         phi_cam - omega * t,
     )
@@ -113,18 +113,18 @@ def _Phi_q(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
+    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_2 = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
     contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_2_contact_4 = contact_2 * contact_4
+    contact_5 = contact_2 * contact_4
     contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_2_contact_6 = contact_2 * contact_6
+    contact_7 = contact_2 * contact_6
     lift_sin_alpha_contact = lift * sin_alpha_contact
     lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_10 = contact_2_contact_4 - lift_sin_alpha_contact_2 * contact_6
-    contact_11 = lift_sin_alpha_contact_2 * contact_4 + contact_2_contact_6
+    contact_10 = contact_5 - lift_sin_alpha_contact_2 * contact_6
+    contact_11 = lift_sin_alpha_contact_2 * contact_4 + contact_7
     contact_12 = s_follower * contact_11 - c_follower * contact_10
     contact_13 = lift * cos_alpha_contact / 2 - contact_2
     return (
@@ -133,10 +133,11 @@ def _Phi_q(f, q, t, p):
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         s_follower,  # contact.contact by x_cam
         -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_2_contact_4 + c_follower * contact_2_contact_6),  # contact.contact by phi_cam
+        -(s_follower * contact_5 + c_follower * contact_7),  # contact.contact by phi_cam
         -s_follower,  # contact.contact by x_follower
         c_follower,  # contact.contact by y_follower
-        -(c_follower * (x_follower - x_cam - contact_2_contact_6) + s_follower * (y_follower - y_cam - contact_2_contact_4)),  # contact.contact by phi_follower
+        -(c_follower * (x_follower - x_cam - contact_7)
+                + s_follower * (y_follower - y_cam - contact_5)),  # contact.contact by phi_follower
         -(s_follower * contact_10 + c_follower * contact_11),  # contact.contact by alpha_contact
         contact_12,  # contact.tangent by phi_cam
         -contact_12,  # contact.tangent by phi_follower
@@ -164,50 +165,55 @@ def _nu(f, q, t, p):
 
 def _gamma(f, q, q_dot, t, p):
     x_cam, y_cam, phi_cam, x_follower, y_follower, phi_follower, alpha_contact = q
-    x_cam_dot, y_cam_dot, phi_cam_dot, x_follower_dot, y_follower_dot, phi_follower_dot, alpha_contact_dot = q_dot
+    (
+        x_cam_dot, y_cam_dot, phi_cam_dot, x_follower_dot, y_follower_dot, phi_follower_dot,
+        alpha_contact_dot,
+    ) = q_dot
     base, lift, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
+    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_2 = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
     contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_2_contact_4 = contact_2 * contact_4
+    contact_5 = contact_2 * contact_4
     contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_2_contact_6 = contact_2 * contact_6
+    contact_7 = contact_2 * contact_6
     lift_sin_alpha_contact = lift * sin_alpha_contact
     lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
     contact_10 = lift_sin_alpha_contact_2 * alpha_contact_dot
-    contact_10_contact_6 = contact_10 * contact_6
+    contact_11 = contact_10 * contact_6
     contact_12 = phi_cam_dot * contact_4 + alpha_contact_dot * contact_4
-    contact_2_contact_12 = contact_2 * contact_12
-    contact_10_contact_4 = contact_10 * contact_4
+    contact_13 = contact_2 * contact_12
+    contact_14 = contact_10 * contact_4
     contact_15 = phi_cam_dot * contact_6 + alpha_contact_dot * contact_6
-    contact_2_contact_15 = contact_2 * contact_15
+    contact_16 = contact_2 * contact_15
     contact_17 = (
-        c_follower * (x_follower_dot - x_cam_dot - contact_10_contact_6 + contact_2_contact_12)
-        + s_follower * (y_follower_dot - y_cam_dot - contact_10_contact_4 - contact_2_contact_15)
+        c_follower * (x_follower_dot - x_cam_dot - contact_11 + contact_13)
+        + s_follower * (y_follower_dot - y_cam_dot - contact_14 - contact_16)
     )
     contact_18 = phi_cam_dot * contact_12 + alpha_contact_dot * contact_12
-    contact_2_contact_18 = contact_2 * contact_18
+    contact_19 = contact_2 * contact_18
     lift_cos_alpha_contact = lift * cos_alpha_contact
     lift_cos_alpha_contact_2 = lift_cos_alpha_contact / 2
     alpha_contact_dot_sq = alpha_contact_dot**2
     contact_23 = lift_cos_alpha_contact_2 * alpha_contact_dot_sq
-    contact_23_contact_4 = contact_23 * contact_4
+    contact_24 = contact_23 * contact_4
     contact_25 = lift_sin_alpha_contact * alpha_contact_dot
-    contact_25_contact_15 = contact_25 * contact_15
-    contact_25_contact_12 = contact_25 * contact_12
-    contact_23_contact_6 = contact_23 * contact_6
+    contact_26 = contact_25 * contact_15
+    contact_27 = contact_25 * contact_12
+    contact_28 = contact_23 * contact_6
     contact_29 = phi_cam_dot * contact_15 + alpha_contact_dot * contact_15
-    contact_2_contact_29 = contact_2 * contact_29
+    contact_30 = contact_2 * contact_29
     contact_31 = lift_cos_alpha_contact_2 * alpha_contact_dot
     contact_32 = (
-        c_follower * (contact_31 * contact_6 - lift_sin_alpha_contact_2 * contact_12 - contact_10_contact_4 - contact_2_contact_15)
-        + s_follower * (contact_31 * contact_4 + lift_sin_alpha_contact_2 * contact_15 + contact_10_contact_6 - contact_2_contact_12)
+        c_follower * (contact_31 * contact_6 - lift_sin_alpha_contact_2 * contact_12
+            - contact_14 - contact_16)
+        + s_follower * (contact_31 * contact_4 + lift_sin_alpha_contact_2 * contact_15
+            + contact_11 - contact_13)
     )
     contact_33 = lift_cos_alpha_contact * alpha_contact_dot
     contact_34 = lift_sin_alpha_contact_2 * alpha_contact_dot_sq
@@ -219,12 +225,22 @@ def _gamma(f, q, q_dot, t, p):
         0,
         phi_follower_dot * (phi_follower_dot * s_follower),
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        phi_follower_dot * (phi_follower_dot * (c_follower * (y_follower - y_cam - contact_2_contact_4) - s_follower * (x_follower - x_cam - contact_2_contact_6)) + contact_17)
+        phi_follower_dot * (phi_follower_dot * (c_follower * (y_follower - y_cam - contact_5)
+                    - s_follower * (x_follower - x_cam - contact_7))
+                + contact_17)
             + phi_follower_dot * contact_17
-            - (c_follower * (contact_2_contact_18 - (contact_23_contact_4 + contact_25_contact_15)) - s_follower * (contact_25_contact_12 - contact_23_contact_6 + contact_2_contact_29)),
-        phi_follower_dot * (phi_follower_dot * (s_follower * (contact_2_contact_4 - lift_sin_alpha_contact_2 * contact_6) + c_follower * (lift_sin_alpha_contact_2 * contact_4 + contact_2_contact_6)) + contact_32)
+            - (c_follower * (contact_19 - (contact_24 + contact_26))
+                - s_follower * (contact_27 - contact_28 + contact_30)),
+        phi_follower_dot * (phi_follower_dot * (s_follower * (contact_5
+                        - lift_sin_alpha_contact_2 * contact_6)
+                    + c_follower * (lift_sin_alpha_contact_2 * contact_4 + contact_7))
+                + contact_32)
             + phi_follower_dot * contact_32
-            - (c_follower * (contact_33 * contact_15 - contact_34 * contact_4 - lift_sin_alpha_contact_2 * contact_18 + contact_23_contact_6 - contact_25_contact_12 - contact_2_contact_29) - s_follower * (contact_2_contact_18 - (contact_34 * contact_6 + contact_33 * contact_12 + lift_sin_alpha_contact_2 * contact_29 + contact_23_contact_4 + contact_25_contact_15))),
+            - (c_follower * (contact_33 * contact_15 - contact_34 * contact_4
+                    - lift_sin_alpha_contact_2 * contact_18 + contact_28 - contact_27 - contact_30)
+                - s_follower * (contact_19
+                    - (contact_34 * contact_6 + contact_33 * contact_12
+                        + lift_sin_alpha_contact_2 * contact_29 + contact_24 + contact_26))),
         # 6  AbsoluteAngle "motor": cam angle omega*t
         0,
     )
@@ -237,20 +253,20 @@ def _position(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
+    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_2 = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
     contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_2_contact_4 = contact_2 * contact_4
-    contact_d_y = y_follower - y_cam - contact_2_contact_4
+    contact_5 = contact_2 * contact_4
+    contact_d_y = y_follower - y_cam - contact_5
     contact_7 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_2_contact_7 = contact_2 * contact_7
-    contact_d_x = x_follower - x_cam - contact_2_contact_7
+    contact_8 = contact_2 * contact_7
+    contact_d_x = x_follower - x_cam - contact_8
     lift_sin_alpha_contact = lift * sin_alpha_contact
     lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_12 = contact_2_contact_4 - lift_sin_alpha_contact_2 * contact_7
-    contact_13 = lift_sin_alpha_contact_2 * contact_4 + contact_2_contact_7
+    contact_12 = contact_5 - lift_sin_alpha_contact_2 * contact_7
+    contact_13 = lift_sin_alpha_contact_2 * contact_4 + contact_8
     contact_14 = s_follower * contact_12 + c_follower * contact_13
     contact_15 = s_follower * contact_13 - c_follower * contact_12
     contact_16 = lift * cos_alpha_contact / 2 - contact_2
@@ -273,7 +289,7 @@ def _position(f, q, t, p):
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         s_follower,  # contact.contact by x_cam
         -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_2_contact_4 + c_follower * contact_2_contact_7),  # contact.contact by phi_cam
+        -(s_follower * contact_5 + c_follower * contact_8),  # contact.contact by phi_cam
         -s_follower,  # contact.contact by x_follower
         c_follower,  # contact.contact by y_follower
         -(c_follower * contact_d_x + s_follower * contact_d_y),  # contact.contact by phi_follower
@@ -292,18 +308,18 @@ def _velocity(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
+    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_2 = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
     contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_2_contact_4 = contact_2 * contact_4
+    contact_5 = contact_2 * contact_4
     contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_2_contact_6 = contact_2 * contact_6
+    contact_7 = contact_2 * contact_6
     lift_sin_alpha_contact = lift * sin_alpha_contact
     lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_10 = contact_2_contact_4 - lift_sin_alpha_contact_2 * contact_6
-    contact_11 = lift_sin_alpha_contact_2 * contact_4 + contact_2_contact_6
+    contact_10 = contact_5 - lift_sin_alpha_contact_2 * contact_6
+    contact_11 = lift_sin_alpha_contact_2 * contact_4 + contact_7
     contact_12 = s_follower * contact_11 - c_follower * contact_10
     contact_13 = lift * cos_alpha_contact / 2 - contact_2
     return (
@@ -313,10 +329,11 @@ def _velocity(f, q, t, p):
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         s_follower,  # contact.contact by x_cam
         -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_2_contact_4 + c_follower * contact_2_contact_6),  # contact.contact by phi_cam
+        -(s_follower * contact_5 + c_follower * contact_7),  # contact.contact by phi_cam
         -s_follower,  # contact.contact by x_follower
         c_follower,  # contact.contact by y_follower
-        -(c_follower * (x_follower - x_cam - contact_2_contact_6) + s_follower * (y_follower - y_cam - contact_2_contact_4)),  # contact.contact by phi_follower
+        -(c_follower * (x_follower - x_cam - contact_7)
+                + s_follower * (y_follower - y_cam - contact_5)),  # contact.contact by phi_follower
         -(s_follower * contact_10 + c_follower * contact_11),  # contact.contact by alpha_contact
         contact_12,  # contact.tangent by phi_cam
         -contact_12,  # contact.tangent by phi_follower
@@ -339,57 +356,62 @@ def _velocity(f, q, t, p):
 
 def _acceleration(f, q, q_dot, t, p):
     x_cam, y_cam, phi_cam, x_follower, y_follower, phi_follower, alpha_contact = q
-    x_cam_dot, y_cam_dot, phi_cam_dot, x_follower_dot, y_follower_dot, phi_follower_dot, alpha_contact_dot = q_dot
+    (
+        x_cam_dot, y_cam_dot, phi_cam_dot, x_follower_dot, y_follower_dot, phi_follower_dot,
+        alpha_contact_dot,
+    ) = q_dot
     base, lift, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
+    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_2 = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
     contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_2_contact_4 = contact_2 * contact_4
+    contact_5 = contact_2 * contact_4
     contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_2_contact_6 = contact_2 * contact_6
-    contact_d_x = x_follower - x_cam - contact_2_contact_6
-    contact_d_y = y_follower - y_cam - contact_2_contact_4
+    contact_7 = contact_2 * contact_6
+    contact_d_x = x_follower - x_cam - contact_7
+    contact_d_y = y_follower - y_cam - contact_5
     lift_sin_alpha_contact = lift * sin_alpha_contact
     lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_12 = contact_2_contact_4 - lift_sin_alpha_contact_2 * contact_6
-    contact_13 = lift_sin_alpha_contact_2 * contact_4 + contact_2_contact_6
+    contact_12 = contact_5 - lift_sin_alpha_contact_2 * contact_6
+    contact_13 = lift_sin_alpha_contact_2 * contact_4 + contact_7
     contact_14 = s_follower * contact_12 + c_follower * contact_13
     contact_15 = s_follower * contact_13 - c_follower * contact_12
     lift_cos_alpha_contact = lift * cos_alpha_contact
     lift_cos_alpha_contact_2 = lift_cos_alpha_contact / 2
     contact_18 = lift_cos_alpha_contact_2 - contact_2
     contact_19 = lift_sin_alpha_contact_2 * alpha_contact_dot
-    contact_19_contact_6 = contact_19 * contact_6
+    contact_20 = contact_19 * contact_6
     contact_21 = phi_cam_dot * contact_4 + alpha_contact_dot * contact_4
-    contact_2_contact_21 = contact_2 * contact_21
-    contact_19_contact_4 = contact_19 * contact_4
+    contact_22 = contact_2 * contact_21
+    contact_23 = contact_19 * contact_4
     contact_24 = phi_cam_dot * contact_6 + alpha_contact_dot * contact_6
-    contact_2_contact_24 = contact_2 * contact_24
+    contact_25 = contact_2 * contact_24
     contact_26 = (
-        c_follower * (x_follower_dot - x_cam_dot - contact_19_contact_6 + contact_2_contact_21)
-        + s_follower * (y_follower_dot - y_cam_dot - contact_19_contact_4 - contact_2_contact_24)
+        c_follower * (x_follower_dot - x_cam_dot - contact_20 + contact_22)
+        + s_follower * (y_follower_dot - y_cam_dot - contact_23 - contact_25)
     )
     contact_27 = phi_cam_dot * contact_21 + alpha_contact_dot * contact_21
-    contact_2_contact_27 = contact_2 * contact_27
+    contact_28 = contact_2 * contact_27
     alpha_contact_dot_sq = alpha_contact_dot**2
     contact_30 = lift_cos_alpha_contact_2 * alpha_contact_dot_sq
-    contact_30_contact_4 = contact_30 * contact_4
+    contact_31 = contact_30 * contact_4
     contact_32 = lift_sin_alpha_contact * alpha_contact_dot
-    contact_32_contact_24 = contact_32 * contact_24
-    contact_32_contact_21 = contact_32 * contact_21
-    contact_30_contact_6 = contact_30 * contact_6
+    contact_33 = contact_32 * contact_24
+    contact_34 = contact_32 * contact_21
+    contact_35 = contact_30 * contact_6
     contact_36 = phi_cam_dot * contact_24 + alpha_contact_dot * contact_24
-    contact_2_contact_36 = contact_2 * contact_36
+    contact_37 = contact_2 * contact_36
     contact_38 = lift_cos_alpha_contact_2 * alpha_contact_dot
     contact_39 = (
-        c_follower * (contact_38 * contact_6 - lift_sin_alpha_contact_2 * contact_21 - contact_19_contact_4 - contact_2_contact_24)
-        + s_follower * (contact_38 * contact_4 + lift_sin_alpha_contact_2 * contact_24 + contact_19_contact_6 - contact_2_contact_21)
+        c_follower * (contact_38 * contact_6 - lift_sin_alpha_contact_2 * contact_21
+            - contact_23 - contact_25)
+        + s_follower * (contact_38 * contact_4 + lift_sin_alpha_contact_2 * contact_24
+            + contact_20 - contact_22)
     )
     contact_40 = lift_cos_alpha_contact * alpha_contact_dot
     contact_41 = lift_sin_alpha_contact_2 * alpha_contact_dot_sq
@@ -400,7 +422,7 @@ def _acceleration(f, q, q_dot, t, p):
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         s_follower,  # contact.contact by x_cam
         -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_2_contact_4 + c_follower * contact_2_contact_6),  # contact.contact by phi_cam
+        -(s_follower * contact_5 + c_follower * contact_7),  # contact.contact by phi_cam
         -s_follower,  # contact.contact by x_follower
         c_follower,  # contact.contact by y_follower
         -(c_follower * contact_d_x + s_follower * contact_d_y),  # contact.contact by phi_follower
@@ -417,11 +439,19 @@ def _acceleration(f, q, q_dot, t, p):
         0,
         phi_follower_dot * (phi_follower_dot * s_follower),
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        phi_follower_dot * (phi_follower_dot * (c_follower * contact_d_y - s_follower * contact_d_x) + contact_26)
+        phi_follower_dot * (phi_follower_dot * (c_follower * contact_d_y
+                    - s_follower * contact_d_x)
+                + contact_26)
             + phi_follower_dot * contact_26
-            - (c_follower * (contact_2_contact_27 - (contact_30_contact_4 + contact_32_contact_24)) - s_follower * (contact_32_contact_21 - contact_30_contact_6 + contact_2_contact_36)),
-        phi_follower_dot * (phi_follower_dot * contact_14 + contact_39) + phi_follower_dot * contact_39
-            - (c_follower * (contact_40 * contact_24 - contact_41 * contact_4 - lift_sin_alpha_contact_2 * contact_27 + contact_30_contact_6 - contact_32_contact_21 - contact_2_contact_36) - s_follower * (contact_2_contact_27 - (contact_41 * contact_6 + contact_40 * contact_21 + lift_sin_alpha_contact_2 * contact_36 + contact_30_contact_4 + contact_32_contact_24))),
+            - (c_follower * (contact_28 - (contact_31 + contact_33))
+                - s_follower * (contact_34 - contact_35 + contact_37)),
+        phi_follower_dot * (phi_follower_dot * contact_14 + contact_39)
+            + phi_follower_dot * contact_39
+            - (c_follower * (contact_40 * contact_24 - contact_41 * contact_4
+                    - lift_sin_alpha_contact_2 * contact_27 + contact_35 - contact_34 - contact_37)
+                - s_follower * (contact_28
+                    - (contact_41 * contact_6 + contact_40 * contact_21
+                        + lift_sin_alpha_contact_2 * contact_36 + contact_31 + contact_33))),
         # 6  AbsoluteAngle "motor": cam angle omega*t
         0,
     )
@@ -429,58 +459,63 @@ def _acceleration(f, q, q_dot, t, p):
 
 def _kinematics(f, q, q_dot, t, p):
     x_cam, y_cam, phi_cam, x_follower, y_follower, phi_follower, alpha_contact = q
-    x_cam_dot, y_cam_dot, phi_cam_dot, x_follower_dot, y_follower_dot, phi_follower_dot, alpha_contact_dot = q_dot
+    (
+        x_cam_dot, y_cam_dot, phi_cam_dot, x_follower_dot, y_follower_dot, phi_follower_dot,
+        alpha_contact_dot,
+    ) = q_dot
     base, lift, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
+    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_2 = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
     contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_2_contact_4 = contact_2 * contact_4
-    contact_d_y = y_follower - y_cam - contact_2_contact_4
+    contact_5 = contact_2 * contact_4
+    contact_d_y = y_follower - y_cam - contact_5
     contact_7 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_2_contact_7 = contact_2 * contact_7
-    contact_d_x = x_follower - x_cam - contact_2_contact_7
+    contact_8 = contact_2 * contact_7
+    contact_d_x = x_follower - x_cam - contact_8
     contact_10 = c_follower * contact_d_y - s_follower * contact_d_x
     lift_sin_alpha_contact = lift * sin_alpha_contact
     lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_13 = contact_2_contact_4 - lift_sin_alpha_contact_2 * contact_7
-    contact_14 = lift_sin_alpha_contact_2 * contact_4 + contact_2_contact_7
+    contact_13 = contact_5 - lift_sin_alpha_contact_2 * contact_7
+    contact_14 = lift_sin_alpha_contact_2 * contact_4 + contact_8
     contact_15 = s_follower * contact_13 + c_follower * contact_14
     contact_16 = s_follower * contact_14 - c_follower * contact_13
     lift_cos_alpha_contact = lift * cos_alpha_contact
     lift_cos_alpha_contact_2 = lift_cos_alpha_contact / 2
     contact_19 = lift_cos_alpha_contact_2 - contact_2
     contact_20 = lift_sin_alpha_contact_2 * alpha_contact_dot
-    contact_20_contact_7 = contact_20 * contact_7
+    contact_21 = contact_20 * contact_7
     contact_22 = phi_cam_dot * contact_4 + alpha_contact_dot * contact_4
-    contact_2_contact_22 = contact_2 * contact_22
-    contact_20_contact_4 = contact_20 * contact_4
+    contact_23 = contact_2 * contact_22
+    contact_24 = contact_20 * contact_4
     contact_25 = phi_cam_dot * contact_7 + alpha_contact_dot * contact_7
-    contact_2_contact_25 = contact_2 * contact_25
+    contact_26 = contact_2 * contact_25
     contact_27 = (
-        c_follower * (x_follower_dot - x_cam_dot - contact_20_contact_7 + contact_2_contact_22)
-        + s_follower * (y_follower_dot - y_cam_dot - contact_20_contact_4 - contact_2_contact_25)
+        c_follower * (x_follower_dot - x_cam_dot - contact_21 + contact_23)
+        + s_follower * (y_follower_dot - y_cam_dot - contact_24 - contact_26)
     )
     contact_28 = phi_cam_dot * contact_22 + alpha_contact_dot * contact_22
-    contact_2_contact_28 = contact_2 * contact_28
+    contact_29 = contact_2 * contact_28
     alpha_contact_dot_sq = alpha_contact_dot**2
     contact_31 = lift_cos_alpha_contact_2 * alpha_contact_dot_sq
-    contact_31_contact_4 = contact_31 * contact_4
+    contact_32 = contact_31 * contact_4
     contact_33 = lift_sin_alpha_contact * alpha_contact_dot
-    contact_33_contact_25 = contact_33 * contact_25
-    contact_33_contact_22 = contact_33 * contact_22
-    contact_31_contact_7 = contact_31 * contact_7
+    contact_34 = contact_33 * contact_25
+    contact_35 = contact_33 * contact_22
+    contact_36 = contact_31 * contact_7
     contact_37 = phi_cam_dot * contact_25 + alpha_contact_dot * contact_25
-    contact_2_contact_37 = contact_2 * contact_37
+    contact_38 = contact_2 * contact_37
     contact_39 = lift_cos_alpha_contact_2 * alpha_contact_dot
     contact_40 = (
-        c_follower * (contact_39 * contact_7 - lift_sin_alpha_contact_2 * contact_22 - contact_20_contact_4 - contact_2_contact_25)
-        + s_follower * (contact_39 * contact_4 + lift_sin_alpha_contact_2 * contact_25 + contact_20_contact_7 - contact_2_contact_22)
+        c_follower * (contact_39 * contact_7 - lift_sin_alpha_contact_2 * contact_22
+            - contact_24 - contact_26)
+        + s_follower * (contact_39 * contact_4 + lift_sin_alpha_contact_2 * contact_25
+            + contact_21 - contact_23)
     )
     contact_41 = lift_cos_alpha_contact * alpha_contact_dot
     contact_42 = lift_sin_alpha_contact_2 * alpha_contact_dot_sq
@@ -503,7 +538,7 @@ def _kinematics(f, q, q_dot, t, p):
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         s_follower,  # contact.contact by x_cam
         -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_2_contact_4 + c_follower * contact_2_contact_7),  # contact.contact by phi_cam
+        -(s_follower * contact_5 + c_follower * contact_8),  # contact.contact by phi_cam
         -s_follower,  # contact.contact by x_follower
         c_follower,  # contact.contact by y_follower
         -(c_follower * contact_d_x + s_follower * contact_d_y),  # contact.contact by phi_follower
@@ -532,10 +567,17 @@ def _kinematics(f, q, q_dot, t, p):
         0,
         phi_follower_dot * (phi_follower_dot * s_follower),
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        phi_follower_dot * (phi_follower_dot * contact_10 + contact_27) + phi_follower_dot * contact_27
-            - (c_follower * (contact_2_contact_28 - (contact_31_contact_4 + contact_33_contact_25)) - s_follower * (contact_33_contact_22 - contact_31_contact_7 + contact_2_contact_37)),
-        phi_follower_dot * (phi_follower_dot * contact_15 + contact_40) + phi_follower_dot * contact_40
-            - (c_follower * (contact_41 * contact_25 - contact_42 * contact_4 - lift_sin_alpha_contact_2 * contact_28 + contact_31_contact_7 - contact_33_contact_22 - contact_2_contact_37) - s_follower * (contact_2_contact_28 - (contact_42 * contact_7 + contact_41 * contact_22 + lift_sin_alpha_contact_2 * contact_37 + contact_31_contact_4 + contact_33_contact_25))),
+        phi_follower_dot * (phi_follower_dot * contact_10 + contact_27)
+            + phi_follower_dot * contact_27
+            - (c_follower * (contact_29 - (contact_32 + contact_34))
+                - s_follower * (contact_35 - contact_36 + contact_38)),
+        phi_follower_dot * (phi_follower_dot * contact_15 + contact_40)
+            + phi_follower_dot * contact_40
+            - (c_follower * (contact_41 * contact_25 - contact_42 * contact_4
+                    - lift_sin_alpha_contact_2 * contact_28 + contact_36 - contact_35 - contact_38)
+                - s_follower * (contact_29
+                    - (contact_42 * contact_7 + contact_41 * contact_22
+                        + lift_sin_alpha_contact_2 * contact_37 + contact_32 + contact_34))),
         # 6  AbsoluteAngle "motor": cam angle omega*t
         0,
     )
@@ -587,8 +629,16 @@ def _solve(f, F, b):
         shaft_x, shaft_y, guide_normal, guide_parallel, contact_contact, contact_tangent, motor,
     ) = b
     phi_follower = guide_parallel * k_1
-    alpha_contact = (contact_tangent - contact_tangent_phi_cam * motor - contact_tangent_phi_follower * phi_follower) * k_2
-    y_follower = (contact_contact - contact_contact_x_cam * shaft_x - contact_contact_y_cam * shaft_y + contact_contact_x_follower * guide_normal - contact_contact_phi_cam * motor - contact_contact_phi_follower * phi_follower - contact_contact_alpha_contact * alpha_contact) * k_3
+    alpha_contact = (
+        (contact_tangent - contact_tangent_phi_cam * motor
+            - contact_tangent_phi_follower * phi_follower) * k_2
+    )
+    y_follower = (
+        (contact_contact - contact_contact_x_cam * shaft_x - contact_contact_y_cam * shaft_y
+            + contact_contact_x_follower * guide_normal - contact_contact_phi_cam * motor
+            - contact_contact_phi_follower * phi_follower
+            - contact_contact_alpha_contact * alpha_contact) * k_3
+    )
     x_follower = -guide_normal
     return (
         shaft_x,

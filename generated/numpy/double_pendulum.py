@@ -72,7 +72,7 @@ def _Phi(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_upper, s_upper = cos_sin(phi_upper)
     c_lower, s_lower = cos_sin(phi_lower)
-    # 2-3  Revolute "elbow": upper (1, 0) - lower (-3, 0)
+    # 2-3  Revolute "elbow"
     floor_lower_y = 3 * s_lower
     return (
         # 0-1  Revolute "hinge": upper (-1, 0) - ground (0.2, 0.5)
@@ -94,7 +94,7 @@ def _Phi_q(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_upper, s_upper = cos_sin(phi_upper)
     c_lower, s_lower = cos_sin(phi_lower)
-    # 2-3  Revolute "elbow": upper (1, 0) - lower (-3, 0)
+    # 2-3  Revolute "elbow"
     floor_lower_x = 3 * c_lower
     return (
         # 0-1  Revolute "hinge": upper (-1, 0) - ground (0.2, 0.5)
@@ -133,11 +133,11 @@ def _gamma(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_upper, s_upper = cos_sin(phi_upper)
     c_lower, s_lower = cos_sin(phi_lower)
-    # 0-1  Revolute "hinge": upper (-1, 0) - ground (0.2, 0.5)
+    # 0-1  Revolute "hinge"
     phi_upper_dot_sq = phi_upper_dot**2
     elbow_upper_w2_x = phi_upper_dot_sq * c_upper
     elbow_upper_w2_y = phi_upper_dot_sq * s_upper
-    # 2-3  Revolute "elbow": upper (1, 0) - lower (-3, 0)
+    # 2-3  Revolute "elbow"
     phi_lower_dot_sq = phi_lower_dot**2
     elbow_2 = phi_lower_dot_sq * (3 * s_lower)
     return (
@@ -160,7 +160,7 @@ def _position(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_upper, s_upper = cos_sin(phi_upper)
     c_lower, s_lower = cos_sin(phi_lower)
-    # 2-3  Revolute "elbow": upper (1, 0) - lower (-3, 0)
+    # 2-3  Revolute "elbow"
     floor_lower_x = 3 * c_lower
     floor_lower_y = 3 * s_lower
     return (
@@ -195,7 +195,7 @@ def _velocity(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_upper, s_upper = cos_sin(phi_upper)
     c_lower, s_lower = cos_sin(phi_lower)
-    # 2-3  Revolute "elbow": upper (1, 0) - lower (-3, 0)
+    # 2-3  Revolute "elbow"
     floor_lower_x = 3 * c_lower
     return (
         # Phi_q
@@ -230,11 +230,11 @@ def _acceleration(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_upper, s_upper = cos_sin(phi_upper)
     c_lower, s_lower = cos_sin(phi_lower)
-    # 0-1  Revolute "hinge": upper (-1, 0) - ground (0.2, 0.5)
+    # 0-1  Revolute "hinge"
     phi_upper_dot_sq = phi_upper_dot**2
     elbow_upper_w2_x = phi_upper_dot_sq * c_upper
     elbow_upper_w2_y = phi_upper_dot_sq * s_upper
-    # 2-3  Revolute "elbow": upper (1, 0) - lower (-3, 0)
+    # 2-3  Revolute "elbow"
     floor_lower_y = 3 * s_lower
     floor_lower_x = 3 * c_lower
     phi_lower_dot_sq = phi_lower_dot**2
@@ -272,16 +272,16 @@ def _kinematics(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_upper, s_upper = cos_sin(phi_upper)
     c_lower, s_lower = cos_sin(phi_lower)
-    # 0-1  Revolute "hinge": upper (-1, 0) - ground (0.2, 0.5)
+    # 0-1  Revolute "hinge"
     phi_upper_dot_sq = phi_upper_dot**2
     elbow_upper_w2_x = phi_upper_dot_sq * c_upper
     elbow_upper_w2_y = phi_upper_dot_sq * s_upper
-    # 2-3  Revolute "elbow": upper (1, 0) - lower (-3, 0)
+    # 2-3  Revolute "elbow"
     floor_lower_x = 3 * c_lower
     floor_lower_y = 3 * s_lower
     phi_lower_dot_sq = phi_lower_dot**2
     elbow_4 = phi_lower_dot_sq * floor_lower_y
-    # 5  AbsoluteAngle "swing": upper angle sin(10*t)
+    # 5  AbsoluteAngle "swing"
     swing_1 = 10 * t
     sin_swing_1 = sin(swing_1)
     return (

@@ -107,7 +107,7 @@ def _gamma(f, q, q_dot, t, p):
     x2_dot, phi1_dot, phi2_dot = q_dot
     (l,) = p
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1": l*sin(phi2) - x2 + cos(phi1) = 0
+    # 0  Equation "equation_1"
     equation_1_1 = l * phi2_dot**2
     phi1_dot_sq = phi1_dot**2
     return (
@@ -124,7 +124,7 @@ def _position(f, q, t, p):
     x2, phi1, phi2 = q
     (l,) = p
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1": l*sin(phi2) - x2 + cos(phi1) = 0
+    # 0  Equation "equation_1"
     equation_1_1 = l * sin(phi2)
     cos_phi1 = cos(phi1)
     sin_phi1 = sin(phi1)
@@ -174,7 +174,7 @@ def _acceleration(f, q, q_dot, t, p):
     x2_dot, phi1_dot, phi2_dot = q_dot
     (l,) = p
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1": l*sin(phi2) - x2 + cos(phi1) = 0
+    # 0  Equation "equation_1"
     sin_phi1 = sin(phi1)
     cos_phi2 = cos(phi2)
     equation_1_3 = l * phi2_dot**2
@@ -204,30 +204,30 @@ def _kinematics(f, q, q_dot, t, p):
     x2_dot, phi1_dot, phi2_dot = q_dot
     (l,) = p
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1": l*sin(phi2) - x2 + cos(phi1) = 0
+    # 0  Equation "equation_1"
     sin_phi2 = sin(phi2)
-    l_sin_phi2 = l * sin_phi2
+    equation_1_2 = l * sin_phi2
     cos_phi1 = cos(phi1)
     sin_phi1 = sin(phi1)
     cos_phi2 = cos(phi2)
-    l_cos_phi2 = l * cos_phi2
+    equation_1_6 = l * cos_phi2
     equation_1_7 = l * phi2_dot**2
     phi1_dot_sq = phi1_dot**2
     return (
         # Phi
         # 0  Equation "equation_1": l*sin(phi2) - x2 + cos(phi1) = 0
-        l_sin_phi2 + cos_phi1 - x2,
+        equation_1_2 + cos_phi1 - x2,
         # 1  Equation "equation_2": -l*cos(phi2) + sin(phi1) = 0
-        sin_phi1 - l_cos_phi2,
+        sin_phi1 - equation_1_6,
         # 2  Equation "equation_3": phi1 - pi*t/12 = 0
         phi1 - pi * t / 12,
         # Phi_q
         # 0  Equation "equation_1": l*sin(phi2) - x2 + cos(phi1) = 0
         -sin_phi1,  # equation_1 by phi1
-        l_cos_phi2,  # equation_1 by phi2
+        equation_1_6,  # equation_1 by phi2
         # 1  Equation "equation_2": -l*cos(phi2) + sin(phi1) = 0
         cos_phi1,  # equation_2 by phi1
-        l_sin_phi2,  # equation_2 by phi2
+        equation_1_2,  # equation_2 by phi2
         # nu
         # 0  Equation "equation_1": l*sin(phi2) - x2 + cos(phi1) = 0
         0,

@@ -80,22 +80,25 @@ pi = math.pi
 
 
 def _Phi(f, q, t, p):
-    x_crank, y_crank, phi_crank, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker, phi_rocker = q
+    (
+        x_crank, y_crank, phi_crank, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker,
+        phi_rocker,
+    ) = q
     a, b, c, d, omega = p
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+    # 0-1  Revolute "A"
     a_2 = a / 2
     B_crank_x = a_2 * c_crank
     B_crank_y = a_2 * s_crank
-    # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+    # 2-3  Revolute "B"
     b_2 = b / 2
     C_coupler_x = b_2 * c_coupler
     C_coupler_y = b_2 * s_coupler
-    # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+    # 4-5  Revolute "C"
     c_2 = c / 2
     D_rocker_x = c_2 * c_rocker
     D_rocker_y = c_2 * s_rocker
@@ -125,15 +128,15 @@ def _Phi_q(f, q, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+    # 0-1  Revolute "A"
     a_2 = a / 2
     B_crank_y = a_2 * s_crank
     B_crank_x = a_2 * c_crank
-    # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+    # 2-3  Revolute "B"
     b_2 = b / 2
     C_coupler_y = b_2 * s_coupler
     C_coupler_x = b_2 * c_coupler
-    # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+    # 4-5  Revolute "C"
     c_2 = c / 2
     D_rocker_y = c_2 * s_rocker
     D_rocker_x = c_2 * c_rocker
@@ -186,17 +189,17 @@ def _gamma(f, q, q_dot, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+    # 0-1  Revolute "A"
     phi_crank_dot_sq = phi_crank_dot**2
     a_2 = a / 2
     B_crank_w2_x = phi_crank_dot_sq * (a_2 * c_crank)
     B_crank_w2_y = phi_crank_dot_sq * (a_2 * s_crank)
-    # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+    # 2-3  Revolute "B"
     phi_coupler_dot_sq = phi_coupler_dot**2
     b_2 = b / 2
     C_coupler_w2_x = phi_coupler_dot_sq * (b_2 * c_coupler)
     C_coupler_w2_y = phi_coupler_dot_sq * (b_2 * s_coupler)
-    # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+    # 4-5  Revolute "C"
     phi_rocker_dot_sq = phi_rocker_dot**2
     c_2 = c / 2
     D_rocker_w2_x = phi_rocker_dot_sq * (c_2 * c_rocker)
@@ -220,22 +223,25 @@ def _gamma(f, q, q_dot, t, p):
 
 
 def _position(f, q, t, p):
-    x_crank, y_crank, phi_crank, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker, phi_rocker = q
+    (
+        x_crank, y_crank, phi_crank, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker,
+        phi_rocker,
+    ) = q
     a, b, c, d, omega = p
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+    # 0-1  Revolute "A"
     a_2 = a / 2
     B_crank_x = a_2 * c_crank
     B_crank_y = a_2 * s_crank
-    # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+    # 2-3  Revolute "B"
     b_2 = b / 2
     C_coupler_x = b_2 * c_coupler
     C_coupler_y = b_2 * s_coupler
-    # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+    # 4-5  Revolute "C"
     c_2 = c / 2
     D_rocker_x = c_2 * c_rocker
     D_rocker_y = c_2 * s_rocker
@@ -283,15 +289,15 @@ def _velocity(f, q, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+    # 0-1  Revolute "A"
     a_2 = a / 2
     B_crank_y = a_2 * s_crank
     B_crank_x = a_2 * c_crank
-    # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+    # 2-3  Revolute "B"
     b_2 = b / 2
     C_coupler_y = b_2 * s_coupler
     C_coupler_x = b_2 * c_coupler
-    # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+    # 4-5  Revolute "C"
     c_2 = c / 2
     D_rocker_y = c_2 * s_rocker
     D_rocker_x = c_2 * c_rocker
@@ -340,21 +346,21 @@ def _acceleration(f, q, q_dot, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+    # 0-1  Revolute "A"
     a_2 = a / 2
     B_crank_y = a_2 * s_crank
     B_crank_x = a_2 * c_crank
     phi_crank_dot_sq = phi_crank_dot**2
     B_crank_w2_x = phi_crank_dot_sq * B_crank_x
     B_crank_w2_y = phi_crank_dot_sq * B_crank_y
-    # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+    # 2-3  Revolute "B"
     b_2 = b / 2
     C_coupler_y = b_2 * s_coupler
     C_coupler_x = b_2 * c_coupler
     phi_coupler_dot_sq = phi_coupler_dot**2
     C_coupler_w2_x = phi_coupler_dot_sq * C_coupler_x
     C_coupler_w2_y = phi_coupler_dot_sq * C_coupler_y
-    # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+    # 4-5  Revolute "C"
     c_2 = c / 2
     D_rocker_y = c_2 * s_rocker
     D_rocker_x = c_2 * c_rocker
@@ -398,7 +404,10 @@ def _acceleration(f, q, q_dot, t, p):
 
 
 def _kinematics(f, q, q_dot, t, p):
-    x_crank, y_crank, phi_crank, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker, phi_rocker = q
+    (
+        x_crank, y_crank, phi_crank, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker,
+        phi_rocker,
+    ) = q
     phi_crank_dot, phi_coupler_dot, phi_rocker_dot = q_dot[2], q_dot[5], q_dot[8]
     a, b, c, d, omega = p
     cos_sin = f.cos_sin
@@ -406,21 +415,21 @@ def _kinematics(f, q, q_dot, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+    # 0-1  Revolute "A"
     a_2 = a / 2
     B_crank_x = a_2 * c_crank
     B_crank_y = a_2 * s_crank
     phi_crank_dot_sq = phi_crank_dot**2
     B_crank_w2_x = phi_crank_dot_sq * B_crank_x
     B_crank_w2_y = phi_crank_dot_sq * B_crank_y
-    # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+    # 2-3  Revolute "B"
     b_2 = b / 2
     C_coupler_x = b_2 * c_coupler
     C_coupler_y = b_2 * s_coupler
     phi_coupler_dot_sq = phi_coupler_dot**2
     C_coupler_w2_x = phi_coupler_dot_sq * C_coupler_x
     C_coupler_w2_y = phi_coupler_dot_sq * C_coupler_y
-    # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+    # 4-5  Revolute "C"
     c_2 = c / 2
     D_rocker_x = c_2 * c_rocker
     D_rocker_y = c_2 * s_rocker

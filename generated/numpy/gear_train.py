@@ -84,13 +84,13 @@ def _Phi(f, q, t, p):
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_arm, s_arm = cos_sin(phi_arm)
-    # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
+    # 4-5  Revolute "planet_bearing"
     planet_bearing_1 = R_planet + R_sun
-    # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 6  Gear "sun_mesh"
     sun_mesh_1 = R_planet * (phi_planet + pi)
     sun_mesh_2 = R_planet * pi
     sun_mesh_3 = (R_sun * phi_sun + sun_mesh_1 - sun_mesh_2) * (1 / planet_bearing_1)
-    # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 7  Gear "ring_mesh"
     ring_mesh_1 = (sun_mesh_1 - sun_mesh_2) * (1 / (R_planet - (2 * R_planet + R_sun)))
     return (
         # 0-1  Revolute "sun_bearing": sun (0, 0) - ground (0, 0)
@@ -102,9 +102,11 @@ def _Phi(f, q, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         x_planet - x_arm - planet_bearing_1 * c_arm,
         y_planet - y_arm - planet_bearing_1 * s_arm,
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         (y_planet - y_sun) * cos(sun_mesh_3) - (x_planet - x_sun) * sin(sun_mesh_3),
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         y_planet * cos(ring_mesh_1) - x_planet * sin(ring_mesh_1),
         # 8  AbsoluteAngle "motor": sun angle omega*t
         phi_sun - omega * t,
@@ -117,9 +119,9 @@ def _Phi_q(f, q, t, p):
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_arm, s_arm = cos_sin(phi_arm)
-    # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
+    # 4-5  Revolute "planet_bearing"
     planet_bearing_1 = R_planet + R_sun
-    # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 6  Gear "sun_mesh"
     sun_mesh_1 = R_planet * (phi_planet + pi)
     sun_mesh_2 = R_planet * pi
     sun_mesh_3 = 1 / planet_bearing_1
@@ -127,7 +129,7 @@ def _Phi_q(f, q, t, p):
     sin_sun_mesh_4 = sin(sun_mesh_4)
     cos_sun_mesh_4 = cos(sun_mesh_4)
     sun_mesh_7 = (x_planet - x_sun) * cos_sun_mesh_4 + (y_planet - y_sun) * sin_sun_mesh_4
-    # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 7  Gear "ring_mesh"
     ring_mesh_1 = 1 / (R_planet - (2 * R_planet + R_sun))
     ring_mesh_2 = (sun_mesh_1 - sun_mesh_2) * ring_mesh_1
     sin_ring_mesh_2 = sin(ring_mesh_2)
@@ -136,14 +138,16 @@ def _Phi_q(f, q, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         planet_bearing_1 * s_arm,  # planet_bearing.x by phi_arm
         -planet_bearing_1 * c_arm,  # planet_bearing.y by phi_arm
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sin_sun_mesh_4,  # sun_mesh by x_sun
         -cos_sun_mesh_4,  # sun_mesh by y_sun
         -R_sun * sun_mesh_3 * sun_mesh_7,  # sun_mesh by phi_sun
         -sin_sun_mesh_4,  # sun_mesh by x_planet
         cos_sun_mesh_4,  # sun_mesh by y_planet
         -R_planet * sun_mesh_3 * sun_mesh_7,  # sun_mesh by phi_planet
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         -sin_ring_mesh_2,  # ring_mesh by x_planet
         cos_ring_mesh_2,  # ring_mesh by y_planet
         -R_planet * ring_mesh_1 * (x_planet * cos_ring_mesh_2 + y_planet * sin_ring_mesh_2),  # ring_mesh by phi_planet
@@ -162,9 +166,11 @@ def _nu(f, q, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         0,
         0,
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         0,
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         0,
         # 8  AbsoluteAngle "motor": sun angle omega*t
         omega,
@@ -173,15 +179,18 @@ def _nu(f, q, t, p):
 
 def _gamma(f, q, q_dot, t, p):
     x_sun, y_sun, phi_sun, x_arm, y_arm, phi_arm, x_planet, y_planet, phi_planet = q
-    x_sun_dot, y_sun_dot, phi_sun_dot, x_arm_dot, y_arm_dot, phi_arm_dot, x_planet_dot, y_planet_dot, phi_planet_dot = q_dot
+    (
+        x_sun_dot, y_sun_dot, phi_sun_dot, x_arm_dot, y_arm_dot, phi_arm_dot, x_planet_dot,
+        y_planet_dot, phi_planet_dot,
+    ) = q_dot
     R_sun, R_planet, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_arm, s_arm = cos_sin(phi_arm)
-    # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
+    # 4-5  Revolute "planet_bearing"
     phi_arm_dot_sq = phi_arm_dot**2
     planet_bearing_2 = R_planet + R_sun
-    # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 6  Gear "sun_mesh"
     R_planet_phi_planet_dot = R_planet * phi_planet_dot
     sun_mesh_2 = 1 / planet_bearing_2
     sun_mesh_3 = (R_sun * phi_sun_dot + R_planet_phi_planet_dot) * sun_mesh_2
@@ -190,8 +199,11 @@ def _gamma(f, q, q_dot, t, p):
     sun_mesh_6 = (R_sun * phi_sun + sun_mesh_4 - sun_mesh_5) * sun_mesh_2
     cos_sun_mesh_6 = cos(sun_mesh_6)
     sin_sun_mesh_6 = sin(sun_mesh_6)
-    sun_mesh_9 = (x_planet_dot - x_sun_dot) * cos_sun_mesh_6 + (y_planet_dot - y_sun_dot) * sin_sun_mesh_6
-    # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    sun_mesh_9 = (
+        (x_planet_dot - x_sun_dot) * cos_sun_mesh_6
+        + (y_planet_dot - y_sun_dot) * sin_sun_mesh_6
+    )
+    # 7  Gear "ring_mesh"
     ring_mesh_1 = 1 / (R_planet - (2 * R_planet + R_sun))
     ring_mesh_2 = R_planet_phi_planet_dot * ring_mesh_1
     ring_mesh_3 = (sun_mesh_4 - sun_mesh_5) * ring_mesh_1
@@ -208,12 +220,17 @@ def _gamma(f, q, q_dot, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         -phi_arm_dot_sq * (planet_bearing_2 * c_arm),
         -phi_arm_dot_sq * (planet_bearing_2 * s_arm),
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sun_mesh_3 * sun_mesh_9
-            + sun_mesh_3 * (sun_mesh_9 + sun_mesh_3 * ((y_planet - y_sun) * cos_sun_mesh_6 - (x_planet - x_sun) * sin_sun_mesh_6)),
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+            + sun_mesh_3 * (sun_mesh_9
+                + sun_mesh_3 * ((y_planet - y_sun) * cos_sun_mesh_6
+                    - (x_planet - x_sun) * sin_sun_mesh_6)),
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         ring_mesh_2 * ring_mesh_6
-            + ring_mesh_2 * (ring_mesh_6 + ring_mesh_2 * (y_planet * cos_ring_mesh_3 - x_planet * sin_ring_mesh_3)),
+            + ring_mesh_2 * (ring_mesh_6
+                + ring_mesh_2 * (y_planet * cos_ring_mesh_3 - x_planet * sin_ring_mesh_3)),
         # 8  AbsoluteAngle "motor": sun angle omega*t
         0,
     )
@@ -225,11 +242,11 @@ def _position(f, q, t, p):
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_arm, s_arm = cos_sin(phi_arm)
-    # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
+    # 4-5  Revolute "planet_bearing"
     planet_bearing_1 = R_planet + R_sun
     planet_bearing_arm_x = planet_bearing_1 * c_arm
     planet_bearing_arm_y = planet_bearing_1 * s_arm
-    # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 6  Gear "sun_mesh"
     sun_mesh_d_y = y_planet - y_sun
     sun_mesh_2 = R_planet * (phi_planet + pi)
     sun_mesh_3 = R_planet * pi
@@ -239,7 +256,7 @@ def _position(f, q, t, p):
     sun_mesh_d_x = x_planet - x_sun
     sin_sun_mesh_5 = sin(sun_mesh_5)
     sun_mesh_9 = sun_mesh_d_x * cos_sun_mesh_5 + sun_mesh_d_y * sin_sun_mesh_5
-    # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 7  Gear "ring_mesh"
     ring_mesh_1 = 1 / (R_planet - (2 * R_planet + R_sun))
     ring_mesh_2 = (sun_mesh_2 - sun_mesh_3) * ring_mesh_1
     cos_ring_mesh_2 = cos(ring_mesh_2)
@@ -255,9 +272,11 @@ def _position(f, q, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         x_planet - x_arm - planet_bearing_arm_x,
         y_planet - y_arm - planet_bearing_arm_y,
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sun_mesh_d_y * cos_sun_mesh_5 - sun_mesh_d_x * sin_sun_mesh_5,
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         y_planet * cos_ring_mesh_2 - x_planet * sin_ring_mesh_2,
         # 8  AbsoluteAngle "motor": sun angle omega*t
         phi_sun - omega * t,
@@ -265,14 +284,16 @@ def _position(f, q, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         planet_bearing_arm_y,  # planet_bearing.x by phi_arm
         -planet_bearing_arm_x,  # planet_bearing.y by phi_arm
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sin_sun_mesh_5,  # sun_mesh by x_sun
         -cos_sun_mesh_5,  # sun_mesh by y_sun
         -R_sun * sun_mesh_4 * sun_mesh_9,  # sun_mesh by phi_sun
         -sin_sun_mesh_5,  # sun_mesh by x_planet
         cos_sun_mesh_5,  # sun_mesh by y_planet
         -R_planet * sun_mesh_4 * sun_mesh_9,  # sun_mesh by phi_planet
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         -sin_ring_mesh_2,  # ring_mesh by x_planet
         cos_ring_mesh_2,  # ring_mesh by y_planet
         -R_planet * ring_mesh_1 * (x_planet * cos_ring_mesh_2 + y_planet * sin_ring_mesh_2),  # ring_mesh by phi_planet
@@ -285,9 +306,9 @@ def _velocity(f, q, t, p):
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_arm, s_arm = cos_sin(phi_arm)
-    # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
+    # 4-5  Revolute "planet_bearing"
     planet_bearing_1 = R_planet + R_sun
-    # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 6  Gear "sun_mesh"
     sun_mesh_1 = R_planet * (phi_planet + pi)
     sun_mesh_2 = R_planet * pi
     sun_mesh_3 = 1 / planet_bearing_1
@@ -295,7 +316,7 @@ def _velocity(f, q, t, p):
     sin_sun_mesh_4 = sin(sun_mesh_4)
     cos_sun_mesh_4 = cos(sun_mesh_4)
     sun_mesh_7 = (x_planet - x_sun) * cos_sun_mesh_4 + (y_planet - y_sun) * sin_sun_mesh_4
-    # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 7  Gear "ring_mesh"
     ring_mesh_1 = 1 / (R_planet - (2 * R_planet + R_sun))
     ring_mesh_2 = (sun_mesh_1 - sun_mesh_2) * ring_mesh_1
     sin_ring_mesh_2 = sin(ring_mesh_2)
@@ -305,14 +326,16 @@ def _velocity(f, q, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         planet_bearing_1 * s_arm,  # planet_bearing.x by phi_arm
         -planet_bearing_1 * c_arm,  # planet_bearing.y by phi_arm
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sin_sun_mesh_4,  # sun_mesh by x_sun
         -cos_sun_mesh_4,  # sun_mesh by y_sun
         -R_sun * sun_mesh_3 * sun_mesh_7,  # sun_mesh by phi_sun
         -sin_sun_mesh_4,  # sun_mesh by x_planet
         cos_sun_mesh_4,  # sun_mesh by y_planet
         -R_planet * sun_mesh_3 * sun_mesh_7,  # sun_mesh by phi_planet
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         -sin_ring_mesh_2,  # ring_mesh by x_planet
         cos_ring_mesh_2,  # ring_mesh by y_planet
         -R_planet * ring_mesh_1 * (x_planet * cos_ring_mesh_2 + y_planet * sin_ring_mesh_2),  # ring_mesh by phi_planet
@@ -326,9 +349,11 @@ def _velocity(f, q, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         0,
         0,
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         0,
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         0,
         # 8  AbsoluteAngle "motor": sun angle omega*t
         omega,
@@ -337,17 +362,20 @@ def _velocity(f, q, t, p):
 
 def _acceleration(f, q, q_dot, t, p):
     x_sun, y_sun, phi_sun, x_arm, y_arm, phi_arm, x_planet, y_planet, phi_planet = q
-    x_sun_dot, y_sun_dot, phi_sun_dot, x_arm_dot, y_arm_dot, phi_arm_dot, x_planet_dot, y_planet_dot, phi_planet_dot = q_dot
+    (
+        x_sun_dot, y_sun_dot, phi_sun_dot, x_arm_dot, y_arm_dot, phi_arm_dot, x_planet_dot,
+        y_planet_dot, phi_planet_dot,
+    ) = q_dot
     R_sun, R_planet, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_arm, s_arm = cos_sin(phi_arm)
-    # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
+    # 4-5  Revolute "planet_bearing"
     planet_bearing_1 = R_planet + R_sun
     planet_bearing_arm_y = planet_bearing_1 * s_arm
     planet_bearing_arm_x = planet_bearing_1 * c_arm
     phi_arm_dot_sq = phi_arm_dot**2
-    # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 6  Gear "sun_mesh"
     sun_mesh_1 = R_planet * (phi_planet + pi)
     sun_mesh_2 = R_planet * pi
     sun_mesh_3 = 1 / planet_bearing_1
@@ -359,8 +387,11 @@ def _acceleration(f, q, q_dot, t, p):
     sun_mesh_9 = sun_mesh_d_x * cos_sun_mesh_4 + sun_mesh_d_y * sin_sun_mesh_4
     R_planet_phi_planet_dot = R_planet * phi_planet_dot
     sun_mesh_11 = (R_sun * phi_sun_dot + R_planet_phi_planet_dot) * sun_mesh_3
-    sun_mesh_12 = (x_planet_dot - x_sun_dot) * cos_sun_mesh_4 + (y_planet_dot - y_sun_dot) * sin_sun_mesh_4
-    # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    sun_mesh_12 = (
+        (x_planet_dot - x_sun_dot) * cos_sun_mesh_4
+        + (y_planet_dot - y_sun_dot) * sin_sun_mesh_4
+    )
+    # 7  Gear "ring_mesh"
     ring_mesh_1 = 1 / (R_planet - (2 * R_planet + R_sun))
     ring_mesh_2 = (sun_mesh_1 - sun_mesh_2) * ring_mesh_1
     sin_ring_mesh_2 = sin(ring_mesh_2)
@@ -372,14 +403,16 @@ def _acceleration(f, q, q_dot, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         planet_bearing_arm_y,  # planet_bearing.x by phi_arm
         -planet_bearing_arm_x,  # planet_bearing.y by phi_arm
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sin_sun_mesh_4,  # sun_mesh by x_sun
         -cos_sun_mesh_4,  # sun_mesh by y_sun
         -R_sun * sun_mesh_3 * sun_mesh_9,  # sun_mesh by phi_sun
         -sin_sun_mesh_4,  # sun_mesh by x_planet
         cos_sun_mesh_4,  # sun_mesh by y_planet
         -R_planet * sun_mesh_3 * sun_mesh_9,  # sun_mesh by phi_planet
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         -sin_ring_mesh_2,  # ring_mesh by x_planet
         cos_ring_mesh_2,  # ring_mesh by y_planet
         -R_planet * ring_mesh_1 * (x_planet * cos_ring_mesh_2 + y_planet * sin_ring_mesh_2),  # ring_mesh by phi_planet
@@ -393,12 +426,16 @@ def _acceleration(f, q, q_dot, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         -phi_arm_dot_sq * planet_bearing_arm_x,
         -phi_arm_dot_sq * planet_bearing_arm_y,
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sun_mesh_11 * sun_mesh_12
-            + sun_mesh_11 * (sun_mesh_12 + sun_mesh_11 * (sun_mesh_d_y * cos_sun_mesh_4 - sun_mesh_d_x * sin_sun_mesh_4)),
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+            + sun_mesh_11 * (sun_mesh_12
+                + sun_mesh_11 * (sun_mesh_d_y * cos_sun_mesh_4 - sun_mesh_d_x * sin_sun_mesh_4)),
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         ring_mesh_5 * ring_mesh_6
-            + ring_mesh_5 * (ring_mesh_6 + ring_mesh_5 * (y_planet * cos_ring_mesh_2 - x_planet * sin_ring_mesh_2)),
+            + ring_mesh_5 * (ring_mesh_6
+                + ring_mesh_5 * (y_planet * cos_ring_mesh_2 - x_planet * sin_ring_mesh_2)),
         # 8  AbsoluteAngle "motor": sun angle omega*t
         0,
     )
@@ -406,17 +443,20 @@ def _acceleration(f, q, q_dot, t, p):
 
 def _kinematics(f, q, q_dot, t, p):
     x_sun, y_sun, phi_sun, x_arm, y_arm, phi_arm, x_planet, y_planet, phi_planet = q
-    x_sun_dot, y_sun_dot, phi_sun_dot, x_arm_dot, y_arm_dot, phi_arm_dot, x_planet_dot, y_planet_dot, phi_planet_dot = q_dot
+    (
+        x_sun_dot, y_sun_dot, phi_sun_dot, x_arm_dot, y_arm_dot, phi_arm_dot, x_planet_dot,
+        y_planet_dot, phi_planet_dot,
+    ) = q_dot
     R_sun, R_planet, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_arm, s_arm = cos_sin(phi_arm)
-    # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
+    # 4-5  Revolute "planet_bearing"
     planet_bearing_1 = R_planet + R_sun
     planet_bearing_arm_x = planet_bearing_1 * c_arm
     planet_bearing_arm_y = planet_bearing_1 * s_arm
     phi_arm_dot_sq = phi_arm_dot**2
-    # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    # 6  Gear "sun_mesh"
     sun_mesh_d_y = y_planet - y_sun
     sun_mesh_2 = R_planet * (phi_planet + pi)
     sun_mesh_3 = R_planet * pi
@@ -429,8 +469,11 @@ def _kinematics(f, q, q_dot, t, p):
     sun_mesh_10 = sun_mesh_d_x * cos_sun_mesh_5 + sun_mesh_d_y * sin_sun_mesh_5
     R_planet_phi_planet_dot = R_planet * phi_planet_dot
     sun_mesh_12 = (R_sun * phi_sun_dot + R_planet_phi_planet_dot) * sun_mesh_4
-    sun_mesh_13 = (x_planet_dot - x_sun_dot) * cos_sun_mesh_5 + (y_planet_dot - y_sun_dot) * sin_sun_mesh_5
-    # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+    sun_mesh_13 = (
+        (x_planet_dot - x_sun_dot) * cos_sun_mesh_5
+        + (y_planet_dot - y_sun_dot) * sin_sun_mesh_5
+    )
+    # 7  Gear "ring_mesh"
     ring_mesh_1 = 1 / (R_planet - (2 * R_planet + R_sun))
     ring_mesh_2 = (sun_mesh_2 - sun_mesh_3) * ring_mesh_1
     cos_ring_mesh_2 = cos(ring_mesh_2)
@@ -449,9 +492,11 @@ def _kinematics(f, q, q_dot, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         x_planet - x_arm - planet_bearing_arm_x,
         y_planet - y_arm - planet_bearing_arm_y,
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sun_mesh_9,
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         ring_mesh_5,
         # 8  AbsoluteAngle "motor": sun angle omega*t
         phi_sun - omega * t,
@@ -459,14 +504,16 @@ def _kinematics(f, q, q_dot, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         planet_bearing_arm_y,  # planet_bearing.x by phi_arm
         -planet_bearing_arm_x,  # planet_bearing.y by phi_arm
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sin_sun_mesh_5,  # sun_mesh by x_sun
         -cos_sun_mesh_5,  # sun_mesh by y_sun
         -R_sun * sun_mesh_4 * sun_mesh_10,  # sun_mesh by phi_sun
         -sin_sun_mesh_5,  # sun_mesh by x_planet
         cos_sun_mesh_5,  # sun_mesh by y_planet
         -R_planet * sun_mesh_4 * sun_mesh_10,  # sun_mesh by phi_planet
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         -sin_ring_mesh_2,  # ring_mesh by x_planet
         cos_ring_mesh_2,  # ring_mesh by y_planet
         -R_planet * ring_mesh_1 * (x_planet * cos_ring_mesh_2 + y_planet * sin_ring_mesh_2),  # ring_mesh by phi_planet
@@ -480,9 +527,11 @@ def _kinematics(f, q, q_dot, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         0,
         0,
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         0,
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         0,
         # 8  AbsoluteAngle "motor": sun angle omega*t
         omega,
@@ -496,9 +545,11 @@ def _kinematics(f, q, q_dot, t, p):
         # 4-5  Revolute "planet_bearing": planet (0, 0) - arm (R_planet + R_sun, 0)
         -phi_arm_dot_sq * planet_bearing_arm_x,
         -phi_arm_dot_sq * planet_bearing_arm_y,
-        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 6  Gear "sun_mesh": sun (0, 0) radius_i R_sun theta_i 0 - planet (0, 0) radius_j
+        #      R_planet theta_j pi
         sun_mesh_12 * sun_mesh_13 + sun_mesh_12 * (sun_mesh_13 + sun_mesh_12 * sun_mesh_9),
-        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0, 0) radius_j R_planet theta_j pi
+        # 7  Gear "ring_mesh": ground (0, 0) radius_i -2*R_planet - R_sun theta_i 0 - planet (0,
+        #      0) radius_j R_planet theta_j pi
         ring_mesh_6 * ring_mesh_7 + ring_mesh_6 * (ring_mesh_7 + ring_mesh_6 * ring_mesh_5),
         # 8  AbsoluteAngle "motor": sun angle omega*t
         0,
@@ -516,8 +567,14 @@ def _factor(f, J):
         sun_mesh_phi_sun, sun_mesh_x_planet, sun_mesh_y_planet, sun_mesh_phi_planet,
         ring_mesh_x_planet, ring_mesh_y_planet, ring_mesh_phi_planet,
     ) = J
-    k_1 = sun_mesh_x_planet * planet_bearing_x_phi_arm + sun_mesh_y_planet * planet_bearing_y_phi_arm
-    k_2 = ring_mesh_x_planet * planet_bearing_x_phi_arm + ring_mesh_y_planet * planet_bearing_y_phi_arm
+    k_1 = (
+        sun_mesh_x_planet * planet_bearing_x_phi_arm
+        + sun_mesh_y_planet * planet_bearing_y_phi_arm
+    )
+    k_2 = (
+        ring_mesh_x_planet * planet_bearing_x_phi_arm
+        + ring_mesh_y_planet * planet_bearing_y_phi_arm
+    )
     k_3 = sun_mesh_phi_planet * k_2 - k_1 * ring_mesh_phi_planet
     k_4 = 1 / k_3
     return (

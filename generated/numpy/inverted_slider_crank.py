@@ -82,10 +82,10 @@ def _Phi(f, q, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_slider, s_slider = cos_sin(phi_slider)
     c_guide, s_guide = cos_sin(phi_guide)
-    # 0-1  Revolute "crank_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "crank_bearing"
     crank_pin_crank_x = 2 * c_crank
     crank_pin_crank_y = 2 * s_crank
-    # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
+    # 4-5  Translational "sleeve"
     sleeve_guide_y = 8 * s_guide
     sleeve_guide_x = 8 * c_guide
     return (
@@ -114,10 +114,10 @@ def _Phi_q(f, q, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_slider, s_slider = cos_sin(phi_slider)
     c_guide, s_guide = cos_sin(phi_guide)
-    # 0-1  Revolute "crank_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "crank_bearing"
     crank_pin_crank_y = 2 * s_crank
     crank_pin_crank_x = 2 * c_crank
-    # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
+    # 4-5  Translational "sleeve"
     sleeve_guide_x = 8 * c_guide
     sleeve_guide_y = 8 * s_guide
     sleeve_3 = c_slider * c_guide + s_slider * s_guide
@@ -133,7 +133,8 @@ def _Phi_q(f, q, t, p):
         # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
         s_slider,  # sleeve.normal by x_slider
         -c_slider,  # sleeve.normal by y_slider
-        -(c_slider * (x_guide + sleeve_guide_x - x_slider) + s_slider * (y_guide + sleeve_guide_y - y_slider)),  # sleeve.normal by phi_slider
+        -(c_slider * (x_guide + sleeve_guide_x - x_slider)
+                + s_slider * (y_guide + sleeve_guide_y - y_slider)),  # sleeve.normal by phi_slider
         -s_slider,  # sleeve.normal by x_guide
         c_slider,  # sleeve.normal by y_guide
         s_slider * sleeve_guide_y + c_slider * sleeve_guide_x,  # sleeve.normal by phi_guide
@@ -166,19 +167,22 @@ def _nu(f, q, t, p):
 
 def _gamma(f, q, q_dot, t, p):
     x_crank, y_crank, phi_crank, x_slider, y_slider, phi_slider, x_guide, y_guide, phi_guide = q
-    x_crank_dot, y_crank_dot, phi_crank_dot, x_slider_dot, y_slider_dot, phi_slider_dot, x_guide_dot, y_guide_dot, phi_guide_dot = q_dot
+    (
+        x_crank_dot, y_crank_dot, phi_crank_dot, x_slider_dot, y_slider_dot, phi_slider_dot,
+        x_guide_dot, y_guide_dot, phi_guide_dot,
+    ) = q_dot
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_slider, s_slider = cos_sin(phi_slider)
     c_guide, s_guide = cos_sin(phi_guide)
-    # 0-1  Revolute "crank_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "crank_bearing"
     phi_crank_dot_sq = phi_crank_dot**2
     crank_pin_crank_w2_x = phi_crank_dot_sq * (2 * c_crank)
     crank_pin_crank_w2_y = phi_crank_dot_sq * (2 * s_crank)
-    # 2-3  Revolute "crank_pin": crank (2, 0) - slider (0, -2)
+    # 2-3  Revolute "crank_pin"
     phi_slider_dot_sq = phi_slider_dot**2
-    # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
+    # 4-5  Translational "sleeve"
     sleeve_guide_y = 8 * s_guide
     sleeve_guide_x = 8 * c_guide
     sleeve_3 = (
@@ -198,7 +202,9 @@ def _gamma(f, q, q_dot, t, p):
         crank_pin_crank_w2_x - phi_slider_dot_sq * (2 * s_slider),
         crank_pin_crank_w2_y + phi_slider_dot_sq * (2 * c_slider),
         # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
-        phi_slider_dot * (phi_slider_dot * (c_slider * (y_guide + sleeve_guide_y - y_slider) - s_slider * (x_guide + sleeve_guide_x - x_slider)) + sleeve_3)
+        phi_slider_dot * (phi_slider_dot * (c_slider * (y_guide + sleeve_guide_y - y_slider)
+                    - s_slider * (x_guide + sleeve_guide_x - x_slider))
+                + sleeve_3)
             + phi_slider_dot * sleeve_3 - (s_slider * sleeve_5 - c_slider * sleeve_6),
         phi_slider_dot * sleeve_8 - phi_guide_dot * sleeve_8,
         # 6-7  Revolute "guide_bearing": guide (-8, 0) - ground (-8, 0)
@@ -216,13 +222,13 @@ def _position(f, q, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_slider, s_slider = cos_sin(phi_slider)
     c_guide, s_guide = cos_sin(phi_guide)
-    # 0-1  Revolute "crank_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "crank_bearing"
     crank_pin_crank_x = 2 * c_crank
     crank_pin_crank_y = 2 * s_crank
-    # 2-3  Revolute "crank_pin": crank (2, 0) - slider (0, -2)
+    # 2-3  Revolute "crank_pin"
     crank_pin_slider_x = 2 * s_slider
     crank_pin_2 = 2 * c_slider
-    # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
+    # 4-5  Translational "sleeve"
     sleeve_guide_y = 8 * s_guide
     sleeve_d_y = y_guide + sleeve_guide_y - y_slider
     sleeve_guide_x = 8 * c_guide
@@ -275,10 +281,10 @@ def _velocity(f, q, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_slider, s_slider = cos_sin(phi_slider)
     c_guide, s_guide = cos_sin(phi_guide)
-    # 0-1  Revolute "crank_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "crank_bearing"
     crank_pin_crank_y = 2 * s_crank
     crank_pin_crank_x = 2 * c_crank
-    # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
+    # 4-5  Translational "sleeve"
     sleeve_guide_x = 8 * c_guide
     sleeve_guide_y = 8 * s_guide
     sleeve_3 = c_slider * c_guide + s_slider * s_guide
@@ -295,7 +301,8 @@ def _velocity(f, q, t, p):
         # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
         s_slider,  # sleeve.normal by x_slider
         -c_slider,  # sleeve.normal by y_slider
-        -(c_slider * (x_guide + sleeve_guide_x - x_slider) + s_slider * (y_guide + sleeve_guide_y - y_slider)),  # sleeve.normal by phi_slider
+        -(c_slider * (x_guide + sleeve_guide_x - x_slider)
+                + s_slider * (y_guide + sleeve_guide_y - y_slider)),  # sleeve.normal by phi_slider
         -s_slider,  # sleeve.normal by x_guide
         c_slider,  # sleeve.normal by y_guide
         s_slider * sleeve_guide_y + c_slider * sleeve_guide_x,  # sleeve.normal by phi_guide
@@ -324,23 +331,26 @@ def _velocity(f, q, t, p):
 
 def _acceleration(f, q, q_dot, t, p):
     x_crank, y_crank, phi_crank, x_slider, y_slider, phi_slider, x_guide, y_guide, phi_guide = q
-    x_crank_dot, y_crank_dot, phi_crank_dot, x_slider_dot, y_slider_dot, phi_slider_dot, x_guide_dot, y_guide_dot, phi_guide_dot = q_dot
+    (
+        x_crank_dot, y_crank_dot, phi_crank_dot, x_slider_dot, y_slider_dot, phi_slider_dot,
+        x_guide_dot, y_guide_dot, phi_guide_dot,
+    ) = q_dot
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_slider, s_slider = cos_sin(phi_slider)
     c_guide, s_guide = cos_sin(phi_guide)
-    # 0-1  Revolute "crank_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "crank_bearing"
     crank_pin_crank_y = 2 * s_crank
     crank_pin_crank_x = 2 * c_crank
     phi_crank_dot_sq = phi_crank_dot**2
     crank_pin_crank_w2_x = phi_crank_dot_sq * crank_pin_crank_x
     crank_pin_crank_w2_y = phi_crank_dot_sq * crank_pin_crank_y
-    # 2-3  Revolute "crank_pin": crank (2, 0) - slider (0, -2)
+    # 2-3  Revolute "crank_pin"
     crank_pin_1 = 2 * c_slider
     crank_pin_slider_x = 2 * s_slider
     phi_slider_dot_sq = phi_slider_dot**2
-    # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
+    # 4-5  Translational "sleeve"
     sleeve_guide_x = 8 * c_guide
     sleeve_d_x = x_guide + sleeve_guide_x - x_slider
     sleeve_guide_y = 8 * s_guide
@@ -385,7 +395,8 @@ def _acceleration(f, q, q_dot, t, p):
         crank_pin_crank_w2_x - phi_slider_dot_sq * crank_pin_slider_x,
         crank_pin_crank_w2_y + phi_slider_dot_sq * crank_pin_1,
         # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
-        phi_slider_dot * (phi_slider_dot * (c_slider * sleeve_d_y - s_slider * sleeve_d_x) + sleeve_6)
+        phi_slider_dot * (phi_slider_dot * (c_slider * sleeve_d_y - s_slider * sleeve_d_x)
+                + sleeve_6)
             + phi_slider_dot * sleeve_6 - (s_slider * sleeve_8 - c_slider * sleeve_9),
         phi_slider_dot * sleeve_11 - phi_guide_dot * sleeve_11,
         # 6-7  Revolute "guide_bearing": guide (-8, 0) - ground (-8, 0)
@@ -398,23 +409,26 @@ def _acceleration(f, q, q_dot, t, p):
 
 def _kinematics(f, q, q_dot, t, p):
     x_crank, y_crank, phi_crank, x_slider, y_slider, phi_slider, x_guide, y_guide, phi_guide = q
-    x_crank_dot, y_crank_dot, phi_crank_dot, x_slider_dot, y_slider_dot, phi_slider_dot, x_guide_dot, y_guide_dot, phi_guide_dot = q_dot
+    (
+        x_crank_dot, y_crank_dot, phi_crank_dot, x_slider_dot, y_slider_dot, phi_slider_dot,
+        x_guide_dot, y_guide_dot, phi_guide_dot,
+    ) = q_dot
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_slider, s_slider = cos_sin(phi_slider)
     c_guide, s_guide = cos_sin(phi_guide)
-    # 0-1  Revolute "crank_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "crank_bearing"
     crank_pin_crank_x = 2 * c_crank
     crank_pin_crank_y = 2 * s_crank
     phi_crank_dot_sq = phi_crank_dot**2
     crank_pin_crank_w2_x = phi_crank_dot_sq * crank_pin_crank_x
     crank_pin_crank_w2_y = phi_crank_dot_sq * crank_pin_crank_y
-    # 2-3  Revolute "crank_pin": crank (2, 0) - slider (0, -2)
+    # 2-3  Revolute "crank_pin"
     crank_pin_slider_x = 2 * s_slider
     crank_pin_2 = 2 * c_slider
     phi_slider_dot_sq = phi_slider_dot**2
-    # 4-5  Translational "sleeve": slider (0, 0) axis (1, 0) - guide (8, 0) axis (1, 0)
+    # 4-5  Translational "sleeve"
     sleeve_guide_y = 8 * s_guide
     sleeve_d_y = y_guide + sleeve_guide_y - y_slider
     sleeve_guide_x = 8 * c_guide

@@ -103,7 +103,7 @@ def _gamma(f, q, q_dot, t, p):
     phi3 = q[2]
     x2_dot, y2_dot, phi3_dot = q_dot
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
+    # 0  Equation "equation_1"
     phi3_dot_sq = phi3_dot**2
     return (
         # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
@@ -118,7 +118,7 @@ def _gamma(f, q, q_dot, t, p):
 def _position(f, q, t, p):
     x2, y2, phi3 = q
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
+    # 0  Equation "equation_1"
     equation_1_1 = sin(phi3) / 4
     equation_1_2 = cos(phi3) / 4
     return (
@@ -166,7 +166,7 @@ def _acceleration(f, q, q_dot, t, p):
     x2, y2, phi3 = q
     x2_dot, y2_dot, phi3_dot = q_dot
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
+    # 0  Equation "equation_1"
     cos_phi3 = cos(phi3)
     phi3_dot_sq = phi3_dot**2
     sin_phi3 = sin(phi3)
@@ -193,7 +193,7 @@ def _kinematics(f, q, q_dot, t, p):
     x2, y2, phi3 = q
     x2_dot, y2_dot, phi3_dot = q_dot
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
+    # 0  Equation "equation_1"
     sin_phi3 = sin(phi3)
     sin_phi3_4 = sin_phi3 / 4
     cos_phi3 = cos(phi3)

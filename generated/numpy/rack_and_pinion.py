@@ -75,7 +75,7 @@ def _Phi(f, q, t, p):
     cos_sin, sin, sqrt = f.cos_sin, f.sin, f.sqrt
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
-    # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+    # 2-3  RackAndPinion "mesh"
     mesh_1 = sqrt(0.04000000000000001) * R
     mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
@@ -86,8 +86,10 @@ def _Phi(f, q, t, p):
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         x_pinion,
         y_pinion,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2) - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
+        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
+                - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
         (mesh_d_y + mesh_6) * mesh_4 - (mesh_d_x + mesh_4) * mesh_6 - mesh_1,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
@@ -102,14 +104,15 @@ def _Phi_q(f, q, t, p):
     cos_sin, sqrt = f.cos_sin, f.sqrt
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
-    # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+    # 2-3  RackAndPinion "mesh"
     mesh_1 = 0.2 * c_rack
     mesh_2 = 0.2 * s_rack
     mesh_d_y = y_pinion - y_rack
     mesh_d_x = x_pinion - x_rack
     mesh_5 = sqrt(0.04000000000000001) * R
     return (
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
         -mesh_1,  # mesh.roll by x_rack
         -mesh_2,  # mesh.roll by y_rack
         mesh_d_y * mesh_1 - mesh_d_x * mesh_2 - mesh_5,  # mesh.roll by phi_rack
@@ -131,7 +134,8 @@ def _nu(f, q, t, p):
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
         0,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
         0,
         0,
         # 4  AbsoluteAngle "guide": rack angle 0
@@ -148,26 +152,29 @@ def _gamma(f, q, q_dot, t, p):
     cos_sin, sin = f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
-    # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+    # 2-3  RackAndPinion "mesh"
     mesh_d_x = x_pinion - x_rack
     phi_rack_dot_sq = phi_rack_dot**2
     mesh_3 = 0.2 * c_rack
-    phi_rack_dot_sq_mesh_3 = phi_rack_dot_sq * mesh_3
+    mesh_4 = phi_rack_dot_sq * mesh_3
     mesh_d_y = y_pinion - y_rack
     mesh_6 = 0.2 * s_rack
-    phi_rack_dot_sq_mesh_6 = phi_rack_dot_sq * mesh_6
+    mesh_7 = phi_rack_dot_sq * mesh_6
     mesh_d_dot_y = y_pinion_dot - y_rack_dot
-    phi_rack_dot_mesh_3 = phi_rack_dot * mesh_3
+    mesh_9 = phi_rack_dot * mesh_3
     mesh_d_dot_x = x_pinion_dot - x_rack_dot
-    phi_rack_dot_mesh_6 = phi_rack_dot * mesh_6
+    mesh_11 = phi_rack_dot * mesh_6
     return (
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
         0,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        mesh_d_x * phi_rack_dot_sq_mesh_3 + mesh_d_y * phi_rack_dot_sq_mesh_6
-            - 2 * (mesh_d_dot_y * phi_rack_dot_mesh_3 - mesh_d_dot_x * phi_rack_dot_mesh_6),
-        -(phi_rack_dot_sq_mesh_3 * mesh_6 - phi_rack_dot_sq_mesh_6 * mesh_3 - 2 * ((mesh_d_dot_y + phi_rack_dot_mesh_3) * phi_rack_dot_mesh_6 + (mesh_d_dot_x - phi_rack_dot_mesh_6) * phi_rack_dot_mesh_3) + ((mesh_d_x + mesh_3) * phi_rack_dot_sq_mesh_6 - (mesh_d_y + mesh_6) * phi_rack_dot_sq_mesh_3)),
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
+        mesh_d_x * mesh_4 + mesh_d_y * mesh_7
+            - 2 * (mesh_d_dot_y * mesh_9 - mesh_d_dot_x * mesh_11),
+        -(mesh_4 * mesh_6 - mesh_7 * mesh_3
+                - 2 * ((mesh_d_dot_y + mesh_9) * mesh_11 + (mesh_d_dot_x - mesh_11) * mesh_9)
+                + ((mesh_d_x + mesh_3) * mesh_7 - (mesh_d_y + mesh_6) * mesh_4)),
         # 4  AbsoluteAngle "guide": rack angle 0
         0,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -181,7 +188,7 @@ def _position(f, q, t, p):
     cos_sin, sin, sqrt = f.cos_sin, f.sin, f.sqrt
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
-    # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+    # 2-3  RackAndPinion "mesh"
     mesh_1 = sqrt(0.04000000000000001) * R
     mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
@@ -195,15 +202,18 @@ def _position(f, q, t, p):
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         x_pinion,
         y_pinion,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2) - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
+        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
+                - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
         mesh_d_y_ * mesh_4 - mesh_d_x_ * mesh_6 - mesh_1,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
         phi_pinion - swing * sin(pi * t),
         # Phi_q
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
         -mesh_4,  # mesh.roll by x_rack
         -mesh_6,  # mesh.roll by y_rack
         mesh_d_y * mesh_4 - mesh_d_x * mesh_6 - mesh_1,  # mesh.roll by phi_rack
@@ -224,7 +234,7 @@ def _velocity(f, q, t, p):
     cos, cos_sin, sqrt = f.cos, f.cos_sin, f.sqrt
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
-    # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+    # 2-3  RackAndPinion "mesh"
     mesh_1 = 0.2 * c_rack
     mesh_2 = 0.2 * s_rack
     mesh_d_y = y_pinion - y_rack
@@ -232,7 +242,8 @@ def _velocity(f, q, t, p):
     mesh_5 = sqrt(0.04000000000000001) * R
     return (
         # Phi_q
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
         -mesh_1,  # mesh.roll by x_rack
         -mesh_2,  # mesh.roll by y_rack
         mesh_d_y * mesh_1 - mesh_d_x * mesh_2 - mesh_5,  # mesh.roll by phi_rack
@@ -248,7 +259,8 @@ def _velocity(f, q, t, p):
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
         0,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
         0,
         0,
         # 4  AbsoluteAngle "guide": rack angle 0
@@ -265,7 +277,7 @@ def _acceleration(f, q, q_dot, t, p):
     cos_sin, sin, sqrt = f.cos_sin, f.sin, f.sqrt
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
-    # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+    # 2-3  RackAndPinion "mesh"
     mesh_1 = 0.2 * c_rack
     mesh_2 = 0.2 * s_rack
     mesh_d_y = y_pinion - y_rack
@@ -274,15 +286,16 @@ def _acceleration(f, q, q_dot, t, p):
     mesh_d_x_ = mesh_d_x + mesh_1
     mesh_d_y_ = mesh_d_y + mesh_2
     phi_rack_dot_sq = phi_rack_dot**2
-    phi_rack_dot_sq_mesh_1 = phi_rack_dot_sq * mesh_1
-    phi_rack_dot_sq_mesh_2 = phi_rack_dot_sq * mesh_2
+    mesh_9 = phi_rack_dot_sq * mesh_1
+    mesh_10 = phi_rack_dot_sq * mesh_2
     mesh_d_dot_y = y_pinion_dot - y_rack_dot
-    phi_rack_dot_mesh_1 = phi_rack_dot * mesh_1
+    mesh_12 = phi_rack_dot * mesh_1
     mesh_d_dot_x = x_pinion_dot - x_rack_dot
-    phi_rack_dot_mesh_2 = phi_rack_dot * mesh_2
+    mesh_14 = phi_rack_dot * mesh_2
     return (
         # Phi_q
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
         -mesh_1,  # mesh.roll by x_rack
         -mesh_2,  # mesh.roll by y_rack
         mesh_d_y * mesh_1 - mesh_d_x * mesh_2 - mesh_5,  # mesh.roll by phi_rack
@@ -298,10 +311,13 @@ def _acceleration(f, q, q_dot, t, p):
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
         0,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        mesh_d_x * phi_rack_dot_sq_mesh_1 + mesh_d_y * phi_rack_dot_sq_mesh_2
-            - 2 * (mesh_d_dot_y * phi_rack_dot_mesh_1 - mesh_d_dot_x * phi_rack_dot_mesh_2),
-        -(phi_rack_dot_sq_mesh_1 * mesh_2 - phi_rack_dot_sq_mesh_2 * mesh_1 - 2 * ((mesh_d_dot_y + phi_rack_dot_mesh_1) * phi_rack_dot_mesh_2 + (mesh_d_dot_x - phi_rack_dot_mesh_2) * phi_rack_dot_mesh_1) + (mesh_d_x_ * phi_rack_dot_sq_mesh_2 - mesh_d_y_ * phi_rack_dot_sq_mesh_1)),
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
+        mesh_d_x * mesh_9 + mesh_d_y * mesh_10
+            - 2 * (mesh_d_dot_y * mesh_12 - mesh_d_dot_x * mesh_14),
+        -(mesh_9 * mesh_2 - mesh_10 * mesh_1
+                - 2 * ((mesh_d_dot_y + mesh_12) * mesh_14 + (mesh_d_dot_x - mesh_14) * mesh_12)
+                + (mesh_d_x_ * mesh_10 - mesh_d_y_ * mesh_9)),
         # 4  AbsoluteAngle "guide": rack angle 0
         0,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -316,7 +332,7 @@ def _kinematics(f, q, q_dot, t, p):
     cos, cos_sin, sin, sqrt = f.cos, f.cos_sin, f.sin, f.sqrt
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
-    # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+    # 2-3  RackAndPinion "mesh"
     mesh_1 = sqrt(0.04000000000000001) * R
     mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
@@ -326,13 +342,13 @@ def _kinematics(f, q, q_dot, t, p):
     mesh_d_y_ = mesh_d_y + mesh_6
     mesh_d_x_ = mesh_d_x + mesh_4
     phi_rack_dot_sq = phi_rack_dot**2
-    phi_rack_dot_sq_mesh_4 = phi_rack_dot_sq * mesh_4
-    phi_rack_dot_sq_mesh_6 = phi_rack_dot_sq * mesh_6
+    mesh_10 = phi_rack_dot_sq * mesh_4
+    mesh_11 = phi_rack_dot_sq * mesh_6
     mesh_d_dot_y = y_pinion_dot - y_rack_dot
-    phi_rack_dot_mesh_4 = phi_rack_dot * mesh_4
+    mesh_13 = phi_rack_dot * mesh_4
     mesh_d_dot_x = x_pinion_dot - x_rack_dot
-    phi_rack_dot_mesh_6 = phi_rack_dot * mesh_6
-    # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
+    mesh_15 = phi_rack_dot * mesh_6
+    # 5  AbsoluteAngle "motor"
     motor_1 = pi * t
     sin_motor_1 = sin(motor_1)
     return (
@@ -340,15 +356,18 @@ def _kinematics(f, q, q_dot, t, p):
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         x_pinion,
         y_pinion,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2) - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
+        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
+                - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
         mesh_d_y_ * mesh_4 - mesh_d_x_ * mesh_6 - mesh_1,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
         phi_pinion - swing * sin_motor_1,
         # Phi_q
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
         -mesh_4,  # mesh.roll by x_rack
         -mesh_6,  # mesh.roll by y_rack
         mesh_d_y * mesh_4 - mesh_d_x * mesh_6 - mesh_1,  # mesh.roll by phi_rack
@@ -364,7 +383,8 @@ def _kinematics(f, q, q_dot, t, p):
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
         0,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
         0,
         0,
         # 4  AbsoluteAngle "guide": rack angle 0
@@ -375,10 +395,13 @@ def _kinematics(f, q, q_dot, t, p):
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
         0,
-        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        mesh_d_x * phi_rack_dot_sq_mesh_4 + mesh_d_y * phi_rack_dot_sq_mesh_6
-            - 2 * (mesh_d_dot_y * phi_rack_dot_mesh_4 - mesh_d_dot_x * phi_rack_dot_mesh_6),
-        -(phi_rack_dot_sq_mesh_4 * mesh_6 - phi_rack_dot_sq_mesh_6 * mesh_4 - 2 * ((mesh_d_dot_y + phi_rack_dot_mesh_4) * phi_rack_dot_mesh_6 + (mesh_d_dot_x - phi_rack_dot_mesh_6) * phi_rack_dot_mesh_4) + (mesh_d_x_ * phi_rack_dot_sq_mesh_6 - mesh_d_y_ * phi_rack_dot_sq_mesh_4)),
+        # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
+        #      theta_pinion 3*pi/2
+        mesh_d_x * mesh_10 + mesh_d_y * mesh_11
+            - 2 * (mesh_d_dot_y * mesh_13 - mesh_d_dot_x * mesh_15),
+        -(mesh_10 * mesh_6 - mesh_11 * mesh_4
+                - 2 * ((mesh_d_dot_y + mesh_13) * mesh_15 + (mesh_d_dot_x - mesh_15) * mesh_13)
+                + (mesh_d_x_ * mesh_11 - mesh_d_y_ * mesh_10)),
         # 4  AbsoluteAngle "guide": rack angle 0
         0,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)

@@ -102,7 +102,7 @@ def _gamma(f, q, q_dot, t, p):
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_pendulum, s_pendulum = cos_sin(phi_pendulum)
-    # 0-1  Revolute "pin": pendulum (1, 0) - ground (1, 1)
+    # 0-1  Revolute "pin"
     phi_pendulum_dot_sq = phi_pendulum_dot**2
     return (
         # 0-1  Revolute "pin": pendulum (1, 0) - ground (1, 1)
@@ -157,7 +157,7 @@ def _acceleration(f, q, q_dot, t, p):
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_pendulum, s_pendulum = cos_sin(phi_pendulum)
-    # 0-1  Revolute "pin": pendulum (1, 0) - ground (1, 1)
+    # 0-1  Revolute "pin"
     phi_pendulum_dot_sq = phi_pendulum_dot**2
     return (
         # Phi_q
@@ -179,7 +179,7 @@ def _kinematics(f, q, q_dot, t, p):
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_pendulum, s_pendulum = cos_sin(phi_pendulum)
-    # 0-1  Revolute "pin": pendulum (1, 0) - ground (1, 1)
+    # 0-1  Revolute "pin"
     phi_pendulum_dot_sq = phi_pendulum_dot**2
     return (
         # Phi

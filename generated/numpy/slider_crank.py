@@ -80,10 +80,10 @@ def _Phi(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "main_bearing"
     crank_pin_crank_x = 2 * c_crank
     crank_pin_crank_y = 2 * s_crank
-    # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
+    # 2-3  Revolute "crank_pin"
     wrist_pin_rod_x = 3 * c_rod
     wrist_pin_rod_y = 3 * s_rod
     return (
@@ -111,10 +111,10 @@ def _Phi_q(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "main_bearing"
     crank_pin_crank_y = 2 * s_crank
     crank_pin_crank_x = 2 * c_crank
-    # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
+    # 2-3  Revolute "crank_pin"
     wrist_pin_rod_y = 3 * s_rod
     wrist_pin_rod_x = 3 * c_rod
     return (
@@ -159,11 +159,11 @@ def _gamma(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "main_bearing"
     phi_crank_dot_sq = phi_crank_dot**2
     crank_pin_crank_w2_x = phi_crank_dot_sq * (2 * c_crank)
     crank_pin_crank_w2_y = phi_crank_dot_sq * (2 * s_crank)
-    # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
+    # 2-3  Revolute "crank_pin"
     phi_rod_dot_sq = phi_rod_dot**2
     wrist_pin_rod_w2_x = phi_rod_dot_sq * (3 * c_rod)
     wrist_pin_rod_w2_y = phi_rod_dot_sq * (3 * s_rod)
@@ -192,10 +192,10 @@ def _position(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "main_bearing"
     crank_pin_crank_x = 2 * c_crank
     crank_pin_crank_y = 2 * s_crank
-    # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
+    # 2-3  Revolute "crank_pin"
     wrist_pin_rod_x = 3 * c_rod
     wrist_pin_rod_y = 3 * s_rod
     return (
@@ -236,10 +236,10 @@ def _velocity(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "main_bearing"
     crank_pin_crank_y = 2 * s_crank
     crank_pin_crank_x = 2 * c_crank
-    # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
+    # 2-3  Revolute "crank_pin"
     wrist_pin_rod_y = 3 * s_rod
     wrist_pin_rod_x = 3 * c_rod
     return (
@@ -281,13 +281,13 @@ def _acceleration(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "main_bearing"
     crank_pin_crank_y = 2 * s_crank
     crank_pin_crank_x = 2 * c_crank
     phi_crank_dot_sq = phi_crank_dot**2
     crank_pin_crank_w2_x = phi_crank_dot_sq * crank_pin_crank_x
     crank_pin_crank_w2_y = phi_crank_dot_sq * crank_pin_crank_y
-    # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
+    # 2-3  Revolute "crank_pin"
     wrist_pin_rod_y = 3 * s_rod
     wrist_pin_rod_x = 3 * c_rod
     phi_rod_dot_sq = phi_rod_dot**2
@@ -332,13 +332,13 @@ def _kinematics(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
+    # 0-1  Revolute "main_bearing"
     crank_pin_crank_x = 2 * c_crank
     crank_pin_crank_y = 2 * s_crank
     phi_crank_dot_sq = phi_crank_dot**2
     crank_pin_crank_w2_x = phi_crank_dot_sq * crank_pin_crank_x
     crank_pin_crank_w2_y = phi_crank_dot_sq * crank_pin_crank_y
-    # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
+    # 2-3  Revolute "crank_pin"
     wrist_pin_rod_x = 3 * c_rod
     wrist_pin_rod_y = 3 * s_rod
     phi_rod_dot_sq = phi_rod_dot**2

@@ -80,11 +80,11 @@ def _Phi(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_disc, s_disc = cos_sin(phi_disc)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
+    # 2-3  Revolute "pivot"
     arm_2 = arm / 2
     pin_rocker_x = arm_2 * c_rocker
     pin_rocker_y = arm_2 * s_rocker
-    # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
+    # 4-5  PointFollower "pin"
     pin_1 = mean + wave * cos(2 * alpha_pin)
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
@@ -96,8 +96,10 @@ def _Phi(f, q, t, p):
         x_rocker - pin_rocker_x - 0.1,
         y_rocker - pin_rocker_y,
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        x_rocker + pin_rocker_x - x_disc - pin_1 * (cos_alpha_pin * c_disc - sin_alpha_pin * s_disc),
-        y_rocker + pin_rocker_y - y_disc - pin_1 * (cos_alpha_pin * s_disc + sin_alpha_pin * c_disc),
+        x_rocker + pin_rocker_x - x_disc
+            - pin_1 * (cos_alpha_pin * c_disc - sin_alpha_pin * s_disc),
+        y_rocker + pin_rocker_y - y_disc
+            - pin_1 * (cos_alpha_pin * s_disc + sin_alpha_pin * c_disc),
         # 6  AbsoluteAngle "motor": disc angle omega*t
         phi_disc - omega * t,
     )
@@ -110,31 +112,31 @@ def _Phi_q(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_disc, s_disc = cos_sin(phi_disc)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
+    # 2-3  Revolute "pivot"
     arm_2 = arm / 2
     pin_rocker_y = arm_2 * s_rocker
     pin_rocker_x = arm_2 * c_rocker
-    # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
+    # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
     pin_2 = mean + wave * cos(pin_1)
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
     pin_5 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_2_pin_5 = pin_2 * pin_5
+    pin_6 = pin_2 * pin_5
     pin_7 = 2 * (wave * sin(pin_1))
     pin_8 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_2_pin_8 = pin_2 * pin_8
+    pin_9 = pin_2 * pin_8
     return (
         # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
         pin_rocker_y,  # pivot.x by phi_rocker
         -pin_rocker_x,  # pivot.y by phi_rocker
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        pin_2_pin_5,  # pin.x by phi_disc
+        pin_6,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_2_pin_5 + pin_7 * pin_8,  # pin.x by alpha_pin
-        -pin_2_pin_8,  # pin.y by phi_disc
+        pin_6 + pin_7 * pin_8,  # pin.x by alpha_pin
+        -pin_9,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_2_pin_8 - pin_7 * pin_5),  # pin.y by alpha_pin
+        -(pin_9 - pin_7 * pin_5),  # pin.y by alpha_pin
     )
 
 
@@ -163,12 +165,12 @@ def _gamma(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_disc, s_disc = cos_sin(phi_disc)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
+    # 2-3  Revolute "pivot"
     phi_rocker_dot_sq = phi_rocker_dot**2
     arm_2 = arm / 2
     pin_rocker_w2_x = phi_rocker_dot_sq * (arm_2 * c_rocker)
     pin_rocker_w2_y = phi_rocker_dot_sq * (arm_2 * s_rocker)
-    # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
+    # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
     pin_2 = wave * cos(pin_1)
     pin_3 = 4 * pin_2 * alpha_pin_dot**2
@@ -204,19 +206,19 @@ def _position(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_disc, s_disc = cos_sin(phi_disc)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
+    # 2-3  Revolute "pivot"
     arm_2 = arm / 2
     pin_rocker_x = arm_2 * c_rocker
     pin_rocker_y = arm_2 * s_rocker
-    # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
+    # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
     pin_2 = mean + wave * cos(pin_1)
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
     pin_5 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_2_pin_5 = pin_2 * pin_5
+    pin_6 = pin_2 * pin_5
     pin_7 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_2_pin_7 = pin_2 * pin_7
+    pin_8 = pin_2 * pin_7
     pin_9 = 2 * (wave * sin(pin_1))
     return (
         # Phi
@@ -227,8 +229,8 @@ def _position(f, q, t, p):
         x_rocker - pin_rocker_x - 0.1,
         y_rocker - pin_rocker_y,
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        x_rocker + pin_rocker_x - x_disc - pin_2_pin_5,
-        y_rocker + pin_rocker_y - y_disc - pin_2_pin_7,
+        x_rocker + pin_rocker_x - x_disc - pin_6,
+        y_rocker + pin_rocker_y - y_disc - pin_8,
         # 6  AbsoluteAngle "motor": disc angle omega*t
         phi_disc - omega * t,
         # Phi_q
@@ -236,12 +238,12 @@ def _position(f, q, t, p):
         pin_rocker_y,  # pivot.x by phi_rocker
         -pin_rocker_x,  # pivot.y by phi_rocker
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        pin_2_pin_7,  # pin.x by phi_disc
+        pin_8,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_2_pin_7 + pin_9 * pin_5,  # pin.x by alpha_pin
-        -pin_2_pin_5,  # pin.y by phi_disc
+        pin_8 + pin_9 * pin_5,  # pin.x by alpha_pin
+        -pin_6,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_2_pin_5 - pin_9 * pin_7),  # pin.y by alpha_pin
+        -(pin_6 - pin_9 * pin_7),  # pin.y by alpha_pin
     )
 
 
@@ -252,32 +254,32 @@ def _velocity(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_disc, s_disc = cos_sin(phi_disc)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
+    # 2-3  Revolute "pivot"
     arm_2 = arm / 2
     pin_rocker_y = arm_2 * s_rocker
     pin_rocker_x = arm_2 * c_rocker
-    # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
+    # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
     pin_2 = mean + wave * cos(pin_1)
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
     pin_5 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_2_pin_5 = pin_2 * pin_5
+    pin_6 = pin_2 * pin_5
     pin_7 = 2 * (wave * sin(pin_1))
     pin_8 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_2_pin_8 = pin_2 * pin_8
+    pin_9 = pin_2 * pin_8
     return (
         # Phi_q
         # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
         pin_rocker_y,  # pivot.x by phi_rocker
         -pin_rocker_x,  # pivot.y by phi_rocker
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        pin_2_pin_5,  # pin.x by phi_disc
+        pin_6,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_2_pin_5 + pin_7 * pin_8,  # pin.x by alpha_pin
-        -pin_2_pin_8,  # pin.y by phi_disc
+        pin_6 + pin_7 * pin_8,  # pin.x by alpha_pin
+        -pin_9,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_2_pin_8 - pin_7 * pin_5),  # pin.y by alpha_pin
+        -(pin_9 - pin_7 * pin_5),  # pin.y by alpha_pin
         # nu
         # 0-1  Revolute "shaft": disc (0, 0) - ground (0, 0)
         0,
@@ -301,25 +303,25 @@ def _acceleration(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_disc, s_disc = cos_sin(phi_disc)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
+    # 2-3  Revolute "pivot"
     arm_2 = arm / 2
     pin_rocker_y = arm_2 * s_rocker
     pin_rocker_x = arm_2 * c_rocker
     phi_rocker_dot_sq = phi_rocker_dot**2
     pin_rocker_w2_x = phi_rocker_dot_sq * pin_rocker_x
     pin_rocker_w2_y = phi_rocker_dot_sq * pin_rocker_y
-    # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
+    # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
     pin_2 = wave * cos(pin_1)
     pin_3 = mean + pin_2
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
     pin_6 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_3_pin_6 = pin_3 * pin_6
+    pin_7 = pin_3 * pin_6
     pin_8 = wave * sin(pin_1)
     pin_9 = 2 * pin_8
     pin_10 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_3_pin_10 = pin_3 * pin_10
+    pin_11 = pin_3 * pin_10
     pin_12 = 4 * pin_2 * alpha_pin_dot**2
     pin_13 = 4 * pin_8 * alpha_pin_dot
     pin_14 = phi_disc_dot * pin_6 + alpha_pin_dot * pin_6
@@ -330,12 +332,12 @@ def _acceleration(f, q, q_dot, t, p):
         pin_rocker_y,  # pivot.x by phi_rocker
         -pin_rocker_x,  # pivot.y by phi_rocker
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        pin_3_pin_6,  # pin.x by phi_disc
+        pin_7,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_3_pin_6 + pin_9 * pin_10,  # pin.x by alpha_pin
-        -pin_3_pin_10,  # pin.y by phi_disc
+        pin_7 + pin_9 * pin_10,  # pin.x by alpha_pin
+        -pin_11,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_3_pin_10 - pin_9 * pin_6),  # pin.y by alpha_pin
+        -(pin_11 - pin_9 * pin_6),  # pin.y by alpha_pin
         # gamma
         # 0-1  Revolute "shaft": disc (0, 0) - ground (0, 0)
         0,
@@ -361,23 +363,23 @@ def _kinematics(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_disc, s_disc = cos_sin(phi_disc)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
+    # 2-3  Revolute "pivot"
     arm_2 = arm / 2
     pin_rocker_x = arm_2 * c_rocker
     pin_rocker_y = arm_2 * s_rocker
     phi_rocker_dot_sq = phi_rocker_dot**2
     pin_rocker_w2_x = phi_rocker_dot_sq * pin_rocker_x
     pin_rocker_w2_y = phi_rocker_dot_sq * pin_rocker_y
-    # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
+    # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
     pin_2 = wave * cos(pin_1)
     pin_3 = mean + pin_2
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
     pin_6 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_3_pin_6 = pin_3 * pin_6
+    pin_7 = pin_3 * pin_6
     pin_8 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_3_pin_8 = pin_3 * pin_8
+    pin_9 = pin_3 * pin_8
     pin_10 = wave * sin(pin_1)
     pin_11 = 2 * pin_10
     pin_12 = 4 * pin_2 * alpha_pin_dot**2
@@ -393,8 +395,8 @@ def _kinematics(f, q, q_dot, t, p):
         x_rocker - pin_rocker_x - 0.1,
         y_rocker - pin_rocker_y,
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        x_rocker + pin_rocker_x - x_disc - pin_3_pin_6,
-        y_rocker + pin_rocker_y - y_disc - pin_3_pin_8,
+        x_rocker + pin_rocker_x - x_disc - pin_7,
+        y_rocker + pin_rocker_y - y_disc - pin_9,
         # 6  AbsoluteAngle "motor": disc angle omega*t
         phi_disc - omega * t,
         # Phi_q
@@ -402,12 +404,12 @@ def _kinematics(f, q, q_dot, t, p):
         pin_rocker_y,  # pivot.x by phi_rocker
         -pin_rocker_x,  # pivot.y by phi_rocker
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        pin_3_pin_8,  # pin.x by phi_disc
+        pin_9,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_3_pin_8 + pin_11 * pin_6,  # pin.x by alpha_pin
-        -pin_3_pin_6,  # pin.y by phi_disc
+        pin_9 + pin_11 * pin_6,  # pin.x by alpha_pin
+        -pin_7,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_3_pin_6 - pin_11 * pin_8),  # pin.y by alpha_pin
+        -(pin_7 - pin_11 * pin_8),  # pin.y by alpha_pin
         # nu
         # 0-1  Revolute "shaft": disc (0, 0) - ground (0, 0)
         0,

@@ -98,7 +98,10 @@ pi = math.pi
 
 
 def _Phi(f, q, t, p):
-    x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel, phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook = q
+    (
+        x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel,
+        phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook,
+    ) = q
     duration, cylinder_length, cylinder_stroke, extension_reach, extension_stroke = p
     cos_sin, sin = f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
@@ -107,32 +110,33 @@ def _Phi(f, q, t, p):
     c_barrel, s_barrel = cos_sin(phi_barrel)
     c_rod, s_rod = cos_sin(phi_rod)
     c_hook, s_hook = cos_sin(phi_hook)
-    # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
+    # 0-1  Revolute "boom_pivot"
     telescope_boom_x = 1.5 * c_boom
     telescope_boom_y = 1.5 * s_boom
-    # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+    # 2-3  Translational "telescope"
     telescope_1 = y_extension + 1.3 * s_extension
     telescope_d_y = telescope_1 - y_boom - telescope_boom_y
     telescope_3 = x_extension + 1.3 * c_extension
     telescope_d_x = telescope_3 - x_boom - telescope_boom_x
-    # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
+    # 4-5  Revolute "barrel_pin"
     barrel_pin_1 = 0.45 * c_barrel
     barrel_pin_2 = 0.45 * s_barrel
-    # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
+    # 6-7  Translational "cylinder"
     cylinder_rod_y = 0.45 * s_rod
     cylinder_d_y = y_rod + cylinder_rod_y - y_barrel + barrel_pin_2
     cylinder_rod_x = 0.45 * c_rod
     cylinder_d_x = x_rod + cylinder_rod_x - x_barrel + barrel_pin_1
-    # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
+    # 8-9  Revolute "rod_pin"
     rod_pin_1 = 0.2 * s_boom
     rod_pin_2 = 0.2 * c_boom
-    # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 13  TranslationalDistance "lift"
     lift_1 = t / duration - sin(2 * (pi * t) / duration) / 2 / pi
     return (
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         telescope_boom_x - x_boom,
         1.6 - y_boom + telescope_boom_y,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         c_boom * telescope_d_y - s_boom * telescope_d_x,
         c_boom * s_extension - s_boom * c_extension,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
@@ -149,15 +153,23 @@ def _Phi(f, q, t, p):
         telescope_1 - y_hook - 0.4 * c_hook,
         # 12  AbsoluteAngle "plumb": hook angle 0
         phi_hook,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
-        c_barrel * cylinder_d_x + s_barrel * cylinder_d_y - (cylinder_length + cylinder_stroke * lift_1),
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
-        c_boom * telescope_d_x + s_boom * telescope_d_y - (extension_reach + extension_stroke * lift_1),
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        c_barrel * cylinder_d_x + s_barrel * cylinder_d_y
+            - (cylinder_length + cylinder_stroke * lift_1),
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
+        c_boom * telescope_d_x + s_boom * telescope_d_y
+            - (extension_reach + extension_stroke * lift_1),
     )
 
 
 def _Phi_q(f, q, t, p):
-    x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel, phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook = q
+    (
+        x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel,
+        phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook,
+    ) = q
     cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_boom, s_boom = cos_sin(phi_boom)
@@ -165,35 +177,37 @@ def _Phi_q(f, q, t, p):
     c_barrel, s_barrel = cos_sin(phi_barrel)
     c_rod, s_rod = cos_sin(phi_rod)
     c_hook, s_hook = cos_sin(phi_hook)
-    # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
+    # 0-1  Revolute "boom_pivot"
     telescope_boom_y = 1.5 * s_boom
     telescope_boom_x = 1.5 * c_boom
-    # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+    # 2-3  Translational "telescope"
     telescope_extension_x = 1.3 * c_extension
     telescope_d_x = x_extension + telescope_extension_x - x_boom - telescope_boom_x
     telescope_extension_y = 1.3 * s_extension
     telescope_d_y = y_extension + telescope_extension_y - y_boom - telescope_boom_y
     telescope_5 = c_boom * c_extension + s_boom * s_extension
-    # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
+    # 4-5  Revolute "barrel_pin"
     barrel_pin_1 = 0.45 * s_barrel
     barrel_pin_2 = 0.45 * c_barrel
-    # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
+    # 6-7  Translational "cylinder"
     cylinder_rod_x = 0.45 * c_rod
     cylinder_d_x = x_rod + cylinder_rod_x - x_barrel + barrel_pin_2
     cylinder_rod_y = 0.45 * s_rod
     cylinder_d_y = y_rod + cylinder_rod_y - y_barrel + barrel_pin_1
     cylinder_5 = c_barrel * c_rod + s_barrel * s_rod
-    # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
+    # 8-9  Revolute "rod_pin"
     rod_pin_1 = 0.2 * s_boom
     rod_pin_2 = 0.2 * c_boom
     return (
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         -telescope_boom_y,  # boom_pivot.x by phi_boom
         telescope_boom_x,  # boom_pivot.y by phi_boom
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         s_boom,  # telescope.normal by x_boom
         -c_boom,  # telescope.normal by y_boom
-        -(c_boom * telescope_d_x + s_boom * telescope_d_y + (s_boom * telescope_boom_y + c_boom * telescope_boom_x)),  # telescope.normal by phi_boom
+        -(c_boom * telescope_d_x + s_boom * telescope_d_y
+                + (s_boom * telescope_boom_y + c_boom * telescope_boom_x)),  # telescope.normal by phi_boom
         -s_boom,  # telescope.normal by x_extension
         c_boom,  # telescope.normal by y_extension
         s_boom * telescope_extension_y + c_boom * telescope_extension_x,  # telescope.normal by phi_extension
@@ -205,7 +219,8 @@ def _Phi_q(f, q, t, p):
         # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
         s_barrel,  # cylinder.normal by x_barrel
         -c_barrel,  # cylinder.normal by y_barrel
-        -(c_barrel * cylinder_d_x + s_barrel * cylinder_d_y - (s_barrel * barrel_pin_1 + c_barrel * barrel_pin_2)),  # cylinder.normal by phi_barrel
+        -(c_barrel * cylinder_d_x + s_barrel * cylinder_d_y
+                - (s_barrel * barrel_pin_1 + c_barrel * barrel_pin_2)),  # cylinder.normal by phi_barrel
         -s_barrel,  # cylinder.normal by x_rod
         c_barrel,  # cylinder.normal by y_rod
         s_barrel * cylinder_rod_y + c_barrel * cylinder_rod_x,  # cylinder.normal by phi_rod
@@ -221,7 +236,8 @@ def _Phi_q(f, q, t, p):
         0.4 * c_hook,  # eye.x by phi_hook
         telescope_extension_x,  # eye.y by phi_extension
         0.4 * s_hook,  # eye.y by phi_hook
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         -c_barrel,  # lift by x_barrel
         -s_barrel,  # lift by y_barrel
         c_barrel * cylinder_d_y - s_barrel * cylinder_d_x
@@ -229,7 +245,9 @@ def _Phi_q(f, q, t, p):
         c_barrel,  # lift by x_rod
         s_barrel,  # lift by y_rod
         s_barrel * cylinder_rod_x - c_barrel * cylinder_rod_y,  # lift by phi_rod
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         -c_boom,  # extend by x_boom
         -s_boom,  # extend by y_boom
         c_boom * telescope_d_y - s_boom * telescope_d_x
@@ -243,13 +261,14 @@ def _Phi_q(f, q, t, p):
 def _nu(f, q, t, p):
     duration, cylinder_length, cylinder_stroke, extension_reach, extension_stroke = p
     cos = f.cos
-    # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 13  TranslationalDistance "lift"
     lift_1 = 1 / duration - cos(2 * (pi * t) / duration) / duration
     return (
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         0,
         0,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         0,
         0,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
@@ -266,16 +285,26 @@ def _nu(f, q, t, p):
         0,
         # 12  AbsoluteAngle "plumb": hook angle 0
         0,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         cylinder_stroke * lift_1,
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         extension_stroke * lift_1,
     )
 
 
 def _gamma(f, q, q_dot, t, p):
-    x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel, phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook = q
-    x_boom_dot, y_boom_dot, phi_boom_dot, x_extension_dot, y_extension_dot, phi_extension_dot, x_barrel_dot, y_barrel_dot, phi_barrel_dot, x_rod_dot, y_rod_dot, phi_rod_dot, x_hook_dot, y_hook_dot, phi_hook_dot = q_dot
+    (
+        x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel,
+        phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook,
+    ) = q
+    (
+        x_boom_dot, y_boom_dot, phi_boom_dot, x_extension_dot, y_extension_dot, phi_extension_dot,
+        x_barrel_dot, y_barrel_dot, phi_barrel_dot, x_rod_dot, y_rod_dot, phi_rod_dot, x_hook_dot,
+        y_hook_dot, phi_hook_dot,
+    ) = q_dot
     duration, cylinder_length, cylinder_stroke, extension_reach, extension_stroke = p
     cos_sin, sin = f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
@@ -284,13 +313,13 @@ def _gamma(f, q, q_dot, t, p):
     c_barrel, s_barrel = cos_sin(phi_barrel)
     c_rod, s_rod = cos_sin(phi_rod)
     c_hook, s_hook = cos_sin(phi_hook)
-    # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
+    # 0-1  Revolute "boom_pivot"
     phi_boom_dot_sq = phi_boom_dot**2
     telescope_boom_x = 1.5 * c_boom
     telescope_boom_w2_x = phi_boom_dot_sq * telescope_boom_x
     telescope_boom_y = 1.5 * s_boom
     telescope_boom_w2_y = phi_boom_dot_sq * telescope_boom_y
-    # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+    # 2-3  Translational "telescope"
     telescope_extension_y = 1.3 * s_extension
     telescope_d_y = y_extension + telescope_extension_y - y_boom - telescope_boom_y
     telescope_extension_x = 1.3 * c_extension
@@ -311,13 +340,13 @@ def _gamma(f, q, q_dot, t, p):
     telescope_12 = telescope_boom_w2_x - eye_extension_w2_x
     telescope_13 = c_boom * s_extension - s_boom * c_extension
     telescope_14 = phi_boom_dot * telescope_13 - phi_extension_dot * telescope_13
-    # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
+    # 4-5  Revolute "barrel_pin"
     phi_barrel_dot_sq = phi_barrel_dot**2
     barrel_pin_2 = 0.45 * c_barrel
     barrel_pin_3 = phi_barrel_dot_sq * barrel_pin_2
     barrel_pin_4 = 0.45 * s_barrel
     barrel_pin_5 = phi_barrel_dot_sq * barrel_pin_4
-    # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
+    # 6-7  Translational "cylinder"
     cylinder_rod_y = 0.45 * s_rod
     cylinder_d_y = y_rod + cylinder_rod_y - y_barrel + barrel_pin_4
     cylinder_rod_x = 0.45 * c_rod
@@ -332,30 +361,33 @@ def _gamma(f, q, q_dot, t, p):
     cylinder_12 = barrel_pin_5 + cylinder_11
     cylinder_13 = c_barrel * s_rod - s_barrel * c_rod
     cylinder_14 = phi_barrel_dot * cylinder_13 - phi_rod_dot * cylinder_13
-    # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
+    # 8-9  Revolute "rod_pin"
     rod_pin_1 = 0.2 * s_boom
     rod_pin_2 = 0.2 * c_boom
-    # 10-11  Revolute "eye": extension (1.3, 0) - hook (0, 0.4)
+    # 10-11  Revolute "eye"
     phi_hook_dot_sq = phi_hook_dot**2
-    # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 13  TranslationalDistance "lift"
     lift_1 = sin(2 * (pi * t) / duration)
     duration_sq = duration**2
     lift_3 = c_barrel * cylinder_d_dot_y - s_barrel * cylinder_d_dot_x
-    # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 14  TranslationalDistance "extend"
     extend_1 = c_boom * telescope_d_dot_y - s_boom * telescope_d_dot_x
     return (
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         telescope_boom_w2_x,
         telescope_boom_w2_y,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
-        phi_boom_dot * (phi_boom_dot * (c_boom * telescope_d_y - s_boom * telescope_d_x) + telescope_7)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
+        phi_boom_dot * (phi_boom_dot * (c_boom * telescope_d_y - s_boom * telescope_d_x)
+                + telescope_7)
             + phi_boom_dot * telescope_7 - (c_boom * telescope_10 - s_boom * telescope_12),
         phi_boom_dot * telescope_14 - phi_extension_dot * telescope_14,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
         barrel_pin_3,
         barrel_pin_5,
         # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
-        phi_barrel_dot * (phi_barrel_dot * (c_barrel * cylinder_d_y - s_barrel * cylinder_d_x) + cylinder_7)
+        phi_barrel_dot * (phi_barrel_dot * (c_barrel * cylinder_d_y - s_barrel * cylinder_d_x)
+                + cylinder_7)
             + phi_barrel_dot * cylinder_7 - (s_barrel * cylinder_10 - c_barrel * cylinder_12),
         phi_barrel_dot * cylinder_14 - phi_rod_dot * cylinder_14,
         # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
@@ -366,17 +398,27 @@ def _gamma(f, q, q_dot, t, p):
         eye_extension_w2_y - phi_hook_dot_sq * (0.4 * c_hook),
         # 12  AbsoluteAngle "plumb": hook angle 0
         0,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         2 * (pi * cylinder_stroke * lift_1) / duration_sq
-            - (phi_barrel_dot * (lift_3 - phi_barrel_dot * (c_barrel * cylinder_d_x + s_barrel * cylinder_d_y)) + phi_barrel_dot * lift_3 - (c_barrel * cylinder_10 + s_barrel * cylinder_12)),
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+            - (phi_barrel_dot * (lift_3
+                    - phi_barrel_dot * (c_barrel * cylinder_d_x + s_barrel * cylinder_d_y))
+                + phi_barrel_dot * lift_3 - (c_barrel * cylinder_10 + s_barrel * cylinder_12)),
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         2 * (pi * extension_stroke * lift_1) / duration_sq
-            - (phi_boom_dot * (extend_1 - phi_boom_dot * (c_boom * telescope_d_x + s_boom * telescope_d_y)) + phi_boom_dot * extend_1 + (c_boom * telescope_12 + s_boom * telescope_10)),
+            - (phi_boom_dot * (extend_1
+                    - phi_boom_dot * (c_boom * telescope_d_x + s_boom * telescope_d_y))
+                + phi_boom_dot * extend_1 + (c_boom * telescope_12 + s_boom * telescope_10)),
     )
 
 
 def _position(f, q, t, p):
-    x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel, phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook = q
+    (
+        x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel,
+        phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook,
+    ) = q
     duration, cylinder_length, cylinder_stroke, extension_reach, extension_stroke = p
     cos_sin, sin = f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
@@ -385,10 +427,10 @@ def _position(f, q, t, p):
     c_barrel, s_barrel = cos_sin(phi_barrel)
     c_rod, s_rod = cos_sin(phi_rod)
     c_hook, s_hook = cos_sin(phi_hook)
-    # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
+    # 0-1  Revolute "boom_pivot"
     telescope_boom_x = 1.5 * c_boom
     telescope_boom_y = 1.5 * s_boom
-    # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+    # 2-3  Translational "telescope"
     telescope_extension_y = 1.3 * s_extension
     telescope_2 = y_extension + telescope_extension_y
     telescope_d_y = telescope_2 - y_boom - telescope_boom_y
@@ -398,10 +440,10 @@ def _position(f, q, t, p):
     telescope_7 = c_boom * telescope_d_y - s_boom * telescope_d_x
     telescope_8 = c_boom * telescope_d_x + s_boom * telescope_d_y
     telescope_9 = c_boom * c_extension + s_boom * s_extension
-    # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
+    # 4-5  Revolute "barrel_pin"
     barrel_pin_1 = 0.45 * c_barrel
     barrel_pin_2 = 0.45 * s_barrel
-    # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
+    # 6-7  Translational "cylinder"
     cylinder_rod_y = 0.45 * s_rod
     cylinder_d_y = y_rod + cylinder_rod_y - y_barrel + barrel_pin_2
     cylinder_rod_x = 0.45 * c_rod
@@ -409,22 +451,23 @@ def _position(f, q, t, p):
     cylinder_5 = c_barrel * cylinder_d_y - s_barrel * cylinder_d_x
     cylinder_6 = c_barrel * cylinder_d_x + s_barrel * cylinder_d_y
     cylinder_7 = c_barrel * c_rod + s_barrel * s_rod
-    # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
+    # 8-9  Revolute "rod_pin"
     rod_pin_1 = 0.2 * s_boom
     rod_pin_2 = 0.2 * c_boom
     rod_pin_boom_x = rod_pin_1 - rod_pin_2
     rod_pin_4 = rod_pin_1 + rod_pin_2
-    # 10-11  Revolute "eye": extension (1.3, 0) - hook (0, 0.4)
+    # 10-11  Revolute "eye"
     eye_1 = 0.4 * s_hook
     eye_hook_y = 0.4 * c_hook
-    # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 13  TranslationalDistance "lift"
     lift_1 = t / duration - sin(2 * (pi * t) / duration) / 2 / pi
     return (
         # Phi
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         telescope_boom_x - x_boom,
         1.6 - y_boom + telescope_boom_y,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         telescope_7,
         c_boom * s_extension - s_boom * c_extension,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
@@ -441,15 +484,19 @@ def _position(f, q, t, p):
         telescope_2 - y_hook - eye_hook_y,
         # 12  AbsoluteAngle "plumb": hook angle 0
         phi_hook,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         cylinder_6 - (cylinder_length + cylinder_stroke * lift_1),
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         telescope_8 - (extension_reach + extension_stroke * lift_1),
         # Phi_q
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         -telescope_boom_y,  # boom_pivot.x by phi_boom
         telescope_boom_x,  # boom_pivot.y by phi_boom
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         s_boom,  # telescope.normal by x_boom
         -c_boom,  # telescope.normal by y_boom
         -(telescope_8 + (s_boom * telescope_boom_y + c_boom * telescope_boom_x)),  # telescope.normal by phi_boom
@@ -480,14 +527,17 @@ def _position(f, q, t, p):
         eye_hook_y,  # eye.x by phi_hook
         telescope_extension_x,  # eye.y by phi_extension
         eye_1,  # eye.y by phi_hook
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         -c_barrel,  # lift by x_barrel
         -s_barrel,  # lift by y_barrel
         cylinder_5 - (c_barrel * barrel_pin_2 - s_barrel * barrel_pin_1),  # lift by phi_barrel
         c_barrel,  # lift by x_rod
         s_barrel,  # lift by y_rod
         s_barrel * cylinder_rod_x - c_barrel * cylinder_rod_y,  # lift by phi_rod
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         -c_boom,  # extend by x_boom
         -s_boom,  # extend by y_boom
         telescope_7 - (s_boom * telescope_boom_x - c_boom * telescope_boom_y),  # extend by phi_boom
@@ -498,7 +548,10 @@ def _position(f, q, t, p):
 
 
 def _velocity(f, q, t, p):
-    x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel, phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook = q
+    (
+        x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel,
+        phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook,
+    ) = q
     duration, cylinder_length, cylinder_stroke, extension_reach, extension_stroke = p
     cos, cos_sin = f.cos, f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
@@ -507,38 +560,40 @@ def _velocity(f, q, t, p):
     c_barrel, s_barrel = cos_sin(phi_barrel)
     c_rod, s_rod = cos_sin(phi_rod)
     c_hook, s_hook = cos_sin(phi_hook)
-    # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
+    # 0-1  Revolute "boom_pivot"
     telescope_boom_y = 1.5 * s_boom
     telescope_boom_x = 1.5 * c_boom
-    # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+    # 2-3  Translational "telescope"
     telescope_extension_x = 1.3 * c_extension
     telescope_d_x = x_extension + telescope_extension_x - x_boom - telescope_boom_x
     telescope_extension_y = 1.3 * s_extension
     telescope_d_y = y_extension + telescope_extension_y - y_boom - telescope_boom_y
     telescope_5 = c_boom * c_extension + s_boom * s_extension
-    # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
+    # 4-5  Revolute "barrel_pin"
     barrel_pin_1 = 0.45 * s_barrel
     barrel_pin_2 = 0.45 * c_barrel
-    # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
+    # 6-7  Translational "cylinder"
     cylinder_rod_x = 0.45 * c_rod
     cylinder_d_x = x_rod + cylinder_rod_x - x_barrel + barrel_pin_2
     cylinder_rod_y = 0.45 * s_rod
     cylinder_d_y = y_rod + cylinder_rod_y - y_barrel + barrel_pin_1
     cylinder_5 = c_barrel * c_rod + s_barrel * s_rod
-    # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
+    # 8-9  Revolute "rod_pin"
     rod_pin_1 = 0.2 * s_boom
     rod_pin_2 = 0.2 * c_boom
-    # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 13  TranslationalDistance "lift"
     lift_1 = 1 / duration - cos(2 * (pi * t) / duration) / duration
     return (
         # Phi_q
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         -telescope_boom_y,  # boom_pivot.x by phi_boom
         telescope_boom_x,  # boom_pivot.y by phi_boom
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         s_boom,  # telescope.normal by x_boom
         -c_boom,  # telescope.normal by y_boom
-        -(c_boom * telescope_d_x + s_boom * telescope_d_y + (s_boom * telescope_boom_y + c_boom * telescope_boom_x)),  # telescope.normal by phi_boom
+        -(c_boom * telescope_d_x + s_boom * telescope_d_y
+                + (s_boom * telescope_boom_y + c_boom * telescope_boom_x)),  # telescope.normal by phi_boom
         -s_boom,  # telescope.normal by x_extension
         c_boom,  # telescope.normal by y_extension
         s_boom * telescope_extension_y + c_boom * telescope_extension_x,  # telescope.normal by phi_extension
@@ -550,7 +605,8 @@ def _velocity(f, q, t, p):
         # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
         s_barrel,  # cylinder.normal by x_barrel
         -c_barrel,  # cylinder.normal by y_barrel
-        -(c_barrel * cylinder_d_x + s_barrel * cylinder_d_y - (s_barrel * barrel_pin_1 + c_barrel * barrel_pin_2)),  # cylinder.normal by phi_barrel
+        -(c_barrel * cylinder_d_x + s_barrel * cylinder_d_y
+                - (s_barrel * barrel_pin_1 + c_barrel * barrel_pin_2)),  # cylinder.normal by phi_barrel
         -s_barrel,  # cylinder.normal by x_rod
         c_barrel,  # cylinder.normal by y_rod
         s_barrel * cylinder_rod_y + c_barrel * cylinder_rod_x,  # cylinder.normal by phi_rod
@@ -566,7 +622,8 @@ def _velocity(f, q, t, p):
         0.4 * c_hook,  # eye.x by phi_hook
         telescope_extension_x,  # eye.y by phi_extension
         0.4 * s_hook,  # eye.y by phi_hook
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         -c_barrel,  # lift by x_barrel
         -s_barrel,  # lift by y_barrel
         c_barrel * cylinder_d_y - s_barrel * cylinder_d_x
@@ -574,7 +631,9 @@ def _velocity(f, q, t, p):
         c_barrel,  # lift by x_rod
         s_barrel,  # lift by y_rod
         s_barrel * cylinder_rod_x - c_barrel * cylinder_rod_y,  # lift by phi_rod
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         -c_boom,  # extend by x_boom
         -s_boom,  # extend by y_boom
         c_boom * telescope_d_y - s_boom * telescope_d_x
@@ -586,7 +645,8 @@ def _velocity(f, q, t, p):
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         0,
         0,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         0,
         0,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
@@ -603,16 +663,26 @@ def _velocity(f, q, t, p):
         0,
         # 12  AbsoluteAngle "plumb": hook angle 0
         0,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         cylinder_stroke * lift_1,
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         extension_stroke * lift_1,
     )
 
 
 def _acceleration(f, q, q_dot, t, p):
-    x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel, phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook = q
-    x_boom_dot, y_boom_dot, phi_boom_dot, x_extension_dot, y_extension_dot, phi_extension_dot, x_barrel_dot, y_barrel_dot, phi_barrel_dot, x_rod_dot, y_rod_dot, phi_rod_dot, x_hook_dot, y_hook_dot, phi_hook_dot = q_dot
+    (
+        x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel,
+        phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook,
+    ) = q
+    (
+        x_boom_dot, y_boom_dot, phi_boom_dot, x_extension_dot, y_extension_dot, phi_extension_dot,
+        x_barrel_dot, y_barrel_dot, phi_barrel_dot, x_rod_dot, y_rod_dot, phi_rod_dot, x_hook_dot,
+        y_hook_dot, phi_hook_dot,
+    ) = q_dot
     duration, cylinder_length, cylinder_stroke, extension_reach, extension_stroke = p
     cos_sin, sin = f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
@@ -621,13 +691,13 @@ def _acceleration(f, q, q_dot, t, p):
     c_barrel, s_barrel = cos_sin(phi_barrel)
     c_rod, s_rod = cos_sin(phi_rod)
     c_hook, s_hook = cos_sin(phi_hook)
-    # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
+    # 0-1  Revolute "boom_pivot"
     telescope_boom_y = 1.5 * s_boom
     telescope_boom_x = 1.5 * c_boom
     phi_boom_dot_sq = phi_boom_dot**2
     telescope_boom_w2_x = phi_boom_dot_sq * telescope_boom_x
     telescope_boom_w2_y = phi_boom_dot_sq * telescope_boom_y
-    # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+    # 2-3  Translational "telescope"
     telescope_extension_x = 1.3 * c_extension
     telescope_d_x = x_extension + telescope_extension_x - x_boom - telescope_boom_x
     telescope_extension_y = 1.3 * s_extension
@@ -651,13 +721,13 @@ def _acceleration(f, q, q_dot, t, p):
     telescope_15 = telescope_boom_w2_x - eye_extension_w2_x
     telescope_16 = c_boom * s_extension - s_boom * c_extension
     telescope_17 = phi_boom_dot * telescope_16 - phi_extension_dot * telescope_16
-    # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
+    # 4-5  Revolute "barrel_pin"
     barrel_pin_1 = 0.45 * s_barrel
     barrel_pin_2 = 0.45 * c_barrel
     phi_barrel_dot_sq = phi_barrel_dot**2
     barrel_pin_4 = phi_barrel_dot_sq * barrel_pin_2
     barrel_pin_5 = phi_barrel_dot_sq * barrel_pin_1
-    # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
+    # 6-7  Translational "cylinder"
     cylinder_rod_x = 0.45 * c_rod
     cylinder_d_x = x_rod + cylinder_rod_x - x_barrel + barrel_pin_2
     cylinder_rod_y = 0.45 * s_rod
@@ -675,27 +745,28 @@ def _acceleration(f, q, q_dot, t, p):
     cylinder_15 = barrel_pin_5 + cylinder_14
     cylinder_16 = c_barrel * s_rod - s_barrel * c_rod
     cylinder_17 = phi_barrel_dot * cylinder_16 - phi_rod_dot * cylinder_16
-    # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
+    # 8-9  Revolute "rod_pin"
     rod_pin_1 = 0.2 * s_boom
     rod_pin_2 = 0.2 * c_boom
     rod_pin_3 = rod_pin_1 + rod_pin_2
     rod_pin_boom_x = rod_pin_1 - rod_pin_2
-    # 10-11  Revolute "eye": extension (1.3, 0) - hook (0, 0.4)
+    # 10-11  Revolute "eye"
     eye_hook_y = 0.4 * c_hook
     eye_2 = 0.4 * s_hook
     phi_hook_dot_sq = phi_hook_dot**2
-    # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 13  TranslationalDistance "lift"
     lift_1 = sin(2 * (pi * t) / duration)
     duration_sq = duration**2
     lift_3 = c_barrel * cylinder_d_dot_y - s_barrel * cylinder_d_dot_x
-    # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 14  TranslationalDistance "extend"
     extend_1 = c_boom * telescope_d_dot_y - s_boom * telescope_d_dot_x
     return (
         # Phi_q
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         -telescope_boom_y,  # boom_pivot.x by phi_boom
         telescope_boom_x,  # boom_pivot.y by phi_boom
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         s_boom,  # telescope.normal by x_boom
         -c_boom,  # telescope.normal by y_boom
         -(telescope_5 + (s_boom * telescope_boom_y + c_boom * telescope_boom_x)),  # telescope.normal by phi_boom
@@ -726,14 +797,17 @@ def _acceleration(f, q, q_dot, t, p):
         eye_hook_y,  # eye.x by phi_hook
         telescope_extension_x,  # eye.y by phi_extension
         eye_2,  # eye.y by phi_hook
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         -c_barrel,  # lift by x_barrel
         -s_barrel,  # lift by y_barrel
         cylinder_7 - (c_barrel * barrel_pin_1 - s_barrel * barrel_pin_2),  # lift by phi_barrel
         c_barrel,  # lift by x_rod
         s_barrel,  # lift by y_rod
         s_barrel * cylinder_rod_x - c_barrel * cylinder_rod_y,  # lift by phi_rod
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         -c_boom,  # extend by x_boom
         -s_boom,  # extend by y_boom
         telescope_7 - (s_boom * telescope_boom_x - c_boom * telescope_boom_y),  # extend by phi_boom
@@ -744,16 +818,17 @@ def _acceleration(f, q, q_dot, t, p):
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         telescope_boom_w2_x,
         telescope_boom_w2_y,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
-        phi_boom_dot * (phi_boom_dot * telescope_7 + telescope_10) + phi_boom_dot * telescope_10
-            - (c_boom * telescope_13 - s_boom * telescope_15),
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
+        phi_boom_dot * (phi_boom_dot * telescope_7 + telescope_10)
+            + phi_boom_dot * telescope_10 - (c_boom * telescope_13 - s_boom * telescope_15),
         phi_boom_dot * telescope_17 - phi_extension_dot * telescope_17,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
         barrel_pin_4,
         barrel_pin_5,
         # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
-        phi_barrel_dot * (phi_barrel_dot * cylinder_7 + cylinder_10) + phi_barrel_dot * cylinder_10
-            - (s_barrel * cylinder_13 - c_barrel * cylinder_15),
+        phi_barrel_dot * (phi_barrel_dot * cylinder_7 + cylinder_10)
+            + phi_barrel_dot * cylinder_10 - (s_barrel * cylinder_13 - c_barrel * cylinder_15),
         phi_barrel_dot * cylinder_17 - phi_rod_dot * cylinder_17,
         # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
         phi_boom_dot_sq * rod_pin_boom_x - cylinder_12,
@@ -763,18 +838,30 @@ def _acceleration(f, q, q_dot, t, p):
         eye_extension_w2_y - phi_hook_dot_sq * eye_hook_y,
         # 12  AbsoluteAngle "plumb": hook angle 0
         0,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         2 * (pi * cylinder_stroke * lift_1) / duration_sq
-            - (phi_barrel_dot * (lift_3 - phi_barrel_dot * cylinder_5) + phi_barrel_dot * lift_3 - (c_barrel * cylinder_13 + s_barrel * cylinder_15)),
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+            - (phi_barrel_dot * (lift_3 - phi_barrel_dot * cylinder_5) + phi_barrel_dot * lift_3
+                - (c_barrel * cylinder_13 + s_barrel * cylinder_15)),
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         2 * (pi * extension_stroke * lift_1) / duration_sq
-            - (phi_boom_dot * (extend_1 - phi_boom_dot * telescope_5) + phi_boom_dot * extend_1 + (c_boom * telescope_15 + s_boom * telescope_13)),
+            - (phi_boom_dot * (extend_1 - phi_boom_dot * telescope_5) + phi_boom_dot * extend_1
+                + (c_boom * telescope_15 + s_boom * telescope_13)),
     )
 
 
 def _kinematics(f, q, q_dot, t, p):
-    x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel, phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook = q
-    x_boom_dot, y_boom_dot, phi_boom_dot, x_extension_dot, y_extension_dot, phi_extension_dot, x_barrel_dot, y_barrel_dot, phi_barrel_dot, x_rod_dot, y_rod_dot, phi_rod_dot, x_hook_dot, y_hook_dot, phi_hook_dot = q_dot
+    (
+        x_boom, y_boom, phi_boom, x_extension, y_extension, phi_extension, x_barrel, y_barrel,
+        phi_barrel, x_rod, y_rod, phi_rod, x_hook, y_hook, phi_hook,
+    ) = q
+    (
+        x_boom_dot, y_boom_dot, phi_boom_dot, x_extension_dot, y_extension_dot, phi_extension_dot,
+        x_barrel_dot, y_barrel_dot, phi_barrel_dot, x_rod_dot, y_rod_dot, phi_rod_dot, x_hook_dot,
+        y_hook_dot, phi_hook_dot,
+    ) = q_dot
     duration, cylinder_length, cylinder_stroke, extension_reach, extension_stroke = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
@@ -783,13 +870,13 @@ def _kinematics(f, q, q_dot, t, p):
     c_barrel, s_barrel = cos_sin(phi_barrel)
     c_rod, s_rod = cos_sin(phi_rod)
     c_hook, s_hook = cos_sin(phi_hook)
-    # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
+    # 0-1  Revolute "boom_pivot"
     telescope_boom_x = 1.5 * c_boom
     telescope_boom_y = 1.5 * s_boom
     phi_boom_dot_sq = phi_boom_dot**2
     telescope_boom_w2_x = phi_boom_dot_sq * telescope_boom_x
     telescope_boom_w2_y = phi_boom_dot_sq * telescope_boom_y
-    # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+    # 2-3  Translational "telescope"
     telescope_extension_y = 1.3 * s_extension
     telescope_2 = y_extension + telescope_extension_y
     telescope_d_y = telescope_2 - y_boom - telescope_boom_y
@@ -815,13 +902,13 @@ def _kinematics(f, q, q_dot, t, p):
     eye_extension_w2_x = phi_extension_dot_sq * telescope_extension_x
     telescope_18 = telescope_boom_w2_x - eye_extension_w2_x
     telescope_19 = phi_boom_dot * telescope_8 - phi_extension_dot * telescope_8
-    # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
+    # 4-5  Revolute "barrel_pin"
     barrel_pin_1 = 0.45 * c_barrel
     barrel_pin_2 = 0.45 * s_barrel
     phi_barrel_dot_sq = phi_barrel_dot**2
     barrel_pin_4 = phi_barrel_dot_sq * barrel_pin_1
     barrel_pin_5 = phi_barrel_dot_sq * barrel_pin_2
-    # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
+    # 6-7  Translational "cylinder"
     cylinder_rod_y = 0.45 * s_rod
     cylinder_d_y = y_rod + cylinder_rod_y - y_barrel + barrel_pin_2
     cylinder_rod_x = 0.45 * c_rod
@@ -839,30 +926,31 @@ def _kinematics(f, q, q_dot, t, p):
     cylinder_15 = phi_rod_dot_sq * cylinder_rod_y
     cylinder_16 = barrel_pin_5 + cylinder_15
     cylinder_17 = phi_barrel_dot * cylinder_6 - phi_rod_dot * cylinder_6
-    # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
+    # 8-9  Revolute "rod_pin"
     rod_pin_1 = 0.2 * s_boom
     rod_pin_2 = 0.2 * c_boom
     rod_pin_boom_x = rod_pin_1 - rod_pin_2
     rod_pin_4 = rod_pin_1 + rod_pin_2
-    # 10-11  Revolute "eye": extension (1.3, 0) - hook (0, 0.4)
+    # 10-11  Revolute "eye"
     eye_1 = 0.4 * s_hook
     eye_hook_y = 0.4 * c_hook
     phi_hook_dot_sq = phi_hook_dot**2
-    # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 13  TranslationalDistance "lift"
     lift_1 = 2 * (pi * t) / duration
     sin_lift_1 = sin(lift_1)
     lift_3 = t / duration - sin_lift_1 / 2 / pi
     lift_4 = 1 / duration - cos(lift_1) / duration
     duration_sq = duration**2
     lift_6 = c_barrel * cylinder_d_dot_y - s_barrel * cylinder_d_dot_x
-    # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+    # 14  TranslationalDistance "extend"
     extend_1 = c_boom * telescope_d_dot_y - s_boom * telescope_d_dot_x
     return (
         # Phi
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         telescope_boom_x - x_boom,
         1.6 - y_boom + telescope_boom_y,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         telescope_7,
         telescope_8,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
@@ -879,15 +967,19 @@ def _kinematics(f, q, q_dot, t, p):
         telescope_2 - y_hook - eye_hook_y,
         # 12  AbsoluteAngle "plumb": hook angle 0
         phi_hook,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         cylinder_7 - (cylinder_length + cylinder_stroke * lift_3),
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         telescope_9 - (extension_reach + extension_stroke * lift_3),
         # Phi_q
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         -telescope_boom_y,  # boom_pivot.x by phi_boom
         telescope_boom_x,  # boom_pivot.y by phi_boom
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         s_boom,  # telescope.normal by x_boom
         -c_boom,  # telescope.normal by y_boom
         -(telescope_9 + (s_boom * telescope_boom_y + c_boom * telescope_boom_x)),  # telescope.normal by phi_boom
@@ -918,14 +1010,17 @@ def _kinematics(f, q, q_dot, t, p):
         eye_hook_y,  # eye.x by phi_hook
         telescope_extension_x,  # eye.y by phi_extension
         eye_1,  # eye.y by phi_hook
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         -c_barrel,  # lift by x_barrel
         -s_barrel,  # lift by y_barrel
         cylinder_5 - (c_barrel * barrel_pin_2 - s_barrel * barrel_pin_1),  # lift by phi_barrel
         c_barrel,  # lift by x_rod
         s_barrel,  # lift by y_rod
         s_barrel * cylinder_rod_x - c_barrel * cylinder_rod_y,  # lift by phi_rod
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         -c_boom,  # extend by x_boom
         -s_boom,  # extend by y_boom
         telescope_7 - (s_boom * telescope_boom_x - c_boom * telescope_boom_y),  # extend by phi_boom
@@ -936,7 +1031,8 @@ def _kinematics(f, q, q_dot, t, p):
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         0,
         0,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
         0,
         0,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
@@ -953,24 +1049,28 @@ def _kinematics(f, q, q_dot, t, p):
         0,
         # 12  AbsoluteAngle "plumb": hook angle 0
         0,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         cylinder_stroke * lift_4,
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         extension_stroke * lift_4,
         # gamma
         # 0-1  Revolute "boom_pivot": ground (0, 1.6) - boom (-1.5, 0)
         telescope_boom_w2_x,
         telescope_boom_w2_y,
-        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1, 0)
-        phi_boom_dot * (phi_boom_dot * telescope_7 + telescope_13) + phi_boom_dot * telescope_13
-            - (c_boom * telescope_16 - s_boom * telescope_18),
+        # 2-3  Translational "telescope": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) axis (1,
+        #      0)
+        phi_boom_dot * (phi_boom_dot * telescope_7 + telescope_13)
+            + phi_boom_dot * telescope_13 - (c_boom * telescope_16 - s_boom * telescope_18),
         phi_boom_dot * telescope_19 - phi_extension_dot * telescope_19,
         # 4-5  Revolute "barrel_pin": ground (0.7, 0.8) - barrel (-0.45, 0)
         barrel_pin_4,
         barrel_pin_5,
         # 6-7  Translational "cylinder": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) axis (1, 0)
-        phi_barrel_dot * (phi_barrel_dot * cylinder_5 + cylinder_11) + phi_barrel_dot * cylinder_11
-            - (s_barrel * cylinder_14 - c_barrel * cylinder_16),
+        phi_barrel_dot * (phi_barrel_dot * cylinder_5 + cylinder_11)
+            + phi_barrel_dot * cylinder_11 - (s_barrel * cylinder_14 - c_barrel * cylinder_16),
         phi_barrel_dot * cylinder_17 - phi_rod_dot * cylinder_17,
         # 8-9  Revolute "rod_pin": boom (-0.2, -0.2) - rod (0.45, 0)
         phi_boom_dot_sq * rod_pin_boom_x - cylinder_13,
@@ -980,12 +1080,17 @@ def _kinematics(f, q, q_dot, t, p):
         eye_extension_w2_y - phi_hook_dot_sq * eye_hook_y,
         # 12  AbsoluteAngle "plumb": hook angle 0
         0,
-        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+        # 13  TranslationalDistance "lift": barrel (-0.45, 0) axis (1, 0) - rod (0.45, 0) distance
+        #      cylinder_length + cylinder_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
         2 * (pi * cylinder_stroke * sin_lift_1) / duration_sq
-            - (phi_barrel_dot * (lift_6 - phi_barrel_dot * cylinder_7) + phi_barrel_dot * lift_6 - (c_barrel * cylinder_14 + s_barrel * cylinder_16)),
-        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0) distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) + t/duration)
+            - (phi_barrel_dot * (lift_6 - phi_barrel_dot * cylinder_7) + phi_barrel_dot * lift_6
+                - (c_barrel * cylinder_14 + s_barrel * cylinder_16)),
+        # 14  TranslationalDistance "extend": boom (1.5, 0) axis (1, 0) - extension (1.3, 0)
+        #      distance extension_reach + extension_stroke*(-sin(2*pi*t/duration)/(2*pi) +
+        #      t/duration)
         2 * (pi * extension_stroke * sin_lift_1) / duration_sq
-            - (phi_boom_dot * (extend_1 - phi_boom_dot * telescope_9) + phi_boom_dot * extend_1 + (c_boom * telescope_18 + s_boom * telescope_16)),
+            - (phi_boom_dot * (extend_1 - phi_boom_dot * telescope_9) + phi_boom_dot * extend_1
+                + (c_boom * telescope_18 + s_boom * telescope_16)),
     )
 
 
@@ -1024,7 +1129,10 @@ def _factor(f, J):
         + telescope_normal_y_boom * boom_pivot_y_phi_boom
     )
     k_5 = rod_pin_y_phi_boom + boom_pivot_y_phi_boom
-    k_6 = extend_phi_boom + extend_x_boom * boom_pivot_x_phi_boom + extend_y_boom * boom_pivot_y_phi_boom
+    k_6 = (
+        extend_phi_boom + extend_x_boom * boom_pivot_x_phi_boom
+        + extend_y_boom * boom_pivot_y_phi_boom
+    )
     k_7 = cylinder_normal_x_rod * k_3 + cylinder_normal_y_rod * k_5
     k_8 = (
         cylinder_normal_phi_rod + cylinder_normal_x_rod * rod_pin_x_phi_rod

@@ -25,10 +25,15 @@ def header(code: InlineProgram) -> list[str]:
     return [*lines, "", *table(rows)]
 
 
-def title(section: Section) -> str:
-    """Return rows, type, name and points of a constraint, for a comment above its code."""
+def short_title(section: Section) -> str:
+    """Return rows, type and name of a constraint, for a comment above its code."""
     instance = section.instance
-    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}": {section.text}'
+    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}"'
+
+
+def title(section: Section) -> str:
+    """Return rows, type, name and points of a constraint, for a comment above its rows."""
+    return f"{short_title(section)}: {section.text}"
 
 
 def place(quantity: str, entry: Entry, code: InlineProgram) -> str:

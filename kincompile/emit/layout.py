@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,6 +20,11 @@ def wrapped(items: Iterable[str], width: int = WIDTH - 4) -> list[str]:
         else:
             lines.append(f"{item},")
     return lines
+
+
+def indented(lines: Iterable[str]) -> str:
+    """Return lines as one text, each indented by a level."""
+    return "\n".join(f"    {line}" for line in lines)
 
 
 def quoted(names: Iterable[str]) -> list[str]:
@@ -42,22 +48,50 @@ def table(rows: Sequence[Sequence[str]]) -> list[str]:
     ]
 
 
-def broken(text: str, width: int = WIDTH) -> list[str]:
-    """Return a long expression in lines, broken before a plus or minus outside all parentheses."""
+def commented(text: str, width: int = WIDTH - 8) -> list[str]:
+    """Return a text as comment lines, the later ones deeper."""
+    if len(text) <= width:
+        return [f"# {text}"]
+    lines = wrap(text, width, subsequent_indent="     ", break_on_hyphens=False)
+    return [f"# {line}" for line in lines]
+
+
+def broken(text: str, width: int = WIDTH - 8) -> list[str]:
+    """Return a long expression in lines, broken before a plus or minus.
+
+    Those outside all parentheses come first, those within only where a line is still too long; such
+    a line is indented by the parentheses around it.
+    """
     if len(text) <= width:
         return [text]
-    pieces, depth, start = [], 0, 0
+    spans, depths = [(0, len(text))], {0: 0}
+    for depth, places in sorted(_places_to_break(text).items()):
+        spans = [part for span in spans for part in _parts(span, places, width)]
+        depths |= dict.fromkeys(places, depth)
+    return ["    " * depths[start] + text[start:stop].strip() for start, stop in spans]
+
+
+def _places_to_break(text: str) -> dict[int, list[int]]:
+    """Return where a plus or minus stands, by the number of parentheses around it."""
+    places: dict[int, list[int]] = {}
+    depth = 0
     for k, character in enumerate(text):
         depth += character in "(["
         depth -= character in ")]"
-        if depth == 0 and text[k : k + 3] in (" + ", " - "):
-            pieces.append(text[start:k])
-            start = k + 1
-    pieces.append(text[start:])
-    lines = [pieces[0]]
-    for piece in pieces[1:]:
-        if len(lines[-1]) + len(piece) + 1 <= width:
-            lines[-1] += f" {piece}"
-        else:
-            lines.append(piece)
-    return lines
+        if character in "+-" and text[k - 1 : k + 2 : 2] == "  ":
+            places.setdefault(depth, []).append(k)
+    return places
+
+
+def _parts(span: tuple[int, int], places: Iterable[int], width: int) -> list[tuple[int, int]]:
+    """Return a span of text cut into as few parts as fit, at some of the places."""
+    first, last = span
+    if last - first <= width:
+        return [span]
+    parts, start, previous = [], first, first
+    for place in (*(place for place in places if first < place < last), last):
+        if place - start > width and previous > start:
+            parts.append((start, previous))
+            start = previous
+        previous = place
+    return [*parts, (start, last)]

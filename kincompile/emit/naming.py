@@ -55,7 +55,8 @@ def content_name(
             return f"{function}_{names[a]}"
         case ("mul", int(a), int(b)) if a in names and b in names:
             name = f"{names[a]}_{names[b]}"
-            return name if len(name) <= MOST_CHARACTERS else None
+            spoken = not (names[a][-1].isdigit() or names[b][-1].isdigit())
+            return name if spoken and len(name) <= MOST_CHARACTERS else None
     return None
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from kincompile.emit.functions import EVALUATORS, Listing, schedule
-from kincompile.emit.headings import header, place, title
-from kincompile.emit.layout import broken, quoted, wrapped
+from kincompile.emit.headings import header, place, short_title, title
+from kincompile.emit.layout import WIDTH, broken, commented, indented, quoted, wrapped
 from kincompile.emit.naming import NameTable
 from kincompile.emit.numpy_solve import solve_functions
 from kincompile.emit.printers import PythonPrinter
@@ -63,7 +63,7 @@ def emit_numpy(code: InlineProgram) -> Emitted:
         kernels += ["", "", *solve_functions(code, solving)]
         lanes += ["factor", "solve"]
     data = _data(code, kernels, sorted(called))
-    data["lanes"] = _indented(f'"{name}": _{name},' for name in lanes)
+    data["lanes"] = indented(f'"{name}": _{name},' for name in lanes)
     data["is_planned"] = plan is not None
     data["has_large_blocks"] = plan is not None and plan.has_large_blocks
     source = fill("numpy/module.py.jinja", data)
@@ -89,29 +89,31 @@ def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[st
         "m": len(program.equations),
         "k": len(program.parameters),
         "nonzeros": len(pattern),
-        "coordinates": _indented(quoted(names)),
-        "equations": _indented(quoted(program.equations)),
-        "parameters": _indented(quoted([item.name for item in program.parameters])),
-        "units": _indented(_units(program)),
-        "defaults": _indented(wrapped([repr(item.default) for item in program.parameters])),
-        "guess": _indented(wrapped([repr(item.guess) for item in program.coordinates])),
-        "pattern": _indented(wrapped([f"({row}, {column})" for row, column in pattern])),
-        "constants": _indented(wrapped([repr(float(value)) for value in constants])),
-        "fixed": _indented(wrapped([str(k) for k in fixed])),
-        "varying": _indented(wrapped([str(k) for k in moving])),
+        "coordinates": indented(quoted(names)),
+        "equations": indented(quoted(program.equations)),
+        "parameters": indented(quoted([item.name for item in program.parameters])),
+        "units": indented(_units(program)),
+        "defaults": indented(wrapped([repr(item.default) for item in program.parameters])),
+        "guess": indented(wrapped([repr(item.guess) for item in program.coordinates])),
+        "pattern": indented(wrapped([f"({row}, {column})" for row, column in pattern])),
+        "constants": indented(wrapped([repr(float(value)) for value in constants])),
+        "fixed": indented(wrapped([str(k) for k in fixed])),
+        "varying": indented(wrapped([str(k) for k in moving])),
         "tables": "\n".join(_tables(program)),
-        "scalar_functions": _indented(
-            [f"{name} = {SCALAR_FUNCTIONS.get(name, f'math.{name}')}" for name in called]
-        ),
-        "array_functions": _indented(
-            [f"{name} = {FUNCTIONS.get(name, f'np.{name}')}" for name in called]
-        ),
+        "scalar_functions": indented(scalar_functions(called)),
+        "array_functions": indented(array_functions(called)),
         "kernels": "\n".join(kernels),
     }
 
 
-def _indented(lines: Iterable[str]) -> str:
-    return "\n".join(f"    {line}" for line in lines)
+def scalar_functions(called: Iterable[str]) -> list[str]:
+    """Return a class body that maps the functions called to those of `math`."""
+    return [f"{name} = {SCALAR_FUNCTIONS.get(name, f'math.{name}')}" for name in called]
+
+
+def array_functions(called: Iterable[str]) -> list[str]:
+    """Return a class body that maps the functions called to those of NumPy."""
+    return [f"{name} = {FUNCTIONS.get(name, f'np.{name}')}" for name in called]
 
 
 def _units(program: Program) -> list[str]:
@@ -140,10 +142,25 @@ def _function(
 ) -> list[str]:
     """Return the lines of one function."""
     states = "q, q_dot" if "gamma" in quantities else "q"
+    body = [*_unpack(code.program, listing, names), *function_body(quantities, code, listing)]
+    return [f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
+
+
+def function_body(
+    quantities: Sequence[str], code: InlineProgram, listing: Listing, *, titled: bool = True
+) -> list[str]:
+    """Return the lines of a function whose inputs have their names already.
+
+    Without `titled` there are no comments that name constraints: the code is for many.
+    """
     printer = PythonPrinter(code.nodes, listing.names)
-    body = [*_unpack(code.program, listing, names), *_frames(listing, printer)]
+    body = []
+    if listing.functions:
+        called = ", ".join(listing.functions)
+        body.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
+    body += _frames(listing, printer)
     for section, assignments in listing.steps:
-        body.append(f"# {title(section)}")
+        body += [f"# {short_title(section)}"] if titled else []
         for item in assignments:
             body += _assignment(item.name, printer.text(item.node, own=True))
     body.append("return (")
@@ -151,14 +168,15 @@ def _function(
         if len(quantities) > 1:
             body.append(f"    # {quantity}")
         for section, entries in rows:
-            if entries:
-                body.append(f"    # {title(section)}")
+            if titled and entries:
+                body += [f"    {line}" for line in commented(title(section))]
             for entry in entries:
-                body += _element(printer.text(entry.node), place(quantity, entry, code))
+                comment = place(quantity, entry, code) if titled else ""
+                body += _element(printer.text(entry.node), comment)
     body.append(")")
     if body[-2] == "return (":
         body[-2:] = ["return ()"]
-    return [f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
+    return body
 
 
 def _assignment(name: str, text: str) -> list[str]:
@@ -189,19 +207,19 @@ def _unpack(program: Program, listing: Listing, names: Mapping[str, str]) -> lis
     for vector, members in vectors.items():
         read = [k for k, name in enumerate(members) if name in listing.inputs]
         if 2 * len(read) > len(members):
-            lines.append(f"{_targets(names[name] for name in members)} = {vector}")
+            lines += _targets([names[name] for name in members], vector)
         elif read:
             left = ", ".join(names[members[k]] for k in read)
             lines.append(f"{left} = {', '.join(f'{vector}[{k}]' for k in read)}")
-    if listing.functions:
-        called = ", ".join(listing.functions)
-        lines.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
     return lines
 
 
-def _targets(names: Iterable[str]) -> str:
-    listed = list(names)
-    return f"({listed[0]},)" if len(listed) == 1 else ", ".join(listed)
+def _targets(members: Sequence[str], vector: str) -> list[str]:
+    """Return the unpacking of a whole vector, a long one in parentheses."""
+    left = f"({members[0]},)" if len(members) == 1 else ", ".join(members)
+    if len(left) <= WIDTH - 8:
+        return [f"{left} = {vector}"]
+    return ["(", *(f"    {line}" for line in wrapped(members)), f") = {vector}"]
 
 
 def _frames(listing: Listing, printer: PythonPrinter) -> list[str]:
