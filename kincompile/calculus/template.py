@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kincompile.calculus.expressions import Symbol, Vector
-
 if TYPE_CHECKING:
-    from kincompile.calculus.expressions import Expression, VectorSymbol
+    from kincompile.calculus.expressions import Expression, Symbol, VectorSymbol
     from kincompile.calculus.symbols import Contact, Frame
 
 
@@ -48,8 +46,3 @@ class Template:
         """The rates of the generalised coordinates, in the same order."""
         bodies = [leaf for frame in self.frames for leaf in (frame.r_dot, frame.phi_dot)]
         return (*bodies, *(contact.alpha_dot for contact in self.contacts))
-
-    @property
-    def equation_count(self) -> int:
-        """Number of equations."""
-        return sum(2 if isinstance(block, Vector) else 1 for block in self.Phi)

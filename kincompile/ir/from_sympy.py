@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import sympy
 from sympy.core.relational import Relational
+from sympy.logic.boolalg import BooleanFunction
 
 from kincompile.errors import InternalError
 from kincompile.model.spline import PeriodicSpline
@@ -116,6 +117,8 @@ class Converter:
         if isinstance(value, sympy.And | sympy.Or):
             connective = "&" if isinstance(value, sympy.And) else "|"
             return graph.logic(connective, *(self._condition(item) for item in value.args))
+        if isinstance(value, BooleanFunction):
+            return self._condition(sympy.to_nnf(value, simplify=False))
         raise InternalError(f"the condition {value} passed the checks but cannot be compiled")
 
     def _function(self, value: sympy.Basic) -> int:

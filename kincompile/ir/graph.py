@@ -9,8 +9,10 @@ outward, so that an attribute that happens to be zero costs nothing in the emitt
 from __future__ import annotations
 
 from fractions import Fraction
-from math import isqrt
+from math import isfinite, isqrt
 from typing import TYPE_CHECKING, Any
+
+from kincompile.errors import ModelError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,7 +38,18 @@ class Graph:
         return found
 
     def const(self, value: Constant) -> int:
-        """Return a number; a whole number is kept as an int, a fraction exactly."""
+        """Return a number; a whole number is kept as an int, a fraction exactly.
+
+        Raises
+        ------
+        ModelError
+            If the number, a product of constants perhaps, is beyond the range of floats.
+        """
+        if isinstance(value, float) and not isfinite(value):
+            raise ModelError(
+                "a constant of the model is beyond 1e308, the range of floating-point numbers; "
+                "choose other units"
+            )
         if value == (whole := int(value)):
             value = whole
         if value < 0:

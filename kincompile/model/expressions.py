@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from numbers import Integral, Rational, Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import sympy
 from sympy.core.function import AppliedUndef
@@ -126,6 +126,11 @@ def smoothness_problem(value: Scalar) -> str | None:
                 f"{node} has no continuous derivative; write a smooth function, or a "
                 "sympy.Piecewise whose pieces meet with equal value and slope"
             )
+        if isinstance(node, sympy.Piecewise) and not _has_value_everywhere(node):
+            return (
+                f"{node} has no value where none of its conditions holds; end it with a piece "
+                "(expression, True)"
+            )
         if isinstance(node, AppliedUndef):
             return f"the function {node} is not defined; give it as an expression"
         if isinstance(node, sympy.Function) and not isinstance(node, SMOOTH):
@@ -133,6 +138,12 @@ def smoothness_problem(value: Scalar) -> str | None:
         if not isinstance(node, _KNOWN):
             return f"{type(node).__name__} in {value} is not supported; {_ELEMENTARY}"
     return None
+
+
+def _has_value_everywhere(node: sympy.Piecewise) -> bool:
+    """Return whether the conditions are seen to cover every case, as `t < 1` and `t >= 1` do."""
+    pieces = cast("tuple[ExprCondPair, ...]", node.args)
+    return bool(sympy.Or(*(piece.cond for piece in pieces)) == sympy.true)
 
 
 def unknown_problem(value: Scalar, declared: Collection[str], what: str) -> str | None:

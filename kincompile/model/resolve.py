@@ -318,7 +318,14 @@ def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
 def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Expr:
     """Return rho as an expression of alpha: from an expression, a function, or a table."""
     if isinstance(given, sympy.Lambda) or (callable(given) and not isinstance(given, sympy.Basic)):
-        given = given(alpha)
+        try:
+            given = given(alpha)
+        except (TypeError, ValueError) as error:
+            scope.problems.append(
+                f"{where}: the function cannot be called with the symbol alpha ({error}); write "
+                "it as rho(alpha) with SymPy's functions, sympy.cos instead of math.cos"
+            )
+            return sympy.S.One
     elif isinstance(given, tuple | list) and len(given) == 2:
         try:
             given = PeriodicSpline.of(table_name, fit(*given))(alpha)

@@ -79,8 +79,8 @@ class ConstraintSystem(MatrixViews):
         points: int = 101,
     ) -> None:
         bodies = tuple(bodies)
-        written = [_as_constraint(item, k) for k, item in enumerate(equations, 1)]
         problems: list[str] = []
+        written = _written(equations, problems)
         declared = _parameters(parameters, problems)
         defaults = {item.name: item.default for item in declared if item.default is not None}
         found = [
@@ -142,10 +142,17 @@ class ConstraintSystem(MatrixViews):
         return f"<ConstraintSystem {self.name!r}: {sizes}>"
 
 
-def _as_constraint(item: Any, number: int) -> Constraint | Equation:
-    if isinstance(item, Constraint | Equation):
-        return item
-    return Equation(f"equation_{number}", item)
+def _written(equations: Iterable[Any], problems: list[str]) -> list[Constraint | Equation]:
+    """Return the constraints as written; an expression is named by its place."""
+    try:
+        items = list(equations)
+    except TypeError:
+        problems.append(f"the equations {equations!r} are not a list; write equations=[...]")
+        return []
+    return [
+        item if isinstance(item, Constraint | Equation) else Equation(f"equation_{k}", item)
+        for k, item in enumerate(items, 1)
+    ]
 
 
 def _name_of(item: Any) -> str:
@@ -177,6 +184,11 @@ def _parameters(
         given = [Parameter(_name_of(key), value) for key, value in given.items()]
     checked = []
     for item in given:
+        if not isinstance(item, Parameter):
+            problems.append(
+                f"{item!r} is not a parameter; give values by name: parameters={{'a': 1.0}}"
+            )
+            continue
         default = item.default
         if default is None:
             problems.append(
@@ -226,6 +238,11 @@ def _free_coordinates(
         if unknown:
             problems.append(f"the guess names {listed(unknown)}; coordinates are: {listed(names)}")
         guess = [by_name.get(name, 0.0) for name in names]
+    try:
+        guess = list(guess)
+    except TypeError:
+        problems.append(f"the guess {guess!r} is not a list; give a value for each coordinate")
+        guess = [0.0] * len(names)
     if len(guess) != len(names):
         problems.append(
             f"the guess has {len(guess)} values for {len(names)} coordinates ({listed(names)}); "
@@ -276,6 +293,8 @@ def _check_names(
     named += [("a coordinate", item.name) for item in coordinates]
     named += [("a constraint", item.name) for item in constraints]
     problems += [problem for what, text in named if (problem := name_problem(text, what))]
+    if not all(isinstance(text, str) for _, text in named):
+        raise ModelError(problems)  # without names nothing more can be said
     problems += [
         f"body {body.name!r}: this is the name of the fixed frame; use m.ground, or another name"
         for body in bodies
