@@ -1,4 +1,4 @@
-"""Phi_q, nu and gamma of a constraint type, derived once from its Phi and kept."""
+"""Phi_q, nu and gamma of a constraint type, derived once from its Phi and kept, with the steps."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from kincompile.calculus.expressions import (
 from kincompile.derive.rules import (
     TIME,
     Direction,
+    Step,
     coefficient,
     derivative,
     gradient,
@@ -27,6 +28,26 @@ from kincompile.derive.rules import (
 if TYPE_CHECKING:
     from kincompile.calculus.expressions import Expression
     from kincompile.calculus.template import Template
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The rules that fired while a row block was derived, inside out.
+
+    Attributes
+    ----------
+    Phi_q
+        Of each coordinate of the template.
+    velocity, Phi_t
+        Of Phi along q_dot, and by time.
+    gamma_terms
+        Of the three terms of gamma.
+    """
+
+    Phi_q: tuple[tuple[Step, ...], ...]
+    velocity: tuple[Step, ...]
+    Phi_t: tuple[Step, ...]
+    gamma_terms: tuple[tuple[Step, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,63 +62,79 @@ class RowBlock:
         Its derivative by each coordinate of the template. By a position r: the number k of the
         block k I where Phi is a vector, the row (d/dx, d/dy) as a vector where Phi is a scalar. By
         an angle: a vector or a scalar, as Phi is.
+    velocity
+        :math:`\Phi_q \dot q`.
     nu
         :math:`-\Phi_t`.
     gamma_terms
         :math:`-(\Phi_q \dot q)_q \dot q`, :math:`-2 \Phi_{qt} \dot q` and :math:`-\Phi_{tt}`.
     gamma
         Their sum.
+    steps
+        How all this was found.
     """
 
     Phi: Expression
     Phi_q: tuple[Expression, ...]
+    velocity: Expression
     nu: Expression
     gamma_terms: tuple[Expression, Expression, Expression]
     gamma: Expression
+    steps: Steps
 
 
 @cache
 def derive(template: Template) -> tuple[RowBlock, ...]:
     """Differentiate the Phi of a constraint type: its row blocks, in order."""
+    return tuple(_row_block(template, Phi) for Phi in template.Phi)
+
+
+def _row_block(template: Template, Phi: Expression) -> RowBlock:
     along_q_dot: Direction = dict(zip(template.coordinates, template.rates, strict=True))
     along_t: Direction = {TIME: ONE}
-    blocks = []
-    for Phi in template.Phi:
-        Phi_t = _along(Phi, along_t)
-        velocity = _along(Phi, along_q_dot)
-        gamma_terms = (
-            _times(-1, _along(velocity, along_q_dot)),
-            _times(-2, _along(velocity, along_t)),
-            _times(-1, _along(Phi_t, along_t)),
-        )
-        blocks.append(
-            RowBlock(
-                Phi,
-                tuple(_by(Phi, coordinate) for coordinate in template.coordinates),
-                _times(-1, Phi_t),
-                gamma_terms,
-                _total(gamma_terms),
-            )
-        )
-    return tuple(blocks)
+    Phi_q, Phi_q_steps = zip(*(_by(Phi, item) for item in template.coordinates), strict=True)
+    Phi_t, Phi_t_steps = _along(Phi, along_t)
+    velocity, velocity_steps = _along(Phi, along_q_dot)
+    second = (
+        (-1, *_along(velocity, along_q_dot)),
+        (-2, *_along(velocity, along_t)),
+        (-1, *_along(Phi_t, along_t)),
+    )
+    first_term, second_term, third_term = (factor * found for factor, found, _ in second)
+    gamma_terms = first_term, second_term, third_term
+    return RowBlock(
+        Phi=Phi,
+        Phi_q=Phi_q,
+        velocity=velocity,
+        nu=-Phi_t,
+        gamma_terms=gamma_terms,
+        gamma=_total(gamma_terms),
+        steps=Steps(
+            Phi_q_steps, velocity_steps, Phi_t_steps, tuple(steps for _, _, steps in second)
+        ),
+    )
 
 
-def _along(expression: Expression, direction: Direction) -> Expression:
+def _along(expression: Expression, direction: Direction) -> tuple[Expression, tuple[Step, ...]]:
+    record: list[Step] = []
     if isinstance(expression, Vector):
-        return vector_derivative(expression, direction)
-    return derivative(expression, direction)
+        found: Expression = vector_derivative(expression, direction, record)
+    else:
+        found = derivative(expression, direction, record)
+    return found, tuple(record)
 
 
-def _by(expression: Expression, coordinate: VectorSymbol | Symbol) -> Expression:
+def _by(
+    expression: Expression, coordinate: VectorSymbol | Symbol
+) -> tuple[Expression, tuple[Step, ...]]:
     if isinstance(coordinate, Symbol):
         return _along(expression, {coordinate: ONE})
+    record: list[Step] = []
     if isinstance(expression, Vector):
-        return coefficient(expression, coordinate)
-    return gradient(expression, coordinate)
-
-
-def _times(factor: int, expression: Expression) -> Expression:
-    return factor * expression
+        found: Expression = coefficient(expression, coordinate, record)
+    else:
+        found = gradient(expression, coordinate, record)
+    return found, tuple(record)
 
 
 def _total(terms: tuple[Expression, ...]) -> Expression:
