@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.solution import Solution
 
-NOISE = 1e-13
-"""What is smaller than this, next to the largest number of its kind, is shown as 0."""
+NOISE = 1e-12
+"""Rounding errors, relative to the largest number of a kind."""
 
 _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 
@@ -51,13 +51,20 @@ def _without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _extremes(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[str, str, str, str]:
-    """Return the least value, its time, the largest value and its time."""
+    """Return the least value and its time, the largest value and its time."""
     found = np.isfinite(values)
     if not found.any():
         return ("-",) * 4
     t, values = t[found], values[found]
-    low, high = values.argmin(), values.argmax()
-    return _text(values[low]), _text(t[low]), _text(values[high]), _text(t[high])
+    return (*_first(t, values, values.min()), *_first(t, values, values.max()))
+
+
+def _first(
+    t: NDArray[np.float64], values: NDArray[np.float64], extreme: np.float64
+) -> tuple[str, str]:
+    """Return an extreme and the first time at which it is reached, up to rounding."""
+    there = np.abs(values - extreme) <= NOISE * np.abs(values).max()
+    return _text(extreme), _text(t[there.argmax()])
 
 
 def _largest(values: NDArray[np.float64]) -> str:
@@ -77,5 +84,11 @@ def _verdict(solution: Solution) -> str:
     return (
         f"{counted(solution.t.size, 'point')} from t = {solution.t[0]:g} to {solution.t[-1]:g}: "
         f"{by_status}; {counted(int(solution.iterations.sum()), 'Newton iteration')}, "
-        f"largest residual {_largest(solution.residual[solution.status == Status.CONVERGED])}"
+        f"largest residual {_largest_residual(solution)}"
     )
+
+
+def _largest_residual(solution: Solution) -> str:
+    """Return the largest residual where the equations hold; of how it failed the message speaks."""
+    found = solution.residual[solution.status == Status.CONVERGED]
+    return f"{found.max():.1e}" if found.size else "-"

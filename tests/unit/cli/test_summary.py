@@ -37,11 +37,16 @@ def test_the_extremes_with_their_times_and_the_largest_absolute_rates(solution):
     assert text.splitlines()[1].split() == ["x", "m", "-2", "1", "3", "2", "4", "6"]
 
 
+def test_that_of_equal_extremes_the_first_counts_whatever_the_rounding(solution):
+    text = summary(solution([1, 2, 1 - 1e-14, 2 + 1e-14], [1] * 4, [1] * 4, [0] * 4))
+    assert text.splitlines()[1].split()[:6] == ["x", "m", "1", "0", "2", "1"]
+
+
 def test_that_points_that_were_not_found_do_not_count(solution):
     text = summary(solution([1, 2, NAN], [3, NAN, NAN], [4, NAN, NAN], [0, 1, 4]))
     assert text.splitlines()[1].split() == ["x", "m", "1", "0", "2", "1", "3", "4"]
     assert "3 points from t = 0 to 2: 1 CONVERGED, 1 NOT_CONVERGED, 1 NOT_REACHED" in text
-    assert text.endswith("6 Newton iterations, largest residual 1e-12")
+    assert text.endswith("6 Newton iterations, largest residual 1.0e-12")
 
 
 def test_that_a_motion_of_which_nothing_was_found_has_dashes(solution):
