@@ -24,7 +24,7 @@ import numpy as np
 
 NAME = "cam_flat_follower"
 FORMAT = 1
-FINGERPRINT = "24781cf61b338f9885e35f7761372e53"
+FINGERPRINT = "dc70f608d91330ad121079edfe1d311f"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (
@@ -82,13 +82,13 @@ def _Phi(f, q, t, p):
     c_follower, s_follower = cos_sin(phi_follower)
     # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
-    contact_2 = base + lift * (1 - cos_alpha_contact) / 2
+    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
-    contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_2 * contact_4
-    contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_2 * contact_6
-    contact_8 = lift * sin_alpha_contact / 2
+    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
+    contact_5 = contact_rho_cam * contact_u_cam_y
+    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
+    contact_7 = contact_rho_cam * contact_u_cam_x
+    contact_rho_cam_1 = lift * sin_alpha_contact / 2
     return (
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
         x_cam,
@@ -99,8 +99,8 @@ def _Phi(f, q, t, p):
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         c_follower * (y_follower - y_cam - contact_5)
             - s_follower * (x_follower - x_cam - contact_7),
-        s_follower * (contact_5 - contact_8 * contact_6)
-            + c_follower * (contact_8 * contact_4 + contact_7),
+        s_follower * (contact_5 - contact_rho_cam_1 * contact_u_cam_x)
+            + c_follower * (contact_rho_cam_1 * contact_u_cam_y + contact_7),
         # 6  AbsoluteAngle "motor": cam angle omega*t
         phi_cam - omega * t,
     )
@@ -115,18 +115,18 @@ def _Phi_q(f, q, t, p):
     c_follower, s_follower = cos_sin(phi_follower)
     # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
-    contact_2 = base + lift * (1 - cos_alpha_contact) / 2
+    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
-    contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_2 * contact_4
-    contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_2 * contact_6
+    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
+    contact_5 = contact_rho_cam * contact_u_cam_y
+    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
+    contact_7 = contact_rho_cam * contact_u_cam_x
     lift_sin_alpha_contact = lift * sin_alpha_contact
-    lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_10 = contact_5 - lift_sin_alpha_contact_2 * contact_6
-    contact_11 = lift_sin_alpha_contact_2 * contact_4 + contact_7
+    contact_rho_cam_1 = lift_sin_alpha_contact / 2
+    contact_10 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
+    contact_11 = contact_rho_cam_1 * contact_u_cam_y + contact_7
     contact_12 = s_follower * contact_11 - c_follower * contact_10
-    contact_13 = lift * cos_alpha_contact / 2 - contact_2
+    contact_13 = lift * cos_alpha_contact / 2 - contact_rho_cam
     return (
         # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
         c_follower,  # guide.parallel by phi_follower
@@ -141,8 +141,8 @@ def _Phi_q(f, q, t, p):
         -(s_follower * contact_10 + c_follower * contact_11),  # contact.contact by alpha_contact
         contact_12,  # contact.tangent by phi_cam
         -contact_12,  # contact.tangent by phi_follower
-        c_follower * (contact_13 * contact_4 + lift_sin_alpha_contact * contact_6)
-            - s_follower * (contact_13 * contact_6 - lift_sin_alpha_contact * contact_4),  # contact.tangent by alpha_contact
+        c_follower * (contact_13 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
+            - s_follower * (contact_13 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
     )
 
 
@@ -176,47 +176,47 @@ def _gamma(f, q, q_dot, t, p):
     c_follower, s_follower = cos_sin(phi_follower)
     # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
-    contact_2 = base + lift * (1 - cos_alpha_contact) / 2
+    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
-    contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_2 * contact_4
-    contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_2 * contact_6
+    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
+    contact_5 = contact_rho_cam * contact_u_cam_y
+    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
+    contact_7 = contact_rho_cam * contact_u_cam_x
     lift_sin_alpha_contact = lift * sin_alpha_contact
-    lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_10 = lift_sin_alpha_contact_2 * alpha_contact_dot
-    contact_11 = contact_10 * contact_6
-    contact_12 = phi_cam_dot * contact_4 + alpha_contact_dot * contact_4
-    contact_13 = contact_2 * contact_12
-    contact_14 = contact_10 * contact_4
-    contact_15 = phi_cam_dot * contact_6 + alpha_contact_dot * contact_6
-    contact_16 = contact_2 * contact_15
+    contact_rho_cam_1 = lift_sin_alpha_contact / 2
+    contact_10 = contact_rho_cam_1 * alpha_contact_dot
+    contact_11 = contact_10 * contact_u_cam_x
+    contact_12 = phi_cam_dot * contact_u_cam_y + alpha_contact_dot * contact_u_cam_y
+    contact_13 = contact_rho_cam * contact_12
+    contact_14 = contact_10 * contact_u_cam_y
+    contact_15 = phi_cam_dot * contact_u_cam_x + alpha_contact_dot * contact_u_cam_x
+    contact_16 = contact_rho_cam * contact_15
     contact_17 = (
         c_follower * (x_follower_dot - x_cam_dot - contact_11 + contact_13)
         + s_follower * (y_follower_dot - y_cam_dot - contact_14 - contact_16)
     )
     contact_18 = phi_cam_dot * contact_12 + alpha_contact_dot * contact_12
-    contact_19 = contact_2 * contact_18
+    contact_19 = contact_rho_cam * contact_18
     lift_cos_alpha_contact = lift * cos_alpha_contact
-    lift_cos_alpha_contact_2 = lift_cos_alpha_contact / 2
+    contact_rho_cam_2 = lift_cos_alpha_contact / 2
     alpha_contact_dot_sq = alpha_contact_dot**2
-    contact_23 = lift_cos_alpha_contact_2 * alpha_contact_dot_sq
-    contact_24 = contact_23 * contact_4
+    contact_23 = contact_rho_cam_2 * alpha_contact_dot_sq
+    contact_24 = contact_23 * contact_u_cam_y
     contact_25 = lift_sin_alpha_contact * alpha_contact_dot
     contact_26 = contact_25 * contact_15
     contact_27 = contact_25 * contact_12
-    contact_28 = contact_23 * contact_6
+    contact_28 = contact_23 * contact_u_cam_x
     contact_29 = phi_cam_dot * contact_15 + alpha_contact_dot * contact_15
-    contact_30 = contact_2 * contact_29
-    contact_31 = lift_cos_alpha_contact_2 * alpha_contact_dot
+    contact_30 = contact_rho_cam * contact_29
+    contact_31 = contact_rho_cam_2 * alpha_contact_dot
     contact_32 = (
-        c_follower * (contact_31 * contact_6 - lift_sin_alpha_contact_2 * contact_12
+        c_follower * (contact_31 * contact_u_cam_x - contact_rho_cam_1 * contact_12
             - contact_14 - contact_16)
-        + s_follower * (contact_31 * contact_4 + lift_sin_alpha_contact_2 * contact_15
+        + s_follower * (contact_31 * contact_u_cam_y + contact_rho_cam_1 * contact_15
             + contact_11 - contact_13)
     )
     contact_33 = lift_cos_alpha_contact * alpha_contact_dot
-    contact_34 = lift_sin_alpha_contact_2 * alpha_contact_dot_sq
+    contact_34 = contact_rho_cam_1 * alpha_contact_dot_sq
     return (
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
         0,
@@ -232,15 +232,15 @@ def _gamma(f, q, q_dot, t, p):
             - (c_follower * (contact_19 - (contact_24 + contact_26))
                 - s_follower * (contact_27 - contact_28 + contact_30)),
         phi_follower_dot * (phi_follower_dot * (s_follower * (contact_5
-                        - lift_sin_alpha_contact_2 * contact_6)
-                    + c_follower * (lift_sin_alpha_contact_2 * contact_4 + contact_7))
+                        - contact_rho_cam_1 * contact_u_cam_x)
+                    + c_follower * (contact_rho_cam_1 * contact_u_cam_y + contact_7))
                 + contact_32)
             + phi_follower_dot * contact_32
-            - (c_follower * (contact_33 * contact_15 - contact_34 * contact_4
-                    - lift_sin_alpha_contact_2 * contact_18 + contact_28 - contact_27 - contact_30)
+            - (c_follower * (contact_33 * contact_15 - contact_34 * contact_u_cam_y
+                    - contact_rho_cam_1 * contact_18 + contact_28 - contact_27 - contact_30)
                 - s_follower * (contact_19
-                    - (contact_34 * contact_6 + contact_33 * contact_12
-                        + lift_sin_alpha_contact_2 * contact_29 + contact_24 + contact_26))),
+                    - (contact_34 * contact_u_cam_x + contact_33 * contact_12
+                        + contact_rho_cam_1 * contact_29 + contact_24 + contact_26))),
         # 6  AbsoluteAngle "motor": cam angle omega*t
         0,
     )
@@ -255,21 +255,21 @@ def _position(f, q, t, p):
     c_follower, s_follower = cos_sin(phi_follower)
     # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
-    contact_2 = base + lift * (1 - cos_alpha_contact) / 2
+    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
-    contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_2 * contact_4
+    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
+    contact_5 = contact_rho_cam * contact_u_cam_y
     contact_d_y = y_follower - y_cam - contact_5
-    contact_7 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_8 = contact_2 * contact_7
+    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
+    contact_8 = contact_rho_cam * contact_u_cam_x
     contact_d_x = x_follower - x_cam - contact_8
     lift_sin_alpha_contact = lift * sin_alpha_contact
-    lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_12 = contact_5 - lift_sin_alpha_contact_2 * contact_7
-    contact_13 = lift_sin_alpha_contact_2 * contact_4 + contact_8
+    contact_rho_cam_1 = lift_sin_alpha_contact / 2
+    contact_12 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
+    contact_13 = contact_rho_cam_1 * contact_u_cam_y + contact_8
     contact_14 = s_follower * contact_12 + c_follower * contact_13
     contact_15 = s_follower * contact_13 - c_follower * contact_12
-    contact_16 = lift * cos_alpha_contact / 2 - contact_2
+    contact_16 = lift * cos_alpha_contact / 2 - contact_rho_cam
     return (
         # Phi
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
@@ -296,8 +296,8 @@ def _position(f, q, t, p):
         -contact_14,  # contact.contact by alpha_contact
         contact_15,  # contact.tangent by phi_cam
         -contact_15,  # contact.tangent by phi_follower
-        c_follower * (contact_16 * contact_4 + lift_sin_alpha_contact * contact_7)
-            - s_follower * (contact_16 * contact_7 - lift_sin_alpha_contact * contact_4),  # contact.tangent by alpha_contact
+        c_follower * (contact_16 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
+            - s_follower * (contact_16 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
     )
 
 
@@ -310,18 +310,18 @@ def _velocity(f, q, t, p):
     c_follower, s_follower = cos_sin(phi_follower)
     # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
-    contact_2 = base + lift * (1 - cos_alpha_contact) / 2
+    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
-    contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_2 * contact_4
-    contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_2 * contact_6
+    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
+    contact_5 = contact_rho_cam * contact_u_cam_y
+    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
+    contact_7 = contact_rho_cam * contact_u_cam_x
     lift_sin_alpha_contact = lift * sin_alpha_contact
-    lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_10 = contact_5 - lift_sin_alpha_contact_2 * contact_6
-    contact_11 = lift_sin_alpha_contact_2 * contact_4 + contact_7
+    contact_rho_cam_1 = lift_sin_alpha_contact / 2
+    contact_10 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
+    contact_11 = contact_rho_cam_1 * contact_u_cam_y + contact_7
     contact_12 = s_follower * contact_11 - c_follower * contact_10
-    contact_13 = lift * cos_alpha_contact / 2 - contact_2
+    contact_13 = lift * cos_alpha_contact / 2 - contact_rho_cam
     return (
         # Phi_q
         # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
@@ -337,8 +337,8 @@ def _velocity(f, q, t, p):
         -(s_follower * contact_10 + c_follower * contact_11),  # contact.contact by alpha_contact
         contact_12,  # contact.tangent by phi_cam
         -contact_12,  # contact.tangent by phi_follower
-        c_follower * (contact_13 * contact_4 + lift_sin_alpha_contact * contact_6)
-            - s_follower * (contact_13 * contact_6 - lift_sin_alpha_contact * contact_4),  # contact.tangent by alpha_contact
+        c_follower * (contact_13 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
+            - s_follower * (contact_13 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
         # nu
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
         0,
@@ -367,54 +367,54 @@ def _acceleration(f, q, q_dot, t, p):
     c_follower, s_follower = cos_sin(phi_follower)
     # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
-    contact_2 = base + lift * (1 - cos_alpha_contact) / 2
+    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
-    contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_2 * contact_4
-    contact_6 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_2 * contact_6
+    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
+    contact_5 = contact_rho_cam * contact_u_cam_y
+    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
+    contact_7 = contact_rho_cam * contact_u_cam_x
     contact_d_x = x_follower - x_cam - contact_7
     contact_d_y = y_follower - y_cam - contact_5
     lift_sin_alpha_contact = lift * sin_alpha_contact
-    lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_12 = contact_5 - lift_sin_alpha_contact_2 * contact_6
-    contact_13 = lift_sin_alpha_contact_2 * contact_4 + contact_7
+    contact_rho_cam_1 = lift_sin_alpha_contact / 2
+    contact_12 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
+    contact_13 = contact_rho_cam_1 * contact_u_cam_y + contact_7
     contact_14 = s_follower * contact_12 + c_follower * contact_13
     contact_15 = s_follower * contact_13 - c_follower * contact_12
     lift_cos_alpha_contact = lift * cos_alpha_contact
-    lift_cos_alpha_contact_2 = lift_cos_alpha_contact / 2
-    contact_18 = lift_cos_alpha_contact_2 - contact_2
-    contact_19 = lift_sin_alpha_contact_2 * alpha_contact_dot
-    contact_20 = contact_19 * contact_6
-    contact_21 = phi_cam_dot * contact_4 + alpha_contact_dot * contact_4
-    contact_22 = contact_2 * contact_21
-    contact_23 = contact_19 * contact_4
-    contact_24 = phi_cam_dot * contact_6 + alpha_contact_dot * contact_6
-    contact_25 = contact_2 * contact_24
+    contact_rho_cam_2 = lift_cos_alpha_contact / 2
+    contact_18 = contact_rho_cam_2 - contact_rho_cam
+    contact_19 = contact_rho_cam_1 * alpha_contact_dot
+    contact_20 = contact_19 * contact_u_cam_x
+    contact_21 = phi_cam_dot * contact_u_cam_y + alpha_contact_dot * contact_u_cam_y
+    contact_22 = contact_rho_cam * contact_21
+    contact_23 = contact_19 * contact_u_cam_y
+    contact_24 = phi_cam_dot * contact_u_cam_x + alpha_contact_dot * contact_u_cam_x
+    contact_25 = contact_rho_cam * contact_24
     contact_26 = (
         c_follower * (x_follower_dot - x_cam_dot - contact_20 + contact_22)
         + s_follower * (y_follower_dot - y_cam_dot - contact_23 - contact_25)
     )
     contact_27 = phi_cam_dot * contact_21 + alpha_contact_dot * contact_21
-    contact_28 = contact_2 * contact_27
+    contact_28 = contact_rho_cam * contact_27
     alpha_contact_dot_sq = alpha_contact_dot**2
-    contact_30 = lift_cos_alpha_contact_2 * alpha_contact_dot_sq
-    contact_31 = contact_30 * contact_4
+    contact_30 = contact_rho_cam_2 * alpha_contact_dot_sq
+    contact_31 = contact_30 * contact_u_cam_y
     contact_32 = lift_sin_alpha_contact * alpha_contact_dot
     contact_33 = contact_32 * contact_24
     contact_34 = contact_32 * contact_21
-    contact_35 = contact_30 * contact_6
+    contact_35 = contact_30 * contact_u_cam_x
     contact_36 = phi_cam_dot * contact_24 + alpha_contact_dot * contact_24
-    contact_37 = contact_2 * contact_36
-    contact_38 = lift_cos_alpha_contact_2 * alpha_contact_dot
+    contact_37 = contact_rho_cam * contact_36
+    contact_38 = contact_rho_cam_2 * alpha_contact_dot
     contact_39 = (
-        c_follower * (contact_38 * contact_6 - lift_sin_alpha_contact_2 * contact_21
+        c_follower * (contact_38 * contact_u_cam_x - contact_rho_cam_1 * contact_21
             - contact_23 - contact_25)
-        + s_follower * (contact_38 * contact_4 + lift_sin_alpha_contact_2 * contact_24
+        + s_follower * (contact_38 * contact_u_cam_y + contact_rho_cam_1 * contact_24
             + contact_20 - contact_22)
     )
     contact_40 = lift_cos_alpha_contact * alpha_contact_dot
-    contact_41 = lift_sin_alpha_contact_2 * alpha_contact_dot_sq
+    contact_41 = contact_rho_cam_1 * alpha_contact_dot_sq
     return (
         # Phi_q
         # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
@@ -429,8 +429,8 @@ def _acceleration(f, q, q_dot, t, p):
         -contact_14,  # contact.contact by alpha_contact
         contact_15,  # contact.tangent by phi_cam
         -contact_15,  # contact.tangent by phi_follower
-        c_follower * (contact_18 * contact_4 + lift_sin_alpha_contact * contact_6)
-            - s_follower * (contact_18 * contact_6 - lift_sin_alpha_contact * contact_4),  # contact.tangent by alpha_contact
+        c_follower * (contact_18 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
+            - s_follower * (contact_18 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
         # gamma
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
         0,
@@ -447,11 +447,11 @@ def _acceleration(f, q, q_dot, t, p):
                 - s_follower * (contact_34 - contact_35 + contact_37)),
         phi_follower_dot * (phi_follower_dot * contact_14 + contact_39)
             + phi_follower_dot * contact_39
-            - (c_follower * (contact_40 * contact_24 - contact_41 * contact_4
-                    - lift_sin_alpha_contact_2 * contact_27 + contact_35 - contact_34 - contact_37)
+            - (c_follower * (contact_40 * contact_24 - contact_41 * contact_u_cam_y
+                    - contact_rho_cam_1 * contact_27 + contact_35 - contact_34 - contact_37)
                 - s_follower * (contact_28
-                    - (contact_41 * contact_6 + contact_40 * contact_21
-                        + lift_sin_alpha_contact_2 * contact_36 + contact_31 + contact_33))),
+                    - (contact_41 * contact_u_cam_x + contact_40 * contact_21
+                        + contact_rho_cam_1 * contact_36 + contact_31 + contact_33))),
         # 6  AbsoluteAngle "motor": cam angle omega*t
         0,
     )
@@ -470,55 +470,55 @@ def _kinematics(f, q, q_dot, t, p):
     c_follower, s_follower = cos_sin(phi_follower)
     # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
-    contact_2 = base + lift * (1 - cos_alpha_contact) / 2
+    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
-    contact_4 = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_2 * contact_4
+    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
+    contact_5 = contact_rho_cam * contact_u_cam_y
     contact_d_y = y_follower - y_cam - contact_5
-    contact_7 = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_8 = contact_2 * contact_7
+    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
+    contact_8 = contact_rho_cam * contact_u_cam_x
     contact_d_x = x_follower - x_cam - contact_8
     contact_10 = c_follower * contact_d_y - s_follower * contact_d_x
     lift_sin_alpha_contact = lift * sin_alpha_contact
-    lift_sin_alpha_contact_2 = lift_sin_alpha_contact / 2
-    contact_13 = contact_5 - lift_sin_alpha_contact_2 * contact_7
-    contact_14 = lift_sin_alpha_contact_2 * contact_4 + contact_8
+    contact_rho_cam_1 = lift_sin_alpha_contact / 2
+    contact_13 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
+    contact_14 = contact_rho_cam_1 * contact_u_cam_y + contact_8
     contact_15 = s_follower * contact_13 + c_follower * contact_14
     contact_16 = s_follower * contact_14 - c_follower * contact_13
     lift_cos_alpha_contact = lift * cos_alpha_contact
-    lift_cos_alpha_contact_2 = lift_cos_alpha_contact / 2
-    contact_19 = lift_cos_alpha_contact_2 - contact_2
-    contact_20 = lift_sin_alpha_contact_2 * alpha_contact_dot
-    contact_21 = contact_20 * contact_7
-    contact_22 = phi_cam_dot * contact_4 + alpha_contact_dot * contact_4
-    contact_23 = contact_2 * contact_22
-    contact_24 = contact_20 * contact_4
-    contact_25 = phi_cam_dot * contact_7 + alpha_contact_dot * contact_7
-    contact_26 = contact_2 * contact_25
+    contact_rho_cam_2 = lift_cos_alpha_contact / 2
+    contact_19 = contact_rho_cam_2 - contact_rho_cam
+    contact_20 = contact_rho_cam_1 * alpha_contact_dot
+    contact_21 = contact_20 * contact_u_cam_x
+    contact_22 = phi_cam_dot * contact_u_cam_y + alpha_contact_dot * contact_u_cam_y
+    contact_23 = contact_rho_cam * contact_22
+    contact_24 = contact_20 * contact_u_cam_y
+    contact_25 = phi_cam_dot * contact_u_cam_x + alpha_contact_dot * contact_u_cam_x
+    contact_26 = contact_rho_cam * contact_25
     contact_27 = (
         c_follower * (x_follower_dot - x_cam_dot - contact_21 + contact_23)
         + s_follower * (y_follower_dot - y_cam_dot - contact_24 - contact_26)
     )
     contact_28 = phi_cam_dot * contact_22 + alpha_contact_dot * contact_22
-    contact_29 = contact_2 * contact_28
+    contact_29 = contact_rho_cam * contact_28
     alpha_contact_dot_sq = alpha_contact_dot**2
-    contact_31 = lift_cos_alpha_contact_2 * alpha_contact_dot_sq
-    contact_32 = contact_31 * contact_4
+    contact_31 = contact_rho_cam_2 * alpha_contact_dot_sq
+    contact_32 = contact_31 * contact_u_cam_y
     contact_33 = lift_sin_alpha_contact * alpha_contact_dot
     contact_34 = contact_33 * contact_25
     contact_35 = contact_33 * contact_22
-    contact_36 = contact_31 * contact_7
+    contact_36 = contact_31 * contact_u_cam_x
     contact_37 = phi_cam_dot * contact_25 + alpha_contact_dot * contact_25
-    contact_38 = contact_2 * contact_37
-    contact_39 = lift_cos_alpha_contact_2 * alpha_contact_dot
+    contact_38 = contact_rho_cam * contact_37
+    contact_39 = contact_rho_cam_2 * alpha_contact_dot
     contact_40 = (
-        c_follower * (contact_39 * contact_7 - lift_sin_alpha_contact_2 * contact_22
+        c_follower * (contact_39 * contact_u_cam_x - contact_rho_cam_1 * contact_22
             - contact_24 - contact_26)
-        + s_follower * (contact_39 * contact_4 + lift_sin_alpha_contact_2 * contact_25
+        + s_follower * (contact_39 * contact_u_cam_y + contact_rho_cam_1 * contact_25
             + contact_21 - contact_23)
     )
     contact_41 = lift_cos_alpha_contact * alpha_contact_dot
-    contact_42 = lift_sin_alpha_contact_2 * alpha_contact_dot_sq
+    contact_42 = contact_rho_cam_1 * alpha_contact_dot_sq
     return (
         # Phi
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
@@ -545,8 +545,8 @@ def _kinematics(f, q, q_dot, t, p):
         -contact_15,  # contact.contact by alpha_contact
         contact_16,  # contact.tangent by phi_cam
         -contact_16,  # contact.tangent by phi_follower
-        c_follower * (contact_19 * contact_4 + lift_sin_alpha_contact * contact_7)
-            - s_follower * (contact_19 * contact_7 - lift_sin_alpha_contact * contact_4),  # contact.tangent by alpha_contact
+        c_follower * (contact_19 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
+            - s_follower * (contact_19 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
         # nu
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
         0,
@@ -573,11 +573,11 @@ def _kinematics(f, q, q_dot, t, p):
                 - s_follower * (contact_35 - contact_36 + contact_38)),
         phi_follower_dot * (phi_follower_dot * contact_15 + contact_40)
             + phi_follower_dot * contact_40
-            - (c_follower * (contact_41 * contact_25 - contact_42 * contact_4
-                    - lift_sin_alpha_contact_2 * contact_28 + contact_36 - contact_35 - contact_38)
+            - (c_follower * (contact_41 * contact_25 - contact_42 * contact_u_cam_y
+                    - contact_rho_cam_1 * contact_28 + contact_36 - contact_35 - contact_38)
                 - s_follower * (contact_29
-                    - (contact_42 * contact_7 + contact_41 * contact_22
-                        + lift_sin_alpha_contact_2 * contact_37 + contact_32 + contact_34))),
+                    - (contact_42 * contact_u_cam_x + contact_41 * contact_22
+                        + contact_rho_cam_1 * contact_37 + contact_32 + contact_34))),
         # 6  AbsoluteAngle "motor": cam angle omega*t
         0,
     )

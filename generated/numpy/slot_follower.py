@@ -24,7 +24,7 @@ import numpy as np
 
 NAME = "slot_follower"
 FORMAT = 1
-FINGERPRINT = "cdf78cf054f361693ad2e300ddecd101"
+FINGERPRINT = "367e36de90eba0a903b4b1f776fcce6a"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (
@@ -85,7 +85,7 @@ def _Phi(f, q, t, p):
     pin_rocker_x = arm_2 * c_rocker
     pin_rocker_y = arm_2 * s_rocker
     # 4-5  PointFollower "pin"
-    pin_1 = mean + wave * cos(2 * alpha_pin)
+    pin_rho_disc = mean + wave * cos(2 * alpha_pin)
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
     return (
@@ -97,9 +97,9 @@ def _Phi(f, q, t, p):
         y_rocker - pin_rocker_y,
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
         x_rocker + pin_rocker_x - x_disc
-            - pin_1 * (cos_alpha_pin * c_disc - sin_alpha_pin * s_disc),
+            - pin_rho_disc * (cos_alpha_pin * c_disc - sin_alpha_pin * s_disc),
         y_rocker + pin_rocker_y - y_disc
-            - pin_1 * (cos_alpha_pin * s_disc + sin_alpha_pin * c_disc),
+            - pin_rho_disc * (cos_alpha_pin * s_disc + sin_alpha_pin * c_disc),
         # 6  AbsoluteAngle "motor": disc angle omega*t
         phi_disc - omega * t,
     )
@@ -118,14 +118,14 @@ def _Phi_q(f, q, t, p):
     pin_rocker_x = arm_2 * c_rocker
     # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
-    pin_2 = mean + wave * cos(pin_1)
+    pin_rho_disc = mean + wave * cos(pin_1)
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
-    pin_5 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_6 = pin_2 * pin_5
+    pin_u_disc_y = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
+    pin_6 = pin_rho_disc * pin_u_disc_y
     pin_7 = 2 * (wave * sin(pin_1))
-    pin_8 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_9 = pin_2 * pin_8
+    pin_u_disc_x = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
+    pin_9 = pin_rho_disc * pin_u_disc_x
     return (
         # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
         pin_rocker_y,  # pivot.x by phi_rocker
@@ -133,10 +133,10 @@ def _Phi_q(f, q, t, p):
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
         pin_6,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_6 + pin_7 * pin_8,  # pin.x by alpha_pin
+        pin_6 + pin_7 * pin_u_disc_x,  # pin.x by alpha_pin
         -pin_9,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_9 - pin_7 * pin_5),  # pin.y by alpha_pin
+        -(pin_9 - pin_7 * pin_u_disc_y),  # pin.y by alpha_pin
     )
 
 
@@ -176,12 +176,12 @@ def _gamma(f, q, q_dot, t, p):
     pin_3 = 4 * pin_2 * alpha_pin_dot**2
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
-    pin_6 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
+    pin_u_disc_x = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
     pin_7 = 4 * (wave * sin(pin_1)) * alpha_pin_dot
-    pin_8 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_9 = phi_disc_dot * pin_8 + alpha_pin_dot * pin_8
-    pin_10 = mean + pin_2
-    pin_11 = phi_disc_dot * pin_6 + alpha_pin_dot * pin_6
+    pin_u_disc_y = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
+    pin_9 = phi_disc_dot * pin_u_disc_y + alpha_pin_dot * pin_u_disc_y
+    pin_rho_disc = mean + pin_2
+    pin_11 = phi_disc_dot * pin_u_disc_x + alpha_pin_dot * pin_u_disc_x
     return (
         # 0-1  Revolute "shaft": disc (0, 0) - ground (0, 0)
         0,
@@ -190,10 +190,10 @@ def _gamma(f, q, q_dot, t, p):
         -pin_rocker_w2_x,
         -pin_rocker_w2_y,
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        pin_rocker_w2_x - pin_3 * pin_6 + pin_7 * pin_9
-            - pin_10 * (phi_disc_dot * pin_11 + alpha_pin_dot * pin_11),
-        pin_rocker_w2_y - pin_3 * pin_8 - pin_7 * pin_11
-            - pin_10 * (phi_disc_dot * pin_9 + alpha_pin_dot * pin_9),
+        pin_rocker_w2_x - pin_3 * pin_u_disc_x + pin_7 * pin_9
+            - pin_rho_disc * (phi_disc_dot * pin_11 + alpha_pin_dot * pin_11),
+        pin_rocker_w2_y - pin_3 * pin_u_disc_y - pin_7 * pin_11
+            - pin_rho_disc * (phi_disc_dot * pin_9 + alpha_pin_dot * pin_9),
         # 6  AbsoluteAngle "motor": disc angle omega*t
         0,
     )
@@ -212,13 +212,13 @@ def _position(f, q, t, p):
     pin_rocker_y = arm_2 * s_rocker
     # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
-    pin_2 = mean + wave * cos(pin_1)
+    pin_rho_disc = mean + wave * cos(pin_1)
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
-    pin_5 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_6 = pin_2 * pin_5
-    pin_7 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_8 = pin_2 * pin_7
+    pin_u_disc_x = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
+    pin_6 = pin_rho_disc * pin_u_disc_x
+    pin_u_disc_y = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
+    pin_8 = pin_rho_disc * pin_u_disc_y
     pin_9 = 2 * (wave * sin(pin_1))
     return (
         # Phi
@@ -240,10 +240,10 @@ def _position(f, q, t, p):
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
         pin_8,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_8 + pin_9 * pin_5,  # pin.x by alpha_pin
+        pin_8 + pin_9 * pin_u_disc_x,  # pin.x by alpha_pin
         -pin_6,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_6 - pin_9 * pin_7),  # pin.y by alpha_pin
+        -(pin_6 - pin_9 * pin_u_disc_y),  # pin.y by alpha_pin
     )
 
 
@@ -260,14 +260,14 @@ def _velocity(f, q, t, p):
     pin_rocker_x = arm_2 * c_rocker
     # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
-    pin_2 = mean + wave * cos(pin_1)
+    pin_rho_disc = mean + wave * cos(pin_1)
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
-    pin_5 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_6 = pin_2 * pin_5
+    pin_u_disc_y = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
+    pin_6 = pin_rho_disc * pin_u_disc_y
     pin_7 = 2 * (wave * sin(pin_1))
-    pin_8 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_9 = pin_2 * pin_8
+    pin_u_disc_x = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
+    pin_9 = pin_rho_disc * pin_u_disc_x
     return (
         # Phi_q
         # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
@@ -276,10 +276,10 @@ def _velocity(f, q, t, p):
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
         pin_6,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_6 + pin_7 * pin_8,  # pin.x by alpha_pin
+        pin_6 + pin_7 * pin_u_disc_x,  # pin.x by alpha_pin
         -pin_9,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_9 - pin_7 * pin_5),  # pin.y by alpha_pin
+        -(pin_9 - pin_7 * pin_u_disc_y),  # pin.y by alpha_pin
         # nu
         # 0-1  Revolute "shaft": disc (0, 0) - ground (0, 0)
         0,
@@ -313,19 +313,19 @@ def _acceleration(f, q, q_dot, t, p):
     # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
     pin_2 = wave * cos(pin_1)
-    pin_3 = mean + pin_2
+    pin_rho_disc = mean + pin_2
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
-    pin_6 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_7 = pin_3 * pin_6
+    pin_u_disc_y = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
+    pin_7 = pin_rho_disc * pin_u_disc_y
     pin_8 = wave * sin(pin_1)
     pin_9 = 2 * pin_8
-    pin_10 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_11 = pin_3 * pin_10
+    pin_u_disc_x = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
+    pin_11 = pin_rho_disc * pin_u_disc_x
     pin_12 = 4 * pin_2 * alpha_pin_dot**2
     pin_13 = 4 * pin_8 * alpha_pin_dot
-    pin_14 = phi_disc_dot * pin_6 + alpha_pin_dot * pin_6
-    pin_15 = phi_disc_dot * pin_10 + alpha_pin_dot * pin_10
+    pin_14 = phi_disc_dot * pin_u_disc_y + alpha_pin_dot * pin_u_disc_y
+    pin_15 = phi_disc_dot * pin_u_disc_x + alpha_pin_dot * pin_u_disc_x
     return (
         # Phi_q
         # 2-3  Revolute "pivot": rocker (-arm/2, 0) - ground (0.1, 0)
@@ -334,10 +334,10 @@ def _acceleration(f, q, q_dot, t, p):
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
         pin_7,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_7 + pin_9 * pin_10,  # pin.x by alpha_pin
+        pin_7 + pin_9 * pin_u_disc_x,  # pin.x by alpha_pin
         -pin_11,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_11 - pin_9 * pin_6),  # pin.y by alpha_pin
+        -(pin_11 - pin_9 * pin_u_disc_y),  # pin.y by alpha_pin
         # gamma
         # 0-1  Revolute "shaft": disc (0, 0) - ground (0, 0)
         0,
@@ -346,10 +346,10 @@ def _acceleration(f, q, q_dot, t, p):
         -pin_rocker_w2_x,
         -pin_rocker_w2_y,
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        pin_rocker_w2_x - pin_12 * pin_10 + pin_13 * pin_14
-            - pin_3 * (phi_disc_dot * pin_15 + alpha_pin_dot * pin_15),
-        pin_rocker_w2_y - pin_12 * pin_6 - pin_13 * pin_15
-            - pin_3 * (phi_disc_dot * pin_14 + alpha_pin_dot * pin_14),
+        pin_rocker_w2_x - pin_12 * pin_u_disc_x + pin_13 * pin_14
+            - pin_rho_disc * (phi_disc_dot * pin_15 + alpha_pin_dot * pin_15),
+        pin_rocker_w2_y - pin_12 * pin_u_disc_y - pin_13 * pin_15
+            - pin_rho_disc * (phi_disc_dot * pin_14 + alpha_pin_dot * pin_14),
         # 6  AbsoluteAngle "motor": disc angle omega*t
         0,
     )
@@ -373,19 +373,19 @@ def _kinematics(f, q, q_dot, t, p):
     # 4-5  PointFollower "pin"
     pin_1 = 2 * alpha_pin
     pin_2 = wave * cos(pin_1)
-    pin_3 = mean + pin_2
+    pin_rho_disc = mean + pin_2
     cos_alpha_pin = cos(alpha_pin)
     sin_alpha_pin = sin(alpha_pin)
-    pin_6 = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
-    pin_7 = pin_3 * pin_6
-    pin_8 = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
-    pin_9 = pin_3 * pin_8
+    pin_u_disc_x = cos_alpha_pin * c_disc - sin_alpha_pin * s_disc
+    pin_7 = pin_rho_disc * pin_u_disc_x
+    pin_u_disc_y = cos_alpha_pin * s_disc + sin_alpha_pin * c_disc
+    pin_9 = pin_rho_disc * pin_u_disc_y
     pin_10 = wave * sin(pin_1)
     pin_11 = 2 * pin_10
     pin_12 = 4 * pin_2 * alpha_pin_dot**2
     pin_13 = 4 * pin_10 * alpha_pin_dot
-    pin_14 = phi_disc_dot * pin_8 + alpha_pin_dot * pin_8
-    pin_15 = phi_disc_dot * pin_6 + alpha_pin_dot * pin_6
+    pin_14 = phi_disc_dot * pin_u_disc_y + alpha_pin_dot * pin_u_disc_y
+    pin_15 = phi_disc_dot * pin_u_disc_x + alpha_pin_dot * pin_u_disc_x
     return (
         # Phi
         # 0-1  Revolute "shaft": disc (0, 0) - ground (0, 0)
@@ -406,10 +406,10 @@ def _kinematics(f, q, q_dot, t, p):
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
         pin_9,  # pin.x by phi_disc
         -pin_rocker_y,  # pin.x by phi_rocker
-        pin_9 + pin_11 * pin_6,  # pin.x by alpha_pin
+        pin_9 + pin_11 * pin_u_disc_x,  # pin.x by alpha_pin
         -pin_7,  # pin.y by phi_disc
         pin_rocker_x,  # pin.y by phi_rocker
-        -(pin_7 - pin_11 * pin_8),  # pin.y by alpha_pin
+        -(pin_7 - pin_11 * pin_u_disc_y),  # pin.y by alpha_pin
         # nu
         # 0-1  Revolute "shaft": disc (0, 0) - ground (0, 0)
         0,
@@ -430,10 +430,10 @@ def _kinematics(f, q, q_dot, t, p):
         -pin_rocker_w2_x,
         -pin_rocker_w2_y,
         # 4-5  PointFollower "pin": rocker (arm/2, 0) - disc (0, 0) profile
-        pin_rocker_w2_x - pin_12 * pin_6 + pin_13 * pin_14
-            - pin_3 * (phi_disc_dot * pin_15 + alpha_pin_dot * pin_15),
-        pin_rocker_w2_y - pin_12 * pin_8 - pin_13 * pin_15
-            - pin_3 * (phi_disc_dot * pin_14 + alpha_pin_dot * pin_14),
+        pin_rocker_w2_x - pin_12 * pin_u_disc_x + pin_13 * pin_14
+            - pin_rho_disc * (phi_disc_dot * pin_15 + alpha_pin_dot * pin_15),
+        pin_rocker_w2_y - pin_12 * pin_u_disc_y - pin_13 * pin_15
+            - pin_rho_disc * (phi_disc_dot * pin_14 + alpha_pin_dot * pin_14),
         # 6  AbsoluteAngle "motor": disc angle omega*t
         0,
     )

@@ -89,9 +89,12 @@ def inline(program: Program) -> InlineProgram:
         kernel = instance.kernel
         inputs = dict(zip(kernel.inputs, instance.bindings, strict=True))
         new = graph.instantiate(kernel.nodes, inputs)
-        for node, stem in kernel.hints:
-            if graph.nodes[new[node]][0] not in ("neg", "const", "input"):
-                hints.setdefault(new[node], _spoken(stem, instance))
+        spoken = [(inputs[name], _spoken_value(name, instance)) for name in inputs]
+        spoken += [(new[node], _spoken(stem, instance)) for node, stem in kernel.hints]
+        for node, said in spoken:
+            # A hint on a call says that it is the cosine or sine of a body frame.
+            if said and graph.nodes[node][0] not in ("neg", "const", "input", "call"):
+                hints.setdefault(node, said)
         sections.append(Section(instance, instance.constraint.text, _entries(instance, new, graph)))
     return InlineProgram(program, tuple(graph.nodes), tuple(sections), hints)
 
@@ -115,13 +118,29 @@ def _spoken(stem: str, instance: Instance) -> str:
     """Return the name of a vector component.
 
     ``B_crank_x`` is A s of joint B on the crank, ``B_crank_w2_x`` the same times the square of the
-    angular velocity, ``B_axis_crank_x`` an axis, ``B_d_x`` the vector d. The stem is the textbook's
-    symbol and the component: ``s_i.x``, ``s_i w2.x``, ``v_j.y``, ``d_dot.x``.
+    angular velocity, ``B_axis_crank_x`` an axis, ``B_d_x`` the vector d, ``B_u_cam_x`` the unit
+    vector towards the contact on a cam. The stem is the textbook's symbol and the component:
+    ``s_i.x``, ``s_i w2.x``, ``v_j.y``, ``d_dot.x``, ``u_i.x``.
     """
     vector, axis = stem.split(".")
     symbol, *factor = vector.split()
     letter, _, index = symbol.partition("_")
-    if index in ("i", "j") and letter in ("s", "v"):
+    if index in ("i", "j") and letter in ("s", "v", "u"):
         body = instance.bodies["ij".index(index)]
-        symbol = body if letter == "s" else f"axis_{body}"
+        symbol = {"s": body, "v": f"axis_{body}", "u": f"u_{body}"}[letter]
     return "_".join((instance.name, symbol, *factor, axis))
+
+
+def _spoken_value(name: str, instance: Instance) -> str | None:
+    """Return the name of a driver's value or of a cam's radius, or of one of their derivatives.
+
+    ``lift_C_dot`` is the rate of the driver C(t) of ``lift``, ``contact_rho_cam_1`` the first
+    derivative of the radius of the cam by the polar angle.
+    """
+    symbol, order = name.rstrip("'"), name.count("'")
+    if symbol == "C":
+        return f"{instance.name}_C{('', '_dot', '_ddot')[order]}"
+    if symbol in ("rho_i", "rho_j"):
+        body = instance.bodies["ij".index(symbol[-1])]
+        return f"{instance.name}_rho_{body}{f'_{order}' if order else ''}"
+    return None

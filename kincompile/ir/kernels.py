@@ -10,6 +10,7 @@ import sympy
 
 from kincompile.calculus.expand import Expansion, Pair, Value
 from kincompile.calculus.expressions import (
+    Basis,
     Power,
     Scalar,
     Scaled,
@@ -150,7 +151,7 @@ def constraint_kernel(template: Template) -> Kernel:
 def _hints(expansion: Expansion) -> tuple[tuple[int, str], ...]:
     """Name the components of vectors that a reader knows from the textbook.
 
-    They are A_i s_i, the centripetal A_i s_i w_i^2, d and its rate.
+    They are A_i s_i, the centripetal A_i s_i w_i^2, d and its rate, and A_i u(alpha_i) of a cam.
     """
     found = []
     for vector, pair in expansion.vectors.items():
@@ -166,6 +167,8 @@ def _stem(vector: Vector) -> str | None:
             return name
         case Scaled(Power(Symbol(), 2), Turned(Symbol(), VectorSymbol(name), 0)):
             return f"{name} w2"
+        case Turned(Symbol(), Turned(Symbol(name), Basis(), 0), 0):
+            return name.replace("alpha", "u")
         case VectorSum(terms):
             names = {term.name for term in terms if isinstance(term, VectorSymbol)}
             if "r_j" in names or names == {"r_i", "c"}:
