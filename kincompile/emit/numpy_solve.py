@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import InlineProgram
 
 
-def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
-    """Return the lines of `_factor` and `_solve`."""
+def solve_functions(
+    code: InlineProgram, listing: SolveListing, prefix: str = ""
+) -> list[str]:
+    """Return the lines of `_factor` and `_solve`, with a prefix where there are several."""
     printer, names = PythonPrinter(listing.plan.nodes, listing.names), listing.names
     factor = [*_unpack([names[node] for node in listing.entries], "J")]
     factor += _steps(listing.factor_steps, listing, printer)
@@ -27,7 +29,7 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     solve += _steps(listing.solve_steps, listing, printer)
     solve += ["return (", *_tuple([printer.text(node) for node in listing.plan.solution]), ")"]
     return [
-        "def _factor(f, J):",
+        f"def {prefix}_factor(f, J):",
         '    """Return what a solve needs of Phi_q, and the determinants of its blocks."""',
         *(
             f"    {line}"
@@ -35,7 +37,7 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
         ),
         "",
         "",
-        "def _solve(f, F, b):",
+        f"def {prefix}_solve(f, F, b):",
         '    """Return x of Phi_q x = b."""',
         *(f"    {line}" for line in solve),
     ]

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import io
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from kincompile.files import write_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from numpy.typing import NDArray
 
     from kincompile.ir.inline import InlineProgram
 
@@ -25,10 +30,13 @@ class Emitted:
         Name of the mechanism.
     files
         Text by file name; the first is the main one.
+    arrays
+        Arrays that the main file reads from ``<name>.npz`` beside it; none for most targets.
     """
 
     name: str
     files: Mapping[str, str]
+    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     @property
     def source(self) -> str:
@@ -51,7 +59,18 @@ class Emitted:
             path = Path(folder) / name
             write_atomically(path, text)
             paths.append(path)
+        if self.arrays:
+            path = Path(folder) / f"{self.name}.npz"
+            write_atomically(path, _packed(self.arrays))
+            paths.append(path)
         return tuple(paths)
+
+
+def _packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Return arrays as the bytes of a .npz file."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    return buffer.getvalue()
 
 
 class Target(Protocol):

@@ -12,10 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kincompile.ir.graph import Graph, Node
+from kincompile.ir.graph import Constant, Graph, Node
 from kincompile.structure.blocks import Block, block_triangular
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from kincompile.ir.inline import InlineProgram
 
 Matrix = dict[int, dict[int, int]]
@@ -68,25 +70,32 @@ class SolvePlan:
 
 def plan_solve(code: InlineProgram) -> SolvePlan | None:
     """Plan the solve of a square system; None where it is structurally singular."""
+    entries = [
+        (entry.row, entry.column, code.number(entry.node))
+        for section in code.sections
+        for entry in section.entries["Phi_q"]
+    ]
+    return plan_entries(len(code.program.equations), len(code.program.coordinates), entries)
+
+
+def plan_entries(
+    row_count: int, column_count: int, entries: Iterable[tuple[int, int, Constant | None]]
+) -> SolvePlan | None:
+    """Plan the solve of a matrix given by its entries, each a number or, where it varies, None."""
     graph = Graph()
-    matrix: Matrix = {row: {} for row in range(len(code.program.equations))}
+    matrix: Matrix = {row: {} for row in range(row_count)}
     varying = []
-    for section in code.sections:
-        for entry in section.entries["Phi_q"]:
-            value = code.number(entry.node)
-            node = (
-                graph.input(f"Phi_q[{entry.row}, {entry.column}]")
-                if value is None
-                else graph.const(value)
-            )
-            matrix[entry.row][entry.column] = node
-            if value is None:
-                varying.append((entry.row, entry.column, node))
+    for row, column, value in entries:
+        if value is None:
+            matrix[row][column] = graph.input(f"Phi_q[{row}, {column}]")
+            varying.append((row, column, matrix[row][column]))
+        else:
+            matrix[row][column] = graph.const(value)
     right = {row: graph.input(f"b[{row}]") for row in matrix}
     given = tuple(right.values())
     pivots, eliminated = _eliminate(graph, matrix, right)
     rows = sorted(matrix)
-    columns = sorted(set(range(len(code.program.coordinates))) - {pivot.column for pivot in pivots})
+    columns = sorted(set(range(column_count)) - {pivot.column for pivot in pivots})
     if len(rows) != len(columns):
         return None
     pattern = [(row, column) for row in rows for column in sorted(matrix[row])]
@@ -96,10 +105,10 @@ def plan_solve(code: InlineProgram) -> SolvePlan | None:
     solution: dict[int, int] = {}
     determinants = [_solve_block(graph, block, matrix, right, solution) for block in blocks]
     for pivot in reversed(pivots):
-        row, rest = eliminated[pivot.row], right[pivot.row]
-        for column in sorted(row.keys() - {pivot.column}):
-            rest = graph.sub(rest, graph.mul(row[column], solution[column]))
-        solution[pivot.column] = graph.div(rest, row[pivot.column])
+        terms, rest = eliminated[pivot.row], right[pivot.row]
+        for column in sorted(terms.keys() - {pivot.column}):
+            rest = graph.sub(rest, graph.mul(terms[column], solution[column]))
+        solution[pivot.column] = graph.div(rest, terms[pivot.column])
     return SolvePlan(
         tuple(graph.nodes),
         tuple(varying),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.ir.program import Instance, Kernel, Program
+    from kincompile.ir.program import Instance, Program
 
     Index = NDArray[np.intp]
 
@@ -50,8 +50,8 @@ class Group:
     ----------
     name
         Name of the code, for instance ``Revolute_2``.
-    kernel
-        The kernel of their type.
+    sample
+        The first of them.
     nodes
         Its code, folded for the shape of the group.
     inputs
@@ -64,10 +64,12 @@ class Group:
         First row of each constraint, shape (L,).
     columns
         Column of each of the type's coordinates for each constraint, shape (L, c); -1 on the ground.
+    hints
+        Speaking names of nodes.
     """
 
     name: str
-    kernel: Kernel
+    sample: Instance
     nodes: tuple[Node, ...]
     inputs: Mapping[str, Source]
     Phi: tuple[int, ...]
@@ -76,6 +78,7 @@ class Group:
     gamma: tuple[int, ...]
     rows: Index
     columns: Index
+    hints: Mapping[int, str]
 
     def number(self, node: int) -> Any:
         """Return the number a node stands for, None where it is not a plain number."""
@@ -198,12 +201,13 @@ class _Builder:
         for number in dict.fromkeys(which.tolist()):
             members = np.flatnonzero(which == number)
             part = bindings[members], columns[members], rows[members]
-            found.append(self._group(instances[0].kernel, shapes[members[0]], *part))
+            found.append(self._group(instances[members[0]], shapes[members[0]], *part))
         return found
 
     def _group(
-        self, kernel: Kernel, shape: NDArray[np.float64], bindings: Index, columns: Index, rows: Index
+        self, sample: Instance, shape: NDArray[np.float64], bindings: Index, columns: Index, rows: Index
     ) -> Group:
+        kernel = sample.kernel
         graph = Graph()
         inputs: dict[str, int] = {}
         sources: dict[str, Source] = {}
@@ -217,7 +221,7 @@ class _Builder:
         self._counts[kernel.name] = self._counts.get(kernel.name, 0) + 1
         return Group(
             f"{kernel.name}_{self._counts[kernel.name]}",
-            kernel,
+            sample,
             tuple(graph.nodes),
             sources,
             tuple(new[node] for node in kernel.Phi),
@@ -230,6 +234,11 @@ class _Builder:
             tuple(new[node] for node in kernel.gamma),
             rows,
             columns,
+            {
+                new[node]: stem.replace(".", "_").replace(" ", "_")
+                for node, stem in kernel.hints
+                if graph.nodes[new[node]][0] not in ("neg", "const", "input")
+            },
         )
 
     def _source(self, nodes: Index) -> Source:

@@ -1,0 +1,270 @@
+"""The NumPy target for large mechanisms: one function per group of constraints, index arrays in a companion file.
+
+The text of the module depends on the number of groups and of classes of equal blocks, not on the number of constraints; the
+arrays are in ``<name>.npz`` beside it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.emit.functions import schedule
+from kincompile.emit.layout import indented, wrapped
+from kincompile.emit.naming import NameTable
+from kincompile.emit.numpy_solve import solve_functions
+from kincompile.emit.numpy_target import (
+    FORMAT,
+    RESERVED,
+    RESERVED_IN_SOLVE,
+    array_functions,
+    function_body,
+    scalar_functions,
+)
+from kincompile.emit.solving import schedule_solve
+from kincompile.emit.target import Emitted
+from kincompile.emit.templates import fill
+from kincompile.errors import StructuralError
+from kincompile.ir.elimination import plan_entries
+from kincompile.ir.grouping import Group, GroupedProgram, group
+from kincompile.ir.inline import Entry, InlineProgram, Section
+from kincompile.structure.stages import Lanes, Stage, plan_stages
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.ir.program import Program
+
+FUNCTIONS = {"position": ("Phi", "Phi_q"), "nu": ("nu",), "gamma": ("gamma",)}
+"""What is computed together; the right sides alone, because Phi_q is then already at hand."""
+
+
+def emit_grouped(program: Program) -> Emitted:
+    """Return a program as a NumPy module with a companion file of arrays."""
+    grouped = group(program)
+    arrays: dict[str, NDArray[Any]] = {
+        "numbers": grouped.numbers,
+        "angles": np.array(grouped.angles),
+    }
+    rows, columns, constants, order = _pattern(grouped)
+    arrays["pattern"] = np.stack((rows, columns), axis=1)
+    arrays["constants"] = np.nan_to_num(constants)
+    arrays["coordinates"] = _text([item.name for item in program.coordinates])
+    arrays["units"] = _text([item.unit for item in program.coordinates])
+    arrays["equations"] = _text(program.equations)
+    arrays["guess"] = np.array([item.guess for item in program.coordinates])
+    stages = plan_stages(rows, columns, constants, len(program.equations))
+    if stages is None:
+        raise StructuralError(
+            f"{program.name!r}: the equations cannot determine the coordinates; compile it with "
+            "form='inline' for the names"
+        )
+    code: list[str] = []
+    called: set[str] = set()
+    tables = [_group_code(item, grouped, arrays, code, called) for item in grouped.groups]
+    _entry_numbers(grouped, order, arrays)
+    code += ["", "", *_values_code(grouped, called)]
+    solving = [
+        _stage_code(k, stage, program, rows, columns, constants, arrays, code)
+        for k, stage in enumerate(stages)
+    ]
+    source = fill(
+        "numpy/grouped.py.jinja", _data(grouped, code, tables, solving, sorted(called), len(rows))
+    )
+    return Emitted(program.name, {f"{program.name}.py": source}, _small(arrays))
+
+
+def _pattern(
+    grouped: GroupedProgram,
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp]]:
+    """Return place and constant value of every entry of Phi_q row by row, and their order in groups."""
+    rows, columns, constants = [], [], []
+    for item in grouped.groups:
+        for row, column, node in item.Phi_q:
+            value = item.number(node)
+            rows.append(item.rows + row)
+            columns.append(item.columns[:, column])
+            constants.append(np.full(item.rows.size, np.nan if value is None else float(value)))
+    found = [np.concatenate(parts) for parts in (rows, columns, constants)]
+    order = np.lexsort((found[1], found[0]))
+    return found[0][order], found[1][order], found[2][order], order
+
+
+def _entry_numbers(
+    grouped: GroupedProgram, order: NDArray[np.intp], arrays: dict[str, NDArray[Any]]
+) -> None:
+    """Write down where each group's varying entries of Phi_q stand in the pattern."""
+    place = np.empty(order.size, dtype=np.intp)
+    place[order] = np.arange(order.size)
+    start = 0
+    for item in grouped.groups:
+        count = item.rows.size
+        kept = []
+        for _, _, node in item.Phi_q:
+            if item.number(node) is None:
+                kept.append(place[start : start + count])
+            start += count
+        arrays[f"{item.name}.entries"] = np.array(kept, dtype=np.intp).reshape(-1, count)
+
+
+def _identifier(name: str) -> str:
+    """Return a kernel's input as a Python name: `cos phi_i` is `cos_i`, `r_i.x` is `x_i`."""
+    for function in ("cos", "sin"):
+        if name.startswith(f"{function} phi_"):
+            return f"{function}_{name[8:]}"
+    vector, dot, axis = name.partition(".")
+    if dot and vector.startswith("r_"):
+        return f"{axis}{vector[1:]}"
+    return name.replace(".", "_").replace("'", "_prime")
+
+
+def _group_code(
+    item: Group,
+    grouped: GroupedProgram,
+    arrays: dict[str, NDArray[Any]],
+    code: list[str],
+    called: set[str],
+) -> list[str]:
+    """Write the functions of a group; return the lines of its entry in the module's table."""
+    table = NameTable((*RESERVED, *grouped.program.tables))
+    names = {name: table.take(_identifier(name)) for name in item.inputs}
+    sections = (Section(item.sample, "", _local_entries(item)),)
+    inline = InlineProgram(grouped.program, item.nodes, sections, item.hints)
+    arrays[f"{item.name}.rows"] = item.rows
+    lines = [f'Group("{item.name}", {len(item.Phi)}, {{']
+    lines += [f'    "{names[name]}": "{source.kind}",' for name, source in item.inputs.items()]
+    lines.append("}, {")
+    for name, source in item.inputs.items():
+        arrays[f"{item.name}.{names[name]}"] = source.index
+    for function, quantities in FUNCTIONS.items():
+        listing = schedule(inline, quantities, names, table)
+        called |= set(listing.functions)
+        read = [names[name] for name in item.inputs if name in listing.inputs]
+        body = function_body(quantities, inline, listing, titled=False)
+        code += ["", "", f"def _{item.name}_{function}({', '.join(('f', *read))}):"]
+        code += [f'    """{function} of {item.rows.size} constraints like "{item.sample.name}"."""']
+        code += [f"    {line}" for line in body]
+        quoted = "".join(f'"{name}", ' for name in read)
+        lines.append(f'    "{function}": (_{item.name}_{function}, ({quoted})),')
+    return [*lines, "}),"]
+
+
+def _local_entries(item: Group) -> dict[str, tuple[Entry, ...]]:
+    vectors = {"Phi": item.Phi, "nu": item.nu, "gamma": item.gamma}
+    entries = {
+        name: tuple(Entry(row, 0, node) for row, node in enumerate(nodes))
+        for name, nodes in vectors.items()
+    }
+    return {**entries, "Phi_q": tuple(Entry(row, column, node) for row, column, node in item.Phi_q)}
+
+
+def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
+    """Return the function of the values that depend on t, p and contact parameters."""
+    program = grouped.program
+    table = NameTable((*RESERVED, *program.tables))
+    coordinates = [item.name for item in program.coordinates]
+    parameters = [item.name for item in program.parameters]
+    names = {"t": "t", **{name: table.take(name) for name in (*parameters, *coordinates)}}
+    sample = program.instances[0]
+    entries = tuple(Entry(k, 0, node) for k, node in enumerate(grouped.values))
+    inline = InlineProgram(program, program.values, (Section(sample, "", {"values": entries}),), {})
+    listing = schedule(inline, ("values",), names, table)
+    called |= set(listing.functions)
+    unpack = [
+        f"{names[name]} = p[{k}]" for k, name in enumerate(parameters) if name in listing.inputs
+    ]
+    unpack += [
+        f"{names[name]} = q[{k}]" for k, name in enumerate(coordinates) if name in listing.inputs
+    ]
+    body = function_body(("values",), inline, listing, titled=False)
+    return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
+
+
+def _stage_code(
+    number: int,
+    stage: Stage,
+    program: Program,
+    rows: NDArray[np.intp],
+    columns: NDArray[np.intp],
+    constants: NDArray[np.float64],
+    arrays: dict[str, NDArray[Any]],
+    code: list[str],
+) -> str:
+    """Write the functions and arrays of a stage; return its entry in the module's table."""
+    key = f"stage_{number}"
+    arrays[f"{key}.rows"], arrays[f"{key}.columns"] = stage.rows, stage.columns
+    arrays[f"{key}.inner"], arrays[f"{key}.outer"] = stage.inner, stage.outer
+    if not isinstance(stage, Lanes):
+        return f'Stage("{key}", None, None, ()),'
+    first = constants[stage.inner[:, 0]] if stage.inner.size else np.empty(0)
+    entries = [
+        (row, column, None if np.isnan(value) else float(value))
+        for (row, column), value in zip(stage.places, first.tolist(), strict=True)
+    ]
+    size = stage.rows.shape[0]
+    plan = plan_entries(size, size, entries)
+    if plan is None:
+        raise StructuralError(
+            f"{program.name!r}: the equations {', '.join(program.equations[k] for k in stage.rows[:, 0])} are dependent "
+            "for every position; remove one of them"
+        )
+    sample = dataclasses.replace(
+        program,
+        equations=tuple(program.equations[k] for k in stage.rows[:, 0].tolist()),
+        coordinates=tuple(program.coordinates[k] for k in stage.columns[:, 0].tolist()),
+    )
+    inline = InlineProgram(sample, (), (), {})
+    listing = schedule_solve(inline, plan, NameTable(RESERVED_IN_SOLVE))
+    arrays[f"{key}.varying"] = stage.inner[
+        [k for k, entry in enumerate(entries) if entry[2] is None]
+    ]
+    code += ["", "", *solve_functions(inline, listing, f"_{key}")]
+    outer = "".join(f"{row}, " for row in stage.outer_rows)
+    return f'Stage("{key}", _{key}_factor, _{key}_solve, ({outer})),'
+
+
+def _data(
+    grouped: GroupedProgram,
+    code: list[str],
+    tables: Sequence[list[str]],
+    solving: Sequence[str],
+    called: Sequence[str],
+    nonzeros: int,
+) -> dict[str, Any]:
+    program = grouped.program
+    return {
+        "title": program.name,
+        "name": program.name,
+        "format": FORMAT,
+        "fingerprint": program.fingerprint,
+        "n": len(program.coordinates),
+        "m": len(program.equations),
+        "nonzeros": nonzeros,
+        "parameters": indented(wrapped([f'"{item.name}"' for item in program.parameters])),
+        "parameter_units": indented(
+            [f'"{item.name}": "{item.unit}",' for item in program.parameters]
+        ),
+        "defaults": indented(wrapped([repr(item.default) for item in program.parameters])),
+        "scalar_functions": indented(scalar_functions(called)),
+        "array_functions": indented(array_functions(called)),
+        "kernels": "\n".join(code),
+        "groups": indented(line for lines in tables for line in lines),
+        "stages": indented(solving),
+    }
+
+
+def _text(names: Sequence[str]) -> NDArray[np.uint8]:
+    """Return names as bytes, a line each."""
+    return np.frombuffer("\n".join(names).encode(), dtype=np.uint8)
+
+
+def _small(arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the arrays in the order of their names, indices in as few bytes as they need."""
+    return {
+        name: values.astype(np.int32) if values.dtype.kind == "i" else values
+        for name, values in sorted(arrays.items())
+    }
