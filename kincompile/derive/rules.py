@@ -185,6 +185,9 @@ def _gradient(expression: Scalar, position: VectorSymbol, record: Record) -> tup
                     for k, factor in enumerate(factors)
                 )
             )
+        case Power(base, exponent):
+            outer = exponent * power_of(base, exponent - 1)
+            return Rule.CHAIN, scaled(outer, gradient(base, position, record))
         case Dot(left, right) if left == right:
             return Rule.PRODUCT, scaled(2 * coefficient(right, position, record), left)
         case Dot(left, right):
