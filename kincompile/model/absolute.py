@@ -12,7 +12,19 @@ from kincompile.model.constraint import Constraint, Kind, argument
 
 @dataclass(frozen=True)
 class AbsoluteX(Constraint):
-    """The global x coordinate of a point on a body is C."""
+    """The global x coordinate of a point on a body is C.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    body
+        The body, or its name.
+    point
+        Point (xi, eta) in the body's frame [length].
+    value
+        C [length], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.2.3"
     body: Any = argument(Kind.BODY, "i")
@@ -27,7 +39,19 @@ class AbsoluteX(Constraint):
 
 @dataclass(frozen=True)
 class AbsoluteY(Constraint):
-    """The global y coordinate of a point on a body is C."""
+    """The global y coordinate of a point on a body is C.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    body
+        The body, or its name.
+    point
+        Point (xi, eta) in the body's frame [length].
+    value
+        C [length], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.2.4"
     body: Any = argument(Kind.BODY, "i")
@@ -42,7 +66,17 @@ class AbsoluteY(Constraint):
 
 @dataclass(frozen=True)
 class AbsoluteAngle(Constraint):
-    """The angle of a body is C."""
+    """The angle of a body is C.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    body
+        The body, or its name.
+    angle
+        C [rad], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.2.6"
     body: Any = argument(Kind.BODY, "i")
@@ -56,7 +90,21 @@ class AbsoluteAngle(Constraint):
 
 @dataclass(frozen=True)
 class AbsoluteDistance(Constraint):
-    """The distance from a ground point to a point on a body is C > 0."""
+    """The distance from a ground point to a point on a body is C > 0.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    body
+        The body, or its name.
+    point
+        Point (xi, eta) in the body's frame [length].
+    ground_point
+        Point (x, y) of the ground [length].
+    distance
+        C [length], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.2.1"
     body: Any = argument(Kind.BODY, "i")

@@ -15,7 +15,23 @@ from kincompile.model.constraint import CamConstraint, Kind, argument
 
 @dataclass(frozen=True)
 class CamFollower(CamConstraint):
-    """Two profiles touch: a common point and a common tangent."""
+    """Two profiles touch: a common point and a common tangent.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; its equations are ``name.x``, ``name.y`` and ``name.tangent``, its
+        contact parameters ``alpha_i_name`` and ``alpha_j_name``.
+    i, j
+        Bodies, or their names; one may be the ground.
+    centre_i, centre_j
+        Centres (xi, eta) of the profiles in the frames of i and j [length].
+    profile_i, profile_j
+        Polar radius [length] about the centre: an expression of `alpha`, a function of alpha, or a
+        table (angles [rad], radii) over one revolution.
+    guess
+        Start values of the contact parameters for Newton's method [rad], 0 if not given.
+    """
 
     source = "Haug 3.4"
     row_names = ("x", "y", "tangent")
@@ -38,7 +54,24 @@ class CamFollower(CamConstraint):
 class CamFlatFollower(CamConstraint):
     """A cam (body i) touches a flat face of the follower (body j).
 
-    The face is the line through a point of the follower along an axis.
+    Parameters
+    ----------
+    name
+        Name of the constraint; its equations are ``name.contact`` and ``name.tangent``, its contact
+        parameter ``alpha_name``.
+    cam, follower
+        Bodies, or their names; one may be the ground.
+    centre
+        Centre (xi, eta) of the profile in the cam's frame [length].
+    profile
+        Polar radius [length] about the centre: an expression of `alpha`, a function of alpha, or a
+        table (angles [rad], radii) over one revolution.
+    point
+        Point (xi, eta) on the face, in the follower's frame [length].
+    axis
+        Direction (xi, eta) of the face in the follower's frame, of any length but zero.
+    guess
+        Start value of the contact parameter for Newton's method [rad], 0 if not given.
     """
 
     source = "Haug 3.4"
@@ -61,7 +94,25 @@ class CamFlatFollower(CamConstraint):
 
 @dataclass(frozen=True)
 class PointFollower(CamConstraint):
-    """A point of body i runs on a profile of body j: a pin in a curved slot."""
+    """A point of body i runs on a profile of body j: a pin in a curved slot.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; its equations are ``name.x`` and ``name.y``, its contact parameter
+        ``alpha_name``.
+    i, j
+        Bodies, or their names; one may be the ground.
+    point_i
+        Point (xi, eta) in the frame of i [length].
+    centre_j
+        Centre (xi, eta) of the profile in the frame of j [length].
+    profile_j
+        Polar radius [length] about the centre: an expression of `alpha`, a function of alpha, or a
+        table (angles [rad], radii) over one revolution.
+    guess
+        Start value of the contact parameter for Newton's method [rad], 0 if not given.
+    """
 
     source = "Haug 3.4.32"
     row_names = ("x", "y")

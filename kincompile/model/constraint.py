@@ -47,7 +47,8 @@ class Constraint:
     """A joint, or a driver where its value is a function of `t`. Every type is a subclass.
 
     A subclass declares its attributes as fields, in the book's order, and its Phi in vectors.
-    Nothing else: Phi_q, nu and gamma follow by differentiation.
+    Nothing else: Phi_q, nu and gamma follow by differentiation. Its arguments are checked together
+    with the whole mechanism, by `Mechanism.system`.
     """
 
     name: str

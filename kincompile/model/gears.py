@@ -15,7 +15,21 @@ from kincompile.model.relative import separation
 class Gear(Constraint):
     """Two gears roll on each other; a negative radius is an internal gear.
 
-    The distance of the centres is a constraint of its own.
+    The distance of the centres is a constraint of its own. Phi is also zero with the gears on
+    opposite sides of each other: the guess decides.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    i, j
+        Bodies, or their names; one may be the ground.
+    centre_i, centre_j
+        Centres (xi, eta) in the frames of i and j [length].
+    radius_i, radius_j
+        Pitch radii [length], numbers or expressions of parameters, not zero.
+    theta_i, theta_j
+        Directions [rad] in the frames of i and j that point at the other gear together.
     """
 
     source = "Haug 3.4.1"
@@ -39,7 +53,22 @@ class Gear(Constraint):
 class RackAndPinion(Constraint):
     """A pinion (body j) rolls on the pitch line of a rack (body i).
 
-    The pitch line passes through the points P and Q of the rack.
+    Parameters
+    ----------
+    name
+        Name of the constraint; its equations are ``name.roll`` and ``name.pitch``.
+    rack, pinion
+        Bodies, or their names; one may be the ground.
+    point_p, point_q
+        Two points (xi, eta) on the pitch line, in the rack's frame [length]. The pinion is to the
+        left of the line from P to Q.
+    theta_rack, theta_pinion
+        Directions [rad] in the two frames: of the line from P to Q, and of the pinion's radius that
+        meets the line where the pinion is at Q.
+    centre
+        Centre of the pinion (xi, eta) in its frame [length].
+    radius
+        Pitch radius of the pinion [length], not zero.
     """
 
     source = "Haug 3.4"

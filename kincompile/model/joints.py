@@ -13,7 +13,17 @@ from kincompile.model.relative import separation
 
 @dataclass(frozen=True)
 class Revolute(Constraint):
-    """A point on body i and a point on body j coincide."""
+    """A point on body i and a point on body j coincide.
+
+    Parameters
+    ----------
+    name
+        Name of the joint; its equations are ``name.x`` and ``name.y``.
+    i, j
+        Bodies, or their names; one may be the ground.
+    point_i, point_j
+        Points (xi, eta) in the frames of i and j [length].
+    """
 
     source = "Haug 3.3.10"
     row_names = ("x", "y")
@@ -30,7 +40,19 @@ class Revolute(Constraint):
 
 @dataclass(frozen=True)
 class Translational(Constraint):
-    """Body j slides along an axis of body i without turning: the two axes stay on one line."""
+    """Body j slides along an axis of body i without turning: the two axes stay on one line.
+
+    Parameters
+    ----------
+    name
+        Name of the joint; its equations are ``name.normal`` and ``name.parallel``.
+    i, j
+        Bodies, or their names; one may be the ground.
+    point_i, point_j
+        Points (xi, eta) on the two axes, in the frames of i and j [length].
+    axis_i, axis_j
+        Directions (xi, eta) in the frames of i and j, of any length but zero.
+    """
 
     source = "Haug 3.3.13"
     row_names = ("normal", "parallel")
@@ -50,7 +72,23 @@ class Translational(Constraint):
 
 @dataclass(frozen=True)
 class RevoluteTranslational(Constraint):
-    """A point on body j keeps the distance C from an axis of body i, counted to its left."""
+    """A point on body j keeps the distance C from an axis of body i, counted to its left.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    i, j
+        Bodies, or their names; one may be the ground.
+    point_i
+        Point (xi, eta) on the axis, in the frame of i [length].
+    axis_i
+        Direction (xi, eta) in the frame of i, of any length but zero.
+    point_j
+        Point (xi, eta) in the frame of j [length].
+    distance
+        C [length], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.3"
     i: Any = argument(Kind.BODY, "i")
@@ -68,7 +106,23 @@ class RevoluteTranslational(Constraint):
 
 @dataclass(frozen=True)
 class TranslationalDistance(Constraint):
-    """A point on body j is at C along an axis of body i, counted from a point on the axis."""
+    """A point on body j is at C along an axis of body i, counted from a point on the axis.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    i, j
+        Bodies, or their names; one may be the ground.
+    point_i
+        Point (xi, eta) on the axis, in the frame of i [length].
+    axis_i
+        Direction (xi, eta) in the frame of i, of any length but zero.
+    point_j
+        Point (xi, eta) in the frame of j [length].
+    distance
+        C [length], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.5"
     i: Any = argument(Kind.BODY, "i")

@@ -79,7 +79,10 @@ class Mechanism(MatrixViews):
         return body
 
     def add(self, constraint: Item) -> Item:
-        """Add a joint, a driver or a free equation, and return it."""
+        """Add a joint, a driver or a free equation, and return it.
+
+        Its equations are the next rows of the system, its contact parameters the next coordinates.
+        """
         self.constraints.append(constraint)
         return constraint
 

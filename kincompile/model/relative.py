@@ -17,7 +17,19 @@ def separation() -> Vector:
 
 @dataclass(frozen=True)
 class RelativeX(Constraint):
-    """The global x component from a point on body i to a point on body j is C."""
+    """The global x component from a point on body i to a point on body j is C.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    i, j
+        Bodies, or their names; one may be the ground.
+    point_i, point_j
+        Points (xi, eta) in the frames of i and j [length].
+    value
+        C [length], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.3"
     i: Any = argument(Kind.BODY, "i")
@@ -34,7 +46,19 @@ class RelativeX(Constraint):
 
 @dataclass(frozen=True)
 class RelativeY(Constraint):
-    """The global y component from a point on body i to a point on body j is C."""
+    """The global y component from a point on body i to a point on body j is C.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    i, j
+        Bodies, or their names; one may be the ground.
+    point_i, point_j
+        Points (xi, eta) in the frames of i and j [length].
+    value
+        C [length], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.3"
     i: Any = argument(Kind.BODY, "i")
@@ -51,7 +75,17 @@ class RelativeY(Constraint):
 
 @dataclass(frozen=True)
 class RelativeAngle(Constraint):
-    """The angle of body j relative to body i is C."""
+    """The angle of body j relative to body i is C.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    i, j
+        Bodies, or their names; one may be the ground.
+    angle
+        C [rad], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.3"
     i: Any = argument(Kind.BODY, "i")
@@ -66,7 +100,19 @@ class RelativeAngle(Constraint):
 
 @dataclass(frozen=True)
 class Distance(Constraint):
-    """The distance between a point on body i and a point on body j is C > 0: a massless coupler."""
+    """The distance between a point on body i and a point on body j is C > 0: a massless coupler.
+
+    Parameters
+    ----------
+    name
+        Name of the constraint; so are its equations called.
+    i, j
+        Bodies, or their names; one may be the ground.
+    point_i, point_j
+        Points (xi, eta) in the frames of i and j [length].
+    distance
+        C [length], a number or an expression of parameters; with `t` in it, a driver.
+    """
 
     source = "Haug 3.3.7"
     i: Any = argument(Kind.BODY, "i")

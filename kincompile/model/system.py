@@ -42,8 +42,12 @@ class ConstraintSystem(MatrixViews):
     Attributes
     ----------
     coordinates : tuple of Coordinate
+        Three for each body in order, the free ones, then the contact parameters of cams: the
+        columns of Phi_q.
     parameters : tuple of Parameter
+        In the order of declaration: the entries of p.
     constraints : tuple of Joint or FreeEquation
+        As written, with their arguments resolved: the rows of Phi_q.
 
     Raises
     ------
