@@ -72,11 +72,11 @@ pi = math.pi
 def _Phi(f, q, t, p):
     x_rack, y_rack, phi_rack, x_pinion, y_pinion, phi_pinion = q
     R, swing = p
-    cos_sin, sin, sqrt = f.cos_sin, f.sin, f.sqrt
+    cos_sin, sin = f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
-    mesh_1 = sqrt(0.04000000000000001) * R
+    mesh_1 = 0.2 * R
     mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
     mesh_4 = 0.2 * c_rack
@@ -101,7 +101,7 @@ def _Phi(f, q, t, p):
 def _Phi_q(f, q, t, p):
     x_rack, y_rack, phi_rack, x_pinion, y_pinion, phi_pinion = q
     R = p[0]
-    cos_sin, sqrt = f.cos_sin, f.sqrt
+    cos_sin = f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
@@ -109,7 +109,7 @@ def _Phi_q(f, q, t, p):
     mesh_2 = 0.2 * s_rack
     mesh_d_y = y_pinion - y_rack
     mesh_d_x = x_pinion - x_rack
-    mesh_5 = sqrt(0.04000000000000001) * R
+    mesh_5 = 0.2 * R
     return (
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
@@ -185,11 +185,11 @@ def _gamma(f, q, q_dot, t, p):
 def _position(f, q, t, p):
     x_rack, y_rack, phi_rack, x_pinion, y_pinion, phi_pinion = q
     R, swing = p
-    cos_sin, sin, sqrt = f.cos_sin, f.sin, f.sqrt
+    cos_sin, sin = f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
-    mesh_1 = sqrt(0.04000000000000001) * R
+    mesh_1 = 0.2 * R
     mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
     mesh_4 = 0.2 * c_rack
@@ -231,7 +231,7 @@ def _position(f, q, t, p):
 def _velocity(f, q, t, p):
     x_rack, y_rack, phi_rack, x_pinion, y_pinion, phi_pinion = q
     R, swing = p
-    cos, cos_sin, sqrt = f.cos, f.cos_sin, f.sqrt
+    cos, cos_sin = f.cos, f.cos_sin
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
@@ -239,7 +239,7 @@ def _velocity(f, q, t, p):
     mesh_2 = 0.2 * s_rack
     mesh_d_y = y_pinion - y_rack
     mesh_d_x = x_pinion - x_rack
-    mesh_5 = sqrt(0.04000000000000001) * R
+    mesh_5 = 0.2 * R
     return (
         # Phi_q
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
@@ -274,7 +274,7 @@ def _acceleration(f, q, q_dot, t, p):
     x_rack, y_rack, phi_rack, x_pinion, y_pinion, phi_pinion = q
     x_rack_dot, y_rack_dot, phi_rack_dot, x_pinion_dot, y_pinion_dot, phi_pinion_dot = q_dot
     R, swing = p
-    cos_sin, sin, sqrt = f.cos_sin, f.sin, f.sqrt
+    cos_sin, sin = f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
@@ -282,7 +282,7 @@ def _acceleration(f, q, q_dot, t, p):
     mesh_2 = 0.2 * s_rack
     mesh_d_y = y_pinion - y_rack
     mesh_d_x = x_pinion - x_rack
-    mesh_5 = sqrt(0.04000000000000001) * R
+    mesh_5 = 0.2 * R
     mesh_d_x_ = mesh_d_x + mesh_1
     mesh_d_y_ = mesh_d_y + mesh_2
     phi_rack_dot_sq = phi_rack_dot**2
@@ -329,11 +329,11 @@ def _kinematics(f, q, q_dot, t, p):
     x_rack, y_rack, phi_rack, x_pinion, y_pinion, phi_pinion = q
     x_rack_dot, y_rack_dot, phi_rack_dot, x_pinion_dot, y_pinion_dot, phi_pinion_dot = q_dot
     R, swing = p
-    cos, cos_sin, sin, sqrt = f.cos, f.cos_sin, f.sin, f.sqrt
+    cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
-    mesh_1 = sqrt(0.04000000000000001) * R
+    mesh_1 = 0.2 * R
     mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
     mesh_4 = 0.2 * c_rack
@@ -579,7 +579,6 @@ class _Floats:
     cos = math.cos
     cos_sin = staticmethod(lambda angle, cos=math.cos, sin=math.sin: (cos(angle), sin(angle)))
     sin = math.sin
-    sqrt = math.sqrt
 
 
 class _Arrays:
@@ -588,7 +587,6 @@ class _Arrays:
     cos = np.cos
     cos_sin = staticmethod(_cos_sin)
     sin = np.sin
-    sqrt = np.sqrt
 
 
 class _Quantity:

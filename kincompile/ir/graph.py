@@ -9,7 +9,7 @@ outward, so that an attribute that happens to be zero costs nothing in the emitt
 from __future__ import annotations
 
 from fractions import Fraction
-from math import isfinite, isqrt
+from math import isfinite, isqrt, sqrt
 from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import ModelError
@@ -192,7 +192,7 @@ class Graph:
             value = self.value_of(arguments[0])
             if value == 0 and name in AT_ZERO:
                 return self.const(AT_ZERO[name])
-            if value is not None and name == "sqrt" and (root := _exact_root(value)) is not None:
+            if value is not None and name == "sqrt" and (root := _root(value)) is not None:
                 return self.const(root)
         return self._intern(("call", name, *arguments))
 
@@ -290,8 +290,11 @@ def operands_of(node: Node) -> tuple[int, ...]:
     return node[_FIRST_OPERAND.get(node[0], 1) :]
 
 
-def _exact_root(value: Constant) -> int | Fraction | None:
-    if value < 0 or isinstance(value, float):
+def _root(value: Constant) -> Constant | None:
+    """Return a square root that is known: of a float, or of a number that has an exact one."""
+    if value < 0:
         return None
+    if isinstance(value, float):
+        return sqrt(value)
     root = Fraction(isqrt(value.numerator), isqrt(value.denominator))
     return root if root * root == value else None
