@@ -207,7 +207,8 @@ def test_that_a_number_over_zero_is_left_to_run_time(graph: Graph) -> None:
     ("name", "value", "expected"),
     [
         ("cos", 0, 1), ("sin", 0, 0), ("tan", 0, 0), ("exp", 0, 1), ("sinh", 0, 0), ("cosh", 0, 1),
-        ("tanh", 0, 0), ("sqrt", 0, 0), ("sqrt", 9, 3), ("sqrt", 0.25, 0.5), ("sqrt", Fraction(4, 9), Fraction(2, 3)),
+        ("tanh", 0, 0), ("sqrt", 0, 0), ("sqrt", 9, 3), ("sqrt", 0.25, 0.5),
+        ("sqrt", Fraction(4, 9), Fraction(2, 3)),
     ],
 )  # fmt: skip
 def test_that_functions_of_special_numbers_are_numbers(
