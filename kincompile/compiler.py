@@ -12,8 +12,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile.emit.grouped import emit_grouped
 from kincompile.emit.numpy_target import emit_numpy
-from kincompile.errors import UnsupportedError
+from kincompile.errors import InputError, UnsupportedError
+from kincompile.ir.grouping import group
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
 from kincompile.names import listed
@@ -33,7 +35,13 @@ if TYPE_CHECKING:
 TARGETS: Mapping[str, Target] = {"numpy": emit_numpy}
 
 
-def emit(model: Mechanism | ConstraintSystem, target: str = "numpy") -> Emitted:
+LARGEST_INLINE = 300
+"""Coordinates up to which every constraint is written out."""
+
+
+def emit(
+    model: Mechanism | ConstraintSystem, target: str = "numpy", form: str | None = None
+) -> Emitted:
     """Compile a mechanism to source files.
 
     Parameters
@@ -42,6 +50,11 @@ def emit(model: Mechanism | ConstraintSystem, target: str = "numpy") -> Emitted:
         A mechanism or a system of free equations.
     target
         Language of the files: ``"numpy"``.
+
+    form : {"inline", "grouped"}, optional
+        ``"inline"`` writes every constraint out, with names and comments; ``"grouped"`` writes one
+        function per type of constraint, for mechanisms of any size. Without a choice the size
+        decides.
 
     Returns
     -------
@@ -59,19 +72,35 @@ def emit(model: Mechanism | ConstraintSystem, target: str = "numpy") -> Emitted:
     """
     if target not in TARGETS:
         raise UnsupportedError(f"there is no target {target!r}; targets are: {listed(TARGETS)}")
+    if form not in (None, "inline", "grouped"):
+        raise InputError(f"there is no form {form!r}; forms are: inline, grouped")
     system = model.system()
-    code = inline(lower(system))
+    program = lower(system)
+    if form == "grouped" or (form is None and len(system.coordinates) > LARGEST_INLINE):
+        if target != "numpy":
+            raise UnsupportedError(
+                f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
+            )
+        grouped = group(program)
+        require_square(system, grouped.pattern())
+        return emit_grouped(grouped)
+    code = inline(program)
     require_square(system, code.pattern())
     return TARGETS[target](code)
 
 
-def compile(model: Mechanism | ConstraintSystem) -> ModuleType:  # noqa: A001 - the public name kc.compile
+def compile(  # noqa: A001 - the public name kc.compile
+    model: Mechanism | ConstraintSystem, form: str | None = None
+) -> ModuleType:
     """Compile a mechanism and load the result.
 
     Parameters
     ----------
     model
         A mechanism or a system of free equations.
+
+    form : {"inline", "grouped"}, optional
+        As for `emit`.
 
     Returns
     -------
@@ -83,7 +112,8 @@ def compile(model: Mechanism | ConstraintSystem) -> ModuleType:  # noqa: A001 - 
     ModelError, StructuralError
         As `emit` does.
     """
-    return from_source(emit(model).source, model.name)
+    emitted = emit(model, form=form)
+    return from_source(emitted.source, model.name, emitted.arrays)
 
 
 def inspect(model: Mechanism | ConstraintSystem) -> Inspection:

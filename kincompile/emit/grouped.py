@@ -1,7 +1,7 @@
-"""The NumPy target for large mechanisms: one function per group of constraints, index arrays in a companion file.
+"""The NumPy target for large mechanisms: one function a group of constraints, arrays in a file.
 
-The text of the module depends on the number of groups and of classes of equal blocks, not on the number of constraints; the
-arrays are in ``<name>.npz`` beside it.
+The text of the module depends on the number of groups and of classes of equal blocks, not on the
+number of constraints; the arrays are in ``<name>.npz`` beside it.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from kincompile.emit.target import Emitted
 from kincompile.emit.templates import fill
 from kincompile.errors import StructuralError
 from kincompile.ir.elimination import plan_entries
-from kincompile.ir.grouping import Group, GroupedProgram, group
 from kincompile.ir.inline import Entry, InlineProgram, Section
+from kincompile.names import listed
 from kincompile.structure.stages import Lanes, Stage, plan_stages
 
 if TYPE_CHECKING:
@@ -37,15 +37,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from kincompile.ir.grouping import Group, GroupedProgram
     from kincompile.ir.program import Program
 
 FUNCTIONS = {"position": ("Phi", "Phi_q"), "nu": ("nu",), "gamma": ("gamma",)}
 """What is computed together; the right sides alone, because Phi_q is then already at hand."""
 
 
-def emit_grouped(program: Program) -> Emitted:
+def emit_grouped(grouped: GroupedProgram) -> Emitted:
     """Return a program as a NumPy module with a companion file of arrays."""
-    grouped = group(program)
+    program = grouped.program
     arrays: dict[str, NDArray[Any]] = {
         "numbers": grouped.numbers,
         "angles": np.array(grouped.angles),
@@ -81,7 +82,7 @@ def emit_grouped(program: Program) -> Emitted:
 def _pattern(
     grouped: GroupedProgram,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp]]:
-    """Return place and constant value of every entry of Phi_q row by row, and their order in groups."""
+    """Return rows, columns and constants of Phi_q row by row, and the order of its entries."""
     rows, columns, constants = [], [], []
     for item in grouped.groups:
         for row, column, node in item.Phi_q:
@@ -208,9 +209,10 @@ def _stage_code(
     size = stage.rows.shape[0]
     plan = plan_entries(size, size, entries)
     if plan is None:
+        dependent = listed(program.equations[k] for k in stage.rows[:, 0].tolist())
         raise StructuralError(
-            f"{program.name!r}: the equations {', '.join(program.equations[k] for k in stage.rows[:, 0])} are dependent "
-            "for every position; remove one of them"
+            f"{program.name!r}: the equations {dependent} are dependent for every position; remove "
+            "one of them"
         )
     sample = dataclasses.replace(
         program,

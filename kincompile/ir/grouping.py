@@ -1,8 +1,9 @@
-"""The program by groups: constraints of one type and one shape run together, each number an array over them.
+"""The program by groups: constraints of one type and one shape run together as arrays.
 
-Two constraints are of one shape when the same attributes are zero and the same bodies are the ground. A group has one piece of
-straight-line code, folded for its shape, and index arrays that say where its inputs come from and where its results go.
-Its size does not depend on the number of constraints.
+Two constraints are of one shape when the same attributes are zero and the same bodies are the
+ground. A group has one piece of straight-line code, folded for its shape, and index arrays that say
+where its inputs come from and where its results go. Its size does not depend on the number of
+constraints.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ class Source:
     Attributes
     ----------
     kind
-        ``"q"``, ``"q_dot"``, ``"cos"`` and ``"sin"`` (of body angles), ``"number"`` (an attribute) or ``"value"`` (computed from t, p
-        and contact parameters).
+        ``"q"``, ``"q_dot"``, ``"cos"`` and ``"sin"`` (of body angles), ``"number"`` (an attribute)
+        or ``"value"`` (computed from t, p and contact parameters).
     index
         Index for each constraint, into the vector of that kind.
     """
@@ -63,7 +64,8 @@ class Group:
     rows
         First row of each constraint, shape (L,).
     columns
-        Column of each of the type's coordinates for each constraint, shape (L, c); -1 on the ground.
+        Column of each of the type's coordinates for each constraint, shape (L, c); -1 on the
+        ground.
     hints
         Speaking names of nodes.
     """
@@ -106,6 +108,15 @@ class GroupedProgram:
     numbers: NDArray[np.float64]
     values: tuple[int, ...]
     angles: tuple[int, ...]
+
+    def pattern(self) -> NDArray[np.intp]:
+        """Return row and column of every entry of Phi_q, shape (nnz, 2), group by group."""
+        parts = [
+            np.stack((item.rows + row, item.columns[:, column]), axis=1)
+            for item in self.groups
+            for row, column, _ in item.Phi_q
+        ]
+        return np.concatenate(parts) if parts else np.empty((0, 2), dtype=np.intp)
 
 
 KINDS = ("q", "q_dot", "cos", "sin", "number", "value")
@@ -205,7 +216,12 @@ class _Builder:
         return found
 
     def _group(
-        self, sample: Instance, shape: NDArray[np.float64], bindings: Index, columns: Index, rows: Index
+        self,
+        sample: Instance,
+        shape: NDArray[np.float64],
+        bindings: Index,
+        columns: Index,
+        rows: Index,
     ) -> Group:
         kernel = sample.kernel
         graph = Graph()

@@ -18,7 +18,10 @@ from kincompile.runtime.contract import REMEDY, check
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+    from typing import Any
+
+    from numpy.typing import NDArray
 
 _SHARED = "\nclass _Quantity:\n"
 """Where the text begins that emitted modules have in common: what calls the mechanism's code."""
@@ -53,7 +56,9 @@ def load(path: str | os.PathLike[str]) -> ModuleType:
     return _fill(module, name, lambda: (compile(text, name, "exec"),))
 
 
-def from_source(source: str, name: str) -> ModuleType:
+def from_source(
+    source: str, name: str, arrays: Mapping[str, NDArray[Any]] | None = None
+) -> ModuleType:
     """Make a module from emitted text, in memory, and check that it keeps the contract.
 
     Tracebacks and `inspect.getsource` show the text as they would for a file.
@@ -64,6 +69,8 @@ def from_source(source: str, name: str) -> ModuleType:
         Text of an emitted module.
     name : str
         Name of the module, for messages and tracebacks.
+    arrays : mapping, optional
+        What the module would read from the companion file beside it.
 
     Returns
     -------
@@ -80,7 +87,10 @@ def from_source(source: str, name: str) -> ModuleType:
     filename = f"<kincompile {name} {zlib.crc32(source.encode()):08x}>"
     # Without a modification time `linecache.checkcache` leaves the entry alone.
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    return _fill(ModuleType(name), filename, lambda: _code(source, filename))
+    module = ModuleType(name)
+    if arrays:
+        module.__dict__["ARRAYS_OF_COMPANION"] = dict(arrays)
+    return _fill(module, filename, lambda: _code(source, filename))
 
 
 def _text(file: Path) -> str:

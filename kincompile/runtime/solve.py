@@ -18,6 +18,7 @@ from kincompile.errors import InputError, SolveError
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
 from kincompile.runtime.lanes import has_planned_solve
+from kincompile.runtime.large import LargeMarch, LargeState, is_grouped
 from kincompile.runtime.march import SMALL_ERROR, Outcome, State, advance, complete, start
 from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.solution import Solution
@@ -97,7 +98,10 @@ def solve(
     on_grid = _takes_grid(module, inputs.t.size, method)
     motion = _Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
-        outcome = _follow(inputs, motion, on_grid, progress)
+        if is_grouped(module):
+            outcome = _follow_large(inputs, motion, progress)
+        else:
+            outcome = _follow(inputs, motion, on_grid, progress)
     solution = _solution(inputs, motion, outcome)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
@@ -120,12 +124,14 @@ class _Motion:
     def over(cls, inputs: Inputs) -> _Motion:
         """Make the arrays for a time grid, with nothing reached."""
         points = inputs.t.size
-        # Each coordinate is contiguous in memory, as the code of a grid wants it.
-        q, q_dot, q_ddot = np.full((3, inputs.guess.size, points), np.nan)
+        if is_grouped(inputs.module):
+            q, q_dot, q_ddot = np.full((3, points, inputs.guess.size), np.nan)
+        else:  # each coordinate contiguous in memory, as the code of a grid wants it
+            q, q_dot, q_ddot = np.full((3, inputs.guess.size, points), np.nan).transpose(0, 2, 1)
         return cls(
-            q.T,
-            q_dot.T,
-            q_ddot.T,
+            q,
+            q_dot,
+            q_ddot,
             np.full(points, int(Status.NOT_REACHED)),
             np.full(points, np.nan),
             np.zeros(points, dtype=np.int64),
@@ -197,6 +203,37 @@ def _follow(inputs: Inputs, motion: _Motion, on_grid: bool, progress: Progress |
             progress(index, len(times))
     motion.forget(index)
     return outcome
+
+
+def _follow_large(inputs: Inputs, motion: _Motion, progress: Progress | None) -> Outcome:
+    """Go through the grid with a module in grouped form."""
+    march = LargeMarch(inputs)
+    times = inputs.t.tolist()
+    found = march.start(times[0])
+    outcome = _large_outcome(found, None)
+    motion.put(0, outcome)
+    for index in range(1, len(times)):
+        if progress:
+            progress(index, len(times))
+        if not isinstance(found, LargeState):
+            break
+        good, found = found, march.advance(found, times[index])
+        outcome = _large_outcome(found, good)
+        motion.put(index, outcome)
+        motion.statistics["marched"] += 1
+    if progress:
+        progress(len(times), len(times))
+    return outcome
+
+
+def _large_outcome(found: LargeState | Status, good: LargeState | None) -> Outcome:
+    """Return a point of a large mechanism's motion, or how it failed after a good one."""
+    if isinstance(found, LargeState):
+        point = Point(found.q, found.Phi, np.empty((0, 0)), 0.0)
+        state = State(found.t, point, found.q_dot, found.q_ddot, 0.0)
+        return Outcome(Status.CONVERGED, found.iterations, state, point)
+    last = None if good is None else _large_outcome(good, None).state
+    return Outcome(found, 0, last)
 
 
 def _grid(equations: Problem, inputs: Inputs, motion: _Motion, first: State) -> NDArray[np.bool_]:

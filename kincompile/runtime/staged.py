@@ -1,4 +1,4 @@
-"""The solve of Phi_q x = b of a large mechanism, stage by stage: equal blocks as lanes, chains by a sparse factorization."""
+"""The solve of Phi_q x = b of a large mechanism in stages: blocks as lanes, chains sparsely."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import SuperLU, splu
 
 if TYPE_CHECKING:
     from types import ModuleType
 
     from numpy.typing import NDArray
+    from scipy.sparse.linalg import SuperLU
 
     Array = NDArray[np.float64]
     Index = NDArray[np.int32]
@@ -38,9 +37,14 @@ class StagedFactors:
 
 
 class _SparseStage:
-    """Equations that are solved together: the fixed pattern of their matrix, values put in place."""
+    """Equations that are solved together: a fixed pattern, values put in place."""
 
     def __init__(self, stage: Any, pattern: Index, size: int) -> None:
+        # Importing SciPy's sparse matrices takes longer than the whole runtime.
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        self._splu: Any = splu
         self.rows, self.columns, self._outer = stage.rows, stage.columns, stage.outer
         row_number = _numbering(stage.rows, size)
         column_number = _numbering(stage.columns, size)
@@ -53,15 +57,20 @@ class _SparseStage:
         # The values of the pattern's entries in the order of the columns.
         self._order = stage.inner[numbered.data - 1]
         self._matrix = csc_array(
-            (np.zeros(count and numbered.nnz), numbered.indices, numbered.indptr), shape=(count, count)
+            (np.zeros(count and numbered.nnz), numbered.indices, numbered.indptr),
+            shape=(count, count),
         )
-        self._outer_rows, self._outer_columns = row_number[pattern[stage.outer, 0]], pattern[stage.outer, 1]
+        self._outer_rows, self._outer_columns = (
+            row_number[pattern[stage.outer, 0]],
+            pattern[stage.outer, 1],
+        )
 
     def factor(self, nonzeros: Array) -> SuperLU:
         """Factor the matrix; RuntimeError where it is exactly singular."""
         self._matrix.data = nonzeros[self._order]
         # The equations are in an order in which the matrix is nearly triangular already.
-        return splu(self._matrix, permc_spec="NATURAL", diag_pivot_thresh=0.1)
+        factored: SuperLU = self._splu(self._matrix, permc_spec="NATURAL", diag_pivot_thresh=0.1)
+        return factored
 
     def solve(self, part: SuperLU, nonzeros: Array, b: Array, x: Array) -> None:
         """Put the solution into x."""
@@ -88,7 +97,9 @@ class _LaneStage:
         """Put the solution into x."""
         stage = self._stage
         right = b[stage.rows]
-        for row, places, columns in zip(stage.outer_rows, stage.outer, self._outer_columns, strict=True):
+        for row, places, columns in zip(
+            stage.outer_rows, stage.outer, self._outer_columns, strict=True
+        ):
             right[row] -= nonzeros[places] * x[columns]
         for columns, values in zip(
             stage.columns, stage.solve(self._functions, part[0], right), strict=True

@@ -13,6 +13,8 @@ from scipy.sparse.csgraph import connected_components, maximum_bipartite_matchin
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from numpy.typing import NDArray
+
 
 @dataclass(frozen=True, slots=True)
 class Block:
@@ -22,7 +24,9 @@ class Block:
     columns: tuple[int, ...]
 
 
-def matching(pattern: Iterable[tuple[int, int]], shape: tuple[int, int]) -> list[int]:
+def matching(
+    pattern: Sequence[tuple[int, int]] | NDArray[np.intp], shape: tuple[int, int]
+) -> list[int]:
     """Match equations with coordinates, one to one and as many as possible.
 
     Parameters
@@ -37,7 +41,7 @@ def matching(pattern: Iterable[tuple[int, int]], shape: tuple[int, int]) -> list
     list of int
         The column matched with each row, -1 where there is none.
     """
-    rows, columns = np.array(list(pattern), dtype=np.intp).reshape(-1, 2).T
+    rows, columns = np.array(pattern, dtype=np.intp).reshape(-1, 2).T
     matrix = csr_array((np.ones(len(rows)), (rows, columns)), shape=shape)
     matched: list[int] = maximum_bipartite_matching(matrix, perm_type="column").tolist()
     return matched

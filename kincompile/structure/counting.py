@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kincompile.errors import StructuralError
 from kincompile.names import listed
 from kincompile.structure.blocks import matching
@@ -12,7 +15,7 @@ from kincompile.structure.blocks import matching
 if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
-Pattern = Sequence[tuple[int, int]]
+Pattern = Sequence[tuple[int, int]] | NDArray[np.intp]
 """Row and column of each entry of Phi_q that is not identically zero."""
 
 

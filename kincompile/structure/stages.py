@@ -1,12 +1,14 @@
-"""The order of solution of a large system: equal blocks together as lanes, and a sparse rest where blocks form a chain.
+"""The order of solution of a large system: equal blocks as lanes, chains as a sparse rest.
 
-The blocks of the block triangular form fall into classes of equal structure. A class whose blocks do not need each other is
-solved as one, each number an array over its blocks. Classes that need each other, or themselves, stay together as one sparse
-system: a chain of loops, each driven by the one before, has no parts that could run side by side.
+The blocks of the block triangular form fall into classes of equal structure. A class whose blocks
+do not need each other is solved as one, each number an array over its blocks. Classes that need
+each other, or themselves, stay together as one sparse system: a chain of loops, each driven by the
+one before, has no parts that could run side by side.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from typing import TYPE_CHECKING
@@ -69,7 +71,9 @@ class Sparse:
 Stage = Lanes | Sparse
 
 
-def plan_stages(rows: Index, columns: Index, constants: Values, size: int) -> tuple[Stage, ...] | None:
+def plan_stages(
+    rows: Index, columns: Index, constants: Values, size: int
+) -> tuple[Stage, ...] | None:
     """Split a large square system into stages.
 
     Parameters
@@ -90,56 +94,62 @@ def plan_stages(rows: Index, columns: Index, constants: Values, size: int) -> tu
     matched = maximum_bipartite_matching(pattern, perm_type="column")
     if (matched < 0).any():
         return None
-    owner = np.empty(size, dtype=np.intp)
-    owner[matched] = np.arange(size)
-    edges = csr_array((np.ones(rows.size), (rows, owner[columns])), shape=(size, size))
-    _, block_of_row = connected_components(edges, connection="strong")
-    block_of_column = block_of_row[owner]
-    is_inner = block_of_row[rows] == block_of_column[columns]
-    row_rank, column_rank = _ranks(block_of_row), _ranks(block_of_column)
-    order, starts, signatures = _signatures(
-        block_of_row[rows], row_rank[rows], column_rank[columns], is_inner, constants, columns
-    )
+    blocks = _Blocks.of(rows, columns, matched)
+    order, starts, signatures = _signatures(blocks, constants)
     classes: dict[tuple[int, ...], list[int]] = {}
     for block, signature in enumerate(signatures):
         classes.setdefault(signature, []).append(block)
     class_of_block = np.empty(len(signatures), dtype=np.intp)
-    for number, blocks in enumerate(classes.values()):
-        class_of_block[blocks] = number
-    outside = ~is_inner
-    needs = np.unique(
-        np.stack((class_of_block[block_of_row[rows[outside]]], class_of_block[block_of_column[columns[outside]]])), axis=1
-    )
-    block_rows = np.argsort(block_of_row, kind="stable")
-    block_columns = np.argsort(block_of_column, kind="stable")
-    sizes = np.bincount(block_of_row)
-    firsts = np.concatenate(([0], np.cumsum(sizes)))
+    for number, members in enumerate(classes.values()):
+        class_of_block[members] = number
+    needs = np.unique(class_of_block[blocks.outside()], axis=1)
     stages: list[Stage] = []
-    for members, is_cyclic in _class_order(needs, len(classes)):
-        blocks = np.flatnonzero(np.isin(class_of_block, members))
+    for together, is_cyclic in _class_order(needs, len(classes)):
+        chosen = np.flatnonzero(np.isin(class_of_block, together))
         if is_cyclic:
-            stages.append(_sparse(blocks, block_of_row, block_of_column, rows, columns, edges))
-            continue
-        width, first = int(sizes[blocks[0]]), firsts[blocks]
-        own_rows = block_rows[first[np.newaxis, :] + np.arange(width)[:, np.newaxis]]
-        own_columns = block_columns[first[np.newaxis, :] + np.arange(width)[:, np.newaxis]]
-        count = int(starts[blocks[0] + 1] - starts[blocks[0]])
-        entries = order[starts[blocks][np.newaxis, :] + np.arange(count)[:, np.newaxis]]
-        inside = is_inner[entries[:, 0]]
-        sample = entries[:, 0]
-        stages.append(
-            Lanes(
-                own_rows,
-                own_columns,
-                entries[inside],
-                tuple(
-                    zip(row_rank[rows[sample[inside]]].tolist(), column_rank[columns[sample[inside]]].tolist(), strict=True)
-                ),
-                entries[~inside],
-                tuple(row_rank[rows[sample[~inside]]].tolist()),
-            )
-        )
+            stages.append(_sparse(chosen, blocks))
+        else:
+            count = len(signatures[chosen[0]])
+            entries = order[starts[chosen][np.newaxis, :] + np.arange(count)[:, np.newaxis]]
+            stages.append(_lanes(chosen, entries, blocks))
     return tuple(stages)
+
+
+@dataclass(frozen=True, slots=True)
+class _Blocks:
+    """The entries of Phi_q, and the blocks of the block triangular form.
+
+    Attributes
+    ----------
+    rows, columns : ndarray of int, shape (nnz,)
+        Place of each entry.
+    of_row, of_column : ndarray of int, shape (size,)
+        Block of each equation and of each coordinate.
+    """
+
+    rows: Index
+    columns: Index
+    of_row: Index
+    of_column: Index
+
+    @classmethod
+    def of(cls, rows: Index, columns: Index, matched: Index) -> _Blocks:
+        """Find the blocks: the strong components of the matched equations."""
+        size = matched.size
+        owner = np.empty(size, dtype=np.intp)
+        owner[matched] = np.arange(size)
+        edges = csr_array((np.ones(rows.size), (rows, owner[columns])), shape=(size, size))
+        _, of_row = connected_components(edges, connection="strong")
+        return cls(rows, columns, of_row, of_row[owner])
+
+    def is_inner(self) -> NDArray[np.bool_]:
+        """Return which entries lie within a block."""
+        return np.asarray(self.of_row[self.rows] == self.of_column[self.columns])
+
+    def outside(self) -> Index:
+        """Return the blocks of row and column of each other entry, shape (2, others)."""
+        outer = ~self.is_inner()
+        return np.stack((self.of_row[self.rows[outer]], self.of_column[self.columns[outer]]))
 
 
 def _ranks(labels: Index) -> Index:
@@ -151,23 +161,45 @@ def _ranks(labels: Index) -> Index:
     return ranks
 
 
-def _signatures(
-    block: Index, row_rank: Index, column_rank: Index, is_inner: NDArray[np.bool_], constants: Values, columns: Index
-) -> tuple[Index, Index, list[tuple[int, ...]]]:
-    """Return the entries sorted by block, where each block begins, and a signature for each block."""
+def _signatures(blocks: _Blocks, constants: Values) -> tuple[Index, Index, list[tuple[int, ...]]]:
+    """Return the entries by block, where each block begins, and the signature of each block."""
     _, kind = np.unique(constants, return_inverse=True)  # all NaN are one kind
-    place = np.where(is_inner, column_rank + 1, 0)
-    code = (row_rank * (column_rank.max() + 2) + place) * (kind.max() + 1) + kind
-    order = np.lexsort((columns, place == 0, row_rank, block))
-    counts = np.bincount(block)
-    starts = np.concatenate(([0], np.cumsum(counts)))
+    row_rank, column_rank = _ranks(blocks.of_row), _ranks(blocks.of_column)
+    place = np.where(blocks.is_inner(), column_rank[blocks.columns] + 1, 0)
+    row, width = row_rank[blocks.rows], int(column_rank.max()) + 2
+    code = (row * width + place) * (int(kind.max()) + 1) + kind
+    block = blocks.of_row[blocks.rows]
+    order = np.lexsort((blocks.columns, place == 0, row, block))
+    starts = np.concatenate(([0], np.cumsum(np.bincount(block))))
     codes, bounds = code[order].tolist(), starts.tolist()
-    signatures = [tuple(codes[a:b]) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-    return order, starts, signatures
+    return order, starts, [tuple(codes[a:b]) for a, b in itertools.pairwise(bounds)]
+
+
+def _lanes(chosen: Index, entries: Index, blocks: _Blocks) -> Lanes:
+    """Return the stage of equal blocks; `entries` has a row an entry and a column a block."""
+    sample = entries[:, 0]
+    inside = blocks.is_inner()[sample]
+    row = _ranks(blocks.of_row)[blocks.rows[sample]]
+    column = _ranks(blocks.of_column)[blocks.columns[sample]]
+    return Lanes(
+        _members(blocks.of_row, chosen),
+        _members(blocks.of_column, chosen),
+        entries[inside],
+        tuple(zip(row[inside].tolist(), column[inside].tolist(), strict=True)),
+        entries[~inside],
+        tuple(row[~inside].tolist()),
+    )
+
+
+def _members(labels: Index, chosen: Index) -> Index:
+    """Return the members of labels of equal size, a column a label."""
+    members, sizes = np.argsort(labels, kind="stable"), np.bincount(labels)
+    first = (np.cumsum(sizes) - sizes)[chosen]
+    return np.asarray(members[first + np.arange(sizes[chosen[0]])[:, np.newaxis]])
 
 
 def _class_order(needs: Index, count: int) -> list[tuple[list[int], bool]]:
-    """Return groups of classes in the order of solution, and whether their blocks need each other."""
+    """Return groups of classes in order of solution, and whether their blocks need each other."""
     graph = csr_array((np.ones(needs.shape[1]), (needs[0], needs[1])), shape=(count, count))
     _, component = connected_components(graph, connection="strong")
     before: dict[int, set[int]] = {label: set() for label in component.tolist()}
@@ -184,28 +216,24 @@ def _class_order(needs: Index, count: int) -> list[tuple[list[int], bool]]:
     ]
 
 
-def _sparse(
-    blocks: Index, block_of_row: Index, block_of_column: Index, rows: Index, columns: Index, edges: csr_array
-) -> Sparse:
+def _sparse(chosen: Index, blocks: _Blocks) -> Sparse:
     """Return the stage of blocks that need each other, in the order in which they do."""
-    own = np.isin(block_of_row, blocks)
-    own_rows, own_columns = np.flatnonzero(own), np.flatnonzero(np.isin(block_of_column, blocks))
-    position = _depths(edges, block_of_row)
-    own_rows = own_rows[np.lexsort((own_rows, position[block_of_row[own_rows]]))]
-    own_columns = own_columns[np.lexsort((own_columns, position[block_of_column[own_columns]]))]
-    entries = np.flatnonzero(own[rows])
-    inside = np.isin(block_of_column[columns[entries]], blocks)
-    return Sparse(own_rows, own_columns, entries[inside], entries[~inside])
+    own = np.isin(blocks.of_row, chosen)
+    rows, columns = np.flatnonzero(own), np.flatnonzero(np.isin(blocks.of_column, chosen))
+    position = _positions(blocks)
+    rows = rows[np.lexsort((rows, position[blocks.of_row[rows]]))]
+    columns = columns[np.lexsort((columns, position[blocks.of_column[columns]]))]
+    entries = np.flatnonzero(own[blocks.rows])
+    inside = np.isin(blocks.of_column[blocks.columns[entries]], chosen)
+    return Sparse(rows, columns, entries[inside], entries[~inside])
 
 
-def _depths(edges: csr_array, block_of_row: Index) -> Index:
+def _positions(blocks: _Blocks) -> Index:
     """Return the position of each block in an order in which none needs a later one."""
-    heads, tails = block_of_row[edges.tocoo().row], block_of_row[edges.tocoo().col]
-    count = int(block_of_row.max()) + 1
+    count = int(blocks.of_row.max()) + 1
     needs: dict[int, set[int]] = {block: set() for block in range(count)}
-    for head, tail in zip(heads.tolist(), tails.tolist(), strict=True):
-        if head != tail:
-            needs[head].add(tail)
+    for head, tail in blocks.outside().T.tolist():
+        needs[head].add(tail)
     position = np.empty(count, dtype=np.intp)
     position[list(TopologicalSorter(needs).static_order())] = np.arange(count)
     return position

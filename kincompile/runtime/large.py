@@ -1,0 +1,162 @@
+r"""The march of a large mechanism, whose module is in grouped form.
+
+The steps are those of `march`: predict with :math:`q + h\,\dot q + \tfrac12 h^2\,\ddot q` (Haug,
+section 3.6), correct by Newton, solve for velocity and acceleration, halve a step that fails. Phi_q
+stays sparse, and is factored stage by stage.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.runtime.grid import LAST_CORRECTION
+from kincompile.runtime.march import ALLOWED_PART, LARGE_ERROR, SMALL_ERROR, SMALLEST_PART
+from kincompile.runtime.newton import RESIDUAL_FACTOR
+from kincompile.runtime.problem import ROUNDING
+from kincompile.runtime.staged import StagedFactors, StagedSolver
+from kincompile.runtime.status import Status
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from kincompile.runtime.inputs import Inputs
+    from kincompile.runtime.problem import Vector
+
+
+def is_grouped(module: ModuleType) -> bool:
+    """Return whether a module is in grouped form."""
+    return getattr(module, "FORM", "") == "grouped"
+
+
+SHORTEST = 2.0**-10
+"""Part of a Newton correction below which it is given up."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LargeState:
+    """A point of the motion, complete.
+
+    Attributes
+    ----------
+    t : float
+        Time.
+    q, q_dot, q_ddot : ndarray, shape (n,)
+        The motion.
+    Phi : ndarray, shape (n,)
+        What is left of the equations.
+    factors
+        Phi_q at the last position but one, factored.
+    iterations : int
+        Newton iterations spent.
+    """
+
+    t: float
+    q: Vector
+    q_dot: Vector
+    q_ddot: Vector
+    Phi: Vector
+    factors: StagedFactors
+    iterations: int
+
+
+class LargeMarch:
+    """A grouped module with its parameters set, and its solver."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        self._module: ModuleType = inputs.module
+        self._p, self._inputs = inputs.p, inputs
+        self._solver = StagedSolver(inputs.module)
+        angular = np.array([unit == "rad" for unit in inputs.module.UNITS.values()])
+        self._angular = angular[: inputs.guess.size]
+        self._reach = max(float(np.max(np.abs(inputs.guess[~self._angular]), initial=0.0)), 1e-12)
+
+    def start(self, t: float) -> LargeState | Status:
+        """Assemble the mechanism at the first time, from the guess."""
+        return self._correct(self._inputs.guess, t, damped=True)
+
+    def advance(self, state: LargeState, t: float) -> LargeState | Status:
+        """Follow the motion from a good point to time `t`, in sub-steps where need be."""
+        step, iterations = t - state.t, 0
+        smallest = abs(step) * SMALLEST_PART
+        while True:
+            whole = abs(step) >= abs(t - state.t)
+            found = self._step(state, t if whole else state.t + step)
+            if isinstance(found, LargeState):
+                iterations += found.iterations
+                state, step = found, 2 * step
+                if whole:
+                    return found
+            elif abs(step) <= smallest:
+                return found
+            else:
+                step /= 2
+
+    def _step(self, state: LargeState, t: float) -> LargeState | Status:
+        """Predict, correct, and accept a point only when it continues the motion."""
+        h = t - state.t
+        move = h * state.q_dot + (h * h / 2) * state.q_ddot
+        predicted = state.q + move
+        found = self._correct(predicted, t)
+        if isinstance(found, Status):
+            return found
+        spread = np.where(self._angular, 1.0, self._reach)
+        error, movement = (
+            np.max(np.abs(found.q - predicted) / spread),
+            np.max(np.abs(move) / spread),
+        )
+        if error > min(LARGE_ERROR, max(SMALL_ERROR, ALLOWED_PART * float(movement))):
+            return Status.NOT_CONVERGED
+        if not np.array_equal(found.factors.signs, state.factors.signs):
+            return Status.SINGULAR  # a singular configuration lies between the two
+        return found
+
+    def _correct(self, q: Vector, t: float, *, damped: bool = False) -> LargeState | Status:
+        """Run Newton's method, and solve for velocity and acceleration where it converges."""
+        module, p, solver = self._module, self._p, self._solver
+        Phi, nonzeros = module.evaluate(q, t, p)
+        for iteration in range(1, self._inputs.max_iterations + 1):
+            try:
+                factors = solver.factor(nonzeros)
+            except RuntimeError:
+                return Status.SINGULAR
+            correction = solver.solve(factors, Phi)
+            if not np.isfinite(correction).all():
+                return Status.SINGULAR if np.isfinite(Phi).all() else Status.NOT_FINITE
+            q, Phi, nonzeros = self._apply(q, Phi, correction, t, damped=damped)
+            largest = np.abs(correction) - ROUNDING * np.abs(q)
+            if np.max(largest) <= self._inputs.tolerance:
+                if np.max(largest) > LAST_CORRECTION:
+                    factors = solver.factor(nonzeros)
+                return self._complete(q, t, Phi, factors, iteration)
+        return Status.NOT_CONVERGED
+
+    def _apply(
+        self, q: Vector, Phi: Vector, correction: Vector, t: float, *, damped: bool
+    ) -> tuple[Vector, Vector, Vector]:
+        """Apply a correction; of a damped one as much as lowers the residual."""
+        part = 1.0
+        while True:
+            moved = q - part * correction
+            found, nonzeros = self._module.evaluate(moved, t, self._p)
+            if not damped or part <= SHORTEST or np.sum(found**2) <= np.sum(Phi**2):
+                return moved, found, nonzeros
+            part /= 2
+
+    def _complete(
+        self, q: Vector, t: float, Phi: Vector, factors: StagedFactors, iterations: int
+    ) -> LargeState | Status:
+        """Solve for velocity and acceleration; check the equations and both solutions."""
+        module, p, solver = self._module, self._p, self._solver
+        allowed = RESIDUAL_FACTOR * self._inputs.tolerance * max(1.0, self._reach)
+        if not np.max(np.abs(Phi)) <= allowed:
+            return Status.NOT_CONVERGED
+        q_dot = solver.solve(factors, module.nu(q, t, p))
+        if not np.isfinite(q_dot).all():
+            return Status.SINGULAR
+        q_ddot = solver.solve(factors, module.gamma(q, q_dot, t, p))
+        if not np.isfinite(q_ddot).all():
+            return Status.SINGULAR
+        return LargeState(t, q, q_dot, q_ddot, Phi, factors, iterations)
