@@ -1,0 +1,153 @@
+"""The grouped form: the same numbers as the inline form, whatever the size of the text."""
+
+import ast
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+from kincompile.ir.grouping import group
+from kincompile.ir.lower import lower
+from kincompile.structure.stages import Lanes, Sparse, plan_stages
+
+FUNCTIONS = ("Phi", "Phi_q", "nu", "Phi_q_nonzeros")
+
+
+def loops(count, link):
+    """Return four-bar loops with lengths of their own, each crank linked to the loop before it."""
+    m = kc.Mechanism("loops")
+    ratio = m.parameter("ratio", 1.1)
+    before = None
+    for k in range(count):
+        s, x = 1 + 0.01 * k, 5.0 * k
+        crank = m.body(f"crank{k}", (x + 0.5 * s, 0, 0))
+        coupler = m.body(f"coupler{k}", (x + 2.13 * s, 0.643 * s, 0.517))
+        rocker = m.body(f"rocker{k}", (x + 2.63 * s, 0.643 * s, 3.937))
+        m.add(kc.Revolute(f"A{k}", m.ground, (x, 0), crank, (-0.5 * s, 0)))
+        m.add(kc.Revolute(f"B{k}", crank, (0.5 * s, 0), coupler, (-1.3 * s, 0)))
+        m.add(kc.Revolute(f"C{k}", coupler, (1.3 * s, 0), rocker, (-0.9 * s, 0)))
+        m.add(kc.Revolute(f"D{k}", rocker, (0.9 * s, 0), m.ground, (x + 2 * s, 0)))
+        if before is None:
+            m.add(kc.AbsoluteAngle("motor", crank, 1.5 * kc.t))
+        elif link == "angle":
+            m.add(kc.RelativeAngle(f"G{k}", before[0], crank, 0.1 * ratio))
+        elif link == "equation":
+            m.add(kc.Equation(f"G{k}", crank.phi - ratio * before[0].phi))
+        elif link == "rocker":
+            m.add(kc.RelativeAngle(f"G{k}", before[1], crank, -3.937))
+        before = crank, rocker
+    return m
+
+
+def both(model):
+    return kc.compile(model, form="grouped"), kc.compile(model, form="inline")
+
+
+def test_every_example_has_the_same_numbers_in_both_forms(example):
+    grouped, written_out = both(example.model)
+    rng = np.random.default_rng(7)
+    n = grouped.N_COORDINATES
+    q, q_dot, t = rng.normal(size=(4, n)), rng.normal(size=(4, n)), rng.uniform(0.1, 1, 4)
+    np.testing.assert_array_equal(grouped.PATTERN, written_out.PATTERN)
+    for name in FUNCTIONS:
+        ours, theirs = getattr(grouped, name)(q, t), getattr(written_out, name)(q, t)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        grouped.gamma(q, q_dot, t), written_out.gamma(q, q_dot, t), rtol=1e-12, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("link", ["angle", "equation", "rocker"])
+def test_both_forms_give_the_same_motion(link):
+    grouped, written_out = both(loops(4, link))
+    t = np.linspace(0, 0.2, 9)
+    ours, theirs = kc.solve(grouped, t), kc.solve(written_out, t, method="march")
+    assert ours.success, ours.message
+    assert theirs.success, theirs.message
+    for ours_part, theirs_part in (
+        (ours.q, theirs.q),
+        (ours.q_dot, theirs.q_dot),
+        (ours.q_ddot, theirs.q_ddot),
+    ):
+        np.testing.assert_allclose(ours_part, theirs_part, rtol=1e-9, atol=1e-9)
+
+
+def test_the_text_does_not_grow_with_the_number_of_constraints():
+    small, large = (len(kc.emit(loops(n, "angle"), form="grouped").source) for n in (10, 200))
+    assert large < 1.02 * small
+
+
+def test_a_written_module_reads_the_file_beside_it(tmp_path):
+    model = loops(3, "angle")
+    source, arrays = kc.emit(model, form="grouped").write(tmp_path)
+    assert (source.name, arrays.name) == ("loops.py", "loops.npz")
+    loaded, fresh = kc.load(source), kc.compile(model, form="grouped")
+    q = np.linspace(0, 1, loaded.N_COORDINATES)
+    np.testing.assert_array_equal(loaded.Phi(q, 0.3), fresh.Phi(q, 0.3))
+
+
+def test_a_module_without_its_arrays_says_so(tmp_path):
+    source, arrays = kc.emit(loops(3, "angle"), form="grouped").write(tmp_path)
+    arrays.unlink()
+    with pytest.raises(kc.ContractError, match=r"loops\.npz"):
+        kc.load(source)
+
+
+def test_the_module_imports_numpy_and_the_standard_library():
+    tree = ast.parse(kc.emit(loops(3, "angle"), form="grouped").source)
+    imported = {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
+    assert imported == {"math", "pathlib", "numpy"}
+
+
+def test_size_chooses_the_form():
+    assert "FORM" in vars(kc.compile(loops(40, "angle")))
+    assert "FORM" not in vars(kc.compile(loops(3, "angle")))
+
+
+def test_a_large_mechanism_without_its_driver_is_refused_by_name():
+    m = loops(40, "angle")
+    m.constraints = [item for item in m.constraints if item.name != "motor"]
+    with pytest.raises(kc.StructuralError, match="1 more equation is needed"):
+        kc.compile(m)
+
+
+def test_an_unknown_form_is_refused():
+    with pytest.raises(kc.InputError, match="forms are: inline, grouped"):
+        kc.emit(loops(1, "angle"), form="tree")
+
+
+def test_an_impossible_position_ends_with_a_status():
+    m = loops(2, "angle")
+    m.add(kc.Equation("far", m.body("block").x - 1e9 * kc.t**2 * kc.t))
+    m.add(kc.Equation("level", m.bodies[-1].y))
+    m.add(kc.Distance("rod", m.bodies[-1], (0, 0), m.ground, (0, 0), 5.0))
+    solution = kc.solve(kc.compile(m, form="grouped"), np.linspace(0, 1, 5))
+    assert not solution.success
+    assert np.isnan(solution.q[solution.status != 0][:, 0]).any()
+
+
+def stages_of(link, count=12):
+    grouped = group(lower(loops(count, link).system()))
+    rows, columns = grouped.pattern().T
+    values = np.concatenate(
+        [
+            np.full(item.rows.size, np.nan if item.number(node) is None else item.number(node))
+            for item in grouped.groups
+            for _, _, node in item.Phi_q
+        ]
+    )
+    order = np.lexsort((columns, rows))
+    return plan_stages(rows[order], columns[order], values[order], 9 * count)
+
+
+def test_independent_loops_are_solved_side_by_side():
+    stages = stages_of("angle")
+    widest = max(stage.rows.shape[1] for stage in stages if isinstance(stage, Lanes))
+    assert widest >= 12
+    assert {type(stage) for stage in stages} == {Lanes, Sparse}  # the chain of cranks is sparse
+
+
+def test_a_chain_of_loops_stays_together():
+    sparse = [stage for stage in stages_of("rocker") if isinstance(stage, Sparse)]
+    assert len(sparse) == 1
+    assert sparse[0].rows.size > 9 * 10
