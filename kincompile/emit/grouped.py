@@ -49,7 +49,7 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
     program = grouped.program
     arrays: dict[str, NDArray[Any]] = {
         "numbers": grouped.numbers,
-        "angles": np.array(grouped.angles),
+        "angles": np.array(grouped.angles, dtype=np.intp),
     }
     rows, columns, constants, order = _pattern(grouped)
     arrays["pattern"] = np.stack((rows, columns), axis=1)

@@ -203,8 +203,9 @@ class _Builder:
         )
         rows = np.array([instance.first_row for instance in instances])
         numbers = self._nodes.number[bindings]
-        # What shapes the code: attributes that are zero, and what stands for the ground.
-        shapes = np.where((numbers == 0) | (numbers == 1), numbers, -1)
+        # What shapes the code: attributes that are zero, and the ground, whose cosine is one.
+        cosine = np.array([name.startswith("cos ") for name in instances[0].kernel.inputs])
+        shapes = np.where((numbers == 0) | ((numbers == 1) & cosine), numbers, -1)
         # One byte string a constraint compares faster than a row of numbers.
         key = np.concatenate((shapes, columns < 0), axis=1).astype(np.int8)
         _, which = np.unique(key.view(f"V{key.shape[1]}").reshape(-1), return_inverse=True)
