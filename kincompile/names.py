@@ -13,6 +13,7 @@ RESERVED = frozenset({"t", "pi", "alpha"})
 """Names with a meaning of their own in every expression."""
 
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_UNIT = re.compile(r"(?!.*\*/)[\w°%·*/^.()+ -]*")
 
 
 def name_problem(name: object, what: str) -> str | None:
@@ -32,6 +33,20 @@ def name_problem(name: object, what: str) -> str | None:
             "angle); rename it"
         )
     return None
+
+
+def unit_problem(unit: object, what: str) -> str | None:
+    """Say what is wrong with a unit, or return None.
+
+    Units stand in comments and docstrings of generated code, so nothing may end those: no quotes,
+    backslashes or line breaks, and no ``*/``.
+    """
+    if isinstance(unit, str) and _UNIT.fullmatch(unit):
+        return None
+    return (
+        f"the unit of {what} is {unit!r}: a unit consists of letters, digits, spaces and "
+        'the characters ° % · * / ^ . ( ) + -, as "m", "rad/s" or "kg*m^2"; write it so'
+    )
 
 
 def rate(name: str, order: int = 1) -> str:

@@ -15,7 +15,7 @@ from kincompile.model.equation import Equation
 from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
-from kincompile.names import body_coordinates, listed, name_problem, rate
+from kincompile.names import body_coordinates, listed, name_problem, rate, unit_problem
 
 
 class ConstraintSystem(MatrixViews):
@@ -290,7 +290,7 @@ def _check_names(
     constraints: list[Constraint | Equation],
     problems: list[str],
 ) -> None:
-    """Check that names are well formed, and that each means one thing."""
+    """Check that names and units are well formed, and that each name means one thing."""
     named = [("the system", name)]
     named += [("a body", body.name) for body in bodies]
     named += [("a parameter", item.name) for item in parameters]
@@ -304,6 +304,9 @@ def _check_names(
         for body in bodies
         if body.name == GROUND.name
     ]
+    units = [(f"parameter {item.name!r}", item.unit) for item in parameters]
+    units += [("lengths", item.unit) for item in coordinates]
+    problems += [problem for what, unit in units if (problem := unit_problem(unit, what))]
     _check_unique("bodies", [body.name for body in bodies], problems)
     _check_unique("constraints", [item.name for item in constraints], problems)
     symbols = [item.name for item in parameters]
