@@ -38,9 +38,13 @@ SCALAR_FUNCTIONS = {
 }
 """Functions that `math` does not have."""
 
-RESERVED = ("f", "q", "q_dot", "t", "p", "np", "math", "pi", "spline", *FUNCTIONS)
+RESERVED = (
+    "f", "q", "q_dot", "t", "p", "np", "math", "pi", "spline", *FUNCTIONS,
+    "sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt",
+)  # fmt: skip
+"""Names that the code of the functions uses."""
+
 RESERVED_IN_SOLVE = ("f", "J", "F", "b")
-RESERVED += ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
 
 
 def emit_numpy(code: InlineProgram) -> Emitted:
