@@ -12,6 +12,7 @@ from sympy.core.relational import Relational
 from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
+from kincompile.model.piecewise import gap_problem
 from kincompile.model.spline import PeriodicSpline
 from kincompile.names import listed, suggestion
 
@@ -72,7 +73,7 @@ def as_expression(value: object) -> Scalar:
         raise NotAnExpressionError(f"{value!r} is not a number or a SymPy expression")
     if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
         raise NotAnExpressionError(f"{value} is not finite")
-    if value.has(sympy.I):
+    if value.has(sympy.I) or (value.is_number and value.is_real is False):  # asin(2) has no I
         raise NotAnExpressionError(f"{value} is not real")
     return _by_name(value)
 
@@ -137,7 +138,7 @@ def smoothness_problem(value: Scalar) -> str | None:
             return f"the function {node.func.__name__} is not supported; {_ELEMENTARY}"
         if not isinstance(node, _KNOWN):
             return f"{type(node).__name__} in {value} is not supported; {_ELEMENTARY}"
-    return None
+    return gap_problem(value) if value.has(sympy.Piecewise) else None
 
 
 def _has_value_everywhere(node: sympy.Piecewise) -> bool:

@@ -1,0 +1,101 @@
+"""Gaps between the pieces of a Piecewise.
+
+They can be seen where its conditions compare one symbol with plain numbers, as `t < 1` does.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, cast
+
+import sympy
+from sympy.core.relational import Relational
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sympy.functions.elementary.piecewise import ExprCondPair
+
+TOLERANCE = 1e-9
+"""A gap relative to the values on both sides: breakpoints are often given as decimal numbers."""
+
+_REMEDY = "let the pieces meet with equal value and slope"
+
+
+def gap_problem(value: sympy.Expr) -> str | None:
+    """Say where an expression made of pieces jumps or turns a corner.
+
+    Velocities and accelerations need the first derivative to be continuous. A breakpoint or a
+    difference that is not a plain number, since it depends on parameters, is not looked at.
+
+    Returns
+    -------
+    str or None
+        The breakpoint and the numbers on both sides, or None where no gap is seen.
+    """
+    for symbol, place, reach in _breakpoints(value):
+        before, after = (_at(value, symbol, place + side * reach) for side in (-1, 1))
+        jump = _numbers_that_differ(before, after, symbol, place)
+        if jump:
+            return (
+                f"the pieces do not meet at {symbol} = {place}: {jump[0]:g} before, "
+                f"{jump[1]:g} after; {_REMEDY}"
+            )
+        corner = _numbers_that_differ(before.diff(symbol), after.diff(symbol), symbol, place)
+        if corner:
+            return (
+                f"the pieces meet in a corner at {symbol} = {place}: the slope is {corner[0]:g} "
+                f"before, {corner[1]:g} after; {_REMEDY}"
+            )
+    return None
+
+
+def _breakpoints(value: sympy.Expr) -> Iterator[tuple[sympy.Symbol, sympy.Expr, sympy.Expr]]:
+    """Yield each symbol with its breakpoints, and how far around one there is no other."""
+    found: dict[sympy.Symbol, set[sympy.Expr]] = {}
+    for relation in value.atoms(Relational):
+        symbols = relation.free_symbols
+        if len(symbols) == 1:
+            symbol = cast("sympy.Symbol", next(iter(symbols)))
+            found.setdefault(symbol, set()).update(_zeros(relation.lhs - relation.rhs, symbol))
+    for symbol in sorted(found, key=str):
+        places = sorted(found[symbol], key=float)
+        reach = min((after - before for before, after in pairwise(places)), default=sympy.S.One)
+        for place in places:
+            yield symbol, place, reach / 4
+
+
+def _zeros(difference: sympy.Expr, symbol: sympy.Symbol) -> list[sympy.Expr]:
+    """Return the real zero of a linear difference; other differences are not looked at."""
+    slope = difference.diff(symbol)
+    if not slope.is_number or not slope.is_real or slope.is_zero:
+        return []
+    zero = -difference.subs(symbol, 0) / slope
+    return [zero] if zero.is_real else []
+
+
+def _at(value: sympy.Expr, symbol: sympy.Symbol, place: sympy.Expr) -> sympy.Expr:
+    """Return the expression that holds around a place: of each Piecewise the piece taken there."""
+
+    def piece(node: sympy.Expr) -> sympy.Expr:
+        for pair in cast("tuple[ExprCondPair, ...]", node.args):
+            holds = pair.cond.subs(symbol, place)
+            if holds == sympy.true:
+                return cast("sympy.Expr", pair.expr)
+            if holds != sympy.false:
+                break
+        return node
+
+    taken = value.replace(lambda node: isinstance(node, sympy.Piecewise), piece)
+    return cast("sympy.Expr", taken)
+
+
+def _numbers_that_differ(
+    before: sympy.Expr, after: sympy.Expr, symbol: sympy.Symbol, place: sympy.Expr
+) -> tuple[float, float] | None:
+    """Return the values of two expressions at a place where both are numbers and not equal."""
+    numbers = [side.subs(symbol, place).evalf() for side in (before, after)]
+    if not all(number.is_Number and number.is_finite for number in numbers):
+        return None
+    left, right = float(numbers[0]), float(numbers[1])
+    return (left, right) if abs(left - right) > TOLERANCE * (1 + abs(left) + abs(right)) else None
