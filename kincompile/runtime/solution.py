@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 class Solution:
     """Position, velocity and acceleration over a time grid of N points, n coordinates.
 
+    Where B variants were solved, all arrays but `t` have a leading axis of length B.
     ``solution["phi_rod"]``, ``solution["x_crank_dot"]`` and ``solution["x_crank_ddot"]`` give
     columns by name.
 
@@ -46,7 +47,7 @@ class Solution:
     units : dict
         Unit of each coordinate and parameter, "" if none.
     parameters : dict
-        Value of each parameter that was used.
+        Value of each parameter that was used; of variants one each, shape (B,).
     statistics : dict
         How it was found: ``coarse``, points of the coarse march of a grid; ``marched``, points that
         were followed one by one with a pivoted solve.
@@ -65,7 +66,7 @@ class Solution:
     coordinates: tuple[str, ...]
     equations: tuple[str, ...]
     units: dict[str, str]
-    parameters: dict[str, float]
+    parameters: dict[str, Any]
     statistics: dict[str, int]
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
@@ -79,7 +80,7 @@ class Solution:
         for order, values in enumerate((self.q, self.q_dot, self.q_ddot)):
             names = columns(self.coordinates, order)
             if column in names:
-                return values[:, names.index(column)]
+                return values[..., names.index(column)]
         known = [name for order in range(3) for name in columns(self.coordinates, order)]
         near = suggestion(str(column), known) or "."
         raise InputError(

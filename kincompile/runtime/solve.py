@@ -1,6 +1,7 @@
 """The motion over a time grid: position, velocity and acceleration at every point.
 
 inputs    checked, in the solver's form          inputs.read_inputs
+  -> of a compiled module, its own march           native.make_native
   -> assemble the first point from the guess     march.start      (newton.assemble)
   -> solve all points together                   grid.solve_grid  (coarse.coarse_march)
   -> follow what cannot be trusted point by point  march.advance  (newton.iterate)
@@ -23,6 +24,7 @@ from kincompile.runtime.march import SMALL_ERROR, Outcome, State, advance, compl
 from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.solution import Solution
 from kincompile.runtime.status import Status
+from kincompile.runtime.variants import read_variants, solve_variants
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,7 +67,9 @@ def solve(
     t : float or array_like, shape (N,)
         Times, rising or falling. One time gives a solution with N = 1.
     p : array_like, shape (k,), or mapping, or None
-        Parameters; a mapping from names to values overrides the module's DEFAULTS.
+        Parameters; a mapping from names to values overrides the module's DEFAULTS. An array of
+        shape (B, 1, k) holds B variants: all are solved, and the solution's arrays get a leading
+        axis of length B.
     guess : array_like, shape (n,), or mapping, or None
         Where Newton starts at the first time; a mapping overrides the module's GUESS.
     tolerance : float
@@ -74,7 +78,8 @@ def solve(
         Cap on Newton's iterations in one attempt.
     method : {"grid", "march"}, optional
         ``"march"`` goes from point to point; ``"grid"`` solves all points together and leaves to
-        the march what it cannot trust. Both give the same; without a choice the faster is taken.
+        the march what it cannot trust. Both give the same; without a choice the faster is taken,
+        which is the compiled march of a module that has one.
     throw : bool
         Raise `SolveError` unless every point converged.
     progress : callable, optional
@@ -94,18 +99,29 @@ def solve(
     SolveError
         With `throw`, when a point failed; `.solution` holds what was found.
     """
-    inputs = read_inputs(module, t, p, guess, tolerance, max_iterations)
+    sets = read_variants(module, p)
+    inputs = read_inputs(module, t, p if sets is None else None, guess, tolerance, max_iterations)
     on_grid = _takes_grid(module, inputs.t.size, method)
-    motion = _Motion.over(inputs)
-    with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
-        if is_grouped(module):
-            outcome = _follow_large(inputs, motion, progress)
-        else:
-            outcome = _follow(inputs, motion, on_grid, progress)
-    solution = _solution(inputs, motion, outcome)
+    if sets is None:
+        solution = _solve_one(inputs, on_grid, progress)
+    else:
+        solution = solve_variants(inputs, sets, progress)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution
+
+
+def _solve_one(inputs: Inputs, on_grid: bool, progress: Progress | None) -> Solution:
+    """Solve with one set of parameters."""
+    motion = _Motion.over(inputs)
+    with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
+        if is_grouped(inputs.module):
+            outcome = _follow_large(inputs, motion, progress)
+        elif method is None and _march_compiled(inputs, motion):
+            outcome = Outcome(Status.CONVERGED, 0, None)
+        else:
+            outcome = _follow(inputs, motion, on_grid, progress)
+    return _solution(inputs, motion, outcome)
 
 
 @dataclass(slots=True, eq=False)
@@ -169,6 +185,23 @@ def _takes_grid(module: ModuleType, points: int, method: str | None) -> bool:
     return method == "grid" or (
         method is None and points >= SMALLEST_GRID and has_planned_solve(module)
     )
+
+
+def _march_compiled(inputs: Inputs, motion: _Motion) -> bool:
+    """Let a compiled module follow the motion; say whether all went well.
+
+    Where anything did not, the careful march finds out what it is, from the first time on.
+    """
+    march = getattr(inputs.module, "march", None)
+    if march is None:
+        return False
+    states = motion.q.T, motion.q_dot.T, motion.q_ddot.T
+    status, iterations = np.empty((2, inputs.t.size), dtype=np.intc)
+    if march(inputs, states, motion.residual, status, iterations) < inputs.t.size:
+        return False
+    motion.status[:], motion.iterations[:] = status, iterations
+    motion.statistics["compiled"] = inputs.t.size
+    return True
 
 
 def _follow(inputs: Inputs, motion: _Motion, on_grid: bool, progress: Progress | None) -> Outcome:

@@ -1,0 +1,79 @@
+"""Many parameter sets at once: each as if it were alone, and none disturbed by another."""
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+
+
+@pytest.fixture(scope="module")
+def four_bar(example_named):
+    return example_named("four_bar").module
+
+
+@pytest.fixture(scope="module")
+def sets(four_bar):
+    rng = np.random.default_rng(0)
+    p = four_bar.DEFAULTS * (1 + 0.02 * rng.normal(size=(12, 1, four_bar.DEFAULTS.size)))
+    p[..., four_bar.PARAMETERS.index("omega")] = 1.5
+    p[3, 0, four_bar.PARAMETERS.index("b")] = 100.0  # cannot be assembled
+    return p
+
+
+def test_that_each_variant_is_solved_as_if_alone(four_bar, sets):
+    t = np.linspace(0, 4, 60)
+    together = kc.solve(four_bar, t, p=sets)
+    assert together.q.shape == (12, 60, 9)
+    for k, p in enumerate(sets):
+        alone = kc.solve(four_bar, t, p=p[0], method="march")
+        np.testing.assert_array_equal(together.status[k], alone.status)
+        for one, other in (
+            (together.q[k], alone.q),
+            (together.q_dot[k], alone.q_dot),
+            (together.q_ddot[k], alone.q_ddot),
+        ):
+            np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-9)
+
+
+def test_that_one_bad_variant_is_named_and_the_others_are_good(four_bar, sets):
+    solution = kc.solve(four_bar, np.linspace(0, 1, 9), p=sets)
+    assert not solution.success
+    assert "1 of 12 variants failed; the first is variant 3 at t = 0" in solution.message
+    assert (np.delete(solution.status, 3, axis=0) == 0).all()
+    assert np.isnan(solution.q[3]).all()
+    assert solution.status[3].tolist() == [1] + [4] * 8
+
+
+def test_that_steps_too_long_for_all_are_taken_by_the_careful_march(four_bar):
+    p = np.repeat(four_bar.DEFAULTS[np.newaxis, np.newaxis], 3, axis=0)
+    t = np.linspace(0, 4, 7)
+    together, alone = kc.solve(four_bar, t, p=p), kc.solve(four_bar, t, method="march")
+    assert together.success, together.message
+    np.testing.assert_allclose(together.q[1], alone.q, atol=1e-9)
+
+
+def test_that_columns_have_a_leading_axis(four_bar, sets):
+    solution = kc.solve(four_bar, [0.0, 0.1], p=sets[:2])
+    assert solution["phi_rocker_dot"].shape == (2, 2)
+    assert solution.parameters["b"].shape == (2,)
+
+
+def test_that_more_variants_than_a_chunk_are_all_solved(four_bar):
+    p = np.repeat(four_bar.DEFAULTS[np.newaxis, np.newaxis], 2100, axis=0)
+    solution = kc.solve(four_bar, [0.0, 0.05], p=p)
+    assert solution.success
+    np.testing.assert_array_equal(solution.q[0], solution.q[-1])
+
+
+@pytest.mark.parametrize("shape", [(3, 1, 4), (3, 2, 5), (0, 1, 5)])
+def test_that_a_wrong_shape_is_refused(four_bar, shape):
+    with pytest.raises(kc.InputError, match=r"give real numbers of shape \(B, 1, 5\)"):
+        kc.solve(four_bar, 0.0, p=np.ones(shape))
+
+
+def test_that_a_value_that_is_not_finite_is_named(four_bar, sets):
+    p = sets.copy()
+    p[5, 0, 1] = np.nan
+    name = four_bar.PARAMETERS[1]
+    with pytest.raises(kc.InputError, match=f"parameter {name!r} of variant 5 is nan"):
+        kc.solve(four_bar, 0.0, p=p)
