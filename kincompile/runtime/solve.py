@@ -103,7 +103,7 @@ def solve(
     inputs = read_inputs(module, t, p if sets is None else None, guess, tolerance, max_iterations)
     on_grid = _takes_grid(module, inputs.t.size, method)
     if sets is None:
-        solution = _solve_one(inputs, on_grid, progress)
+        solution = _solve_one(inputs, on_grid, method is None, progress)
     else:
         solution = solve_variants(inputs, sets, progress)
     if throw and not solution.success:
@@ -111,13 +111,15 @@ def solve(
     return solution
 
 
-def _solve_one(inputs: Inputs, on_grid: bool, progress: Progress | None) -> Solution:
+def _solve_one(
+    inputs: Inputs, on_grid: bool, may_be_compiled: bool, progress: Progress | None
+) -> Solution:
     """Solve with one set of parameters."""
     motion = _Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if is_grouped(inputs.module):
             outcome = _follow_large(inputs, motion, progress)
-        elif method is None and _march_compiled(inputs, motion):
+        elif may_be_compiled and _march_compiled(inputs, motion):
             outcome = Outcome(Status.CONVERGED, 0, None)
         else:
             outcome = _follow(inputs, motion, on_grid, progress)
