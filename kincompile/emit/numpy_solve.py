@@ -15,9 +15,7 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import InlineProgram
 
 
-def solve_functions(
-    code: InlineProgram, listing: SolveListing, prefix: str = ""
-) -> list[str]:
+def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
     """Return the lines of `_factor` and `_solve`, with a prefix where there are several."""
     printer, names = PythonPrinter(listing.plan.nodes, listing.names), listing.names
     factor = [*_unpack([names[node] for node in listing.entries], "J")]
