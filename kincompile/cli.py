@@ -228,8 +228,6 @@ def _print(text: str) -> None:
     try:
         click.echo(text.encode(), nl=False)
     except OSError as error:
-        # What is left in the buffer would fail once more, at the end of the process.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise InputError(f"cannot write to stdout: {error.strerror}") from error
 
 

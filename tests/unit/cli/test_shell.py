@@ -46,7 +46,12 @@ def test_that_too_many_points_for_the_memory_are_a_message(kincompile, pendulum,
 
 
 def test_that_ctrl_c_ends_a_process_without_a_traceback(tmp_path):
-    (tmp_path / "endless.py").write_text("print('running', flush=True)\nwhile True: pass\n")
+    (tmp_path / "endless.py").write_text(
+        "import sys, time\n"
+        "print('running', file=sys.stderr, flush=True)\n"
+        "while True:\n"
+        "    time.sleep(60)\n"
+    )
     command = [sys.executable, "-m", "kincompile", "run", str(tmp_path / "endless.py")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
         assert running.stderr
