@@ -33,6 +33,7 @@ _PUBLIC = {
     "kincompile.runtime.solve": ("solve",),
     "kincompile.runtime.solution": ("Solution",),
     "kincompile.runtime.status": ("Status",),
+    "kincompile.teach.compare": ("compare", "compare_file"),
     "kincompile.errors": (
         "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError",
         "ContractError", "InputError", "SolveError", "InternalError",

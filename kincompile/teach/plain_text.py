@@ -1,0 +1,109 @@
+"""Vector expressions as plain text, in the notation of the textbook: A_i s_i, B_j s_j w_j^2."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.calculus.expressions import (
+    Basis,
+    Dot,
+    Expression,
+    Norm,
+    Number,
+    Perpendicular,
+    Pi,
+    Power,
+    Product,
+    Profile,
+    Scalar,
+    Scaled,
+    Sum,
+    Symbol,
+    TimeFunction,
+    Turned,
+    Vector,
+    VectorSum,
+    VectorSymbol,
+    split_coefficient,
+)
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+
+def described(expression: Expression) -> str:
+    """Return an expression as plain text."""
+    if isinstance(expression, Scalar):
+        return _scalar(expression)
+    return _vector(expression)
+
+
+def _scalar(expression: Scalar) -> str:
+    match expression:
+        case Number(value):
+            return str(value)
+        case Pi():
+            return "pi"
+        case Symbol(name):
+            return _symbol(name)
+        case TimeFunction(name, order) | Profile(name, _, order):
+            return name + "'" * order
+        case Sum(terms):
+            return _sum([_scalar(term) for term in terms])
+        case Product(factors):
+            return _product(factors)
+        case Power(base, exponent):
+            return f"{_bracketed(_scalar(base))}^{exponent}"
+        case Norm(vector):
+            return f"|{_vector(vector)}|"
+        case Dot(left, right):
+            return f"({_vector(left)})^T {_bracketed(_vector(right))}"
+    raise TypeError(f"not a scalar expression: {expression!r}")
+
+
+def _vector(expression: Vector) -> str:
+    match expression:
+        case VectorSymbol(name):
+            return name
+        case Basis():
+            return "e_x"
+        case Turned(Symbol(name), vector, quarter) if name.startswith("phi_"):
+            return f"{'AB'[quarter]}_{name[-1]} {_bracketed(_vector(vector))}"
+        case Turned(angle, vector, quarter):
+            return f"{'AB'[quarter]}({_scalar(angle)}) {_bracketed(_vector(vector))}"
+        case Perpendicular(vector):
+            return f"R {_bracketed(_vector(vector))}"
+        case VectorSum(terms):
+            return _sum([_vector(term) for term in terms]) if terms else "0"
+        case Scaled(factor, vector):
+            number, rest = split_coefficient(factor)
+            parts = [_number(number), *(_bracketed(_scalar(item)) for item in rest)]
+            return " ".join([*filter(None, parts), _bracketed(_vector(vector))])
+    raise TypeError(f"not a vector expression: {expression!r}")
+
+
+def _symbol(name: str) -> str:
+    """Write the angular velocity of a body as w."""
+    if name.startswith("phi_") and name.endswith("_dot"):
+        return f"w_{name[4]}"
+    return name
+
+
+def _product(factors: tuple[Scalar, ...]) -> str:
+    number, rest = split_coefficient(Product(factors))
+    parts = [_number(number), *(_bracketed(_scalar(item)) for item in rest)]
+    return " ".join(filter(None, parts))
+
+
+def _number(number: Fraction) -> str:
+    if number == 1:
+        return ""
+    return "-" if number == -1 else str(number)
+
+
+def _sum(terms: list[str]) -> str:
+    return " + ".join(terms).replace("+ - ", "- ").replace("+ -", "- ")
+
+
+def _bracketed(text: str) -> str:
+    return f"({text})" if " + " in text or " - " in text[1:] else text
