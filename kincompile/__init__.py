@@ -34,6 +34,7 @@ _PUBLIC = {
     "kincompile.runtime.solution": ("Solution",),
     "kincompile.runtime.status": ("Status",),
     "kincompile.teach.compare": ("compare", "compare_file"),
+    "kincompile.teach.derivation": ("derivation",),
     "kincompile.errors": (
         "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError",
         "ContractError", "InputError", "SolveError", "InternalError",

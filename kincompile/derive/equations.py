@@ -21,6 +21,7 @@ class EquationDerivatives:
 
     Phi: sympy.Expr
     Phi_q: tuple[sympy.Expr, ...]
+    velocity: sympy.Expr
     nu: sympy.Expr
     gamma_terms: tuple[sympy.Expr, sympy.Expr, sympy.Expr]
     gamma: sympy.Expr
@@ -40,4 +41,4 @@ def derive_equation(Phi: sympy.Expr, columns: Sequence[str]) -> EquationDerivati
         -2 * velocity.diff(_T),
         -Phi_t.diff(_T),
     )
-    return EquationDerivatives(Phi, tuple(Phi_q), -Phi_t, terms, sympy.Add(*terms))
+    return EquationDerivatives(Phi, tuple(Phi_q), velocity, -Phi_t, terms, sympy.Add(*terms))

@@ -1,0 +1,161 @@
+"""What a page prints besides the vector calculus: symbols, matrices, equations, written-out code.
+
+A formula is a node of `kincompile.calculus`, a SymPy expression, or one of the nodes below. None of
+them knows how it is printed; `notation` does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import sympy
+
+from kincompile.calculus.expressions import Expression, Scalar, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Glyph:
+    """A symbol of the page itself: Phi_q, nu, A_i.
+
+    Attributes
+    ----------
+    letter
+        The letter, or the name of a Greek one.
+    index
+        Subscript; several indices are separated by commas.
+    dots
+        Number of dots over it.
+    bold
+        Whether it is a vector or a matrix.
+    exponent
+        Superscript, "" for none.
+    """
+
+    letter: str
+    index: str = ""
+    dots: int = 0
+    bold: bool = True
+    exponent: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Formulas side by side; a string is an operator, a bracket or a word."""
+
+    parts: tuple[Formula | str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sub:
+    """A formula with a formula as its index: (Phi_q q_dot)_q."""
+
+    base: Formula
+    index: Formula
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    """The derivative of one formula by another: partial, or total with d."""
+
+    numerator: Formula
+    denominator: Formula
+    sign: str = "\N{PARTIAL DIFFERENTIAL}"
+
+
+@dataclass(frozen=True, slots=True)
+class Transposed:
+    """A vector as a row: d^T."""
+
+    vector: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Equated:
+    """Formulas that are equal, in a row: a = b = c."""
+
+    parts: tuple[Formula, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Matrix:
+    """A matrix in brackets; a cell may be a vector or a block."""
+
+    rows: tuple[tuple[Formula, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Decimal(Scalar):
+    """A floating-point number, printed with a number of significant digits."""
+
+    value: float
+    digits: int = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Call(Scalar):
+    """A function of scalars."""
+
+    function: str
+    arguments: tuple[Scalar, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Quotient(Scalar):
+    """A fraction, as the emitted code divides."""
+
+    numerator: Scalar
+    denominator: Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Choice(Scalar):
+    """The first value where the condition holds, the second elsewhere."""
+
+    condition: Scalar
+    first: Scalar
+    second: Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Relation(Scalar):
+    """Two values joined by a relation or a connective: a condition."""
+
+    relation: str
+    left: Scalar
+    right: Scalar
+
+
+Formula: TypeAlias = (
+    Expression | sympy.Basic | Glyph | Row | Sub | Partial | Transposed | Equated | Matrix
+)
+
+PHI, PHI_Q, PHI_T = Glyph("Phi"), Glyph("Phi", "q"), Glyph("Phi", "t")
+PHI_QT, PHI_TT = Glyph("Phi", "qt"), Glyph("Phi", "tt")
+NU, GAMMA = Glyph("nu"), Glyph("gamma")
+Q, Q_DOT, Q_DDOT = Glyph("q"), Glyph("q", dots=1), Glyph("q", dots=2)
+DELTA_Q = Row((Glyph("Delta", bold=False), Q))
+IDENTITY, ZERO_BLOCK = Glyph("I"), Glyph("0")
+VELOCITY_TERM = Row((PHI_Q, Q_DOT))
+GAMMA_TERMS = (
+    Row(("-", Sub(Row(("(", PHI_Q, Q_DOT, ")")), Q), Q_DOT)),
+    Row(("-", "2", PHI_QT, Q_DOT)),
+    Row(("-", PHI_TT)),
+)
+"""The three terms of gamma as the textbook writes them."""
+
+
+def column(values: tuple[Formula, ...]) -> Matrix:
+    """Return a column matrix."""
+    return Matrix(tuple((value,) for value in values))
+
+
+def decimals(values: object, digits: int = 6) -> Matrix:
+    """Return an array of numbers, shape (m,) or (m, n), as a matrix; a vector is a column."""
+    rows = [row if isinstance(row, list) else [row] for row in _nested(values)]
+    return Matrix(tuple(tuple(Decimal(value, digits) for value in row) for row in rows))
+
+
+def _nested(values: object) -> list[list[float] | float]:
+    found: list[list[float] | float] = values.tolist()  # type: ignore[attr-defined]
+    return found
