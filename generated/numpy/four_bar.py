@@ -16,7 +16,9 @@ row  constraint                                        source
 The functions take one point, q of shape (9,), or batches: q (..., 9), t (...)
 and p (..., 5) broadcast against each other. The code of the mechanism is in the functions
 that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch.
+last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
+of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
+a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -516,8 +518,8 @@ def _factor(f, J):
     k_2 = C_y_phi_coupler + B_y_phi_coupler
     k_3 = C_x_phi_rocker + D_x_phi_rocker
     k_4 = C_y_phi_rocker + D_y_phi_rocker
-    k_5 = k_1 * k_4 - k_3 * k_2
-    k_6 = 1 / k_5
+    determinant = k_1 * k_4 - k_3 * k_2
+    k_6 = 1 / determinant
     return (
         A_x_phi_crank,
         A_y_phi_crank,
@@ -533,7 +535,7 @@ def _factor(f, J):
         k_4,
         k_6,
     ), (
-        k_5,
+        determinant,
     )
 
 

@@ -17,7 +17,9 @@ row  constraint                                       source
 The functions take one point, q of shape (9,), or batches: q (..., 9), t (...)
 and p (..., 3) broadcast against each other. The code of the mechanism is in the functions
 that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch.
+last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
+of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
+a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -575,8 +577,8 @@ def _factor(f, J):
         ring_mesh_x_planet * planet_bearing_x_phi_arm
         + ring_mesh_y_planet * planet_bearing_y_phi_arm
     )
-    k_3 = sun_mesh_phi_planet * k_2 - k_1 * ring_mesh_phi_planet
-    k_4 = 1 / k_3
+    determinant = sun_mesh_phi_planet * k_2 - k_1 * ring_mesh_phi_planet
+    k_4 = 1 / determinant
     return (
         planet_bearing_x_phi_arm,
         planet_bearing_y_phi_arm,
@@ -593,7 +595,7 @@ def _factor(f, J):
         k_2,
         k_4,
     ), (
-        k_3,
+        determinant,
     )
 
 

@@ -15,7 +15,9 @@ row  constraint                                      source
 The functions take one point, q of shape (9,), or batches: q (..., 9), t (...)
 and p (..., 0) broadcast against each other. The code of the mechanism is in the functions
 that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch.
+last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
+of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
+a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -537,8 +539,8 @@ def _factor(f, J):
         sleeve_normal_phi_guide - sleeve_normal_x_guide * guide_bearing_x_phi_guide
         - sleeve_normal_y_guide * guide_bearing_y_phi_guide
     )
-    k_3 = k_1 * sleeve_parallel_phi_guide - k_2 * sleeve_parallel_phi_slider
-    k_4 = 1 / k_3
+    determinant = k_1 * sleeve_parallel_phi_guide - k_2 * sleeve_parallel_phi_slider
+    k_4 = 1 / determinant
     return (
         crank_bearing_x_phi_crank,
         crank_bearing_y_phi_crank,
@@ -558,7 +560,7 @@ def _factor(f, J):
         k_2,
         k_4,
     ), (
-        k_3,
+        determinant,
     )
 
 

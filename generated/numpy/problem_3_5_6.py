@@ -12,7 +12,9 @@ row  constraint                        source
 The functions take one point, q of shape (3,), or batches: q (..., 3), t (...)
 and p (..., 0) broadcast against each other. The code of the mechanism is in the functions
 that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch.
+last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
+of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
+a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -239,7 +241,7 @@ def _factor(f, J):
     (
         equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2,
     ) = J
-    k_1 = -(equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3)
+    determinant = -(equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3)
     k_2 = 1 / (equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3)
     return (
         equation_1_phi3,
@@ -248,7 +250,7 @@ def _factor(f, J):
         equation_3_y2,
         k_2,
     ), (
-        k_1,
+        determinant,
     )
 
 

@@ -14,7 +14,9 @@ row  constraint                                       source
 The functions take one point, q of shape (6,), or batches: q (..., 6), t (...)
 and p (..., 2) broadcast against each other. The code of the mechanism is in the functions
 that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch.
+last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
+of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
+a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -419,8 +421,8 @@ def _factor(f, J):
         mesh_roll_y_pinion, mesh_roll_phi_pinion, mesh_pitch_x_rack, mesh_pitch_y_rack,
         mesh_pitch_phi_rack, mesh_pitch_x_pinion, mesh_pitch_y_pinion,
     ) = J
-    k_1 = mesh_roll_x_rack * mesh_pitch_y_rack - mesh_roll_y_rack * mesh_pitch_x_rack
-    k_2 = 1 / k_1
+    determinant = mesh_roll_x_rack * mesh_pitch_y_rack - mesh_roll_y_rack * mesh_pitch_x_rack
+    k_2 = 1 / determinant
     return (
         mesh_roll_x_rack,
         mesh_roll_y_rack,
@@ -435,7 +437,7 @@ def _factor(f, J):
         mesh_pitch_y_pinion,
         k_2,
     ), (
-        k_1,
+        determinant,
     )
 
 

@@ -16,7 +16,9 @@ row  constraint                                      source
 The functions take one point, q of shape (9,), or batches: q (..., 9), t (...)
 and p (..., 0) broadcast against each other. The code of the mechanism is in the functions
 that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch.
+last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
+of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
+a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -419,8 +421,8 @@ def _factor(f, J):
         crank_pin_x_phi_rod, crank_pin_y_phi_crank, crank_pin_y_phi_rod, wrist_pin_x_phi_rod,
         wrist_pin_y_phi_rod,
     ) = J
-    k_1 = wrist_pin_y_phi_rod + crank_pin_y_phi_rod
-    k_2 = 1 / k_1
+    determinant = wrist_pin_y_phi_rod + crank_pin_y_phi_rod
+    k_2 = 1 / determinant
     return (
         main_bearing_x_phi_crank,
         main_bearing_y_phi_crank,
@@ -431,7 +433,7 @@ def _factor(f, J):
         wrist_pin_x_phi_rod,
         k_2,
     ), (
-        k_1,
+        determinant,
     )
 
 

@@ -22,7 +22,9 @@ row    constraint                                                 source
 The functions take one point, q of shape (15,), or batches: q (..., 15), t (...)
 and p (..., 5) broadcast against each other. The code of the mechanism is in the functions
 that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch.
+last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
+of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
+a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -1149,14 +1151,14 @@ def _factor(f, J):
     k_17 = cylinder_parallel_phi_barrel * k_9
     k_18 = k_9 * k_1 - k_2 * k_7
     k_19 = k_7 * cylinder_parallel_phi_barrel
-    k_20 = k_7 * k_11 + k_1 * k_14 - k_8 * k_17
-    k_21 = 1 / k_20
+    determinant = k_7 * k_11 + k_1 * k_14 - k_8 * k_17
+    k_21 = 1 / determinant
     k_22 = 1 / telescope_parallel_phi_extension
-    k_23 = (
+    determinant_ = (
         telescope_normal_x_extension * extend_y_extension
         - telescope_normal_y_extension * extend_x_extension
     )
-    k_24 = 1 / k_23
+    k_24 = 1 / determinant_
     return (
         boom_pivot_x_phi_boom,
         boom_pivot_y_phi_boom,
@@ -1204,9 +1206,9 @@ def _factor(f, J):
         k_22,
         k_24,
     ), (
-        k_20,
+        determinant,
         telescope_parallel_phi_extension,
-        k_23,
+        determinant_,
     )
 
 

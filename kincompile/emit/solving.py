@@ -77,6 +77,8 @@ def schedule_solve(code: InlineProgram, plan: SolvePlan, table: NameTable) -> So
             continue
         if is_factor or is_result or (uses[node] > 1 and nodes[node][0] != "neg"):
             wanted = solved.get(node) or content_name(nodes[node], names, numbers)
+            if node in plan.determinants:
+                wanted = "determinant"
             letter = "b" if node in variable else "k"
             names[node] = table.take(wanted or f"{letter}_{len(steps[node in variable]) + 1}")
             steps[node in variable].append(node)
