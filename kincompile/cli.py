@@ -1,7 +1,8 @@
-"""The command line: `kincompile compile | run | inspect MODEL`.
+"""The command line: `kincompile compile | run | inspect MODEL`, `kincompile compare MODEL HAND`.
 
 stdout is data, stderr messages. Exit codes: 0 done; 2 wrong usage or model, or a file that cannot
-be read or written; 3 the motion did not converge; 130 interrupted. Code 1 is kept for `compare`.
+be read or written; 3 the motion did not converge; 130 interrupted; 1 is kept for `compare`, where
+an entry is different.
 No traceback reaches a user, unless the environment variable KINCOMPILE_TRACEBACK asks for one.
 
 SymPy is loaded by the names of `kc` that need it, so that `--help` does not wait for it.
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
-USAGE_OR_MODEL, NOT_CONVERGED, INTERRUPTED = 2, 3, 130
+DIFFERENT, USAGE_OR_MODEL, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes."""
 
 TRACEBACK = "KINCOMPILE_TRACEBACK"
@@ -185,6 +186,57 @@ def inspect(model: str) -> None:
     _print(f"{kc.inspect(_read(model))}\n")
 
 
+@cli.command()
+@click.argument("model")
+@click.argument("hand")
+@click.option("--constraint", metavar="NAME", help="Check this constraint alone.")
+@click.option("--reveal", is_flag=True, help="Show the right formulas.")
+@click.option("-o", "--output", metavar="FILE", help="Write the report: .html, .json or .txt.")
+@click.option("--gradescope", metavar="FILE", help="Write a results.json for Gradescope.")
+@click.pass_context
+def compare(
+    context: click.Context,
+    model: str,
+    hand: str,
+    constraint: str | None,
+    reveal: bool,
+    output: str | None,
+    gradescope: str | None,
+) -> None:
+    """Compare the formulas in HAND with those derived from MODEL.
+
+    HAND is a TOML or JSON file, or lines such as "Phi_q = [[1, 0, cos(phi)], ...]", with any of
+    Phi, Phi_q, nu and gamma. Its formulas are parsed, never run. The exit code is 0 where all
+    entries are equal, up to a convention that is named or on the constraint manifold; 1 where one
+    is different.
+    """
+    writers = {".html": "to_html", ".json": "to_json", ".txt": "to_text"}
+    if output is not None and Path(output).suffix not in writers:
+        raise InputError(f"{output}: a report is written as .html, .json or .txt")
+    for path in filter(None, (output, gradescope)):
+        require_writable(path)
+    report = kc.compare_file(_read(model), hand, constraint=constraint)
+    if output is not None:
+        write_atomically(output, getattr(report, writers[Path(output).suffix])(reveal))
+    if gradescope is not None:
+        write_atomically(gradescope, report.to_gradescope(reveal))
+    if output is None and sys.stdout.isatty():
+        _print_coloured(report.to_rich(reveal))
+    elif output is None:
+        _print(report.to_text(reveal))
+    else:
+        click.echo(f"{report.summary}\nWrote {output}", err=True)
+    if not report.equal:
+        context.exit(DIFFERENT)
+
+
+def _print_coloured(table: Any) -> None:
+    """Print a table to the terminal."""
+    from rich.console import Console
+
+    Console().print(table)
+
+
 def _read(model: str) -> Mechanism | ConstraintSystem:
     """Read a model; what its file prints is a message, not data."""
     with redirect_stdout(sys.stderr):
@@ -226,7 +278,7 @@ def _times(
 def _print(text: str) -> None:
     """Write data to stdout, or say why that is impossible."""
     try:
-        click.echo(text.encode(), nl=False)
+        click.echo(text, nl=False)
     except OSError as error:
         raise InputError(f"cannot write to stdout: {error.strerror}") from error
 

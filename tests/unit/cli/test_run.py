@@ -111,3 +111,13 @@ def test_that_a_result_replaces_an_existing_file_whole_or_not_at_all(
     assert path.read_text() == "precious"
     assert kincompile("run", pendulum, "-o", path).exit_code == 0
     assert len(rows_of(path)) == 5
+
+
+@pytest.mark.parametrize("output", ["no/out.csv", "out.xlsx"])
+def test_that_an_output_which_cannot_be_written_is_refused_before_the_work(
+    kincompile, tmp_path, output
+):
+    (tmp_path / "model.py").write_text("raise AssertionError('too early')\n")
+    done = kincompile("run", tmp_path / "model.py", "-o", tmp_path / output)
+    assert done.exit_code == 2
+    assert done.stderr.startswith("Error: cannot write ")
