@@ -26,11 +26,12 @@ from kincompile.teach.agreement import agrees
 from kincompile.teach.conventions import Matcher, Matching, Scope, conventions_found
 from kincompile.teach.dependence import Dependence
 from kincompile.teach.diagnosis import Diagnostician, Differing
+from kincompile.teach.entries import Diagnosis, Difference, Entry, Verdict
 from kincompile.teach.hand import Hand, read_hand, vocabulary
 from kincompile.teach.hand_file import HandFile, read_hand_file
 from kincompile.teach.layouts import expected_widths, usual_layout
 from kincompile.teach.reference import QUANTITIES, Reference
-from kincompile.teach.report import Diagnosis, Difference, Entry, Report, Verdict
+from kincompile.teach.report import Report
 from kincompile.teach.states import States, given_states
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ import numpy as np
 from kincompile.model.resolve import Joint
 from kincompile.teach.agreement import ABSOLUTE
 from kincompile.teach.elementary import entry_faults
+from kincompile.teach.entries import Diagnosis
 from kincompile.teach.faults import LEFT_ZERO, Fault, Place, VectorFaults
-from kincompile.teach.report import Diagnosis
 from kincompile.teach.vectors import with_roles_exchanged
 
 if TYPE_CHECKING:
