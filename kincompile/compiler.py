@@ -6,12 +6,14 @@ program   -> inline          InlineProgram     written out in one graph, where e
 pattern   -> require_square                    as many equations as coordinates, matched one to one
 program   -> emit_...        Emitted           the files of a target
 emitted   -> from_source     module            loaded, its contract checked
+module    -> make_native     module            its functions replaced by compiled C, for target="c"
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile.emit.c_target import emit_c
 from kincompile.emit.grouped import emit_grouped
 from kincompile.emit.numpy_target import emit_numpy
 from kincompile.errors import InputError, UnsupportedError
@@ -20,6 +22,7 @@ from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
 from kincompile.names import listed
 from kincompile.runtime.load import from_source
+from kincompile.runtime.native import make_native
 from kincompile.structure.counting import require_square
 from kincompile.structure.report import inspect_system
 
@@ -32,7 +35,7 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.report import Inspection
 
-TARGETS: Mapping[str, Target] = {"numpy": emit_numpy}
+TARGETS: Mapping[str, Target] = {"numpy": emit_numpy, "c": emit_c}
 
 
 LARGEST_INLINE = 300
@@ -49,7 +52,7 @@ def emit(
     model
         A mechanism or a system of free equations.
     target
-        Language of the files: ``"numpy"``.
+        Language of the files: ``"numpy"`` or ``"c"``.
 
     form : {"inline", "grouped"}, optional
         ``"inline"`` writes every constraint out, with names and comments; ``"grouped"`` writes one
@@ -68,7 +71,7 @@ def emit(
     StructuralError
         If the equations cannot determine the coordinates.
     UnsupportedError
-        If there is no such target.
+        If there is no such target, or it cannot print the mechanism.
     """
     if target not in TARGETS:
         raise UnsupportedError(f"there is no target {target!r}; targets are: {listed(TARGETS)}")
@@ -90,7 +93,7 @@ def emit(
 
 
 def compile(  # noqa: A001 - the public name kc.compile
-    model: Mechanism | ConstraintSystem, form: str | None = None
+    model: Mechanism | ConstraintSystem, target: str = "numpy", form: str | None = None
 ) -> ModuleType:
     """Compile a mechanism and load the result.
 
@@ -98,22 +101,31 @@ def compile(  # noqa: A001 - the public name kc.compile
     ----------
     model
         A mechanism or a system of free equations.
-
+    target
+        ``"numpy"``, or ``"c"``: the same module, but its functions are compiled by the machine's
+        own C compiler, which takes a second or two the first time; after that they come from the
+        user's cache.
     form : {"inline", "grouped"}, optional
         As for `emit`.
 
     Returns
     -------
     module
-        The emitted NumPy module, with Phi, Phi_q, nu, gamma and their fused forms.
+        The emitted module, with Phi, Phi_q, nu, gamma and their fused forms.
 
     Raises
     ------
     ModelError, StructuralError
         As `emit` does.
+    UnsupportedError
+        If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    emitted = emit(model, form=form)
-    return from_source(emitted.source, model.name, emitted.arrays)
+    emitted = emit(model, target, form)
+    if target == "numpy":
+        return from_source(emitted.source, model.name, emitted.arrays)
+    # The NumPy module has the constants, the checks and the careful march of the compiled one.
+    module = from_source(emit(model, form="inline").source, model.name)
+    return make_native(module, emitted.files)
 
 
 def inspect(model: Mechanism | ConstraintSystem) -> Inspection:

@@ -39,6 +39,10 @@ class Example:
     path: Path
     model: Any
 
+    def files(self, target: str) -> Any:
+        """Text by file name, as a target emits it."""
+        return kc.emit(self.model, target).files
+
     @cached_property
     def source(self) -> Any:
         """The emitted NumPy module as text."""

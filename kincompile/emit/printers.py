@@ -5,6 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
+from kincompile.errors import UnsupportedError
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -69,3 +71,52 @@ class PythonPrinter:
         if isinstance(value, Fraction):
             return f"{value.numerator} / {value.denominator}", PRODUCT
         return repr(value), ATOM
+
+
+class CPrinter(PythonPrinter):
+    """Prints nodes as C expressions of doubles; `square` and others are the template's."""
+
+    def _print(self, node: int, *, own: bool = False) -> tuple[str, int]:
+        if node in self._names and not own:
+            return self._names[node], ATOM
+        match self._nodes[node]:
+            case ("pi",):
+                return "PI", ATOM
+            case ("square", a):
+                return f"square({self.text(a)})", ATOM
+            case ("call", name, *arguments):
+                return self._call(name, [self.text(k) for k in arguments]), ATOM
+            case ("select", condition, a, b):
+                return f"({self.text(condition)} ? {self.text(a)} : {self.text(b)})", ATOM
+            case ("logic", connective, a, b):
+                return f"({self.text(a)} {connective * 2} {self.text(b)})", ATOM
+            case ("table", name, order, a):
+                return f"spline(&{name}, {order}, {self.text(a)})", ATOM
+        return super()._print(node, own=own)
+
+    def _call(self, name: str, arguments: list[str]) -> str:
+        """Return a call; cosine and sine say by `far` that an angle is out of their reach."""
+        if name in C_ANGLE_FUNCTIONS:
+            return f"{C_ANGLE_FUNCTIONS[name]}({', '.join(arguments)}, exact, &far)"
+        if name not in C_FUNCTIONS:
+            raise UnsupportedError(
+                f"the C target has no function {name!r}; use the NumPy target, or write the "
+                "expression with other functions"
+            )
+        return f"{name}({', '.join(arguments)})"
+
+    def number(self, value: Constant) -> tuple[str, int]:
+        """Return a non-negative number as text: a double, since C divides integers to integers."""
+        if isinstance(value, Fraction):
+            return f"{float(value.numerator)!r} / {float(value.denominator)!r}", PRODUCT
+        return repr(float(value)), ATOM
+
+
+C_ANGLE_FUNCTIONS = {"cos": "cosine", "sin": "sine"}
+"""Functions that the C target has of its own, so that compilers take several points at once."""
+
+C_FUNCTIONS = frozenset({
+    "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
+    "exp", "log", "sqrt", "pow",
+})  # fmt: skip
+"""Functions of C's math.h."""

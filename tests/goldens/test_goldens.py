@@ -1,4 +1,4 @@
-"""The committed modules of generated/numpy/ are what the examples emit today, and they run alone.
+"""The committed files of generated/ are what the examples emit today, and they run alone.
 
 `pytest -k golden --update-goldens` rewrites them and fails the run, so that nothing passes by
 updating. The bytes are those of the pinned SymPy; on another one the numbers must agree.
@@ -20,11 +20,13 @@ import kincompile as kc
 from kincompile.compiler import TARGETS
 
 ROOT = Path(__file__).resolve().parents[2]
-GENERATED = ROOT / "generated" / "numpy"
+GENERATED = ROOT / "generated"
+NUMPY = GENERATED / "numpy"
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
 PINNED = re.search(
     r"^sympy==(\S+)$", (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE
 )
+SUFFIXES = {"numpy": (".py",), "c": (".c", ".h")}
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
 # Runs a golden in an interpreter in which neither kincompile nor SymPy can be imported.
@@ -56,8 +58,10 @@ import kincompile as kc
 
 for path in sys.argv[1:]:
     names = runpy.run_path(path)
-    source = kc.emit(names["mechanism"] if "mechanism" in names else names["system"]).source
-    print(path, hashlib.sha256(source.encode()).hexdigest())
+    model = names["mechanism"] if "mechanism" in names else names["system"]
+    for target in ("numpy", "c"):
+        text = "".join(kc.emit(model, target).files.values())
+        print(target, path, hashlib.sha256(text.encode()).hexdigest())
 """
 
 
@@ -90,12 +94,18 @@ def rewritten(request, example_named):
     """With --update-goldens rewrite them first, and return what was changed."""
     if not request.config.getoption("--update-goldens"):
         return []
-    return update(GENERATED, {name: example_named(name).source for name in EXAMPLES})
+    wanted = {
+        f"{target}/{file}": text
+        for target in SUFFIXES
+        for name in EXAMPLES
+        for file, text in example_named(name).files(target).items()
+    }
+    return update(GENERATED, wanted)
 
 
-def update(folder: Path, sources: dict[str, str]) -> list[str]:
+def update(folder: Path, files: dict[str, str]) -> list[str]:
     """Bring a folder of goldens up to date; return what was changed."""
-    wanted = {folder / f"{name}.py": source for name, source in sources.items()}
+    wanted = {folder / name: text for name, text in files.items()}
     changes = []
     for path in sorted(file for file in folder.rglob("*") if file.is_file()):
         if path not in wanted:
@@ -114,19 +124,23 @@ def test_that_this_run_does_not_rewrite_them(rewritten):
 
 
 def test_that_nothing_is_missing_and_nothing_extra():
-    assert {path.name for path in GENERATED.parent.iterdir()} <= set(TARGETS)
-    found = [path for path in GENERATED.rglob("*") if "__pycache__" not in path.parts]
-    assert sorted(found) == [GENERATED / f"{name}.py" for name in EXAMPLES]
+    assert sorted(path.name for path in GENERATED.iterdir()) == sorted(SUFFIXES) == sorted(TARGETS)
+    for target, suffixes in SUFFIXES.items():
+        found = [path for path in (GENERATED / target).iterdir() if path.name != "__pycache__"]
+        wanted = [f"{name}{suffix}" for name in EXAMPLES for suffix in suffixes]
+        assert sorted(path.name for path in found) == sorted(wanted)
 
 
 @pytest.mark.skipif(not is_pinned(), reason="the bytes are those of the pinned SymPy")
-def test_that_the_text_is_what_is_emitted_today(example):
-    path = GENERATED / f"{example.path.stem}.py"
-    assert read_text(path) == example.source, "make update-goldens rewrites it, if it is meant"
+@pytest.mark.parametrize("target", SUFFIXES)
+def test_that_the_text_is_what_is_emitted_today(example, target):
+    for name, text in example.files(target).items():
+        golden = read_text(GENERATED / target / name)
+        assert golden == text, "make update-goldens rewrites it, if it is meant"
 
 
 def test_that_the_numbers_are_those_of_today(example):
-    golden = kc.load(GENERATED / f"{example.path.stem}.py")
+    golden = kc.load(NUMPY / f"{example.path.stem}.py")
     module = example.module
     for constant in ("COORDINATES", "EQUATIONS", "PARAMETERS", "UNITS"):
         assert getattr(golden, constant) == getattr(module, constant)
@@ -140,7 +154,7 @@ def test_that_the_numbers_are_those_of_today(example):
 
 
 def test_that_they_run_where_kincompile_and_sympy_cannot_be_imported(example_named):
-    paths = [str(GENERATED / f"{name}.py") for name in EXAMPLES]
+    paths = [str(NUMPY / f"{name}.py") for name in EXAMPLES]
     results = json.loads(run("-I", "-c", ALONE, *paths))
     assert sorted(results) == EXAMPLES
     for name, values in results.items():
@@ -162,14 +176,16 @@ def test_that_the_bytes_do_not_depend_on_the_hash_seed(example_named, seed):
     paths = [str(example_named(name).path) for name in EXAMPLES]
     printed = run("-c", EMIT, *paths, PYTHONHASHSEED=seed)
     digests = dict(line.rsplit(" ", 1) for line in printed.splitlines())
-    for name, path in zip(EXAMPLES, paths, strict=True):
-        here = hashlib.sha256(example_named(name).source.encode()).hexdigest()
-        assert digests[path] == here, name
+    for target in SUFFIXES:
+        for name, path in zip(EXAMPLES, paths, strict=True):
+            text = "".join(example_named(name).files(target).values())
+            here = hashlib.sha256(text.encode()).hexdigest()
+            assert digests[f"{target} {path}"] == here, name
 
 
 def test_that_they_have_no_errors_of_style():
     pytest.importorskip("ruff", reason="ruff comes with the extra `lint`")
-    run("-m", "ruff", "check", "--isolated", "--no-cache", "--select", "E9,F", str(GENERATED))
+    run("-m", "ruff", "check", "--isolated", "--no-cache", "--select", "E9,F", str(NUMPY))
 
 
 def test_that_updating_rewrites_and_removes(tmp_path):
@@ -178,16 +194,16 @@ def test_that_updating_rewrites_and_removes(tmp_path):
     (folder / "kept.py").write_bytes(b"same\n")
     (folder / "old.py").write_bytes(b"old\n")
     (folder / "stray.py").write_bytes(b"stray\n")
-    sources = {"kept": "same\n", "old": "new\n", "added": "added\n"}
-    changes = update(folder, sources)
+    files = {"kept.py": "same\n", "old.py": "new\n", "added.py": "added\n"}
+    changes = update(folder, files)
     assert changes == ["removed stray.py", "wrote old.py", "wrote added.py"]
-    assert {path.stem: read_text(path) for path in folder.iterdir()} == sources
-    assert update(folder, sources) == ["nothing had changed"]
+    assert {path.name: read_text(path) for path in folder.iterdir()} == files
+    assert update(folder, files) == ["nothing had changed"]
 
 
 @pytest.mark.parametrize(
     "volatile", [r"/work|/home|/tmp", r"\b20\d\d-\d\d-\d\d\b", r"0x[0-9a-f]{6}"]
 )
 def test_that_they_hold_nothing_volatile(volatile):
-    for name in EXAMPLES:
-        assert not re.search(volatile, read_text(GENERATED / f"{name}.py")), name
+    for path in [path for path in GENERATED.rglob("*.*") if path.suffix in (".py", ".c", ".h")]:
+        assert not re.search(volatile, read_text(path)), path.name

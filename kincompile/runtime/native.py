@@ -1,0 +1,401 @@
+"""An emitted module whose functions run as compiled C.
+
+The NumPy module of the same mechanism stays below: its constants, its checks and its messages are
+the module's, complex numbers (for complex steps) run on it, and so does the careful march that
+takes over where the compiled one reports anything but success.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import threading
+from ctypes import Structure, byref, c_double, c_int, c_size_t, c_ssize_t, c_void_p
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.runtime.c_library import library
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.inputs import Inputs
+
+    Array = NDArray[np.float64]
+    Function = Callable[..., Any]
+
+REAL = np.dtype(np.float64)
+NUMBER = REAL.itemsize
+
+STATES = ("q", "q_dot")
+QUANTITIES: Mapping[str, tuple[str, ...]] = {
+    "Phi": ("Phi",),
+    "Phi_q": ("Phi_q",),
+    "nu": ("nu",),
+    "gamma": ("gamma",),
+    "Phi_q_nonzeros": ("nonzeros",),
+    "position": ("Phi", "Phi_q"),
+    "velocity": ("Phi_q", "nu"),
+    "acceleration": ("Phi_q", "gamma"),
+    "kinematics": ("Phi", "Phi_q", "nu", "gamma"),
+}
+"""What each function of a module returns."""
+
+BATCH_LAST = ("Phi", "nonzeros", "nu", "gamma")
+"""What `kinematics_batch_last` returns."""
+
+
+class _Numbers(Structure):
+    """Numbers of many points: entry i of point k is ``first[i * entry + k * point]``."""
+
+    _fields_ = (("first", c_void_p), ("entry", c_ssize_t), ("point", c_ssize_t))
+
+
+class _Batch(Structure):
+    """What is to be evaluated, as the emitted header has it."""
+
+    _fields_ = (
+        ("count", c_size_t),
+        *((name, _Numbers) for name in (*STATES, "t", "p")),
+        *((name, _Numbers) for name in ("Phi", "Phi_q", "nonzeros", "nu", "gamma")),
+        ("varying_only", c_int),
+    )
+
+
+class _System(Structure):
+    """Linear systems, as the emitted header has them."""
+
+    _fields_ = (("count", c_size_t), *((name, _Numbers) for name in ("nonzeros", "b", "x")))
+
+
+class _Motion(Structure):
+    """A motion, as the emitted header has it."""
+
+    _fields_ = (
+        ("count", c_size_t),
+        *((name, c_void_p) for name in ("t", "p", "guess")),
+        ("tolerance", c_double),
+        ("max_iterations", c_int),
+        *((name, _Numbers) for name in ("q", "q_dot", "q_ddot")),
+        *((name, c_void_p) for name in ("residual", "status", "iterations")),
+    )
+
+
+def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
+    """Replace the functions of an emitted NumPy module by compiled ones.
+
+    Parameters
+    ----------
+    module
+        The NumPy module of a mechanism, loaded; it is changed.
+    files
+        What the C target emitted for the same mechanism.
+
+    Returns
+    -------
+    module
+        The same module. It has a function ``march`` more where the mechanism has a planned solve.
+
+    Raises
+    ------
+    UnsupportedError
+        If there is no C compiler, or it does not do its work.
+    """
+    loaded = library(module.NAME, files, module.FINGERPRINT)
+    functions = _Functions(module, loaded)
+    names = vars(module)
+    compiled = {name: functions.evaluator(name) for name in QUANTITIES}
+    compiled["kinematics_batch_last"] = functions.batch_last()
+    if "solve" in names:
+        compiled["solve"] = functions.solve()
+        compiled["march"] = functions.march()
+    for name, function in compiled.items():
+        function.__name__, function.__module__ = name, module.__name__
+        function.__doc__ = getattr(names.get(name), "__doc__", function.__doc__)
+    names.update(compiled)
+    return module
+
+
+class _Point:
+    """Evaluates one point; the numbers go through memory of fixed place, under a lock.
+
+    Attributes
+    ----------
+    lock
+        To be held from writing the states until the results are copied.
+    states
+        Where coordinates and rates are to be written.
+    evaluate
+        Function of t and p that gives the results, or None where they are not a point's or a
+        number is not finite.
+    """
+
+    def __init__(
+        self,
+        module: ModuleType,
+        loaded: ctypes.CDLL,
+        quantities: Sequence[str],
+        shapes: Mapping[str, tuple[int, ...]],
+    ) -> None:
+        self.lock = threading.Lock()
+        self.states = tuple(np.zeros((2, module.N_COORDINATES)))
+        time, parameters = np.zeros(1), module.DEFAULTS.copy()
+        results = [np.zeros(shapes[quantity]) for quantity in quantities]
+        batch = _Batch(count=1, t=_vector(time), p=_vector(parameters))
+        batch.q, batch.q_dot = (_vector(state) for state in self.states)
+        for quantity, result in zip(quantities, results, strict=True):
+            setattr(batch, quantity, _vector(result))
+        # To give up the interpreter's lock for a point would take longer than the point.
+        prototype = ctypes.PYFUNCTYPE(c_int, c_void_p)
+        run = prototype((f"{module.NAME}_evaluate", loaded))
+        self.evaluate = _point_evaluator(module.DEFAULTS, time, parameters, results, run, batch)
+
+
+def _point_evaluator(
+    defaults: Array,
+    time: Array,
+    parameters: Array,
+    results: Sequence[Array],
+    run: Function,
+    batch: _Batch,
+) -> Function:
+    """Return the function that sets time and parameters, runs a point and copies its results."""
+    ndarray, shape, real, copy = np.ndarray, defaults.shape, REAL, np.ndarray.copy
+    pointer, result, is_one, last = byref(batch), results[0], len(results) == 1, defaults
+
+    def evaluate(t: Any, p: Any) -> Any:
+        nonlocal last
+        if not isinstance(t, float):
+            return None
+        # Parameters are copied unless they are the defaults, which cannot have changed.
+        if p is not last or p is not defaults:
+            if type(p) is not ndarray or p.shape != shape or p.dtype is not real:
+                return None
+            parameters[...] = p
+            last = p
+        time[0] = t
+        if run(pointer):
+            return None
+        return result.copy() if is_one else tuple(map(copy, results))
+
+    return evaluate
+
+
+class _Functions:
+    """Makes the functions of a module from those of its library."""
+
+    def __init__(self, module: ModuleType, loaded: ctypes.CDLL) -> None:
+        self._module, self._library, self._name = module, loaded, module.NAME
+        self._n, self._m = module.N_COORDINATES, module.N_EQUATIONS
+        self._shapes: dict[str, tuple[int, ...]] = {
+            "Phi": (self._m,),
+            "Phi_q": (self._m, self._n),
+            "nonzeros": (len(module.PATTERN),),
+            "nu": (self._m,),
+            "gamma": (self._m,),
+        }
+        self._run = getattr(loaded, f"{self._name}_evaluate")
+
+    def evaluator(self, name: str) -> Function:
+        """Return a function of points (..., n).
+
+        A single point is looked at first, and nothing is called that need not be: what is around
+        the compiled code takes ten times as long as the code itself.
+        """
+        quantities = QUANTITIES[name]
+        point, evaluate = _Point(self._module, self._library, quantities, self._shapes), self._batch
+        defaults, original = self._module.DEFAULTS, getattr(self._module, name)
+        ndarray, shape, real = np.ndarray, (self._n,), REAL
+        lock, q_place, q_dot_place, at_point = point.lock, *point.states, point.evaluate
+
+        def of_states(q: Any, q_dot: Any, t: Any, p: Any = defaults) -> Any:
+            if (
+                type(q) is ndarray and q.shape == shape and q.dtype is real
+                and type(q_dot) is ndarray and q_dot.shape == shape and q_dot.dtype is real
+            ):  # fmt: skip
+                with lock:
+                    q_place[...] = q
+                    q_dot_place[...] = q_dot
+                    results = at_point(t, p)
+                if results is not None:
+                    return results
+            results = evaluate(quantities, (q, q_dot), t, p)
+            return original(q, q_dot, t, p) if results is None else results
+
+        def of_positions(q: Any, t: Any, p: Any = defaults) -> Any:
+            if type(q) is ndarray and q.shape == shape and q.dtype is real:
+                with lock:
+                    q_place[...] = q
+                    results = at_point(t, p)
+                if results is not None:
+                    return results
+            results = evaluate(quantities, (q,), t, p)
+            return original(q, t, p) if results is None else results
+
+        return of_states if "gamma" in quantities else of_positions
+
+    def _batch(self, quantities: Sequence[str], states: tuple[Any, ...], t: Any, p: Any) -> Any:
+        """Evaluate a batch whose axes are the first ones; None where numbers are complex."""
+        batch = self._plain(states, t, p)
+        if batch is not None:
+            results = self._fill(batch, quantities, states[0].shape[:-1])
+            if results is not None:
+                return results
+        # Broadcasting, conversion and what is to be said of bad arguments are the module's.
+        rows, t, p, shape = vars(self._module)["_batch"](t, p, states)
+        if rows[0].dtype != REAL:
+            return None
+        batch = _Batch(count=math.prod(shape), t=_times(t), p=_numbers(p))
+        for name, state in zip(STATES, rows, strict=False):
+            setattr(batch, name, _numbers(state))
+        return self._fill(batch, quantities, shape)
+
+    def _plain(self, states: tuple[Any, ...], t: Any, p: Any) -> _Batch | None:
+        """Return a batch of arrays that need no conversion; that they are finite C will see."""
+        shape = getattr(states[0], "shape", ())
+        if not (
+            all(_is_plain(state, (*shape[:-1], self._n)) for state in states)
+            and _is_plain(p, self._module.DEFAULTS.shape)
+            and (isinstance(t, float) or _is_plain(t, shape[:-1]))
+        ):
+            return None
+        time = np.asarray(t)
+        batch = _Batch(count=math.prod(shape[:-1]), t=_times(time), p=_numbers(p))
+        for name, state in zip(STATES, states, strict=False):
+            setattr(batch, name, _Numbers(state.ctypes.data, 1, self._n))
+        return batch if batch.count else None
+
+    def _fill(self, batch: _Batch, quantities: Sequence[str], shape: tuple[int, ...]) -> Any:
+        """Run a batch into new arrays; None where a number is not finite."""
+        results = []
+        for quantity in quantities:
+            result = np.empty((*shape, *self._shapes[quantity]))
+            size = math.prod(self._shapes[quantity])
+            setattr(batch, quantity, _Numbers(result.ctypes.data, 1, size))
+            results.append(result)
+        if self._run(byref(batch)):
+            return None
+        return results[0] if len(results) == 1 else tuple(results)
+
+    def batch_last(self) -> Function:
+        """Return `kinematics_batch_last`."""
+        defaults, original = self._module.DEFAULTS, self._module.kinematics_batch_last
+        sizes = [math.prod(self._shapes[quantity]) for quantity in BATCH_LAST]
+
+        def kinematics_batch_last(
+            q: Any, q_dot: Any, t: Any, p: Any = defaults, out: Any = None
+        ) -> Any:
+            shape: tuple[int, ...] = getattr(q, "shape", ())
+            arrays = [*((item, (self._n, *shape[1:])) for item in (q, q_dot))]
+            if (
+                len(shape) != 2
+                or not all(_is_real(*item) for item in arrays)
+                or not (isinstance(t, float) or _is_real(t, shape[1:]))
+                or not (_is_real(p, defaults.shape) or _is_real(p, (defaults.size, shape[1])))
+            ):
+                return original(q, q_dot, t, p)
+            results = out or _split(np.empty((sum(sizes), shape[1])), sizes)
+            batch = _Batch(count=shape[1], q=_numbers(q), q_dot=_numbers(q_dot), p=_numbers(p))
+            time = np.asarray(t)
+            batch.t, batch.varying_only = _times(time), out is not None
+            for quantity, result in zip(BATCH_LAST, results, strict=True):
+                setattr(batch, quantity, _numbers(result))
+            return original(q, q_dot, t, p) if self._run(byref(batch)) else results
+
+        return kinematics_batch_last
+
+    def solve(self) -> Function:
+        """Return the planned solve."""
+        original, run = self._module.solve, getattr(self._library, f"{self._name}_solve")
+
+        def solve(nonzeros: Any, b: Any) -> Any:
+            nonzeros, b = np.asarray(nonzeros), np.asarray(b)
+            if "c" in (nonzeros.dtype.kind, b.dtype.kind):
+                return original(nonzeros, b)
+            shape = np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
+            x = np.empty((*shape, self._n))
+            system = _System(math.prod(shape), x=_Numbers(x.ctypes.data, 1, self._n))
+            system.nonzeros = _numbers(matrix := _rows(nonzeros, shape, self._shapes["nonzeros"]))
+            system.b = _numbers(right := _rows(b, shape, (self._m,)))
+            run(byref(system))
+            del matrix, right  # until here their memory is read
+            return x
+
+        return solve
+
+    def march(self) -> Function:
+        """Return the march over a time grid."""
+        run = getattr(self._library, f"{self._name}_march")
+        run.restype = c_size_t
+
+        def march(
+            inputs: Inputs,
+            states: Sequence[Array],
+            residual: Array,
+            status: NDArray[np.intc],
+            iterations: NDArray[np.intc],
+        ) -> int:
+            """Follow the motion from the guess as long as every point converges.
+
+            Fills position, velocity and acceleration, (n, N) each, and of every point the largest
+            absolute value of Phi, the `Status` and the Newton iterations, (N,) each. Returns how
+            many points converged, from the first one on.
+            """
+            t, p, guess = inputs.t, inputs.p, inputs.guess
+            motion = _Motion(t.size, t.ctypes.data, p.ctypes.data, guess.ctypes.data)
+            motion.tolerance, motion.max_iterations = inputs.tolerance, inputs.max_iterations
+            motion.q, motion.q_dot, motion.q_ddot = (_numbers(state) for state in states)
+            motion.residual, motion.status = residual.ctypes.data, status.ctypes.data
+            motion.iterations = iterations.ctypes.data
+            return int(run(byref(motion)))
+
+        return march
+
+
+def _vector(array: Array) -> _Numbers:
+    """Return the numbers of one point."""
+    return _Numbers(array.ctypes.data, 1, 0)
+
+
+def _numbers(array: Array) -> _Numbers:
+    """Return an array whose last axis is the batch; one without it is shared by all points."""
+    if array.ndim == 2:
+        entry, point = array.strides
+        return _Numbers(array.ctypes.data, entry // NUMBER, point // NUMBER)
+    return _Numbers(array.ctypes.data, 1, 0)
+
+
+def _times(array: Array) -> _Numbers:
+    """Return one time a point, or one for all."""
+    return _Numbers(array.ctypes.data, 0, array.strides[-1] // NUMBER if array.ndim else 0)
+
+
+def _is_real(value: Any, shape: tuple[int, ...]) -> bool:
+    """Return whether something is an array of real numbers that C can read where it lies."""
+    return (
+        type(value) is np.ndarray
+        and value.shape == shape
+        and value.dtype is REAL
+        and value.flags.aligned
+        and all(stride % NUMBER == 0 for stride in value.strides)
+    )
+
+
+def _is_plain(value: Any, shape: tuple[int, ...]) -> bool:
+    return _is_real(value, shape) and value.flags.c_contiguous
+
+
+def _rows(array: Any, shape: tuple[int, ...], entries: tuple[int, ...]) -> Array:
+    """Return an array (..., n), broadcast to a batch's shape, as (n, N)."""
+    spread = np.broadcast_to(array.astype(np.float64, copy=False), (*shape, *entries))
+    rows: Array = spread.reshape(math.prod(shape), *entries).T
+    return rows
+
+
+def _split(memory: Array, sizes: Sequence[int]) -> tuple[Array, ...]:
+    """Return one piece of memory as arrays of so many rows."""
+    return tuple(np.split(memory, np.cumsum(sizes)[:-1]))
