@@ -79,20 +79,18 @@ def _Phi(f, q, t, p):
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
     mesh_1 = 0.2 * R
-    mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
-    mesh_4 = 0.2 * c_rack
+    mesh_3 = 0.2 * c_rack
     mesh_d_y = y_pinion - y_rack
-    mesh_6 = 0.2 * s_rack
+    mesh_5 = 0.2 * s_rack
     return (
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         x_pinion,
         y_pinion,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
-                - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
-        (mesh_d_y + mesh_6) * mesh_4 - (mesh_d_x + mesh_4) * mesh_6 - mesh_1,
+        -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5)),
+        (mesh_d_y + mesh_5) * mesh_3 - (mesh_d_x + mesh_3) * mesh_5 - mesh_1,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -192,13 +190,12 @@ def _position(f, q, t, p):
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
     mesh_1 = 0.2 * R
-    mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
-    mesh_4 = 0.2 * c_rack
+    mesh_3 = 0.2 * c_rack
     mesh_d_y = y_pinion - y_rack
-    mesh_6 = 0.2 * s_rack
-    mesh_d_y_ = mesh_d_y + mesh_6
-    mesh_d_x_ = mesh_d_x + mesh_4
+    mesh_5 = 0.2 * s_rack
+    mesh_d_y_ = mesh_d_y + mesh_5
+    mesh_d_x_ = mesh_d_x + mesh_3
     return (
         # Phi
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
@@ -206,9 +203,8 @@ def _position(f, q, t, p):
         y_pinion,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
-                - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
-        mesh_d_y_ * mesh_4 - mesh_d_x_ * mesh_6 - mesh_1,
+        -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5)),
+        mesh_d_y_ * mesh_3 - mesh_d_x_ * mesh_5 - mesh_1,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -216,17 +212,17 @@ def _position(f, q, t, p):
         # Phi_q
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -mesh_4,  # mesh.roll by x_rack
-        -mesh_6,  # mesh.roll by y_rack
-        mesh_d_y * mesh_4 - mesh_d_x * mesh_6 - mesh_1,  # mesh.roll by phi_rack
-        mesh_4,  # mesh.roll by x_pinion
-        mesh_6,  # mesh.roll by y_pinion
+        -mesh_3,  # mesh.roll by x_rack
+        -mesh_5,  # mesh.roll by y_rack
+        mesh_d_y * mesh_3 - mesh_d_x * mesh_5 - mesh_1,  # mesh.roll by phi_rack
+        mesh_3,  # mesh.roll by x_pinion
+        mesh_5,  # mesh.roll by y_pinion
         mesh_1,  # mesh.roll by phi_pinion
-        mesh_6,  # mesh.pitch by x_rack
-        -mesh_4,  # mesh.pitch by y_rack
-        mesh_6**2 + mesh_4**2 - (mesh_d_x_ * mesh_4 + mesh_d_y_ * mesh_6),  # mesh.pitch by phi_rack
-        -mesh_6,  # mesh.pitch by x_pinion
-        mesh_4,  # mesh.pitch by y_pinion
+        mesh_5,  # mesh.pitch by x_rack
+        -mesh_3,  # mesh.pitch by y_rack
+        mesh_5**2 + mesh_3**2 - (mesh_d_x_ * mesh_3 + mesh_d_y_ * mesh_5),  # mesh.pitch by phi_rack
+        -mesh_5,  # mesh.pitch by x_pinion
+        mesh_3,  # mesh.pitch by y_pinion
     )
 
 
@@ -336,20 +332,19 @@ def _kinematics(f, q, q_dot, t, p):
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
     mesh_1 = 0.2 * R
-    mesh_2 = 3 * pi / 2
     mesh_d_x = x_pinion - x_rack
-    mesh_4 = 0.2 * c_rack
+    mesh_3 = 0.2 * c_rack
     mesh_d_y = y_pinion - y_rack
-    mesh_6 = 0.2 * s_rack
-    mesh_d_y_ = mesh_d_y + mesh_6
-    mesh_d_x_ = mesh_d_x + mesh_4
+    mesh_5 = 0.2 * s_rack
+    mesh_d_y_ = mesh_d_y + mesh_5
+    mesh_d_x_ = mesh_d_x + mesh_3
     phi_rack_dot_sq = phi_rack_dot**2
-    mesh_10 = phi_rack_dot_sq * mesh_4
-    mesh_11 = phi_rack_dot_sq * mesh_6
+    mesh_9 = phi_rack_dot_sq * mesh_3
+    mesh_10 = phi_rack_dot_sq * mesh_5
     mesh_d_dot_y = y_pinion_dot - y_rack_dot
-    mesh_13 = phi_rack_dot * mesh_4
+    mesh_12 = phi_rack_dot * mesh_3
     mesh_d_dot_x = x_pinion_dot - x_rack_dot
-    mesh_15 = phi_rack_dot * mesh_6
+    mesh_14 = phi_rack_dot * mesh_5
     # 5  AbsoluteAngle "motor"
     motor_1 = pi * t
     sin_motor_1 = sin(motor_1)
@@ -360,9 +355,8 @@ def _kinematics(f, q, q_dot, t, p):
         y_pinion,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
-                - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6)),
-        mesh_d_y_ * mesh_4 - mesh_d_x_ * mesh_6 - mesh_1,
+        -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5)),
+        mesh_d_y_ * mesh_3 - mesh_d_x_ * mesh_5 - mesh_1,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -370,17 +364,17 @@ def _kinematics(f, q, q_dot, t, p):
         # Phi_q
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -mesh_4,  # mesh.roll by x_rack
-        -mesh_6,  # mesh.roll by y_rack
-        mesh_d_y * mesh_4 - mesh_d_x * mesh_6 - mesh_1,  # mesh.roll by phi_rack
-        mesh_4,  # mesh.roll by x_pinion
-        mesh_6,  # mesh.roll by y_pinion
+        -mesh_3,  # mesh.roll by x_rack
+        -mesh_5,  # mesh.roll by y_rack
+        mesh_d_y * mesh_3 - mesh_d_x * mesh_5 - mesh_1,  # mesh.roll by phi_rack
+        mesh_3,  # mesh.roll by x_pinion
+        mesh_5,  # mesh.roll by y_pinion
         mesh_1,  # mesh.roll by phi_pinion
-        mesh_6,  # mesh.pitch by x_rack
-        -mesh_4,  # mesh.pitch by y_rack
-        mesh_6**2 + mesh_4**2 - (mesh_d_x_ * mesh_4 + mesh_d_y_ * mesh_6),  # mesh.pitch by phi_rack
-        -mesh_6,  # mesh.pitch by x_pinion
-        mesh_4,  # mesh.pitch by y_pinion
+        mesh_5,  # mesh.pitch by x_rack
+        -mesh_3,  # mesh.pitch by y_rack
+        mesh_5**2 + mesh_3**2 - (mesh_d_x_ * mesh_3 + mesh_d_y_ * mesh_5),  # mesh.pitch by phi_rack
+        -mesh_5,  # mesh.pitch by x_pinion
+        mesh_3,  # mesh.pitch by y_pinion
         # nu
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
@@ -399,11 +393,11 @@ def _kinematics(f, q, q_dot, t, p):
         0,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        mesh_d_x * mesh_10 + mesh_d_y * mesh_11
-            - 2 * (mesh_d_dot_y * mesh_13 - mesh_d_dot_x * mesh_15),
-        -(mesh_10 * mesh_6 - mesh_11 * mesh_4
-                - 2 * ((mesh_d_dot_y + mesh_13) * mesh_15 + (mesh_d_dot_x - mesh_15) * mesh_13)
-                + (mesh_d_x_ * mesh_11 - mesh_d_y_ * mesh_10)),
+        mesh_d_x * mesh_9 + mesh_d_y * mesh_10
+            - 2 * (mesh_d_dot_y * mesh_12 - mesh_d_dot_x * mesh_14),
+        -(mesh_9 * mesh_5 - mesh_10 * mesh_3
+                - 2 * ((mesh_d_dot_y + mesh_12) * mesh_14 + (mesh_d_dot_x - mesh_14) * mesh_12)
+                + (mesh_d_x_ * mesh_10 - mesh_d_y_ * mesh_9)),
         # 4  AbsoluteAngle "guide": rack angle 0
         0,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)

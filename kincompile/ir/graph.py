@@ -82,6 +82,9 @@ class Graph:
             return self.sub(a, minus_b)
         if minus_a is not None:
             return self.sub(b, minus_a)
+        for difference, taken in ((a, b), (b, a)):
+            if self.nodes[difference][0] == "sub" and self.nodes[difference][2] == taken:
+                return int(self.nodes[difference][1])
         swapped = self._index.get(("add", b, a))
         return self._intern(("add", a, b)) if swapped is None else swapped
 
@@ -101,6 +104,9 @@ class Graph:
             return self.add(a, minus_b)
         if minus_a is not None:
             return self.neg(self.add(minus_a, b))
+        if self.nodes[a][0] == "add" and b in self.nodes[a][1:]:
+            first, second = self.nodes[a][1:]
+            return int(first if b == second else second)
         reverse = self._index.get(("sub", b, a))
         return self._intern(("sub", a, b)) if reverse is None else self.neg(reverse)
 

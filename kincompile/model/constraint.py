@@ -107,5 +107,10 @@ class CamConstraint(Constraint):
 
     @property
     def alpha(self) -> sympy.Symbol:
-        """Symbol of the contact parameter, of the first where there are two."""
+        """Symbol of the contact parameter; of two, the one on body i."""
         return sympy.Symbol(self.contact_names[0])
+
+    @property
+    def alphas(self) -> tuple[sympy.Symbol, ...]:
+        """Symbols of all contact parameters, body i first."""
+        return tuple(sympy.Symbol(name) for name in self.contact_names)
