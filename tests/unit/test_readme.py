@@ -62,7 +62,7 @@ class Reader:
             self.printed = self.execute(block["text"])
         elif language == "python" and name == "slider_crank.py":
             self.execute(block["text"])
-        elif language == "text":
+        elif language == "text" and action is None:
             require(block["text"], self.printed)
         elif language == "console":
             for command, output in commands(block["text"]):
