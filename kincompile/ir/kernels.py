@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-import sympy
-
 from kincompile.calculus.expand import Expansion, Pair, Value
 from kincompile.calculus.expressions import (
     Basis,
@@ -187,9 +185,7 @@ def equation_kernel(equation: FreeEquation) -> Kernel:
         return inputs[name]
 
     convert = Converter(graph, leaf).convert
-    found = [
-        derive_equation(sympy.sympify(item), equation.columns) for item in equation.expressions
-    ]
+    found = [derive_equation(item, equation.columns) for item in equation.expressions]
     entries = [
         (row, column, convert(entry))
         for row, item in enumerate(found)

@@ -12,7 +12,7 @@ from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
 from kincompile.ir.kernels import constraint_kernel, derivative_name, equation_kernel
 from kincompile.ir.program import Instance, Kernel, Program
-from kincompile.model.expressions import alpha, t
+from kincompile.model.expressions import alpha, as_sympy, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.spline import PeriodicSpline, SplineTable
 from kincompile.names import body_coordinates, rate
@@ -156,7 +156,7 @@ def _function_nodes(joint: Joint, convert: Callable[..., int]) -> Callable[[str]
             contact = _contact_symbols(joint.template, joint.columns)[symbol]
             return convert(rho.subs(alpha, contact))
         value = joint.scalars[symbol]
-        return convert(value if order == 0 else sympy.sympify(value).diff(t, order))
+        return convert(value if order == 0 else as_sympy(value).diff(t, order))
 
     return node
 

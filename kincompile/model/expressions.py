@@ -58,9 +58,10 @@ def as_expression(value: object) -> Scalar:
         return value
     if isinstance(value, bool):
         raise NotAnExpressionError(f"{value} is a truth value, not a number")
-    if isinstance(value, Integral):
-        return int(value)
-    if isinstance(value, Rational):
+    if isinstance(value, Integral | Rational):
+        _require_range(value)
+        if isinstance(value, Integral):
+            return int(value)
         fraction: sympy.Rational = sympy.Rational(value.numerator, value.denominator)
         return fraction
     if isinstance(value, Real) and not isinstance(value, sympy.Expr):
@@ -69,13 +70,28 @@ def as_expression(value: object) -> Scalar:
         return float(value)
     if isinstance(value, sympy.Eq):
         value = value.lhs - value.rhs
-    if not isinstance(value, sympy.Expr):
+    if not isinstance(value, sympy.Expr) or isinstance(value, sympy.Lambda):
         raise NotAnExpressionError(f"{value!r} is not a number or a SymPy expression")
     if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
         raise NotAnExpressionError(f"{value} is not finite")
     if value.has(sympy.I) or (value.is_number and value.is_real is False):  # asin(2) has no I
         raise NotAnExpressionError(f"{value} is not real")
     return _by_name(value)
+
+
+def _require_range(value: Rational) -> None:
+    """Refuse a whole number or a fraction that no float can hold."""
+    try:
+        float(value)
+    except OverflowError:
+        raise NotAnExpressionError("the number is beyond 1e308, the range of floats") from None
+
+
+def as_sympy(value: Scalar) -> sympy.Expr:
+    """Return a number or an expression as an expression; text is refused, it would be run."""
+    if isinstance(value, sympy.Expr):
+        return value
+    return sympy.Integer(value) if isinstance(value, int) else sympy.Float(value)
 
 
 def _by_name(expression: sympy.Expr) -> sympy.Expr:
@@ -168,7 +184,8 @@ def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
         return None
     numbers = {sympy.Symbol(name): sympy.Float(values[name]) for name in names}
     number = value.xreplace(numbers).evalf()
-    return float(number) if number.is_number and number.is_real and number.is_finite else None
+    is_number = number.is_number and number.is_real and math.isfinite(float(number))
+    return float(number) if is_number else None
 
 
 def depends_on(value: Scalar, names: Iterable[str]) -> bool:

@@ -11,7 +11,7 @@ from kincompile.calculus.expand import Expansion, Pair, Value
 from kincompile.calculus.expressions import Expression, Scalar, Vector
 from kincompile.derive.derivation import derive
 from kincompile.derive.equations import derive_equation
-from kincompile.model.expressions import alpha, t
+from kincompile.model.expressions import alpha, as_sympy, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.names import rate
 
@@ -180,7 +180,7 @@ class SymbolicEnvironment:
     def symbol(self, name: str) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
         found = self._symbols.get(name)
-        return sympy.sympify(self._joint.scalars[name]) if found is None else found
+        return as_sympy(self._joint.scalars[name]) if found is None else found
 
     def vector(self, name: str) -> Pair:
         """Return a position, a velocity or a body-fixed point."""
@@ -188,11 +188,11 @@ class SymbolicEnvironment:
         if found is not None:
             return found
         x, y = self._joint.points[name]
-        return sympy.sympify(x), sympy.sympify(y)
+        return as_sympy(x), as_sympy(y)
 
     def time_function(self, name: str, order: int) -> Value:
         """Return C(t) or one of its derivatives."""
-        return sympy.sympify(self._joint.scalars[name]).diff(t, order)
+        return as_sympy(self._joint.scalars[name]).diff(t, order)
 
     def profile(self, name: str, order: int) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""

@@ -61,7 +61,7 @@ class Mechanism(MatrixViews):
             Its unit, for documentation.
         """
         self.parameters.append(Parameter(name, default, unit))
-        return sympy.Symbol(name)
+        return sympy.Symbol(str(name))
 
     def body(self, name: str, guess: Any = (0, 0, 0)) -> Body:
         """Add a body with coordinates (x, y, phi) and return it.

@@ -5,8 +5,10 @@ Every problem is collected, none is raised.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Set, Sized
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import sympy
@@ -18,6 +20,7 @@ from kincompile.model.expressions import (
     Scalar,
     alpha,
     as_expression,
+    as_sympy,
     depends_on,
     evaluate,
     smoothness_problem,
@@ -28,7 +31,7 @@ from kincompile.model.spline import PeriodicSpline, fit
 from kincompile.names import body_coordinates, listed, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Sequence
 
     from kincompile.calculus.template import Template
     from kincompile.model.equation import Equation
@@ -155,7 +158,7 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
                 f"{where} contains no coordinate, so it cannot constrain anything; coordinates "
                 f"are: {listed(scope.coordinates)}"
             )
-        expressions.append(sympy.sympify(0 if value is None else value))
+        expressions.append(as_sympy(0 if value is None else value))
     if len(scope.problems) > before:
         return None
     occurring = set().union(*(symbol_names(expression) for expression in expressions))
@@ -166,7 +169,7 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
 def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     """Check the arguments of a constraint of a known type."""
     before = len(scope.problems)
-    bodies: list[Body] = []
+    bodies: list[Body | None] = []
     scalars: dict[str, Scalar] = {}
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
@@ -181,18 +184,20 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
             profiles[item.symbol] = _profile(given, table_name, where, scope)
         else:
             scalars[item.symbol] = _scalar(given, item.kind, where, scope)
-    _check_bodies(constraint, bodies, scope)
+    known = [body for body in bodies if body is not None]
+    if len(known) == len(bodies):
+        _check_bodies(constraint, known, scope)
     _check_whole(constraint, scalars, points, scope)
     if len(scope.problems) > before:
         return None
     return Joint(
         constraint,
         constraint.template(),
-        tuple(bodies),
+        tuple(known),
         scalars,
         points,
         profiles,
-        (*(name for body in bodies for name in _columns(body)), *constraint.contact_names),
+        (*(name for body in known for name in _columns(body)), *constraint.contact_names),
     )
 
 
@@ -204,9 +209,10 @@ def _columns(body: Body) -> tuple[str | None, ...]:
     return (None, None, None) if body.is_ground else body_coordinates(body.name)
 
 
-def _body(given: Any, where: str, scope: Scope) -> Body:
+def _body(given: Any, where: str, scope: Scope) -> Body | None:
+    """Return the body that is meant, None where there is none."""
     name = given.name if isinstance(given, Body) else given
-    if name == GROUND.name or given is GROUND:
+    if isinstance(name, str) and name == GROUND.name:
         return GROUND
     if not isinstance(name, str) or name not in scope.bodies:
         hint = suggestion(name, scope.bodies) if isinstance(name, str) else ""
@@ -214,15 +220,13 @@ def _body(given: Any, where: str, scope: Scope) -> Body:
             f"{where}: there is no body {name!r} in this mechanism{hint}; bodies are: ground, "
             f"{listed(scope.bodies)}"
         )
-        return GROUND
+        return None
     return scope.bodies[name]
 
 
 def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> None:
-    """Check that a joint has something to constrain; where a body is missing, that was said."""
+    """Check that a joint has something to constrain."""
     what = _title(constraint)
-    if any(what in problem for problem in scope.problems):
-        return
     if len(bodies) == 2 and bodies[0] == bodies[1]:
         scope.problems.append(
             f"{what}: bodies i and j are both {bodies[0].name!r}; a joint connects two different "
@@ -302,8 +306,10 @@ def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
 
 
 def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
+    # A generator would be used up here, a set has no order.
+    is_list = isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
     try:
-        xi, eta = given
+        xi, eta = given if is_list else (None,)
     except (TypeError, ValueError):
         scope.problems.append(
             f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame"
@@ -320,7 +326,7 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
     if isinstance(given, sympy.Lambda) or (callable(given) and not isinstance(given, sympy.Basic)):
         try:
             given = given(alpha)
-        except (TypeError, ValueError) as error:
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             scope.problems.append(
                 f"{where}: the function cannot be called with the symbol alpha ({error}); write "
                 "it as rho(alpha) with SymPy's functions, sympy.cos instead of math.cos"
@@ -332,14 +338,24 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
         except (TypeError, ValueError) as error:
             scope.problems.append(f"{where}: {error}")
             return sympy.S.One
-    others = symbol_names(given) - set(scope.parameters) if isinstance(given, sympy.Expr) else set()
-    if len(others) == 1:
-        given = given.subs(
-            {symbol: alpha for symbol in given.free_symbols if symbol.name in others}
+    if isinstance(given, sympy.Expr):
+        given = _of_alpha(given, scope)
+    elif not isinstance(given, Real):
+        scope.problems.append(
+            f"{where}: {given!r} is neither a radius rho(alpha) nor a table (angles, radii)"
         )
+        return sympy.S.One
     value = _expression(given, where, {*scope.parameters, alpha.name}, scope)
-    rho: sympy.Expr = sympy.sympify(1 if value is None else value)
+    rho: sympy.Expr = as_sympy(1 if value is None else value)
     return rho
+
+
+def _of_alpha(rho: sympy.Expr, scope: Scope) -> sympy.Expr:
+    """Return a radius as a function of alpha, whatever its one free symbol is called."""
+    others = symbol_names(rho) - set(scope.parameters)
+    if len(others) != 1 or not others.isdisjoint(scope.declared):
+        return rho
+    return rho.xreplace({symbol: alpha for symbol in rho.free_symbols if str(symbol) in others})
 
 
 def _check_whole(

@@ -90,7 +90,7 @@ def fit(angles: Any, radii: Any) -> SplineTable:
     # SciPy's interpolation takes a quarter of a second to import, and only tables need it.
     from scipy.interpolate import PPoly, make_interp_spline
 
-    x, y = np.asarray(angles, dtype=float), np.asarray(radii, dtype=float)
+    x, y = _numbers(angles), _numbers(radii)
     problem = _table_problem(x, y)
     if problem:
         raise ValueError(problem)
@@ -101,6 +101,13 @@ def fit(angles: Any, radii: Any) -> SplineTable:
     keep = wide & (pieces.x[:-1] >= x[0] - 1e-12) & (pieces.x[:-1] < x[-1] - 1e-12)
     breaks = (*pieces.x[:-1][keep].tolist(), float(x[-1]))
     return SplineTable(breaks, tuple(tuple(row) for row in pieces.c.T[keep].tolist()))
+
+
+def _numbers(values: Any) -> np.ndarray:
+    array = np.asarray(values)
+    if array.dtype.kind == "c":
+        raise ValueError("the table contains complex numbers")
+    return array.astype(float)
 
 
 def _table_problem(x: np.ndarray, y: np.ndarray) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import sympy
@@ -82,8 +83,8 @@ class ConstraintSystem(MatrixViews):
         end: float = 1.0,
         points: int = 101,
     ) -> None:
-        bodies = tuple(bodies)
         problems: list[str] = []
+        bodies = _bodies(bodies, problems)
         written = _written(equations, problems)
         declared = _parameters(parameters, problems)
         defaults = {item.name: item.default for item in declared if item.default is not None}
@@ -148,15 +149,30 @@ class ConstraintSystem(MatrixViews):
 
 def _written(equations: Iterable[Any], problems: list[str]) -> list[Constraint | Equation]:
     """Return the constraints as written; an expression is named by its place."""
-    try:
-        items = list(equations)
-    except TypeError:
-        problems.append(f"the equations {equations!r} are not a list; write equations=[...]")
-        return []
     return [
         item if isinstance(item, Constraint | Equation) else Equation(f"equation_{k}", item)
-        for k, item in enumerate(items, 1)
+        for k, item in enumerate(_items(equations, "equations", problems), 1)
     ]
+
+
+def _bodies(given: Iterable[Any], problems: list[str]) -> tuple[Body, ...]:
+    """Return the bodies among what was given as such."""
+    found = _items(given, "bodies", problems)
+    problems += [
+        f"{item!r} is not a body; make one with Mechanism.body"
+        for item in found
+        if not isinstance(item, Body)
+    ]
+    return tuple(item for item in found if isinstance(item, Body))
+
+
+def _items(given: Iterable[Any], what: str, problems: list[str]) -> list[Any]:
+    """Return the members of a list, none where it is not one."""
+    if not isinstance(given, str):
+        with suppress(TypeError):
+            return list(given)
+    problems.append(f"the {what} {given!r} are not a list; write {what}=[...]")
+    return []
 
 
 def _name_of(item: Any) -> str:
@@ -187,11 +203,14 @@ def _parameters(
     if isinstance(given, Mapping):
         given = [Parameter(_name_of(key), value) for key, value in given.items()]
     checked = []
-    for item in given:
+    for item in _items(given, "parameters", problems):
         if not isinstance(item, Parameter):
             problems.append(
                 f"{item!r} is not a parameter; give values by name: parameters={{'a': 1.0}}"
             )
+            continue
+        if not isinstance(item.name, str):
+            problems.append(f"{name_problem(item.name, 'a parameter')}")
             continue
         default = item.default
         if default is None:
@@ -232,8 +251,9 @@ def _free_coordinates(
     values: dict[str, float],
     problems: list[str],
 ) -> list[Coordinate]:
-    items = given.replace(",", " ").split() if isinstance(given, str) else list(given)
-    names = [_name_of(item) for item in items]
+    if isinstance(given, str):
+        given = given.replace(",", " ").split()
+    names = [_name_of(item) for item in _items(given, "coordinates", problems)]
     if guess is None:
         guess = [0.0] * len(names)
     if isinstance(guess, Mapping):
@@ -312,7 +332,8 @@ def _check_names(
     symbols = [item.name for item in parameters]
     if len({body.name for body in bodies}) == len(bodies):
         symbols += [item.name for item in coordinates]
-        symbols += [rate(item.name, order) for item in coordinates for order in (1, 2)]
+        known = dict.fromkeys(item.name for item in coordinates)
+        symbols += [rate(name, order) for name in known for order in (1, 2)]
     _check_unique("coordinates, rates and parameters", symbols, problems)
 
 
