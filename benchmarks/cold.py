@@ -1,6 +1,7 @@
 """One fresh process: `python -m benchmarks.cold kincompile|sympy|sympy-warm` prints seconds.
 
-The first number is for the four-bar, the second for another mechanism of the same joint types.
+The first number is for the four-bar, the second for another mechanism of the same joint types; it
+is processor time, so that what else runs on the machine does not count.
 Writing the mechanisms down and imports are not counted. But SymPy imports its printers when
 `lambdify` is called first: `sympy` counts that, `sympy-warm` calls `lambdify` on a symbol before.
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 import json
 import sys
-from time import perf_counter
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -47,9 +48,9 @@ def by_sympy(*, is_warm: bool) -> list[float]:
 def _times(build: Callable[[Any], object], models: list[Any]) -> list[float]:
     times = []
     for model in models:
-        start = perf_counter()
+        start = process_time()
         build(model)
-        times.append(perf_counter() - start)
+        times.append(process_time() - start)
     return times
 
 
