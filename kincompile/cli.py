@@ -1,4 +1,4 @@
-"""The command line: `kincompile compile | run | inspect MODEL`, `kincompile compare MODEL HAND`.
+"""The command line: `kincompile compile | run | inspect | derive MODEL`, `compare MODEL HAND`.
 
 stdout is data, stderr messages. Exit codes: 0 done; 2 wrong usage or model, or a file that cannot
 be read or written; 3 the motion did not converge; 130 interrupted; 1 is kept for `compare`, where
@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 
 DIFFERENT, USAGE_OR_MODEL, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes."""
+
+DERIVATIONS = (".html", ".tex", ".md", ".ipynb")
+"""Endings of the files that `derive` writes."""
 
 TRACEBACK = "KINCOMPILE_TRACEBACK"
 """The environment variable that shows where an error comes from."""
@@ -228,6 +231,38 @@ def compare(
         click.echo(f"{report.summary}\nWrote {output}", err=True)
     if not report.equal:
         context.exit(DIFFERENT)
+
+
+@cli.command()
+@click.argument("model")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="FILE",
+    help="File to write: .html, .tex, .md or .ipynb.",
+)
+@click.option("--time", "at", type=float, default=0.0, metavar="T", help="Time of the numbers.")
+@click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Value of a parameter, coordinate or rate; may be given several times.",
+)
+def derive(model: str, output: str, at: float, assignments: tuple[str, ...]) -> None:
+    """Show how Phi_q, nu and gamma of MODEL follow from Phi, step by step.
+
+    A page for each constraint in nine steps (in vectors, in sines and cosines, in numbers) and for
+    the assembled system. The numbers are taken where the mechanism is assembled at the time, or at
+    the coordinates that are set.
+    """
+    if Path(output).suffix not in DERIVATIONS:
+        raise InputError(f"{output}: a derivation is written as {', '.join(DERIVATIONS)}")
+    require_writable(output)
+    state = {"t": at, **_values(assignments)}
+    kc.derivation(_read(model), state).write(output)
+    click.echo(f"Wrote {output}", err=True)
 
 
 def _print_coloured(table: Any) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kincompile.structure.report import inspect_system
-from kincompile.teach.derivation_page import anchor, counted, row_range, table
+from kincompile.teach.derivation_page import anchor, counted, is_number, row_range, table
 from kincompile.teach.document import Code, Display, Link, Math, Pattern, Section, Verbatim, text
 from kincompile.teach.formulas import (
     DELTA_Q,
@@ -143,7 +143,7 @@ def _vectors(page: Page) -> Section:
         for Phi, nu, gamma in zip(*quantities, strict=True):
             row: list[Run | Runs] = [str(Phi.row), Verbatim(page.equations[Phi.row])]
             for quantity, entry in (("Phi", Phi), ("nu", nu), ("gamma", gamma)):
-                shown = Math(page.expanded(entry))
+                shown = page.brief(quantity, entry)
                 row += [Link(anchor(quantity, entry), shown), _math(page.value(quantity, entry))]
             rows.append(tuple(row))
     header: tuple[Run, ...] = (
@@ -178,9 +178,10 @@ def _jacobian(page: Page) -> Section:
 
 
 def _cell(page: Page, entry: Entry) -> Runs:
-    formula = page.expanded(entry)
-    number = _math(page.value("Phi_q", entry))
-    return (Link(anchor("Phi_q", entry), Math(formula)), " ", number)
+    shown, number = page.brief("Phi_q", entry), _math(page.value("Phi_q", entry))
+    if is_number(page.expanded(entry)):
+        return (Link(anchor("Phi_q", entry), shown),)
+    return (Link(anchor("Phi_q", entry), shown), " = ", number)
 
 
 def _newton(page: Page) -> Section:

@@ -19,7 +19,10 @@ from kincompile.model.resolve import Joint
 from kincompile.names import listed
 from kincompile.teach.assembled import assembled_section, unknowns_section
 from kincompile.teach.derivation_html import as_html
+from kincompile.teach.derivation_markdown import as_markdown
+from kincompile.teach.derivation_notebook import as_notebook
 from kincompile.teach.derivation_page import Page, counted
+from kincompile.teach.derivation_tex import as_tex
 from kincompile.teach.document import Document, Section
 from kincompile.teach.equation_section import equation_section
 from kincompile.teach.joint_section import joint_section
@@ -51,6 +54,18 @@ class Derivation(Document):
         """Return one self-contained page: MathML, no script, no network."""
         return as_html(self)
 
+    def to_latex(self) -> str:
+        """Return a LaTeX document, for pdflatex."""
+        return as_tex(self)
+
+    def to_markdown(self) -> str:
+        """Return Markdown with formulas as GitHub renders them."""
+        return as_markdown(self)
+
+    def to_notebook(self) -> str:
+        """Return a Jupyter notebook, the text of an .ipynb file; it computes the numbers again."""
+        return as_notebook(self)
+
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the derivation in the format that the file's ending names.
 
@@ -74,7 +89,13 @@ class Derivation(Document):
         return self.to_html()
 
 
-FORMATS: Mapping[str, Callable[[Derivation], str]] = {".html": Derivation.to_html}
+FORMATS: Mapping[str, Callable[[Derivation], str]] = {
+    ".html": Derivation.to_html,
+    ".tex": Derivation.to_latex,
+    ".md": Derivation.to_markdown,
+    ".ipynb": Derivation.to_notebook,
+}
+"""What prints a derivation, by the ending of the file it goes to."""
 
 
 def format_of(path: str | os.PathLike[str]) -> Callable[[Derivation], str]:

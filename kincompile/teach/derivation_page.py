@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.calculus.expressions import Symbol
-from kincompile.teach.document import Display, Table, cells
+from kincompile.teach.document import Display, Math, Table, cells
 from kincompile.teach.emitted_lines import emitted_lines
 from kincompile.teach.expanded import Writer
-from kincompile.teach.formulas import Decimal, Equated, Glyph, Partial
+from kincompile.teach.formulas import Decimal, Equated, Glyph, Partial, size
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from kincompile.teach.document import Run, Runs, SourceLine
     from kincompile.teach.formulas import Formula
     from kincompile.teach.situation import Array, Situation
+
+BRIEF = 30
+"""Nodes of a formula that still fits into a cell of a table."""
 
 ROUNDING = 1e-14
 """Numbers this much smaller than the largest of their kind are shown as zero."""
@@ -57,6 +60,14 @@ class Page:
     def partial(self, entry: Entry) -> Partial:
         """Return the symbol of an entry of Phi_q."""
         return Partial(self.symbol("Phi", entry.row), Symbol(self.coordinates[entry.column]))
+
+    def brief(self, quantity: str, entry: Entry) -> Math:
+        """Return an entry in sines and cosines where that is short, else its symbol."""
+        formula = self.expanded(entry)
+        if size(formula) <= BRIEF:
+            return Math(formula)
+        is_cell = quantity == "Phi_q"
+        return Math(self.partial(entry) if is_cell else self.symbol(quantity, entry.row))
 
     def display(self, quantity: str, entry: Entry) -> Display:
         """Return an entry's line: symbol, formula, number, and the code that computes it."""

@@ -127,10 +127,9 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """Code that a notebook runs; other media leave it out, or show it where `shown`."""
+    """Code that a notebook runs; other media leave it out."""
 
     text: str
-    shown: bool = False
 
 
 Block: TypeAlias = Text | Display | Table | Pattern | Code

@@ -48,7 +48,7 @@ class Writer:
             case ("neg", a):
                 return minus(self.formula(a))
             case ("mul", a, b):
-                return Product((*_factors(self.formula(a)), *_factors(self.formula(b))))
+                return Product((*_factors(self.formula(a)), self.formula(b)))
             case ("div", a, b):
                 return Quotient(self.formula(a), self.formula(b))
             case ("square", a):

@@ -6,7 +6,7 @@ them knows how it is printed; `notation` does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import TypeAlias
 
 import sympy
@@ -148,6 +148,15 @@ GAMMA_TERMS = (
 def column(values: tuple[Formula, ...]) -> Matrix:
     """Return a column matrix."""
     return Matrix(tuple((value,) for value in values))
+
+
+def size(formula: object) -> int:
+    """Return the number of nodes of a formula."""
+    if isinstance(formula, tuple):
+        return sum(size(item) for item in formula)
+    if not is_dataclass(formula):
+        return 0
+    return 1 + sum(size(getattr(formula, item.name)) for item in fields(formula))
 
 
 def decimals(values: object, digits: int = 6) -> Matrix:

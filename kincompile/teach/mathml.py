@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 OPERATORS = {
     "-": "\N{MINUS SIGN}", "<=": "\N{LESS-THAN OR EQUAL TO}", ">=": "\N{GREATER-THAN OR EQUAL TO}",
-    "==": "=", "!=": "\N{NOT EQUAL TO}", "&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}",
+    "==": "=", "!=": "\N{NOT EQUAL TO}",
 }  # fmt: skip
 VARTHETA = "\N{GREEK THETA SYMBOL}"
 DOTS = ("", "\N{DOT ABOVE}", "\N{DIAERESIS}")

@@ -61,6 +61,7 @@ GREEK = frozenset(
 )
 _NAME = re.compile(r"([A-Za-z]+?)(\d*)(?:_(\w+))?")
 _RATE = re.compile(r"(\w+?)_(d+)ot")
+CONNECTIVES = {"&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}"}
 _BODY_FIXED = ("s", "v")
 
 
@@ -345,7 +346,7 @@ class Notation:
         return self.array(rows)
 
     def _print_Relation(self, expr: Relation) -> Printed:
-        relation = self.operator(expr.relation)
+        relation = self.operator(CONNECTIVES.get(expr.relation, expr.relation))
         return self.row([self._print(expr.left), relation, self._print(expr.right)])
 
     def _print_Glyph(self, expr: Glyph) -> Printed:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from kincompile.teach.formulas import Formula, Glyph
 
 OPERATORS = {
-    "-": "-", "<=": r"\le", ">=": r"\ge", "==": "=", "!=": r"\ne", "&": r"\wedge", "|": "|",
+    "-": "-", "<=": r"\le", ">=": r"\ge", "==": "=", "!=": r"\ne", "|": r"\vert",
+    "\N{LOGICAL AND}": r"\wedge", "\N{LOGICAL OR}": r"\vee",
     "\N{PARTIAL DIFFERENTIAL}": r"\partial", "\N{MULTIPLICATION SIGN}": r"\times",
     "\N{DOT OPERATOR}": r"\cdot",
 }  # fmt: skip
@@ -24,6 +25,7 @@ SPECIAL = {
     "\\": r"\textbackslash{}", "_": r"\_", "&": r"\&", "%": r"\%", "#": r"\#", "$": r"\$",
     "{": r"\{", "}": r"\}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
     "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}",
+    "\N{MINUS SIGN}": "$-$", "\N{MULTIPLICATION SIGN}": r"$\times$", "\N{EN DASH}": "--",
 }  # fmt: skip
 
 
@@ -67,7 +69,7 @@ class TexPrinter(Notation, LatexPrinter):
 
     def leading(self, text: str) -> str:
         """Return an operator at the beginning of a continued line."""
-        return self.operator(text)
+        return f"{{}} {self.operator(text)}"
 
     def numeral(self, text: str) -> str:
         """Return a number."""
