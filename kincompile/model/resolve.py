@@ -9,7 +9,7 @@ from collections.abc import Mapping, Set, Sized
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import sympy
 
@@ -309,7 +309,7 @@ def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
     # A generator would be used up here, a set has no order.
     is_list = isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
     try:
-        xi, eta = given if is_list else (None,)
+        xi, eta = tuple(given) if is_list else ()
     except (TypeError, ValueError):
         scope.problems.append(
             f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame"
@@ -355,7 +355,8 @@ def _of_alpha(rho: sympy.Expr, scope: Scope) -> sympy.Expr:
     others = symbol_names(rho) - set(scope.parameters)
     if len(others) != 1 or not others.isdisjoint(scope.declared):
         return rho
-    return rho.xreplace({symbol: alpha for symbol in rho.free_symbols if str(symbol) in others})
+    named = {symbol: alpha for symbol in rho.free_symbols if str(symbol) in others}
+    return cast("sympy.Expr", rho.xreplace(named))
 
 
 def _check_whole(
