@@ -152,7 +152,8 @@ class Matcher:
                 best = best.better(self._rows_matched(layout, Units()))
                 if best.is_whole:
                     break
-        matching = self._with_signs(best.matching)
+        # A relative angle counted from the other body flips nu as well: its roles come first.
+        matching = self._with_signs(self._with_roles(best.matching))
         return self._with_roles(matching)
 
     def _promising(self, usual: Layout) -> list[Layout]:
@@ -304,7 +305,12 @@ class Matcher:
         return replace(matching, signs=signs)
 
     def _with_roles(self, matching: Matching) -> Matching:
-        """Exchange the roles of i and j in the constraints that this explains entirely."""
+        """Exchange the roles of i and j in the constraints that this explains entirely.
+
+        Phi or Phi_q has to show it: in gamma alone the exchange of a revolute joint is its sign.
+        """
+        if not {"Phi", "Phi_q"}.intersection(self._hands):
+            return matching
         states = self._scope.states
         written = self.written(matching, states)
         right = self._right_rows(matching, written)
@@ -314,11 +320,19 @@ class Matcher:
             if all(right[k] for k in rows):
                 continue
             trial = self._exchanged_trial(matching, block, positions, rows)
-            if trial is not None:
+            if trial is not None and self._is_natural(trial, rows):
                 now = self._right_rows(trial, written)
                 if all(now[k] for k in rows):
                     matching = trial
         return matching
+
+    def _is_natural(self, trial: Matching, rows: list[int]) -> bool:
+        """Return whether the rows have the sign that the exchanged roles give them.
+
+        Exchanged and written with the opposite sign, a relative angle has its usual Phi_q and a
+        reversed nu: without Phi that is a driver's rate reversed.
+        """
+        return "Phi" in self._hands or bool(np.all(trial.factors[rows] > 0))
 
     def _exchanged_trial(
         self, matching: Matching, block: Block, positions: Sequence[int], rows: list[int]

@@ -201,6 +201,8 @@ def _wrong_rotations(node: Turned, symbols: Symbols) -> Iterator[tuple[str, str,
     back = Turned(Product((MINUS_ONE, angle)), vector, quarter)
     transposed = times(MINUS_ONE, back) if quarter else back
     yield TRANSPOSED, f"{name} is transposed", transposed
+    if quarter:
+        yield TRANSPOSED, f"the angle has the wrong sign in {name}", back
     complement = Sum((Product((HALF, Pi())), Product((MINUS_ONE, angle))))
     exchanged = Turned(complement, vector, quarter)
     yield SINE_COSINE, f"sine and cosine are swapped in {name}", exchanged

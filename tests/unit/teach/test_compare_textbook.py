@@ -437,7 +437,8 @@ def hand_text(kind: str, formulas: dict[str, Any]) -> str:
 def checked(kind: str, formulas: dict[str, Any], folder: Path) -> Report:
     file = folder / f"{kind}.txt"
     file.write_text(hand_text(kind, formulas))
-    return kc.compare_file(mechanism(kind), file)
+    report: Report = kc.compare_file(mechanism(kind), file)
+    return report
 
 
 @pytest.mark.parametrize("kind", FORMULAS)
