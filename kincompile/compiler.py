@@ -16,10 +16,12 @@ from typing import TYPE_CHECKING
 from kincompile.emit.c_target import emit_c
 from kincompile.emit.grouped import emit_grouped
 from kincompile.emit.numpy_target import emit_numpy
-from kincompile.errors import InputError, UnsupportedError
+from kincompile.errors import InputError, ModelError, UnsupportedError
 from kincompile.ir.grouping import group
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
+from kincompile.model.mechanism import Mechanism
+from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native import make_native
@@ -31,8 +33,6 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from kincompile.emit.target import Emitted, Target
-    from kincompile.model.mechanism import Mechanism
-    from kincompile.model.system import ConstraintSystem
     from kincompile.structure.report import Inspection
 
 TARGETS: Mapping[str, Target] = {"numpy": emit_numpy, "c": emit_c}
@@ -77,7 +77,7 @@ def emit(
         raise UnsupportedError(f"there is no target {target!r}; targets are: {listed(TARGETS)}")
     if form not in (None, "inline", "grouped"):
         raise InputError(f"there is no form {form!r}; forms are: inline, grouped")
-    system = model.system()
+    system = _checked(model)
     program = lower(system)
     if form == "grouped" or (form is None and len(system.coordinates) > LARGEST_INLINE):
         if target != "numpy":
@@ -90,6 +90,16 @@ def emit(
     code = inline(program)
     require_square(system, code.pattern())
     return TARGETS[target](code)
+
+
+def _checked(model: Mechanism | ConstraintSystem) -> ConstraintSystem:
+    """Return the checked system of a model."""
+    if not isinstance(model, Mechanism | ConstraintSystem):
+        raise ModelError(
+            f"{type(model).__name__} is not a model: give a kc.Mechanism or a kc.ConstraintSystem "
+            "(a file is read by kc.read_model)"
+        )
+    return model.system()
 
 
 def compile(  # noqa: A001 - the public name kc.compile
@@ -147,5 +157,5 @@ def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
     ModelError
         If the model cannot be used as written; every problem is listed.
     """
-    system = model.system()
+    system = _checked(model)
     return inspect_system(system, inline(lower(system)).pattern())

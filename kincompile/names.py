@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 RESERVED = frozenset({"t", "pi", "alpha"})
 """Names with a meaning of their own in every expression."""
 
+SYMBOLS = frozenset({"a parameter", "a coordinate"})
+"""What has a name that stands in expressions."""
+
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _UNIT = re.compile(r"(?!.*\*/)[\w°%·*/^.()+ -]*")
 
@@ -27,7 +30,7 @@ def name_problem(name: object, what: str) -> str | None:
             f"{what} is named {name!r}: a name is an ASCII letter followed by letters, digits or "
             "underscores; rename it"
         )
-    if name in RESERVED:
+    if name in RESERVED and what in SYMBOLS:
         return (
             f"{what} is named {name!r}, which is reserved (t is time, pi the number, alpha a cam's "
             "angle); rename it"
