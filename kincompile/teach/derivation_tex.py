@@ -37,7 +37,7 @@ class _Renderer:
     """Prints sections, blocks and runs."""
 
     def __init__(self, document: Document) -> None:
-        self._printer = TexPrinter(document.abbreviations)
+        self._printer = TexPrinter(document.abbreviations, is_breakable=True)
 
     def section(self, section: Section, depth: int) -> Iterator[str]:
         level = rf" \level{{{section.level}}}" if section.level else ""
@@ -68,7 +68,7 @@ class _Renderer:
         pieces = self._printer.pieces(block.formula)
         target = _target(block.anchor) if block.anchor else ""
         yield rf"\formula{{{target}%"
-        yield from (rf"\piece{{{piece}}}%" for piece in pieces)
+        yield from (rf"{_command(piece)}{{{piece}}}%" for piece in pieces)
         yield "}"
         if block.source is not None:
             yield _source(block.source)
@@ -105,6 +105,11 @@ def _plain(run: Run) -> str:
         case str():
             return run
     return ""
+
+
+def _command(piece: str) -> str:
+    """Return what sets a piece of a formula: no line is broken within a matrix."""
+    return r"\block" if "bmatrix" in piece else r"\piece"
 
 
 def _target(anchor: str) -> str:

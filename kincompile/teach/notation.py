@@ -42,6 +42,7 @@ from kincompile.teach.formulas import (
     Row,
     Sub,
     Transposed,
+    size,
 )
 
 if TYPE_CHECKING:
@@ -62,6 +63,9 @@ GREEK = frozenset(
 _NAME = re.compile(r"([A-Za-z]+?)(\d*)(?:_(\w+))?")
 _RATE = re.compile(r"(\w+?)_(d+)ot")
 CONNECTIVES = {"&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}"}
+LONGEST_NUMERATOR = 24
+"""Nodes above a fraction bar: within a fraction no line can be broken."""
+
 _BODY_FIXED = ("s", "v")
 
 
@@ -290,8 +294,13 @@ class Notation:
         below = [item.base for item in factors if _is_reciprocal(item)]
         above = [item for item in factors if not _is_reciprocal(item)]
         above.sort(key=_place)
-        printed = self._juxtaposed(above)
-        return self.fraction(printed, self._juxtaposed(below)) if below else printed
+        if not below:
+            return self._juxtaposed(above)
+        divisor = self._juxtaposed(below)
+        if size(tuple(above)) <= LONGEST_NUMERATOR:
+            return self.fraction(self._juxtaposed(above), divisor)
+        inverse = self.fraction(self.numeral("1"), divisor)
+        return self.row([inverse, self.thin_space(), *(self._factor(item) for item in above)])
 
     def _juxtaposed(self, factors: Sequence[Any]) -> Printed:
         if not factors:

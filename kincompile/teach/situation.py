@@ -159,11 +159,12 @@ def _evaluated(
     is_assembled = converged and not is_given
     start = assembly.q if is_assembled and assembly is not None else guess
     q = np.array([given.get(name, start[k]) for k, name in enumerate(names)])
-    Phi, Phi_q = module.position(q, t, p)
-    nu = module.nu(q, t, p)
-    q_dot = _solved(Phi_q, nu) if is_assembled else np.zeros_like(q)
-    q_dot = np.array([given.get(rate(name), q_dot[k]) for k, name in enumerate(names)])
-    gamma = module.gamma(q, q_dot, t, p)
+    with np.errstate(all="ignore"):  # what is not finite is refused below
+        Phi, Phi_q = module.position(q, t, p)
+        nu = module.nu(q, t, p)
+        q_dot = _solved(Phi_q, nu) if is_assembled else np.zeros_like(q)
+        q_dot = np.array([given.get(rate(name), q_dot[k]) for k, name in enumerate(names)])
+        gamma = module.gamma(q, q_dot, t, p)
     if not all(np.isfinite(item).all() for item in (Phi, Phi_q, nu, gamma)):
         raise InputError(f"the formulas of {system.name!r} have no finite values at this state")
     q_ddot = _solved(Phi_q, gamma) if is_assembled else np.zeros_like(q)

@@ -35,9 +35,20 @@ def escape(text: str) -> str:
 
 
 class TexPrinter(Notation, LatexPrinter):
-    """Prints formulas as LaTeX in mathematical mode; amsmath is all that it needs."""
+    """Prints formulas as LaTeX in mathematical mode; amsmath is all that it needs.
 
-    def __init__(self, abbreviations: Mapping[Any, Glyph] | None = None) -> None:
+    Parameters
+    ----------
+    abbreviations
+        What is printed as one symbol.
+    is_breakable
+        Whether a line may be broken between factors.
+    """
+
+    def __init__(
+        self, abbreviations: Mapping[Any, Glyph] | None = None, *, is_breakable: bool = False
+    ) -> None:
+        self._space = r"\,\allowbreak" if is_breakable else r"\,"
         super().__init__({"mul_symbol": None})  # type: ignore[no-untyped-call]
         self.abbreviations = abbreviations or {}
 
@@ -99,7 +110,7 @@ class TexPrinter(Notation, LatexPrinter):
 
     def thin_space(self) -> str:
         """Return what stands between factors."""
-        return r"\,"
+        return self._space
 
     def array(self, rows: Sequence[Sequence[str]]) -> str:
         """Return a matrix in brackets."""
