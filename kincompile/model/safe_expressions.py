@@ -130,6 +130,8 @@ def parse_expression(
     source.check_brackets()
     try:
         value = _Reader(source, names, refused or {}).read(source.tree())
+        if not all(_fits(number) for number in value.atoms(sympy.Number)):
+            raise source.error("a number in this expression is too large for floating point", 0)
         return sympy.sympify(as_expression(value), strict=True)
     except ExpressionError:
         raise

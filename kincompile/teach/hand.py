@@ -182,7 +182,13 @@ def read_hand(
     rows = _rows(quantity, given, where)
     _check_rectangular(quantity, rows, where)
     problems: list[str] = []
-    table = [[_entry(cell, words, quantity, where, problems) for cell in row] for row in rows]
+    table = [
+        [
+            _entry(cell, words, f"{where}{quantity}", f"row {r}, column {c}", problems)
+            for c, cell in enumerate(row, 1)
+        ]
+        for r, row in enumerate(rows, 1)
+    ]
     if problems:
         raise InputError(problems)
     if quantity != "Phi_q":
@@ -227,8 +233,10 @@ def _line(row: list[Any]) -> str:
 
 
 def _entry(
-    cell: Any, words: Vocabulary, quantity: str, where: str, problems: list[str]
+    cell: Any, words: Vocabulary, quantity: str, place: str, problems: list[str]
 ) -> sympy.Expr:
+    """Return an entry in SymPy; a `Cell` knows its own place in the file."""
+    at = f"{quantity}, " if isinstance(cell, Cell) else f"{quantity}, {place}: "
     try:
         if isinstance(cell, Cell):
             return parse_expression(cell.text, words.names, cell.place, words.refused)
@@ -242,11 +250,11 @@ def _entry(
             return meant
         hint = suggestion(unknown[0], words.names)
         problems.append(
-            f"{where}{quantity}: {expression} contains {listed(unknown)}{hint}; "
+            f"{at}{expression} contains {listed(unknown)}{hint}; "
             f"the names are: {listed(words.names, 60)}"
         )
     except NotAnExpressionError as error:
-        problems.append(f"{where}{quantity}, {error}")
+        problems.append(f"{at}{error}")
     nothing: sympy.Expr = sympy.Integer(0)
     return nothing
 

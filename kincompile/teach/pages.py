@@ -69,7 +69,7 @@ def _table(every: Sequence[Entry], quantity: str) -> dict[str, Any]:
         rows.setdefault(entry.row, []).append(_cell(entry))
     return {
         "name": escape(quantity),
-        "columns": [escape(column or "") for column in columns],
+        "columns": [escape(column) for column in columns if column is not None],
         "rows": [{"name": escape(name), "cells": cells} for name, cells in rows.items()],
     }
 

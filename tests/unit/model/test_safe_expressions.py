@@ -85,6 +85,7 @@ def test_that_every_smooth_function_can_be_called() -> None:
         ("1e999", (1, 1), "too large"),
         ("10^64*10^64*10^64*10^64*10^64", (1, 1), "too large"),
         ("exp(exp(exp(100.0)))", (1, 5), "too large"),
+        ("y + 1e308*x*10", (1, 1), "too large"),
         ("9^9^9", (1, 3), "exponent is beyond"),
         ("True", (1, 1), "not a real number"),
         ("", (1, 1), "empty"),
