@@ -1,10 +1,13 @@
 """Hand files: what is read, and what a bad one is told."""
 
+import io
 import json
 from pathlib import Path
 
 import click.testing
 import pytest
+import rich.console
+import sympy
 
 import kincompile as kc
 from kincompile.cli import cli
@@ -166,3 +169,23 @@ def test_the_command_with_a_bad_file(tmp_path: Path) -> None:
     assert result.exit_code == 2
     assert "there is no 'zeta'" in result.stderr
     assert run(str(DATA / "problem_3_5_6.toml"), "-o", "a.pdf").exit_code == 2
+
+
+def test_what_a_report_shows_and_what_it_keeps(system: kc.ConstraintSystem) -> None:
+    report = kc.compare_file(system, DATA / "problem_3_5_6.txt")
+    screen = io.StringIO()
+    rich.console.Console(file=screen, width=100, force_terminal=True).print(report.to_rich())
+    assert "gamma[equation_3]" in screen.getvalue()
+    assert "\x1b[1;31mdifferent" in screen.getvalue()  # bold and red
+    (entry,) = report.different
+    assert entry.generated == "-2*x2_dot**2 - 2*y2_dot**2 + 1/50"
+    for form in (report.to_text, report.to_json, report.to_html, report.to_gradescope):
+        assert entry.generated not in form()
+        assert entry.generated in form(reveal=True)
+
+
+def test_that_a_page_shows_what_was_written_and_does_not_obey_it() -> None:
+    system = kc.ConstraintSystem("free", "x", [sympy.Symbol("x") - kc.t])
+    report = kc.compare(system, gamma="[Piecewise((1, x<1), (2, True))]")
+    assert "x&lt;1" in report.to_html()
+    assert "x<1" not in report.to_html()
