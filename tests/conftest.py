@@ -1,7 +1,9 @@
 """What every test shares: fixed seeds, the option that rewrites the goldens, and the examples."""
 
+import os
 import runpy
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -54,6 +56,11 @@ class Example:
         return kc.compile(self.model)
 
     @cached_property
+    def native(self) -> Any:
+        """The module of the C target; a test that takes it takes `quick_compiler` too."""
+        return kc.compile(self.model, target="c")
+
+    @cached_property
     def solution(self) -> Any:
         """The motion over the example's own time grid."""
         return kc.solve(self.module, np.linspace(0, self.model.end, self.model.points))
@@ -64,6 +71,32 @@ def load_example(path: Path) -> Example:
     """Run an example's file, once a session, and take its model."""
     names = runpy.run_path(str(path))
     return Example(path, names["mechanism"] if "mechanism" in names else names["system"])
+
+
+@pytest.fixture(scope="session")
+def quick_compiler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Let the C target build in a cache of this session, with little optimization.
+
+    What the optimization does is left to the tests that ask for the machine's own compiler, whose
+    path is the fixture's value.
+    """
+    compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    if compiler is None:
+        pytest.skip("there is no C compiler")
+    folder = tmp_path_factory.mktemp("native")
+    quick = folder / "quick-cc"
+    quick.write_text(
+        '#!/bin/sh\nfor word do shift; [ "$word" = -O3 ] && word=-O1; set -- "$@" "$word"; done\n'
+        f'exec {compiler} "$@"\n'
+    )
+    quick.chmod(0o755)
+    before = {name: os.environ.get(name) for name in ("CC", "XDG_CACHE_HOME")}
+    os.environ.update(CC=str(quick), XDG_CACHE_HOME=str(folder / "cache"))
+    yield compiler
+    for name, value in before.items():
+        os.environ.pop(name)
+        if value is not None:
+            os.environ[name] = value
 
 
 @pytest.fixture(scope="session", params=EXAMPLES, ids=lambda path: path.stem)

@@ -95,25 +95,29 @@ INLINE int64_t cos_sin(double angle, int exact, double *cosine, double *sine)
         *sine = sin(angle);
         return 0;
     }
-    // The nearest multiple of pi/2 is taken off in three parts (Cody and Waite); adding 3 * 2^51
-    // rounds to a whole number, and leaves it in the low bits.
+    // The nearest multiple of pi/2 is taken off in three parts (Cody and Waite), and what rounding
+    // takes from the rest r is kept in `low`. Adding 3 * 2^51 rounds to a whole number, and leaves
+    // it in the low bits.
     const double shift = 6755399441055744.0;
     const double shifted = angle * 0.63661977236758134 + shift;
     const double n = shifted - shift;
-    const double r = ((angle - n * 1.57079632673412561417e+00) - n * 6.07710050630396597660e-11)
-        - n * 2.02226624879595063154e-21;
+    const double rest = angle - n * 1.57079632673412561417e+00;
+    const double second_part = n * 6.07710050630396597660e-11;
+    const double high = rest - second_part;
+    const double lost = ((rest - high) - second_part) - n * 2.02226624879595063154e-21;
+    const double r = high + lost, low = (high - r) + lost;
     uint64_t quadrant;
     memcpy(&quadrant, &shifted, sizeof quadrant);
     // the polynomials of Sun's fdlibm, for |r| <= pi/4
-    const double z = r * r;
-    const double s = r + r * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03
-        + z * (-1.98412698298579493134e-04 + z * (2.75573137070700676789e-06
-        + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-    const double half = 0.5 * z, w = 1.0 - half;
-    const double c = w + (((1.0 - w) - half) + z * z * (4.16666666666666019037e-02
+    const double z = r * r, half = 0.5 * z, w = 1.0 - half;
+    const double s = r + (low * w + r * z * (-1.66666666666666324348e-01
+        + z * (8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04
+        + z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08
+        + z * 1.58969099521155010221e-10))))));
+    const double c = w + (((1.0 - w) - half) + (z * z * (4.16666666666666019037e-02
         + z * (-1.38888888888741095749e-03 + z * (2.48015872894767294178e-05
         + z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09
-        - z * 1.13596475577881948265e-11))))));
+        - z * 1.13596475577881948265e-11))))) - r * low));
     const double first = quadrant & 1 ? s : c, second = quadrant & 1 ? c : s;
     *cosine = (quadrant + 1) & 2 ? -first : first;
     *sine = quadrant & 2 ? -second : second;

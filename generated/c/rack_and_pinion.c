@@ -96,25 +96,29 @@ INLINE int64_t cos_sin(double angle, int exact, double *cosine, double *sine)
         *sine = sin(angle);
         return 0;
     }
-    // The nearest multiple of pi/2 is taken off in three parts (Cody and Waite); adding 3 * 2^51
-    // rounds to a whole number, and leaves it in the low bits.
+    // The nearest multiple of pi/2 is taken off in three parts (Cody and Waite), and what rounding
+    // takes from the rest r is kept in `low`. Adding 3 * 2^51 rounds to a whole number, and leaves
+    // it in the low bits.
     const double shift = 6755399441055744.0;
     const double shifted = angle * 0.63661977236758134 + shift;
     const double n = shifted - shift;
-    const double r = ((angle - n * 1.57079632673412561417e+00) - n * 6.07710050630396597660e-11)
-        - n * 2.02226624879595063154e-21;
+    const double rest = angle - n * 1.57079632673412561417e+00;
+    const double second_part = n * 6.07710050630396597660e-11;
+    const double high = rest - second_part;
+    const double lost = ((rest - high) - second_part) - n * 2.02226624879595063154e-21;
+    const double r = high + lost, low = (high - r) + lost;
     uint64_t quadrant;
     memcpy(&quadrant, &shifted, sizeof quadrant);
     // the polynomials of Sun's fdlibm, for |r| <= pi/4
-    const double z = r * r;
-    const double s = r + r * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03
-        + z * (-1.98412698298579493134e-04 + z * (2.75573137070700676789e-06
-        + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-    const double half = 0.5 * z, w = 1.0 - half;
-    const double c = w + (((1.0 - w) - half) + z * z * (4.16666666666666019037e-02
+    const double z = r * r, half = 0.5 * z, w = 1.0 - half;
+    const double s = r + (low * w + r * z * (-1.66666666666666324348e-01
+        + z * (8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04
+        + z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08
+        + z * 1.58969099521155010221e-10))))));
+    const double c = w + (((1.0 - w) - half) + (z * z * (4.16666666666666019037e-02
         + z * (-1.38888888888741095749e-03 + z * (2.48015872894767294178e-05
         + z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09
-        - z * 1.13596475577881948265e-11))))));
+        - z * 1.13596475577881948265e-11))))) - r * low));
     const double first = quadrant & 1 ? s : c, second = quadrant & 1 ? c : s;
     *cosine = (quadrant + 1) & 2 ? -first : first;
     *sine = quadrant & 2 ? -second : second;
@@ -153,18 +157,16 @@ INLINE int64_t Phi_at(block *at, size_t lane, int exact)
     far |= cos_sin(phi_rack, exact, &c_rack, &s_rack);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
     const double mesh_1 = 0.2 * R;
-    const double mesh_2 = 3.0 * PI / 2.0;
     const double mesh_d_x = x_pinion - x_rack;
-    const double mesh_4 = 0.2 * c_rack;
+    const double mesh_3 = 0.2 * c_rack;
     const double mesh_d_y = y_pinion - y_rack;
-    const double mesh_6 = 0.2 * s_rack;
+    const double mesh_5 = 0.2 * s_rack;
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
     at->Phi[0][lane] = x_pinion;
     at->Phi[1][lane] = y_pinion;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
-            - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6));
-    at->Phi[3][lane] = (mesh_d_y + mesh_6) * mesh_4 - (mesh_d_x + mesh_4) * mesh_6 - mesh_1;
+    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5));
+    at->Phi[3][lane] = (mesh_d_y + mesh_5) * mesh_3 - (mesh_d_x + mesh_3) * mesh_5 - mesh_1;
     // 4  AbsoluteAngle "guide": rack angle 0
     at->Phi[4][lane] = phi_rack;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -327,36 +329,34 @@ INLINE int64_t position_at(block *at, size_t lane, int exact)
     far |= cos_sin(phi_rack, exact, &c_rack, &s_rack);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
     const double mesh_1 = 0.2 * R;
-    const double mesh_2 = 3.0 * PI / 2.0;
     const double mesh_d_x = x_pinion - x_rack;
-    const double mesh_4 = 0.2 * c_rack;
+    const double mesh_3 = 0.2 * c_rack;
     const double mesh_d_y = y_pinion - y_rack;
-    const double mesh_6 = 0.2 * s_rack;
-    const double mesh_d_y_ = mesh_d_y + mesh_6;
-    const double mesh_d_x_ = mesh_d_x + mesh_4;
+    const double mesh_5 = 0.2 * s_rack;
+    const double mesh_d_y_ = mesh_d_y + mesh_5;
+    const double mesh_d_x_ = mesh_d_x + mesh_3;
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
     at->Phi[0][lane] = x_pinion;
     at->Phi[1][lane] = y_pinion;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
-            - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6));
-    at->Phi[3][lane] = mesh_d_y_ * mesh_4 - mesh_d_x_ * mesh_6 - mesh_1;
+    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5));
+    at->Phi[3][lane] = mesh_d_y_ * mesh_3 - mesh_d_x_ * mesh_5 - mesh_1;
     // 4  AbsoluteAngle "guide": rack angle 0
     at->Phi[4][lane] = phi_rack;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
     at->Phi[5][lane] = phi_pinion - swing * sine(PI * t, exact, &far);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi_q[2][lane] = -mesh_4;  // mesh.roll by x_rack
-    at->Phi_q[3][lane] = -mesh_6;  // mesh.roll by y_rack
-    at->Phi_q[4][lane] = mesh_d_y * mesh_4 - mesh_d_x * mesh_6 - mesh_1;  // mesh.roll by phi_rack
-    at->Phi_q[5][lane] = mesh_4;  // mesh.roll by x_pinion
-    at->Phi_q[6][lane] = mesh_6;  // mesh.roll by y_pinion
+    at->Phi_q[2][lane] = -mesh_3;  // mesh.roll by x_rack
+    at->Phi_q[3][lane] = -mesh_5;  // mesh.roll by y_rack
+    at->Phi_q[4][lane] = mesh_d_y * mesh_3 - mesh_d_x * mesh_5 - mesh_1;  // mesh.roll by phi_rack
+    at->Phi_q[5][lane] = mesh_3;  // mesh.roll by x_pinion
+    at->Phi_q[6][lane] = mesh_5;  // mesh.roll by y_pinion
     at->Phi_q[7][lane] = mesh_1;  // mesh.roll by phi_pinion
-    at->Phi_q[8][lane] = mesh_6;  // mesh.pitch by x_rack
-    at->Phi_q[9][lane] = -mesh_4;  // mesh.pitch by y_rack
-    at->Phi_q[10][lane] = square(mesh_6) + square(mesh_4) - (mesh_d_x_ * mesh_4 + mesh_d_y_ * mesh_6);  // mesh.pitch by phi_rack
-    at->Phi_q[11][lane] = -mesh_6;  // mesh.pitch by x_pinion
-    at->Phi_q[12][lane] = mesh_4;  // mesh.pitch by y_pinion
+    at->Phi_q[8][lane] = mesh_5;  // mesh.pitch by x_rack
+    at->Phi_q[9][lane] = -mesh_3;  // mesh.pitch by y_rack
+    at->Phi_q[10][lane] = square(mesh_5) + square(mesh_3) - (mesh_d_x_ * mesh_3 + mesh_d_y_ * mesh_5);  // mesh.pitch by phi_rack
+    at->Phi_q[11][lane] = -mesh_5;  // mesh.pitch by x_pinion
+    at->Phi_q[12][lane] = mesh_3;  // mesh.pitch by y_pinion
     return far;
 }
 
@@ -520,20 +520,19 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     far |= cos_sin(phi_rack, exact, &c_rack, &s_rack);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
     const double mesh_1 = 0.2 * R;
-    const double mesh_2 = 3.0 * PI / 2.0;
     const double mesh_d_x = x_pinion - x_rack;
-    const double mesh_4 = 0.2 * c_rack;
+    const double mesh_3 = 0.2 * c_rack;
     const double mesh_d_y = y_pinion - y_rack;
-    const double mesh_6 = 0.2 * s_rack;
-    const double mesh_d_y_ = mesh_d_y + mesh_6;
-    const double mesh_d_x_ = mesh_d_x + mesh_4;
+    const double mesh_5 = 0.2 * s_rack;
+    const double mesh_d_y_ = mesh_d_y + mesh_5;
+    const double mesh_d_x_ = mesh_d_x + mesh_3;
     const double phi_rack_dot_sq = square(phi_rack_dot);
-    const double mesh_10 = phi_rack_dot_sq * mesh_4;
-    const double mesh_11 = phi_rack_dot_sq * mesh_6;
+    const double mesh_9 = phi_rack_dot_sq * mesh_3;
+    const double mesh_10 = phi_rack_dot_sq * mesh_5;
     const double mesh_d_dot_y = y_pinion_dot - y_rack_dot;
-    const double mesh_13 = phi_rack_dot * mesh_4;
+    const double mesh_12 = phi_rack_dot * mesh_3;
     const double mesh_d_dot_x = x_pinion_dot - x_rack_dot;
-    const double mesh_15 = phi_rack_dot * mesh_6;
+    const double mesh_14 = phi_rack_dot * mesh_5;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
     const double motor_1 = PI * t;
     const double sin_motor_1 = sine(motor_1, exact, &far);
@@ -541,25 +540,24 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     at->Phi[0][lane] = x_pinion;
     at->Phi[1][lane] = y_pinion;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion - mesh_2 + mesh_2)
-            - (mesh_d_x * mesh_4 + mesh_d_y * mesh_6));
-    at->Phi[3][lane] = mesh_d_y_ * mesh_4 - mesh_d_x_ * mesh_6 - mesh_1;
+    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5));
+    at->Phi[3][lane] = mesh_d_y_ * mesh_3 - mesh_d_x_ * mesh_5 - mesh_1;
     // 4  AbsoluteAngle "guide": rack angle 0
     at->Phi[4][lane] = phi_rack;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
     at->Phi[5][lane] = phi_pinion - swing * sin_motor_1;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi_q[2][lane] = -mesh_4;  // mesh.roll by x_rack
-    at->Phi_q[3][lane] = -mesh_6;  // mesh.roll by y_rack
-    at->Phi_q[4][lane] = mesh_d_y * mesh_4 - mesh_d_x * mesh_6 - mesh_1;  // mesh.roll by phi_rack
-    at->Phi_q[5][lane] = mesh_4;  // mesh.roll by x_pinion
-    at->Phi_q[6][lane] = mesh_6;  // mesh.roll by y_pinion
+    at->Phi_q[2][lane] = -mesh_3;  // mesh.roll by x_rack
+    at->Phi_q[3][lane] = -mesh_5;  // mesh.roll by y_rack
+    at->Phi_q[4][lane] = mesh_d_y * mesh_3 - mesh_d_x * mesh_5 - mesh_1;  // mesh.roll by phi_rack
+    at->Phi_q[5][lane] = mesh_3;  // mesh.roll by x_pinion
+    at->Phi_q[6][lane] = mesh_5;  // mesh.roll by y_pinion
     at->Phi_q[7][lane] = mesh_1;  // mesh.roll by phi_pinion
-    at->Phi_q[8][lane] = mesh_6;  // mesh.pitch by x_rack
-    at->Phi_q[9][lane] = -mesh_4;  // mesh.pitch by y_rack
-    at->Phi_q[10][lane] = square(mesh_6) + square(mesh_4) - (mesh_d_x_ * mesh_4 + mesh_d_y_ * mesh_6);  // mesh.pitch by phi_rack
-    at->Phi_q[11][lane] = -mesh_6;  // mesh.pitch by x_pinion
-    at->Phi_q[12][lane] = mesh_4;  // mesh.pitch by y_pinion
+    at->Phi_q[8][lane] = mesh_5;  // mesh.pitch by x_rack
+    at->Phi_q[9][lane] = -mesh_3;  // mesh.pitch by y_rack
+    at->Phi_q[10][lane] = square(mesh_5) + square(mesh_3) - (mesh_d_x_ * mesh_3 + mesh_d_y_ * mesh_5);  // mesh.pitch by phi_rack
+    at->Phi_q[11][lane] = -mesh_5;  // mesh.pitch by x_pinion
+    at->Phi_q[12][lane] = mesh_3;  // mesh.pitch by y_pinion
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
     at->nu[0][lane] = 0.0;
     at->nu[1][lane] = 0.0;
@@ -574,11 +572,11 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     at->gamma[0][lane] = 0.0;
     at->gamma[1][lane] = 0.0;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->gamma[2][lane] = mesh_d_x * mesh_10 + mesh_d_y * mesh_11
-        - 2.0 * (mesh_d_dot_y * mesh_13 - mesh_d_dot_x * mesh_15);
-    at->gamma[3][lane] = -(mesh_10 * mesh_6 - mesh_11 * mesh_4
-            - 2.0 * ((mesh_d_dot_y + mesh_13) * mesh_15 + (mesh_d_dot_x - mesh_15) * mesh_13)
-            + (mesh_d_x_ * mesh_11 - mesh_d_y_ * mesh_10));
+    at->gamma[2][lane] = mesh_d_x * mesh_9 + mesh_d_y * mesh_10
+        - 2.0 * (mesh_d_dot_y * mesh_12 - mesh_d_dot_x * mesh_14);
+    at->gamma[3][lane] = -(mesh_9 * mesh_5 - mesh_10 * mesh_3
+            - 2.0 * ((mesh_d_dot_y + mesh_12) * mesh_14 + (mesh_d_dot_x - mesh_14) * mesh_12)
+            + (mesh_d_x_ * mesh_10 - mesh_d_y_ * mesh_9));
     // 4  AbsoluteAngle "guide": rack angle 0
     at->gamma[4][lane] = 0.0;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)

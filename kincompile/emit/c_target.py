@@ -31,9 +31,11 @@ KEYWORDS = (
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else",
     "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long", "register",
     "restrict", "return", "short", "signed", "sizeof", "static", "struct", "switch", "typedef",
-    "union", "unsigned", "void", "volatile", "while", "asm", "typeof", "linux", "unix",
+    "union", "unsigned", "void", "volatile", "while", "asm", "typeof", "bool",
+    "true", "false", "nullptr", "constexpr", "alignas", "alignof", "static_assert", "thread_local",
+    "linux", "unix", "NULL", "NAN", "INFINITY", "HUGE_VAL", "M_E", "M_PI",
 )  # fmt: skip
-"""Words of C, and macros that some compilers define."""
+"""Words of C and of later standards, and macros of headers and compilers."""
 
 RESERVED = (
     *KEYWORDS, "at", "lane", "t", "far", "exact", "F", "right", "to", "PI", "LANES",

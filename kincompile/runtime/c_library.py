@@ -15,6 +15,7 @@ import platform
 import shlex
 import shutil
 import subprocess
+import sys
 import tempfile
 from contextlib import suppress
 from functools import cache
@@ -32,6 +33,8 @@ COMPILERS = ("cc", "gcc", "clang")
 
 FLAGS = ("-std=c99", "-O3", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast")
 """None of these changes what a program may assume of floating-point numbers, NaN included."""
+
+TRIAL = "import ctypes, sys; ctypes.CDLL(sys.argv[1])"
 
 MOST_LINES = 20
 """Lines of a compiler's messages that are passed on."""
@@ -69,6 +72,7 @@ def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDL
     try:
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             built = _built(command, Path(folder), files)
+            _try(built, name)
             loaded = _loaded(built, name, fingerprint)
             _keep(built.read_bytes(), kept)
             return loaded
@@ -178,6 +182,17 @@ def _run(command: tuple[str, ...], folder: Path | None) -> subprocess.CompletedP
             f"{said}\nIf it does so with every program, {REPAIR}."
         )
     return done
+
+
+def _try(path: Path, name: str) -> None:
+    """Load a new library in a process of its own: one that was cut short takes the process down."""
+    command = (sys.executable, "-I", "-S", "-c", TRIAL, str(path))
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    if done.returncode != 0:
+        said = (done.stderr.splitlines() or [f"exit code {done.returncode}"])[-1]
+        raise UnsupportedError(
+            f"the library that the C compiler made of {name} cannot be loaded: {said}; {REPAIR}."
+        )
 
 
 def _loaded(path: Path, name: str, fingerprint: str) -> ctypes.CDLL:

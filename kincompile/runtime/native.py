@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.errors import InputError
 from kincompile.runtime.c_library import library
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
         compiled["march"] = functions.march()
     for name, function in compiled.items():
         function.__name__, function.__module__ = name, module.__name__
-        function.__doc__ = getattr(names.get(name), "__doc__", function.__doc__)
+        function.__doc__ = function.__doc__ or names[name].__doc__
     names.update(compiled)
     return module
 
@@ -290,23 +291,44 @@ class _Functions:
             q: Any, q_dot: Any, t: Any, p: Any = defaults, out: Any = None
         ) -> Any:
             shape: tuple[int, ...] = getattr(q, "shape", ())
-            arrays = [*((item, (self._n, *shape[1:])) for item in (q, q_dot))]
-            if (
-                len(shape) != 2
-                or not all(_is_real(*item) for item in arrays)
-                or not (isinstance(t, float) or _is_real(t, shape[1:]))
-                or not (_is_real(p, defaults.shape) or _is_real(p, (defaults.size, shape[1])))
+            if not (
+                len(shape) == 2
+                and all(_is_real(state, (self._n, shape[1])) for state in (q, q_dot))
+                and (isinstance(t, float) or _is_real(t, shape[1:]))
+                and (_is_real(p, defaults.shape) or _is_real(p, (defaults.size, shape[1])))
             ):
-                return original(q, q_dot, t, p)
-            results = out or _split(np.empty((sum(sizes), shape[1])), sizes)
-            batch = _Batch(count=shape[1], q=_numbers(q), q_dot=_numbers(q_dot), p=_numbers(p))
+                return _copied(original(q, q_dot, t, p), self._checked(out, sizes))
+            results = self._checked(out, sizes, shape[1])
+            if results is None:
+                results = _split(np.empty((sum(sizes), shape[1])), sizes)
             time = np.asarray(t)
-            batch.t, batch.varying_only = _times(time), out is not None
+            batch = _Batch(shape[1], _numbers(q), _numbers(q_dot), _times(time), _numbers(p))
+            batch.varying_only = out is not None
             for quantity, result in zip(BATCH_LAST, results, strict=True):
                 setattr(batch, quantity, _numbers(result))
             return original(q, q_dot, t, p) if self._run(byref(batch)) else results
 
+        kinematics_batch_last.__doc__ = f"""{original.__doc__}
+    out, if given, is what an earlier call for as many points returned: the arrays are filled again,
+    which saves the time to fetch memory and to write the entries that never change.
+    """
         return kinematics_batch_last
+
+    def _checked(self, out: Any, sizes: Sequence[int], points: int | None = None) -> Any:
+        """Return the arrays of an earlier call, or None where none are given."""
+        if out is None:
+            return None
+        given = out if isinstance(out, tuple) and len(out) == len(sizes) else ()
+        points = getattr(given[0], "size", 0) // sizes[0] if given and points is None else points
+        if not given or not all(
+            _is_real(array, (size, points or 0)) and array.flags.writeable
+            for array, size in zip(given, sizes, strict=True)
+        ):
+            raise InputError(
+                f"{self._name}: out is not what an earlier call returned for as many points: give "
+                "the same tuple of arrays again, or nothing"
+            )
+        return out
 
     def solve(self) -> Function:
         """Return the planned solve."""
@@ -394,6 +416,15 @@ def _rows(array: Any, shape: tuple[int, ...], entries: tuple[int, ...]) -> Array
     spread = np.broadcast_to(array.astype(np.float64, copy=False), (*shape, *entries))
     rows: Array = spread.reshape(math.prod(shape), *entries).T
     return rows
+
+
+def _copied(results: tuple[Array, ...], out: tuple[Array, ...] | None) -> tuple[Array, ...]:
+    """Return results, in the arrays given for them if there are any."""
+    if out is None:
+        return results
+    for place, result in zip(out, results, strict=True):
+        place[...] = result
+    return out
 
 
 def _split(memory: Array, sizes: Sequence[int]) -> tuple[Array, ...]:

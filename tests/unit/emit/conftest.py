@@ -48,6 +48,12 @@ def rich() -> Any:
 
 
 @pytest.fixture(scope="session")
+def tabled_model() -> kc.Mechanism:
+    """The mechanism of `tabled`."""
+    return table_mechanism()
+
+
+@pytest.fixture(scope="session")
 def tabled() -> Any:
     """A module without parameters, with a spline."""
     return kc.compile(table_mechanism())

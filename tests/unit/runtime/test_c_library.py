@@ -1,0 +1,306 @@
+"""Compilers that are missing or broken, caches that are corrupt, read-only or shared."""
+
+import hashlib
+import os
+import subprocess
+import sys
+import tempfile
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+from kincompile.runtime import c_library
+
+COMPILE = """
+import sys, kincompile as kc
+m = kc.Mechanism("tiny")
+rod = m.body("rod")
+m.add(kc.Revolute("A", m.ground, (0, 0), rod, (1, 0)))
+m.add(kc.AbsoluteAngle("motor", rod, kc.t))
+for _ in range(int(sys.argv[1])):
+    module = kc.compile(m, target="c")
+print((module.Phi(module.GUESS, 0.5) + 0.0).tolist())
+"""
+
+
+@pytest.fixture
+def cache(monkeypatch, tmp_path, quick_compiler):
+    """Return an empty cache, for the machine's own compiler."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("CC", f"{quick_compiler}")
+    return tmp_path / "cache" / "kincompile" / "native"
+
+
+@pytest.fixture
+def compiler(monkeypatch, tmp_path, cache, quick_compiler):
+    """Return a function that puts a script in the compiler's place; it is told what to do."""
+
+    def replace(script: str) -> None:
+        path = tmp_path / "fake-cc"
+        path.write_text(
+            '#!/bin/sh\n[ "$1" = --version ] && { echo fake 1; exit; }\n'
+            'out=; last=; for word do [ "$last" = -o ] && out=$word; last=$word; done\n'
+            + textwrap.dedent(script).replace("REAL", quick_compiler)
+        )
+        path.chmod(0o755)
+        monkeypatch.setenv("CC", str(path))
+
+    return replace
+
+
+def tiny(name: str = "tiny", angle: float = 1.0) -> kc.Mechanism:
+    """Return a mechanism that compiles in no time."""
+    m = kc.Mechanism(name)
+    rod = m.body("rod")
+    m.add(kc.Revolute("A", m.ground, (0, 0), rod, (angle, 0)))
+    m.add(kc.AbsoluteAngle("motor", rod, kc.t))
+    return m
+
+
+def assert_right(module):
+    np.testing.assert_allclose(module.Phi(np.array([1.0, 2.0, 0.0]), 0.5), [-2.0, -2.0, -0.5])
+
+
+def assert_intact(folder: Path, libraries: int):
+    """Check that a cache holds so many libraries, with their checksums, and nothing else."""
+    names = sorted(path.name for path in folder.iterdir())
+    found = [path for path in folder.iterdir() if path.suffix == ".so"]
+    assert len(found) == libraries
+    for path in found:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        assert path.with_suffix(".sha256").read_text() == digest
+    assert len(names) == 2 * libraries
+
+
+# ---------------------------------------------------------------- the compiler
+
+
+def test_without_a_compiler_the_error_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    with pytest.raises(
+        kc.UnsupportedError, match=r"needs a C compiler, and there is no .* apt install gcc"
+    ) as error:
+        kc.compile(tiny(), target="c")
+    assert "kc.compile(m)" in str(error.value)
+
+
+def test_a_compiler_that_is_named_in_vain(monkeypatch, cache):
+    monkeypatch.setenv("CC", "no-such-compiler -O0")
+    with pytest.raises(kc.UnsupportedError, match="no-such-compiler, which CC names, is not there"):
+        kc.compile(tiny(), target="c")
+
+
+def test_without_a_compiler_numpy_and_the_emitted_text_remain(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    assert "tiny_march" in kc.emit(tiny(), target="c").source
+    assert_right(kc.compile(tiny()))
+
+
+def test_a_compiler_that_fails_is_quoted(compiler, cache):
+    compiler('echo "internal compiler error: out of luck" >&2; exit 4')
+    with pytest.raises(kc.UnsupportedError, match=r"exit code 4(?s:.*)out of luck"):
+        kc.compile(tiny(), target="c")
+    assert not cache.exists()
+
+
+def test_a_compiler_that_fails_without_a_word(compiler):
+    compiler("exit 1")
+    with pytest.raises(kc.UnsupportedError, match="it says nothing"):
+        kc.compile(tiny(), target="c")
+
+
+def test_a_compiler_that_cannot_tell_its_version(monkeypatch, tmp_path, cache):
+    path = tmp_path / "dumb-cc"
+    path.write_text("#!/bin/sh\nexit 1\n")
+    path.chmod(0o755)
+    monkeypatch.setenv("CC", str(path))
+    with pytest.raises(kc.UnsupportedError, match="exit code 1"):
+        kc.compile(tiny(), target="c")
+
+
+def test_a_compiler_that_is_no_program(monkeypatch, tmp_path, cache):
+    path = tmp_path / "text-cc"
+    path.write_bytes(b"\x00\x01")
+    path.chmod(0o755)
+    monkeypatch.setenv("CC", str(path))
+    with pytest.raises(kc.UnsupportedError, match=r"cannot be run: .*; repair or reinstall it"):
+        kc.compile(tiny(), target="c")
+
+
+def test_a_compiler_that_writes_nothing(compiler, cache):
+    compiler("exit 0")
+    with pytest.raises(kc.UnsupportedError, match="wrote no library"):
+        kc.compile(tiny(), target="c")
+    assert not cache.exists()
+
+
+@pytest.mark.parametrize(
+    "script", ['echo rubbish > "$out"', ': > "$out"', 'REAL "$@" && truncate -s 700 "$out"']
+)
+def test_a_compiler_that_writes_rubbish_is_found_out_and_nothing_is_kept(compiler, cache, script):
+    compiler(script)
+    with pytest.raises(kc.UnsupportedError, match="cannot be loaded"):
+        kc.compile(tiny(), target="c")
+    assert not cache.exists()
+
+
+def test_a_compiler_that_compiles_something_else_is_found_out(compiler, cache):
+    compiler("""
+        sed 's/fingerprint\\[\\] = "./fingerprint[] = "?/' tiny.c > other.c
+        set -- $(echo "$@" | sed 's/tiny.c/other.c/'); exec REAL "$@"
+    """)
+    with pytest.raises(kc.UnsupportedError, match="a library of another mechanism"):
+        kc.compile(tiny(), target="c")
+    assert not cache.exists()
+
+
+def test_arguments_beside_the_name_reach_the_compiler(monkeypatch, compiler, cache, tmp_path):
+    compiler(f'echo "$@" > {tmp_path}/seen; exec REAL "$@"')
+    monkeypatch.setenv("CC", f"{os.environ['CC']} -DEXTRA=1")
+    assert_right(kc.compile(tiny(), target="c"))
+    assert (tmp_path / "seen").read_text().startswith("-DEXTRA=1 -std=c99 -O3")
+
+
+# ---------------------------------------------------------------- the cache
+
+
+def test_the_second_time_the_compiler_is_not_needed(compiler, cache, tmp_path):
+    compiler(f'echo x >> {tmp_path}/calls; exec REAL "$@"')
+    for _ in range(2):
+        assert_right(kc.compile(tiny(), target="c"))
+    assert (tmp_path / "calls").read_text() == "x\n"
+    assert_intact(cache, 1)
+
+
+def test_another_mechanism_has_a_library_of_its_own(cache):
+    one, other = kc.compile(tiny(), target="c"), kc.compile(tiny(angle=3.0), target="c")
+    q = np.zeros(3)
+    assert one.Phi(q, 0.0)[0] == -1.0
+    assert other.Phi(q, 0.0)[0] == -3.0
+    assert_intact(cache, 2)
+
+
+def test_another_compiler_or_other_flags_build_anew(monkeypatch, cache, quick_compiler):
+    kc.compile(tiny(), target="c")
+    monkeypatch.setenv("CC", f"{quick_compiler} -DOTHER=1")
+    kc.compile(tiny(), target="c")
+    assert_intact(cache, 2)
+
+
+def test_another_processor_builds_anew(monkeypatch, cache):
+    kc.compile(tiny(), target="c")
+    monkeypatch.setattr(c_library, "_processor", lambda: "flags: something else")
+    kc.compile(tiny(), target="c")
+    assert_intact(cache, 2)
+
+
+def damage_nothing(library: Path) -> None:
+    """Take the checksum away."""
+    library.with_suffix(".sha256").unlink()
+
+
+def damage_end(library: Path) -> None:
+    """Cut the library short, as a full disk would."""
+    library.write_bytes(library.read_bytes()[:5000])
+
+
+def damage_middle(library: Path) -> None:
+    """Change one byte."""
+    data = bytearray(library.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    library.write_bytes(data)
+
+
+def damage_all(library: Path) -> None:
+    """Put something else in its place, with a checksum that is right."""
+    library.write_bytes(b"rubbish")
+    digest = hashlib.sha256(b"rubbish").hexdigest()
+    library.with_suffix(".sha256").write_text(digest)
+
+
+@pytest.mark.parametrize("damage", [damage_nothing, damage_end, damage_middle, damage_all])
+def test_what_does_not_agree_with_its_checksum_is_built_again(cache, damage):
+    # In processes of their own: a library in use must not be written to.
+    assert run_compile() == "[-1.0, 0.0, -0.5]"
+    damage(next(cache.glob("*.so")))
+    assert run_compile() == "[-1.0, 0.0, -0.5]"
+    assert_intact(cache, 1)
+
+
+def test_a_cache_that_cannot_be_made_is_no_obstacle(monkeypatch, cache, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert_right(kc.compile(tiny(), target="c"))
+    assert (tmp_path / "file").read_text() == "in the way"
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write everywhere")
+def test_a_cache_that_cannot_be_written_to_is_no_obstacle(cache):
+    cache.mkdir(parents=True)
+    cache.chmod(0o500)
+    assert_right(kc.compile(tiny(), target="c"))
+    assert list(cache.iterdir()) == []
+
+
+def test_a_cache_in_which_a_folder_is_in_the_way_is_no_obstacle(cache):
+    kc.compile(tiny(), target="c")
+    library = next(cache.glob("*.so"))
+    library.unlink()
+    library.mkdir()
+    assert_right(kc.compile(tiny(), target="c"))
+
+
+def test_a_temporary_folder_that_cannot_be_written_to_is_named(monkeypatch, cache):
+    def refuse(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tempfile, "TemporaryDirectory", refuse)
+    with pytest.raises(kc.UnsupportedError, match=r"No space left on device.*set TMPDIR"):
+        kc.compile(tiny(), target="c")
+
+
+def test_nothing_is_left_in_the_temporary_folder(monkeypatch, cache, tmp_path):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    kc.compile(tiny(), target="c")
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def start_compile(times: int = 1) -> "subprocess.Popen[str]":
+    """Start a process that compiles the tiny mechanism."""
+    return subprocess.Popen(
+        [sys.executable, "-c", COMPILE, str(times)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def run_compile() -> str:
+    """Compile in a process of its own and return what it prints."""
+    process = start_compile()
+    printed, errors = process.communicate()
+    assert process.returncode == 0, errors
+    return printed.strip()
+
+
+def test_processes_that_fill_the_cache_at_once_all_get_it_right(cache):
+    processes = [start_compile(3) for _ in range(4)]
+    results = [process.communicate() for process in processes]
+    assert results == [("[-1.0, 0.0, -0.5]\n", "")] * 4
+    assert_intact(cache, 1)
+
+
+def test_a_process_that_is_killed_while_it_builds_leaves_nothing_to_load(compiler, cache, tmp_path):
+    compiler('echo half > "$out"; kill -9 $PPID')
+    process = start_compile()
+    process.communicate()
+    assert process.returncode == -9
+    assert not cache.exists()
+    compiler('exec REAL "$@"')
+    assert run_compile() == "[-1.0, 0.0, -0.5]"
