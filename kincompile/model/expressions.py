@@ -72,6 +72,8 @@ def as_expression(value: object) -> Scalar:
         value = value.lhs - value.rhs
     if not isinstance(value, sympy.Expr) or isinstance(value, sympy.Lambda):
         raise NotAnExpressionError(f"{value!r} is not a number or a SymPy expression")
+    if isinstance(value, sympy.Float):
+        _require_range(value)
     if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
         raise NotAnExpressionError(f"{value} is not finite")
     if value.has(sympy.I) or (value.is_number and value.is_real is False):  # asin(2) has no I
@@ -79,12 +81,14 @@ def as_expression(value: object) -> Scalar:
     return _by_name(value)
 
 
-def _require_range(value: Rational) -> None:
-    """Refuse a whole number or a fraction that no float can hold."""
+def _require_range(value: Rational | sympy.Float) -> None:
+    """Refuse an exact number that no float can hold."""
     try:
-        float(value)
+        is_in_range = math.isfinite(float(value))
     except OverflowError:
-        raise NotAnExpressionError("the number is beyond 1e308, the range of floats") from None
+        is_in_range = False
+    if not is_in_range:
+        raise NotAnExpressionError("the number is beyond 1e308, the range of floats")
 
 
 def as_sympy(value: Scalar) -> sympy.Expr:
