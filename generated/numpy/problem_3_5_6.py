@@ -484,11 +484,14 @@ def _evaluate_batch_last(kernel, quantities, t, p, *states):
     """Run a kernel on a batch whose axis is the last one."""
     states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
     t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
-    count = states[0].shape[1]
-    if {states[-1].shape[1:], t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
+    count = states[0].shape[-1]
+    batches = {state.shape[1:] for state in states}
+    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
         shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
         raise InputError(
-            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis"
+            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
+            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
+            f"({len(PARAMETERS)}, N)"
         )
     # One array for all: the memory of several goes back to the system and is fetched again with
     # every call.

@@ -194,6 +194,21 @@ def test_that_a_batch_of_the_wrong_layout_is_refused(
         rich.kinematics_batch_last(state, rates, t, *(() if p is None else (p,)))
 
 
+@pytest.mark.parametrize(
+    ("state", "rates"),
+    [
+        (q, q),
+        (np.zeros((N, 2, 3)), np.zeros((N, 2, 3))),
+        (np.zeros((N, 3)), q),
+        (np.zeros((N, 2, 3)), np.zeros((N, 3))),
+    ],
+)
+def test_that_the_batch_last_form_wants_one_batch_axis(rich: Any, state: Any, rates: Any) -> None:
+    message = r"do not have the same last axis; give states \(7, N\), t \(\) or \(N,\), and p"
+    with pytest.raises(kc.InputError, match=message):
+        rich.kinematics_batch_last(state, rates, 0.0)
+
+
 # ---- domains, and the accuracy of cosine and sine ------------------------------------------------
 
 
