@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 import kincompile as kc
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
+from kincompile.model.spline import fit
 from kincompile.runtime.load import from_source
 from kincompile.structure.counting import unmatched
 
@@ -67,6 +68,23 @@ def slope(alpha: Any, functions: Any, c0: Any, c1: Any, c2: Any) -> Any:
     """Return the derivative of `radius`, by hand."""
     del c0
     return -c1 * functions.sin(alpha) + 2 * c2 * functions.cos(2 * alpha)
+
+
+def tabulated(values: Any) -> tuple[Array, Array]:
+    """Return a radius as a table over one revolution."""
+    angles = np.linspace(-1, 2 * np.pi - 1, 24, endpoint=False)
+    return angles, radius(angles, np, *values)
+
+
+def exact_spline(values: Any, alpha: Any) -> tuple[Any, Any]:
+    """Return the tabulated radius and its derivative with 40 digits, piece by piece."""
+    table = fit(*tabulated(values))
+    first, last = mp.mpf(table.breaks[0]), mp.mpf(table.breaks[-1])
+    place = first + (alpha - first) % (last - first)
+    piece = max(k for k, start in enumerate(table.breaks[:-1]) if start <= place)
+    powers = [mp.mpf(c) for c in table.coefficients[piece]]
+    rho, slant = mp.polyval(powers, place - mp.mpf(table.breaks[piece]), derivative=True)
+    return rho, slant
 
 
 # ---- the constraints as a user writes them, and by hand in the complex plane ---------------------
@@ -185,6 +203,7 @@ class Case:
     driver: Callable[..., Any] = generic_driver
     ground: str = ""
     as_parameters: bool = False
+    as_table: bool = False
 
     @cached_property
     def free(self) -> list[int]:
@@ -205,7 +224,9 @@ class Case:
         given = {key: self._given(m, key, value) for key, value in self.values.items()}
         vars(a).update(given)
         a.C = self.driver(kc.t, sympy.sin, *given["driver"])
-        a.rho_i, a.rho_j = (radius(kc.alpha, sympy, *given[key]) for key in ("rho_i", "rho_j"))
+        for key in ("rho_i", "rho_j"):
+            rho = tabulated(given[key]) if self.as_table else radius(kc.alpha, sympy, *given[key])
+            setattr(a, key, rho)
         m.add(BUILD[self.kind](a))
         system = m.system()
         _, coordinates = unmatched(system, inline(lower(system)).pattern())
@@ -256,8 +277,10 @@ class Case:
             setattr(w, key, mp.mpc(*exact) if len(exact) == 2 else (*exact, exact[0])[-1])
         w.C = self.driver(t, mp.sin, *map(mp.mpf, self.values["driver"]))
         for alpha, key in zip(full[6:], PROFILES.get(self.kind, ()), strict=False):
-            coefficients = [mp.mpf(x) for x in self.values[key]]
-            rho, slant = radius(alpha, mp, *coefficients), slope(alpha, mp, *coefficients)
+            exact = [mp.mpf(x) for x in self.values[key]]
+            rho, slant = radius(alpha, mp, *exact), slope(alpha, mp, *exact)
+            if self.as_table:
+                rho, slant = exact_spline(self.values[key], alpha)
             setattr(w, f"a{key[3:]}", rho * mp.expj(alpha))
             setattr(w, f"g{key[3:]}", (slant + 1j * rho) * mp.expj(alpha))
         return w
@@ -336,6 +359,8 @@ def variants(kind: str) -> Iterator[tuple[str, Case]]:
     if kind not in (*ABSOLUTE, "Equation"):
         yield "ground_i", replace(plain, ground="i")
         yield "ground_j", replace(plain, ground="j")
+    if kind in PROFILES:
+        yield "table", replace(plain, as_table=True)
     if kind == "Gear":
         yield "internal", replace(plain, values=GENERIC | {"R_i": -0.55})
 
