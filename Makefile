@@ -14,6 +14,7 @@ PYTEST := $(BIN)/python -m pytest
 VENV_READY := $(VENV)/venv.stamp
 DEMO_READY := $(VENV)/demo.stamp
 TEST_READY := $(VENV)/test.stamp
+PAGES_READY := $(VENV)/pages.stamp
 LINT_READY := $(VENV)/lint.stamp
 
 .DELETE_ON_ERROR:
@@ -22,7 +23,7 @@ LINT_READY := $(VENV)/lint.stamp
 
 help:
 	@echo "make demo            compile the wrecker boom, run it, say what was written"
-	@echo "make test            run the tests                 make test-slow    the packaging tests"
+	@echo "make test            run the tests                 make test-slow    packaging, pages in a browser"
 	@echo "make lint            ruff check, ruff format       make format       repair what ruff can"
 	@echo "make types           mypy                          make bench        the benchmarks"
 	@echo "make goldens         compare generated/ with re-emission, under several hash seeds"
@@ -44,6 +45,11 @@ $(TEST_READY): $(DEMO_READY)
 	@$(PIP) --editable '.[test]'
 	@touch $@
 
+$(PAGES_READY): $(TEST_READY)
+	@echo "Installing what reads notebooks and drives a browser into $(VENV)"
+	@$(PIP) --editable '.[pages]'
+	@touch $@
+
 $(LINT_READY): $(TEST_READY)
 	@echo "Installing ruff and mypy into $(VENV)"
 	@$(PIP) --editable '.[lint]'
@@ -61,7 +67,7 @@ demo: $(DEMO_READY)
 test: $(TEST_READY)
 	@$(PYTEST)
 
-test-slow: $(TEST_READY)
+test-slow: $(PAGES_READY)
 	@$(PYTEST) -m slow
 
 lint: $(LINT_READY)

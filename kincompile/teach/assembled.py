@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     Rows: TypeAlias = list[tuple[Run | Runs, ...]]
 
-LARGEST_MATRIX = 16
+LARGEST_MATRIX = 9
 """Columns up to which a matrix of numbers is written out."""
 
 MOST_COORDINATES = 12

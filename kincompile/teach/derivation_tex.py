@@ -21,6 +21,9 @@ ROWS_TOGETHER = 24
 LONGEST_CELL = 300
 """Characters of LaTeX in a cell from which on the lines in it are broken."""
 
+MOST_PARAGRAPHS = 5
+"""Columns up to which lines in cells are broken; a table with more is shrunk instead."""
+
 
 def as_tex(document: Document) -> str:
     """Return a document as LaTeX."""
@@ -124,7 +127,7 @@ def _source(source: SourceLine) -> str:
 def _tabular(header: list[str], rows: list[list[str]]) -> Iterator[str]:
     """Yield a table: as wide as its cells, or in paragraphs as wide as the page."""
     sizes = [max(len(row[k]) for row in (header, *rows)) for k in range(len(header))]
-    is_wide = max(sizes) > LONGEST_CELL
+    is_wide = max(sizes) > LONGEST_CELL and len(header) <= MOST_PARAGRAPHS
     columns = _shares(sizes) if is_wide else "l" * len(header)
     frame = r"\par" if is_wide else r"\fitted"
     yield rf"{frame}{{\begin{{tabular}}{{{columns}}}"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from kincompile.calculus.expressions import (
@@ -137,6 +138,10 @@ class Notation:
     def root(self, value: Printed) -> Printed:
         """Return a square root."""
 
+    def fenced_with(self, value: Printed, exponent: Printed) -> Printed:
+        """Return something in brackets with an exponent."""
+        return self.scripts(self._fenced(value), None, exponent)
+
     @abstractmethod
     def thin_space(self) -> Printed:
         """Return what stands between factors."""
@@ -216,10 +221,13 @@ class Notation:
         return self.row([*minus, self._transposed(magnitude)])
 
     def _transposed(self, vector: Any) -> Printed:
-        printed = self._short(vector)
-        if not self._is_atom(vector):
-            printed = self._fenced(printed)
-        return self.scripts(printed, None, self.letter("T"))
+        return self._raised(vector, self.letter("T"))
+
+    def _raised(self, base: Any, exponent: Printed) -> Printed:
+        """Return something with an exponent, in brackets where it needs them."""
+        if self._is_atom(base):
+            return self.scripts(self._short(base), None, exponent)
+        return self.fenced_with(self._short(base), exponent)
 
     def _is_atom(self, expr: Any) -> bool:
         """Return whether something needs no brackets under an exponent."""
@@ -321,10 +329,7 @@ class Notation:
         if isinstance(base, Call) and base.function != "sqrt":
             head = self.scripts(self.function(base.function), None, self.numeral(exponent))
             return self.row([head, self._arguments(base)])
-        printed = self._short(base)
-        if not self._is_atom(base):
-            printed = self._fenced(printed)
-        return self.scripts(printed, None, self.numeral(exponent))
+        return self._raised(base, self.numeral(exponent))
 
     def _print_Quotient(self, expr: Quotient) -> Printed:
         return self.fraction(self._print(expr.numerator), self._print(expr.denominator))
@@ -376,12 +381,22 @@ class Notation:
         return self.function(part) if part.isalpha() else self.operator(part)
 
     def _print_Sub(self, expr: Sub) -> Printed:
-        return self.scripts(self._print(expr.base), self._print(expr.index), None)
+        index = self._print(expr.index)
+        if isinstance(expr.base, Glyph) and expr.base.exponent and not expr.base.index:
+            bare = self._print(replace(expr.base, exponent=""))
+            return self.scripts(bare, index, self.index_text(expr.base.exponent))
+        return self.scripts(self._print(expr.base), index, None)
 
     def _print_Partial(self, expr: Partial) -> Printed:
-        sign = self.letter("d") if expr.sign == "d" else self.operator(expr.sign)
-        top = self.row([sign, self._print(expr.numerator)])
-        return self.fraction(top, self.row([sign, self._print(expr.denominator)]))
+        parts = (
+            [self._sign(expr.sign), self._print(item)]
+            for item in (expr.numerator, expr.denominator)
+        )
+        top, bottom = (self.row(part) for part in parts)
+        return self.fraction(top, bottom)
+
+    def _sign(self, sign: str) -> Printed:
+        return self.letter("d") if sign == "d" else self.operator(sign)
 
     def _print_Equated(self, expr: Equated) -> Printed:
         parts: list[Printed] = []

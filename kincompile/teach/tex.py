@@ -96,6 +96,13 @@ class TexPrinter(Notation, LatexPrinter):
         above = "" if exponent is None else f"^{{{exponent}}}"
         return f"{{{base}}}{below}{above}" if below or above else base
 
+    def fenced_with(self, value: str, exponent: str) -> str:
+        """Return something in brackets with an exponent, which is put on the bracket.
+
+        What stands within the brackets can then be broken into lines.
+        """
+        return f"( {value} )^{{{exponent}}}"
+
     def fraction(self, numerator: str, denominator: str) -> str:
         """Return a fraction."""
         return rf"\frac{{{numerator}}}{{{denominator}}}"

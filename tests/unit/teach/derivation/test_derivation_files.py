@@ -170,7 +170,8 @@ def test_that_pdflatex_sets_the_document(derivation: Any, tmp_path: Path) -> Non
         assert done.returncode == 0, done.stdout[-2000:]
     too_wide = re.findall(r"Overfull \\hbox \((\d+)\.\d*pt", done.stdout)
     assert max(map(int, too_wide), default=0) < 30  # of a margin of 62 points
-    assert "undefined" not in done.stdout
+    assert "Missing character" not in done.stdout
+    assert "undefined references" not in done.stdout
 
 
 @pytest.mark.slow

@@ -11,7 +11,16 @@ import kincompile as kc
 from kincompile.calculus.expressions import Number, Product, Sum, Symbol, Turned, VectorSymbol
 from kincompile.calculus.symbols import i, j, s_i, s_j, unit
 from kincompile.derive.derivation import derive
-from kincompile.teach.formulas import Call, Choice, Decimal, Equated, Glyph, Matrix, Relation
+from kincompile.teach.formulas import (
+    Call,
+    Choice,
+    Decimal,
+    Equated,
+    Glyph,
+    Matrix,
+    Partial,
+    Relation,
+)
 from kincompile.teach.joint_terms import abbreviations
 from kincompile.teach.mathml import MathMLPrinter
 from kincompile.teach.notation import split_name
@@ -97,6 +106,16 @@ def test_that_vectors_are_bold_and_names_upright_in_mathml() -> None:
     element = ET.fromstring(printer.math(Symbol("phi_crank_dot")))
     assert [item.text for item in element.iter("mi")] == ["\N{GREEK SMALL LETTER PHI}", "crank"]
     assert element.find("./msub/mover/mo").text == "\N{DOT ABOVE}"  # type: ignore[union-attr]
+
+
+def test_that_a_derivative_has_its_sign_above_and_below() -> None:
+    formula = Partial(Glyph("Phi"), Symbol("phi"))
+    element = ET.fromstring(MathMLPrinter().math(formula))
+    above, below = element.findall("./mfrac/mrow")
+    for part in (above, below):
+        assert part[0].text == "\N{PARTIAL DIFFERENTIAL}"
+    assert tex(formula) == "\\frac{\\partial \\boldsymbol{\\Phi}}{\\partial \\phi}"
+    assert tex(Partial(Glyph("A"), Symbol("phi"), "d")) == "\\frac{d {A}}{d \\phi}"
 
 
 def test_that_a_relation_is_escaped_in_mathml() -> None:
