@@ -6,6 +6,7 @@ It has four continuous derivatives, one more than a pair of cams needs.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -51,8 +52,12 @@ class PeriodicSpline(sympy.Function):
     order: ClassVar[int]
 
     @classmethod
+    @lru_cache(maxsize=256)
     def of(cls, table_name: str, table: SplineTable, order: int = 0) -> type[PeriodicSpline]:
-        """Return the SymPy function of a table, or of one of its derivatives."""
+        """Return the SymPy function of a table, or of one of its derivatives.
+
+        The same one for the same table, since SymPy takes functions of two classes for different.
+        """
         contents = {"table": table, "table_name": table_name, "order": order}
         function: type[PeriodicSpline] = type(table_name + "'" * order, (cls,), contents)
         return function
