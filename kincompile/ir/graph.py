@@ -8,8 +8,9 @@ outward, so that an attribute that happens to be zero costs nothing in the emitt
 
 from __future__ import annotations
 
+import sys
 from fractions import Fraction
-from math import isfinite, isqrt, sqrt
+from math import isqrt, sqrt
 from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import ModelError
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
 Node = tuple[Any, ...]
 Constant = int | float | Fraction
+
+LARGEST = sys.float_info.max
+EXACT = 2**53
+"""Below this a float that is a whole number may be written as one."""
 
 
 class Graph:
@@ -45,12 +50,12 @@ class Graph:
         ModelError
             If the number, a product of constants perhaps, is beyond the range of floats.
         """
-        if isinstance(value, float) and not isfinite(value):
+        if not -LARGEST <= value <= LARGEST:
             raise ModelError(
                 "a constant of the model is beyond 1e308, the range of floating-point numbers; "
                 "choose other units"
             )
-        if value == (whole := int(value)):
+        if -EXACT < value < EXACT and value == (whole := int(value)):
             value = whole
         if value < 0:
             return self._intern(("neg", self._intern(("const", -value))))

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kincompile.errors import ModelError
 from kincompile.ir.graph import Graph, number_of, operands_of
 
 VALUES = {"x": Fraction(3, 7), "y": Fraction(-5, 2), "z": Fraction(11)}
@@ -256,3 +257,15 @@ def test_that_an_unknown_operation_cannot_be_copied(graph: Graph) -> None:
 )  # fmt: skip
 def test_that_the_operands_of_a_node_are_nodes(node: Any, expected: Any) -> None:
     assert operands_of(node) == expected
+
+
+@pytest.mark.parametrize("value", [1e200, 1.5e-7, 10**200, Fraction(10**200, 3), 2.0**60])
+def test_that_large_and_small_constants_keep_their_value(graph: Graph, value: Any) -> None:
+    assert graph.value_of(graph.const(value)) == value
+    assert isinstance(value, int) or not isinstance(graph.value_of(graph.const(value)), int)
+
+
+@pytest.mark.parametrize("value", [10**200, 1e200, 1.5e160, Fraction(10**200, 3)])
+def test_that_a_product_beyond_floats_is_refused(graph: Graph, value: Any) -> None:
+    with pytest.raises(ModelError, match=r"beyond 1e308, the range of .*; choose other units"):
+        graph.mul(graph.const(value), graph.const(value))
