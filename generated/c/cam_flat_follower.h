@@ -102,6 +102,26 @@ typedef struct {
 // Follow a motion; returns how many points converged, from the first one on.
 size_t cam_flat_follower_march(const cam_flat_follower_motion *motion);
 
+// The motions of many variants, each with parameters of its own. Of q, q_dot and q_ddot, entry i of
+// variant v at time j is first[i * entry + v * point + j * time]; of residual, status and
+// iterations it is [j * variants + v]. A variant that fails has the status at that time, is not
+// reached at later ones, and disturbs no other.
+typedef struct {
+    size_t count, variants;
+    const double *t;      // count times
+    cam_flat_follower_input p;  // 3 parameters a variant
+    const double *guess;  // 7 coordinates
+    double tolerance;
+    int max_iterations;
+    cam_flat_follower_output q, q_dot, q_ddot;
+    ptrdiff_t time;
+    double *residual;
+    int *status, *iterations;
+} cam_flat_follower_variants;
+
+// Follow the motions; returns how many variants converged at all times.
+size_t cam_flat_follower_march_variants(const cam_flat_follower_variants *all);
+
 #ifdef __cplusplus
 }
 #endif

@@ -578,17 +578,17 @@ void example_3_7_5_solve(const example_3_7_5_system *system)
     }
 }
 
-// By what the numbers of a motion are judged.
+// By what the numbers of a motion are judged; each point of a block has its own.
 typedef struct {
-    double reference[N];  // scale of each coordinate: 1 rad, or the size of the mechanism
-    double magnitude[M];  // what the terms of each equation contribute at a generic position
+    double reference[N][LANES];  // scale of each coordinate: 1 rad, or the size of the mechanism
+    double magnitude[M][LANES];  // what the terms of each equation contribute at a generic position
     double tolerance;
 } scales;
 
-// What became of the points of a block.
+// What became of the points of a block; those that are over are not looked at any more.
 typedef struct {
-    int status[LANES], iterations[LANES];
-    double residual[LANES], branch[LANES];
+    int status[LANES], iterations[LANES], is_over[LANES];
+    double residual[LANES];
 } outcome;
 
 // Which coordinates are angles; numbers of size 1/2 to 1 and either sign without a pattern.
@@ -613,25 +613,27 @@ enum { MAX_CORRECTIONS = 6 };
 static const double SMALLEST_PART = 1.0 / (1 << 20);
 enum { MAX_SUBSTEPS = 10000 };
 
-// Measure the mechanism at a position.
-static void measure(block *b, const double *q, scales *s)
+// Measure the mechanism at the positions in a block, which stay as they are.
+static void measure(block *b, size_t count, scales *s)
 {
-    double size = 0;
-    for (int i = 0; i < N; i++) {
-        if (ANGULAR[i])
-            continue;
-        size = fmax(size, fmax(fabs(q[i]), fabs(example_3_7_5_guess[i])));
-    }
-    for (int i = 0; i < N; i++) {
-        s->reference[i] = ANGULAR[i] || size <= 1e-12 ? 1 : size;
-        b->q[i][0] = q[i] + s->reference[i] * PROBE[i];
-    }
-    position_of_block(b, 1);
+    double q[N][LANES], size[LANES] = { 0 };
+    memcpy(q, b->q, sizeof q);
+    for (int i = 0; i < N; i++)
+        for (size_t k = 0; !ANGULAR[i] && k < count; k++)
+            size[k] = fmax(size[k], fmax(fabs(q[i][k]), fabs(example_3_7_5_guess[i])));
+    for (int i = 0; i < N; i++)
+        for (size_t k = 0; k < count; k++) {
+            s->reference[i][k] = ANGULAR[i] || size[k] <= 1e-12 ? 1 : size[k];
+            b->q[i][k] += s->reference[i][k] * PROBE[i];
+        }
+    position_of_block(b, count);
     memset(s->magnitude, 0, sizeof s->magnitude);
     for (int e = 0; e < NONZEROS; e++) {
         const int *place = example_3_7_5_pattern[e];
-        s->magnitude[place[0]] += fabs(b->Phi_q[e][0]) * s->reference[place[1]];
+        for (size_t k = 0; k < count; k++)
+            s->magnitude[place[0]][k] += fabs(b->Phi_q[e][k]) * s->reference[place[1]][k];
     }
+    memcpy(b->q, q, sizeof q);
 }
 
 // Apply corrections until they are small; a point whose corrections are stays where it is.
@@ -641,7 +643,7 @@ static int correct(block *b, const scales *s, size_t count, int max_iterations, 
     double change[N][LANES], going[LANES], iterations[LANES];
     int left = 1;
     for (size_t k = 0; k < count; k++) {
-        going[k] = 1;
+        going[k] = o->is_over[k] ? 0 : 1;
         iterations[k] = 0;
     }
     for (int iteration = 0; left && iteration < max_iterations; iteration++) {
@@ -679,12 +681,13 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
     factor_of_block(b, count);
     memset(o->residual, 0, sizeof o->residual);
     for (int i = 0; i < M; i++) {
-        const double allowed = fmax(RESIDUAL_FACTOR * s->tolerance, ROUNDING) * s->magnitude[i];
+        const double part = fmax(RESIDUAL_FACTOR * s->tolerance, ROUNDING);
         for (size_t k = 0; k < count; k++) {
+            const double allowed = part * s->magnitude[i][k];
             const double size = fabs(b->Phi[i][k]);
             o->residual[k] = size > o->residual[k] ? size : o->residual[k];
             excess[k] += size <= allowed ? 0 : 1;
-            right[i][k] = s->magnitude[i] * PROBE[i];
+            right[i][k] = s->magnitude[i][k] * PROBE[i];
         }
     }
     solve_of_block(b, right, answer, count);
@@ -692,19 +695,12 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
     solve_of_block(b, b->nu, b->q_dot, count);
     gamma_of_block(b, count);
     solve_of_block(b, b->gamma, b->q_ddot, count);
-    for (int i = 0; i < N; i++) {
-        const double inverse = 1 / s->reference[i];
+    for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
-            const double size = fabs(answer[i][k]) * inverse;
+            const double size = fabs(answer[i][k]) / s->reference[i][k];
             sensitivity[k] = size <= sensitivity[k] ? sensitivity[k] : size;
             total[k] += b->q_dot[i][k] + b->q_ddot[i][k];
         }
-    }
-    for (size_t k = 0; k < count; k++)
-        o->branch[k] = 1;
-    for (int i = 0; i < BLOCKS; i++)
-        for (size_t k = 0; k < count; k++)
-            o->branch[k] = b->determinants[i][k] < 0 ? -o->branch[k] : o->branch[k];
     for (size_t k = 0; k < count; k++) {
         const int holds = excess[k] == 0, finite = total[k] - total[k] == 0;
         const int regular = sensitivity[k] <= SINGULAR_SENSITIVITY;
@@ -720,13 +716,14 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
 
 // A good point of the motion.
 typedef struct {
-    double t, q[N], q_dot[N], q_ddot[N], branch;
+    double t, q[N], q_dot[N], q_ddot[N], determinants[BLOCKS > 0 ? BLOCKS : 1];
 } state;
 
-static void take_up(state *at, const block *b, const outcome *o, size_t k)
+static void take_up(state *at, const block *b, size_t k)
 {
     at->t = b->t[k];
-    at->branch = o->branch[k];
+    for (int i = 0; i < BLOCKS; i++)
+        at->determinants[i] = b->determinants[i][k];
     for (int i = 0; i < N; i++) {
         at->q[i] = b->q[i][k];
         at->q_dot[i] = b->q_dot[i][k];
@@ -734,31 +731,47 @@ static void take_up(state *at, const block *b, const outcome *o, size_t k)
     }
 }
 
+// Correct predicted positions; those that end too far from the prediction have not converged.
+static void settle(block *b, const scales *s, size_t count, outcome *o)
+{
+    double predicted[N][LANES], error[LANES] = { 0 };
+    memcpy(predicted, b->q, sizeof predicted);
+    correct(b, s, count, MAX_CORRECTIONS, o);
+    complete(b, s, count, o);
+    for (int i = 0; i < N; i++)
+        for (size_t k = 0; k < count; k++) {
+            const double size = fabs(b->q[i][k] - predicted[i][k]) / s->reference[i][k];
+            error[k] = size <= error[k] ? error[k] : size;
+        }
+    for (size_t k = 0; k < count; k++)
+        if (!(error[k] <= LARGEST_ERROR))
+            o->status[k] = EXAMPLE_3_7_5_NOT_CONVERGED;
+}
+
+// Where the determinant of a block has changed its sign, a singular configuration lies between.
+static int is_on_branch(const state *from, const block *b, size_t k)
+{
+    for (int i = 0; i < BLOCKS; i++) {
+        const double before = from->determinants[i], here = b->determinants[i][k];
+        if (!(before > 0 ? here > 0 : here < 0))
+            return 0;
+    }
+    return 1;
+}
+
 // Solve the points at the times in a block, each predicted from one good point by
 // q + h q_dot + h^2 q_ddot / 2. Returns how many continue the motion, from the first one on.
 static size_t step(block *b, const scales *s, const state *from, size_t count, outcome *o)
 {
-    double predicted[N][LANES], error[LANES] = { 0 };
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
             const double h = b->t[k] - from->t;
-            predicted[i][k] = from->q[i] + h * (from->q_dot[i] + 0.5 * h * from->q_ddot[i]);
-            b->q[i][k] = predicted[i][k];
+            b->q[i][k] = from->q[i] + h * (from->q_dot[i] + 0.5 * h * from->q_ddot[i]);
         }
-    correct(b, s, count, MAX_CORRECTIONS, o);
-    complete(b, s, count, o);
-    for (int i = 0; i < N; i++) {
-        const double inverse = 1 / s->reference[i];
-        for (size_t k = 0; k < count; k++) {
-            const double size = fabs(b->q[i][k] - predicted[i][k]) * inverse;
-            error[k] = size <= error[k] ? error[k] : size;
-        }
-    }
+    settle(b, s, count, o);
     for (size_t k = 0; k < count; k++) {
-        if (o->status[k] == EXAMPLE_3_7_5_CONVERGED && o->branch[k] != from->branch)
+        if (o->status[k] == EXAMPLE_3_7_5_CONVERGED && !is_on_branch(from, b, k))
             o->status[k] = EXAMPLE_3_7_5_SINGULAR;
-        if (!(error[k] <= LARGEST_ERROR))
-            o->status[k] = EXAMPLE_3_7_5_NOT_CONVERGED;
         if (o->status[k] != EXAMPLE_3_7_5_CONVERGED)
             return k;
     }
@@ -778,7 +791,7 @@ static int advance(block *b, const scales *s, state *at, double t, outcome *o)
         const size_t good = step(b, s, at, 1, o);
         iterations += o->iterations[0];
         if (good) {
-            take_up(at, b, o, 0);
+            take_up(at, b, 0);
             h *= 2;
         } else if (fabs(h) <= smallest) {
             break;
@@ -806,20 +819,21 @@ static void record(const example_3_7_5_motion *motion, block *b, const outcome *
     memcpy(motion->iterations + start, o->iterations, count * sizeof *o->iterations);
 }
 
-// Assemble the mechanism at the first time, from the guess.
-static int begin(block *b, scales *s, const example_3_7_5_motion *motion, state *at, outcome *o)
+// Assemble the mechanism at a time, from a guess.
+static void assemble(block *b, scales *s, double t, const double *guess, int max_iterations,
+    size_t count, outcome *o)
 {
-    b->t[0] = motion->t[0];
-    measure(b, motion->guess, s);
-    for (int i = 0; i < N; i++)
-        b->q[i][0] = motion->guess[i];
-    correct(b, s, 1, motion->max_iterations, o);
-    complete(b, s, 1, o);
-    record(motion, b, o, 0, 1);
-    take_up(at, b, o, 0);
+    for (size_t k = 0; k < count; k++) {
+        b->t[k] = t;
+        o->is_over[k] = 0;
+        for (int i = 0; i < N; i++)
+            b->q[i][k] = guess[i];
+    }
+    measure(b, count, s);
+    correct(b, s, count, max_iterations, o);
+    complete(b, s, count, o);
     // The guess may be rough: from here on the assembled mechanism gives the size.
-    measure(b, at->q, s);
-    return o->status[0];
+    measure(b, count, s);
 }
 
 size_t example_3_7_5_march(const example_3_7_5_motion *motion)
@@ -834,7 +848,10 @@ size_t example_3_7_5_march(const example_3_7_5_motion *motion)
     for (int i = 0; i < K; i++)
         for (size_t k = 0; k < LANES; k++)
             b.p[i][k] = motion->p[i];
-    int status = begin(&b, &s, motion, &at, &o);
+    assemble(&b, &s, motion->t[0], motion->guess, motion->max_iterations, LANES, &o);
+    record(motion, &b, &o, 0, 1);
+    take_up(&at, &b, 0);
+    int status = o.status[0];
     size_t done = status == EXAMPLE_3_7_5_CONVERGED ? 1 : 0, width = 1;
     while (status == EXAMPLE_3_7_5_CONVERGED && done < motion->count) {
         const size_t rest = motion->count - done, count = rest < width ? rest : width;
@@ -842,7 +859,7 @@ size_t example_3_7_5_march(const example_3_7_5_motion *motion)
         const size_t good = step(&b, &s, &at, count, &o);
         if (good > 0) {
             record(motion, &b, &o, done, good);
-            take_up(&at, &b, &o, good - 1);
+            take_up(&at, &b, good - 1);
             done += good;
             // The fewer iterations, the more points the next prediction can serve.
             if (good < count || o.iterations[good - 1] > 3)
@@ -860,5 +877,116 @@ size_t example_3_7_5_march(const example_3_7_5_motion *motion)
     for (size_t k = done + 1; k < motion->count; k++)
         motion->status[k] = EXAMPLE_3_7_5_NOT_REACHED;
     return done;
+}
+
+// Write the points of a block of variants at one time; those that are over have no numbers.
+static void record_variants(const example_3_7_5_variants *all, block *b, const outcome *o,
+    size_t time, size_t first, size_t count)
+{
+    const example_3_7_5_output to[3] = { all->q, all->q_dot, all->q_ddot };
+    double (*const rows[3])[LANES] = { b->q, b->q_dot, b->q_ddot };
+    for (int kind = 0; kind < 3; kind++) {
+        example_3_7_5_output now = to[kind];
+        now.first += (ptrdiff_t)time * all->time;
+        write_rows(now, rows[kind], NULL, N, first, count);
+        for (size_t k = 0; k < count; k++)
+            for (int i = 0; o->is_over[k] && i < N; i++)
+                now.first[i * now.entry + (ptrdiff_t)(first + k) * now.point] = NAN;
+    }
+    for (size_t k = 0; k < count; k++) {
+        const size_t place = time * all->variants + first + k;
+        all->residual[place] = o->is_over[k] ? NAN : o->residual[k];
+        all->status[place] = o->status[k];
+        all->iterations[place] = o->iterations[k];
+    }
+}
+
+// Let the variants that failed at a time rest at the guess, where they disturb no others.
+static void put_to_rest(const example_3_7_5_variants *all, block *b, outcome *o, size_t count)
+{
+    for (size_t k = 0; k < count; k++) {
+        if (o->is_over[k])
+            o->status[k] = EXAMPLE_3_7_5_NOT_REACHED;
+        else if (o->status[k] == EXAMPLE_3_7_5_CONVERGED)
+            continue;
+        o->is_over[k] = 1;
+        for (int i = 0; i < N; i++) {
+            b->q[i][k] = all->guess[i];
+            b->q_dot[i][k] = b->q_ddot[i][k] = 0;
+        }
+    }
+}
+
+// Take one variant of a block from where it was to the block's time, in sub-steps.
+static void advance_alone(block *b, const scales *s, state *at, size_t k, outcome *o)
+{
+    block alone;
+    scales own;
+    outcome found;
+    double matrix[M * N];
+    place_constants(&alone, matrix, 1);
+    own.tolerance = s->tolerance;
+    found.is_over[0] = 0;
+    for (int i = 0; i < K; i++)
+        alone.p[i][0] = b->p[i][k];
+    for (int i = 0; i < M; i++)
+        own.magnitude[i][0] = s->magnitude[i][k];
+    for (int i = 0; i < N; i++)
+        own.reference[i][0] = s->reference[i][k];
+    o->status[k] = advance(&alone, &own, at, b->t[k], &found);
+    o->iterations[k] = found.iterations[0];
+    o->residual[k] = found.residual[0];
+    for (int i = 0; i < BLOCKS; i++)
+        b->determinants[i][k] = alone.determinants[i][0];
+    for (int i = 0; i < N; i++) {
+        b->q[i][k] = alone.q[i][0];
+        b->q_dot[i][k] = alone.q_dot[i][0];
+        b->q_ddot[i][k] = alone.q_ddot[i][0];
+    }
+}
+
+// Take a block of variants to the next time: all together, and alone those that fail.
+static void step_variants(block *b, const scales *s, double t, size_t count, outcome *o)
+{
+    state from[LANES];
+    const double h = t - b->t[0];
+    for (size_t k = 0; k < count; k++)
+        take_up(&from[k], b, k);
+    for (size_t k = 0; k < count; k++)
+        b->t[k] = t;
+    for (int i = 0; i < N; i++)
+        for (size_t k = 0; k < count; k++)
+            b->q[i][k] += h * (b->q_dot[i][k] + 0.5 * h * b->q_ddot[i][k]);
+    settle(b, s, count, o);
+    for (size_t k = 0; k < count; k++)
+        if (!o->is_over[k]
+            && (o->status[k] != EXAMPLE_3_7_5_CONVERGED || !is_on_branch(&from[k], b, k)))
+            advance_alone(b, s, &from[k], k, o);
+}
+
+size_t example_3_7_5_march_variants(const example_3_7_5_variants *all)
+{
+    block b;
+    scales s;
+    outcome o;
+    double matrix[M * N], check[LANES] = { 0 };
+    size_t good = 0;
+    s.tolerance = all->tolerance;
+    place_constants(&b, matrix, LANES);
+    for (size_t first = 0; first < all->variants; first += LANES) {
+        const size_t rest = all->variants - first, count = rest < LANES ? rest : LANES;
+        read_rows(b.p, K, all->p, first, count, check);
+        assemble(&b, &s, all->t[0], all->guess, all->max_iterations, count, &o);
+        put_to_rest(all, &b, &o, count);
+        record_variants(all, &b, &o, 0, first, count);
+        for (size_t time = 1; time < all->count; time++) {
+            step_variants(&b, &s, all->t[time], count, &o);
+            put_to_rest(all, &b, &o, count);
+            record_variants(all, &b, &o, time, first, count);
+        }
+        for (size_t k = 0; k < count; k++)
+            good += !o.is_over[k];
+    }
+    return good;
 }
 

@@ -102,6 +102,26 @@ typedef struct {
 // Follow a motion; returns how many points converged, from the first one on.
 size_t inverted_slider_crank_march(const inverted_slider_crank_motion *motion);
 
+// The motions of many variants, each with parameters of its own. Of q, q_dot and q_ddot, entry i of
+// variant v at time j is first[i * entry + v * point + j * time]; of residual, status and
+// iterations it is [j * variants + v]. A variant that fails has the status at that time, is not
+// reached at later ones, and disturbs no other.
+typedef struct {
+    size_t count, variants;
+    const double *t;      // count times
+    inverted_slider_crank_input p;  // 0 parameters a variant
+    const double *guess;  // 9 coordinates
+    double tolerance;
+    int max_iterations;
+    inverted_slider_crank_output q, q_dot, q_ddot;
+    ptrdiff_t time;
+    double *residual;
+    int *status, *iterations;
+} inverted_slider_crank_variants;
+
+// Follow the motions; returns how many variants converged at all times.
+size_t inverted_slider_crank_march_variants(const inverted_slider_crank_variants *all);
+
 #ifdef __cplusplus
 }
 #endif

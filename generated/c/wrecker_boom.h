@@ -109,6 +109,26 @@ typedef struct {
 // Follow a motion; returns how many points converged, from the first one on.
 size_t wrecker_boom_march(const wrecker_boom_motion *motion);
 
+// The motions of many variants, each with parameters of its own. Of q, q_dot and q_ddot, entry i of
+// variant v at time j is first[i * entry + v * point + j * time]; of residual, status and
+// iterations it is [j * variants + v]. A variant that fails has the status at that time, is not
+// reached at later ones, and disturbs no other.
+typedef struct {
+    size_t count, variants;
+    const double *t;      // count times
+    wrecker_boom_input p;  // 5 parameters a variant
+    const double *guess;  // 15 coordinates
+    double tolerance;
+    int max_iterations;
+    wrecker_boom_output q, q_dot, q_ddot;
+    ptrdiff_t time;
+    double *residual;
+    int *status, *iterations;
+} wrecker_boom_variants;
+
+// Follow the motions; returns how many variants converged at all times.
+size_t wrecker_boom_march_variants(const wrecker_boom_variants *all);
+
 #ifdef __cplusplus
 }
 #endif

@@ -86,6 +86,23 @@ class _Motion(Structure):
     )
 
 
+class _Variants(Structure):
+    """Motions of many variants, as the emitted header has them."""
+
+    _fields_ = (
+        ("count", c_size_t),
+        ("variants", c_size_t),
+        ("t", c_void_p),
+        ("p", _Numbers),
+        ("guess", c_void_p),
+        ("tolerance", c_double),
+        ("max_iterations", c_int),
+        *((name, _Numbers) for name in ("q", "q_dot", "q_ddot")),
+        ("time", c_ssize_t),
+        *((name, c_void_p) for name in ("residual", "status", "iterations")),
+    )
+
+
 def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     """Replace the functions of an emitted NumPy module by compiled ones.
 
@@ -99,7 +116,8 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     Returns
     -------
     module
-        The same module. It has a function ``march`` more where the mechanism has a planned solve.
+        The same module. Where the mechanism has a planned solve it has two functions more,
+        ``march`` and ``march_variants``.
 
     Raises
     ------
@@ -114,6 +132,7 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     if "solve" in names:
         compiled["solve"] = functions.solve()
         compiled["march"] = functions.march()
+        compiled["march_variants"] = functions.march_variants()
     for name, function in compiled.items():
         function.__name__, function.__module__ = name, module.__name__
         function.__doc__ = function.__doc__ or names[name].__doc__
@@ -376,6 +395,37 @@ class _Functions:
             return int(run(byref(motion)))
 
         return march
+
+    def march_variants(self) -> Function:
+        """Return the march of many parameter sets."""
+        run = getattr(self._library, f"{self._name}_march_variants")
+        run.restype = c_size_t
+
+        def march_variants(
+            inputs: Inputs,
+            sets: Array,
+            states: Array,
+            residual: Array,
+            status: NDArray[np.intc],
+            iterations: NDArray[np.intc],
+        ) -> int:
+            """Follow the motion of each variant from the guess as long as it converges.
+
+            `sets` (B, k) are the parameters; filled are `states` (3, N, n, B) with position,
+            velocity and acceleration, and residual, status and iterations, (N, B) each. Returns
+            how many variants converged at all times.
+            """
+            t, guess = inputs.t, inputs.guess
+            motions = _Variants(t.size, len(sets), t.ctypes.data, _numbers(sets.T))
+            motions.guess, motions.tolerance = guess.ctypes.data, inputs.tolerance
+            motions.max_iterations = inputs.max_iterations
+            motions.q, motions.q_dot, motions.q_ddot = (_numbers(state[0]) for state in states)
+            motions.time = states.strides[1] // NUMBER
+            motions.residual, motions.status = residual.ctypes.data, status.ctypes.data
+            motions.iterations = iterations.ctypes.data
+            return int(run(byref(motions)))
+
+        return march_variants
 
 
 def _vector(array: Array) -> _Numbers:

@@ -7,7 +7,6 @@ variant notices.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -84,6 +83,17 @@ class _Arrays:
     residual: Array
     iterations: NDArray[np.int64]
 
+    @classmethod
+    def over(cls, inputs: Inputs, count: int) -> _Arrays:
+        """Make the arrays for so many variants, with nothing reached."""
+        points, n = inputs.t.size, inputs.guess.size
+        return cls(
+            np.empty((3, points, n, count)),
+            np.full((points, count), int(Status.NOT_REACHED)),
+            np.full((points, count), np.nan),
+            np.zeros((points, count), dtype=np.int64),
+        )
+
 
 def solve_variants(
     inputs: Inputs, sets: Array, progress: Callable[[int, int], object] | None
@@ -104,20 +114,36 @@ def solve_variants(
     Solution
         With arrays q, q_dot, q_ddot of shape (B, N, n) and a status per variant and point.
     """
-    count, points, n = len(sets), inputs.t.size, inputs.guess.size
-    arrays = _Arrays(
-        np.empty((3, points, n, count)),
-        np.full((points, count), int(Status.NOT_REACHED)),
-        np.full((points, count), np.nan),
-        np.zeros((points, count), dtype=np.int64),
-    )
+    count = len(sets)
+    arrays = _Arrays.over(inputs, count)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         for first in range(0, count, CHUNK):
             chunk = slice(first, min(first + CHUNK, count))
-            _Chunk(inputs, sets[chunk], arrays, first).run()
+            _solve_chunk(inputs, sets[chunk], arrays, chunk)
             if progress:
                 progress(chunk.stop, count)
     return _solution(inputs, sets, arrays)
+
+
+def _solve_chunk(inputs: Inputs, sets: Array, arrays: _Arrays, chunk: slice) -> None:
+    """Solve some of the variants: compiled, where the module can, and with care those that fail."""
+    march = getattr(inputs.module, "march_variants", None)
+    if march is None:
+        _Chunk(inputs, sets, arrays, chunk.start).run()
+        return
+    residual = np.empty((inputs.t.size, len(sets)))
+    status, iterations = np.empty((2, *residual.shape), dtype=np.intc)
+    march(inputs, sets, arrays.motion[..., chunk], residual, status, iterations)
+    arrays.residual[:, chunk] = residual
+    arrays.status[:, chunk], arrays.iterations[:, chunk] = status, iterations
+    failed = np.flatnonzero(status.any(axis=0))
+    if failed.size:
+        alone = _Arrays.over(inputs, failed.size)
+        _Chunk(inputs, sets[failed], alone, 0).run()
+        arrays.motion[..., chunk.start + failed] = alone.motion
+        arrays.status[:, chunk.start + failed] = alone.status
+        arrays.residual[:, chunk.start + failed] = alone.residual
+        arrays.iterations[:, chunk.start + failed] = alone.iterations
 
 
 class _Chunk:
@@ -129,7 +155,7 @@ class _Chunk:
         count = len(sets)
         self._alive = np.ones(count, dtype=bool)
         self._q, self._q_dot, self._q_ddot = np.empty((3, inputs.guess.size, count))
-        self._sign = np.zeros(count)
+        self._signs: Any = np.zeros((0, count))
         nominal = problem(inputs.module, sets[0], inputs.guess, float(inputs.t[0]))
         self._allowed = RESIDUAL_FACTOR * inputs.tolerance * nominal.magnitude
         self._spread = nominal.spread(inputs.guess)[:, np.newaxis]
@@ -152,11 +178,11 @@ class _Chunk:
         """Take all variants that are left from one time to the next."""
         h = times[index] - times[index - 1]
         before = self._q.copy(), self._q_dot.copy(), self._q_ddot.copy()
-        sign = self._sign.copy()
+        signs = self._signs.copy()
         predicted = self._q + h * (self._q_dot + (0.5 * h) * self._q_ddot)
         good, iterations = self._correct(predicted, times[index], CORRECTIONS)
         good &= np.max(np.abs(self._q - predicted) / self._spread, axis=0) <= SMALL_ERROR
-        good &= self._sign == sign
+        good &= (self._signs == signs).all(axis=0)
         self._record(index, good, iterations)
         for variant in np.flatnonzero(self._alive & ~good).tolist():
             equations = problem(
@@ -200,10 +226,9 @@ class _Chunk:
             for row, value in zip(rows, values, strict=True):
                 row[:] = value
         good &= np.isfinite(self._q_dot.sum(axis=0) + self._q_ddot.sum(axis=0))
-        determinant: Any = math.prod(at.determinants) if at.determinants else 1.0
-        self._sign = np.sign(determinant) * np.ones(q.shape[1])
+        self._signs = _signs(at.determinants, q.shape[1])
         self._residual = residual
-        good &= self._sign != 0
+        good &= (self._signs != 0).all(axis=0)
         return good
 
     def _record(self, index: int, good: Mask, iterations: NDArray[np.int64]) -> None:
@@ -234,7 +259,7 @@ class _Chunk:
             self._inputs.module, self._inputs.module.FLOATS, self._sets[variant].tolist()
         )
         determinants = lane.position(state.point.q.tolist(), state.t).determinants
-        self._sign[variant] = math.copysign(1.0, math.prod(determinants))
+        self._signs[:, variant] = _signs(determinants, 1)[:, 0]
 
     def _fail(self, index: int, variant: int, status: Status) -> None:
         """Write down why a variant ends; its place in the arrays is kept busy with its guess."""
@@ -245,6 +270,14 @@ class _Chunk:
 
     def _inputs_of(self, variant: int) -> Inputs:
         return replace(self._inputs, p=self._sets[variant])
+
+
+def _signs(determinants: Any, count: int) -> Array:
+    """Return the signs of the determinants of the blocks, shape (blocks, count)."""
+    signs = np.empty((len(determinants), count))
+    for block, values in enumerate(determinants):
+        signs[block] = np.sign(values)
+    return signs
 
 
 def _state(equations: Any, t: float, parts: list[Array]) -> State | Status:
@@ -283,4 +316,6 @@ def _solution(inputs: Inputs, sets: Array, arrays: _Arrays) -> Solution:
         units=dict(module.UNITS),
         parameters=dict(zip(module.PARAMETERS, sets.T, strict=True)),
         statistics={"coarse": 0, "marched": 0},
+        events=[],
+        module=module,
     )

@@ -83,7 +83,7 @@ def test_the_march_judges_by_the_numbers_of_the_runtime(example_named):
         (text,) = re.findall(rf"\b{name} = ([^,;]+)", source)
         assert eval(text) == value, name
     assert f"MAX_SUBSTEPS = {march.MAX_SUBSTEPS} " in source
-    assert f"size <= {problem.NO_SIZE!r} " in source
+    assert f"<= {problem.NO_SIZE!r} ? 1" in source
 
 
 def test_the_statuses_are_those_of_the_runtime(example_named):

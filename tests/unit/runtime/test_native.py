@@ -308,3 +308,50 @@ def test_the_order_of_convergence_is_that_of_newton(four_bar):
     assert all(more >= fewer for more, fewer in pairwise(counts))
     assert counts[0] <= 6
     assert counts[-1] <= 2
+
+
+# ---------------------------------------------------------------- variants
+
+
+@pytest.mark.parametrize("points", [1, 12, 120])
+def test_variants_agree_with_those_of_numpy_and_bad_ones_disturb_none(four_bar, points):
+    native, module = four_bar
+    sets = module.DEFAULTS * np.random.default_rng(9).uniform(0.95, 1.05, (75, 5))
+    sets[[3, 40]] = [100.0, 1.0, 1.0, 20.0, 1.5]  # too short to be assembled
+    sets[[4, 70]] = [20.0, 15.0, 18.0, 20.0, 1.5]  # locks up
+    times = np.linspace(0.4, 4.0, points)
+    found = kc.solve(native, times, sets[:, np.newaxis])
+    expected = kc.solve(module, times, sets[:, np.newaxis])
+    np.testing.assert_array_equal(found.status, expected.status)
+    assert found.message == expected.message
+    for name in ("q", "q_dot", "q_ddot"):
+        here, there = getattr(found, name), getattr(expected, name)
+        assert here.shape == there.shape == (75, points, 9)
+        np.testing.assert_allclose(here, there, rtol=1e-9, atol=1e-9)
+    good = (found.status == 0).all(axis=1)
+    assert 60 <= good.sum() < 75
+    alone = kc.solve(native, times, sets[50])
+    np.testing.assert_allclose(found.q_ddot[50], alone.q_ddot, rtol=1e-10, atol=1e-10)
+
+
+def test_variants_of_every_example(example):
+    n = example.module
+    rng = np.random.default_rng(4)
+    sets = n.DEFAULTS * rng.uniform(0.999, 1.001, (5, n.DEFAULTS.size))
+    times = np.linspace(0, example.model.end, 25)
+    found = kc.solve(example.native, times, sets[:, np.newaxis])
+    expected = kc.solve(n, times, sets[:, np.newaxis])
+    np.testing.assert_array_equal(found.status, expected.status)
+    np.testing.assert_allclose(found.q_ddot, expected.q_ddot, rtol=1e-9, atol=1e-9)
+
+
+def test_two_blocks_that_turn_singular_together_are_noticed():
+    x, y = sympy.symbols("x y")
+    equations = [x**2 - (1 - kc.t) ** 2, y**2 - 4 * (1 - kc.t) ** 2]
+    m = kc.ConstraintSystem("twins", "x y", equations, guess=(1, 2))
+    native, module = kc.compile(m, target="c"), kc.compile(m)
+    for times in (np.linspace(0, 1.9, 38), np.array([0.0, 0.93, 1.11, 1.3])):
+        found, expected = kc.solve(native, times), kc.solve(module, times, method="march")
+        assert not found.success
+        np.testing.assert_array_equal(found.status, expected.status)
+        assert found.message == expected.message
