@@ -11,6 +11,8 @@ from kincompile.calculus.expand import Expansion, Pair, Value
 from kincompile.calculus.expressions import Expression, Scalar, Vector
 from kincompile.derive.derivation import derive
 from kincompile.derive.equations import derive_equation
+from kincompile.errors import ModelError
+from kincompile.model.display import constraints_html, equations_latex, problems_html
 from kincompile.model.expressions import alpha, as_sympy, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.names import rate
@@ -35,7 +37,9 @@ class CheckedSystem(Protocol):
 
 
 class MatrixViews:
-    """Matrix properties shared by `Mechanism` and `ConstraintSystem`."""
+    """Matrix properties shared by `Mechanism` and `ConstraintSystem`, and their display."""
+
+    name: str
 
     def system(self) -> CheckedSystem:
         """Return the checked system."""
@@ -77,6 +81,19 @@ class MatrixViews:
     def gamma(self) -> sympy.ImmutableDenseMatrix:
         """The right side of the acceleration equation, shape (m, 1)."""
         return _column([row.gamma for row in assemble(self.system())])
+
+    def _repr_html_(self) -> str:
+        try:
+            system = self.system()
+        except ModelError as error:
+            return problems_html(self.name, str(error))
+        return constraints_html(self.name, len(system.coordinates), system.constraints)
+
+    def _repr_latex_(self) -> str | None:
+        try:
+            return equations_latex(self.Phi)
+        except ModelError:
+            return None
 
 
 def _column(entries: list[sympy.Expr]) -> sympy.ImmutableDenseMatrix:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import linecache
 import zlib
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.util import decode_source
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.errors import ContractError, InputError
 from kincompile.runtime.contract import REMEDY, check
+from kincompile.runtime.display import module_html
 
 if TYPE_CHECKING:
     import os
@@ -143,4 +144,5 @@ def _fill(
             f"{filename} cannot be loaded: {type(error).__name__}: {error}. {REMEDY}"
         ) from error
     check(module)
+    module.__dict__["_repr_html_"] = partial(module_html, module)
     return module

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import listed, rate, suggestion
+from kincompile.runtime.branches import signatures
+from kincompile.runtime.condition import conditions
+from kincompile.runtime.display import table_html
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
     from numpy.typing import NDArray
+
+    from kincompile.runtime.events import Event
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -51,6 +59,11 @@ class Solution:
     statistics : dict
         How it was found: ``coarse``, points of the coarse march of a grid; ``marched``, points that
         were followed one by one with a pivoted solve.
+    events : list of Event
+        Lock-ups, bifurcations and jumps, in order, each with `.kind`, `.t`, `.bodies`, `.message`.
+        Those of variants are found by solving a variant alone.
+    module : module or None
+        The emitted module; None in a copy from another process.
     """
 
     t: NDArray[np.float64]
@@ -68,6 +81,49 @@ class Solution:
     units: dict[str, str]
     parameters: dict[str, Any]
     statistics: dict[str, int]
+    events: list[Event]
+    module: ModuleType | None
+
+    @property
+    def condition(self) -> NDArray[np.float64]:
+        """Condition number of the scaled Phi_q at every point, shape (N,); NaN without a position.
+
+        Lengths count in sizes of the mechanism, angles in radians, so that it does not depend on
+        units. It is computed when it is asked for. 1e8 and more is a singular configuration.
+        """
+        return self._at_points(conditions)
+
+    @property
+    def branch(self) -> NDArray[np.int8]:
+        """Branch signature of every point, shape (N, blocks); 0 without a position.
+
+        The signs of the determinants of the structural blocks of Phi_q: as long as none changes,
+        the motion stays on its branch. It is computed when it is asked for.
+        """
+        return self._at_points(signatures)
+
+    def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
+        """Apply a function of module, q, t and p to the motion, or to that of each variant."""
+        if self.module is None:
+            raise InputError(
+                f"this Solution of {self.name} was pickled, and the compiled module was not: take "
+                ".condition and .branch before, or solve again."
+            )
+        p = np.array(list(self.parameters.values()), dtype=np.float64)
+        if self.q.ndim == 2:
+            return function(self.module, self.q, self.t, p)
+        sets = p.T if p.size else np.zeros((len(self.q), 0))
+        variants = zip(self.q, sets, strict=True)
+        return np.array([function(self.module, q, self.t, one) for q, one in variants])
+
+    def __getstate__(self) -> list[Any]:
+        """Give everything but the module, which cannot be pickled."""
+        return [getattr(self, item.name) for item in fields(self)[:-1]] + [None]
+
+    def __setstate__(self, state: list[Any]) -> None:
+        """Take what `__getstate__` gave."""
+        for item, value in zip(fields(self), state, strict=True):
+            object.__setattr__(self, item.name, value)
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
         """Give the column of a coordinate, its rate or its second rate, shape (N,).
@@ -88,6 +144,16 @@ class Solution:
             f"{listed(self.coordinates)}; add _dot or _ddot for the rates."
         )
 
+    def _repr_html_(self) -> str:
+        t = self.t
+        header = ("coordinate", "unit", f"t = {t[0]:g}", f"t = {t[-1]:g}", "smallest", "largest")
+        rows = [
+            (name, self.units.get(name, ""), *(f"{x:.6g}" for x in (q[0], q[-1], *_range(q))))
+            for name, q in zip(self.coordinates, self.q.T, strict=True)
+        ]
+        title = f"{t.size} points from t = {t[0]:g} to {t[-1]:g}. {self.message}"
+        return table_html(self.name, title, header, rows)
+
     def __repr__(self) -> str:
         """Give the name, the grid and the outcome in one line."""
         ends = f"t = {self.t[0]:g}" + (f" to {self.t[-1]:g}" if self.t.size > 1 else "")
@@ -105,3 +171,9 @@ class Solution:
 def columns(coordinates: tuple[str, ...], order: int) -> tuple[str, ...]:
     """Give the names of q, q_dot or q_ddot, for `order` 0, 1 or 2."""
     return coordinates if order == 0 else tuple(rate(name, order) for name in coordinates)
+
+
+def _range(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Give the smallest and the largest of the values that were found."""
+    found = values[np.isfinite(values)]
+    return (float(found.min()), float(found.max())) if found.size else (np.nan, np.nan)

@@ -11,6 +11,7 @@ page      -> to_...       text              HTML, LaTeX, Markdown, a notebook
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
 from typing import TYPE_CHECKING
 
 from kincompile.errors import InputError
@@ -86,7 +87,9 @@ class Derivation(Document):
         return f"<Derivation of {self.name!r}: {self.summary}>"
 
     def _repr_html_(self) -> str:
-        return self.to_html()
+        # In a frame, so that the page's style sheet leaves the notebook alone.
+        page = escape(self.to_html(), quote=True)
+        return f'<iframe srcdoc="{page}" style="width: 100%; height: 40em; border: 0"></iframe>'
 
 
 FORMATS: Mapping[str, Callable[[Derivation], str]] = {

@@ -1,0 +1,53 @@
+"""How a mechanism or a system shows itself in a notebook."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import sympy
+
+from kincompile.model.resolve import FreeEquation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.model.resolve import Joint
+
+MOST_EQUATIONS = 24
+"""Equations up to which Phi is written out."""
+
+_HEADER = ("row", "constraint", "type", "between", "source")
+
+
+def constraints_html(
+    name: str, coordinates: int, constraints: Sequence[Joint | FreeEquation]
+) -> str:
+    """Return the constraints of a system as an HTML table."""
+    rows, first = [], 0
+    for item in constraints:
+        cells = (str(first), item.name, _kind(item), item.text, item.source)
+        rows.append(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>")
+        first += len(item.equation_names)
+    header = "".join(f"<th>{cell}</th>" for cell in _HEADER)
+    return (
+        f"<p><b>{escape(name)}</b>: {coordinates} coordinates, {first} equations</p>"
+        f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+    )
+
+
+def problems_html(name: str, problems: str) -> str:
+    """Return what is wrong with a mechanism that is not finished, as HTML."""
+    return f"<p><b>{escape(str(name))}</b>, not usable yet:</p><pre>{escape(problems)}</pre>"
+
+
+def equations_latex(Phi: sympy.ImmutableDenseMatrix) -> str | None:
+    """Return Phi = 0 in LaTeX, or None where there are too many equations to read."""
+    if Phi.rows > MOST_EQUATIONS:
+        return None
+    return rf"$\displaystyle \Phi = {sympy.latex(Phi)} = 0$"
+
+
+def _kind(item: Joint | FreeEquation) -> str:
+    kind = "Equation" if isinstance(item, FreeEquation) else item.template.type_name
+    return f"{kind} (driver)" if item.is_driver else kind
