@@ -38,16 +38,20 @@ def gap_problem(value: sympy.Expr) -> str | None:
         jump = _numbers_that_differ(before, after, symbol, place)
         if jump:
             return (
-                f"the pieces do not meet at {symbol} = {place}: {jump[0]:g} before, "
+                f"the pieces do not meet at {symbol} = {_text(place)}: {jump[0]:g} before, "
                 f"{jump[1]:g} after; {_REMEDY}"
             )
         corner = _numbers_that_differ(before.diff(symbol), after.diff(symbol), symbol, place)
         if corner:
             return (
-                f"the pieces meet in a corner at {symbol} = {place}: the slope is {corner[0]:g} "
-                f"before, {corner[1]:g} after; {_REMEDY}"
+                f"the pieces meet in a corner at {symbol} = {_text(place)}: the slope is "
+                f"{corner[0]:g} before, {corner[1]:g} after; {_REMEDY}"
             )
     return None
+
+
+def _text(place: sympy.Expr) -> str:
+    return f"{float(place):g}" if isinstance(place, sympy.Float) else str(place)
 
 
 def _breakpoints(value: sympy.Expr) -> Iterator[tuple[sympy.Symbol, sympy.Expr, sympy.Expr]]:
