@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import sympy
 
+from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
-from kincompile.calculus.expressions import TimeFunction, Vector, VectorSymbol
 from kincompile.derive.derivation import derive
 from kincompile.model.constraint import Kind
 from kincompile.model.expressions import depends_on
@@ -18,6 +18,7 @@ from kincompile.teach.formulas import (
     GAMMA_TERMS,
     PHI_T,
     VELOCITY_TERM,
+    ZERO_BLOCK,
     Equated,
     Glyph,
     Matrix,
@@ -137,7 +138,7 @@ def _attribute(joint: Joint, symbol: str) -> Formula:
 def _constraint_step(on_page: _JointPage) -> Section:
     blocks: list[Block] = []
     for k, block in enumerate(on_page.blocks):
-        zero = Glyph("0", bold=isinstance(block.Phi, Vector))
+        zero = ZERO_BLOCK if isinstance(block.Phi, Vector) else ZERO
         blocks.append(Display(Equated((on_page.symbol("Phi", k), block.Phi, zero))))
     names = abbreviations(on_page.joint.template)
     if names:

@@ -129,6 +129,20 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
         minus = [self.operator("-")] if expr < 0 else []
         return self.row([*minus, self.numeral(str(abs(expr)))])
 
+    def _print_Function(self, expr: Any) -> Element:
+        parts: list[Element] = []
+        for k, item in enumerate(expr.args):
+            parts += [self.operator(",")] if k else []
+            parts.append(self._print(item))
+        return self.row([self.function(expr.func.__name__), self._fenced(self.row(parts))])
+
+    def _print_exp(self, expr: Any) -> Element:
+        return self.scripts(self._print_Exp1(expr), None, self._print(expr.args[0]))
+
+    def _print_Exp1(self, expr: Any) -> Element:
+        del expr
+        return self._element("mi", "e", class_="u", mathvariant="normal")
+
     def _print_PeriodicSpline(self, expr: Any) -> Element:
         name = self.letter(expr.table_name)
         primes = self.operator("\N{PRIME}" * expr.order) if expr.order else None

@@ -118,6 +118,14 @@ def test_that_a_derivative_has_its_sign_above_and_below() -> None:
     assert tex(Partial(Glyph("A"), Symbol("phi"), "d")) == "\\frac{d {A}}{d \\phi}"
 
 
+def test_that_functions_of_sympy_are_upright() -> None:
+    x = sympy.Symbol("x")
+    element = ET.fromstring(MathMLPrinter().math(sympy.sin(x) + sympy.atan2(x, 2) - sympy.exp(x)))
+    upright = {item.text for item in element.iter("mi") if item.get("mathvariant") == "normal"}
+    assert upright == {"sin", "atan2", "e"}
+    assert [item.text for item in element.iter("mo")].count("\N{MINUS SIGN}") == 1
+
+
 def test_that_a_relation_is_escaped_in_mathml() -> None:
     choice = Choice(Relation("<", Symbol("t"), Symbol("a")), Symbol("b"), Symbol("c"))
     text = MathMLPrinter().math(choice)
