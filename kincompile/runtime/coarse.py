@@ -41,15 +41,15 @@ class Node:
         Number of the point in the time grid.
     q, q_dot, q_ddot
         Position, velocity and acceleration, as floats.
-    determinant
-        Product of the determinants of the blocks.
+    determinants
+        Those of the blocks.
     """
 
     index: int
     q: Lanes
     q_dot: Lanes
     q_ddot: Lanes
-    determinant: float
+    determinants: Lanes
 
 
 def coarse_march(
@@ -122,8 +122,9 @@ def _step(
     else:
         return None
     q_dot, q_ddot = code.rates(at, q, t)
-    determinant = math.prod(at.determinants)
-    if not math.isfinite(sum(q_ddot)) or determinant * node.determinant <= 0:
+    if not math.isfinite(sum(q_ddot)):
+        return None
+    if any(x * y <= 0 for x, y in zip(at.determinants, node.determinants, strict=True)):
         return None
     error = max([abs(x - y) / s for x, y, s in zip(q, predicted, spread, strict=True)])
-    return Node(index, q, q_dot, q_ddot, determinant), error
+    return Node(index, q, q_dot, q_ddot, at.determinants), error

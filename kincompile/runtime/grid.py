@@ -4,7 +4,7 @@ Between two points of the coarse march every coordinate is interpolated by the p
 degree through :math:`q, \dot q, \ddot q` at both ends (Hermite). That is so near that the first
 correction already leaves rounding errors, and the second shows it. Nothing is taken on trust: a
 point counts only if its corrections became small, its equations hold, it stayed near the
-interpolation, and det Phi_q kept its sign.
+interpolation, and the determinant of every block of Phi_q kept its sign.
 """
 
 from __future__ import annotations
@@ -91,22 +91,25 @@ def solve_grid(
     module, p = equations.module, equations.p.tolist()
     code = LaneCode(module, module.FLOATS, p)
     q = first.point.q.tolist()
-    determinant = math.prod(code.position(q, first.t).determinants)
-    node = Node(0, q, first.q_dot.tolist(), first.q_ddot.tolist(), determinant)
+    determinants = code.position(q, first.t).determinants
+    node = Node(0, q, first.q_dot.tolist(), first.q_ddot.tolist(), determinants)
     spread = equations.spread(first.point.q)
     nodes = coarse_march(code, node, times.tolist(), spread.tolist(), tolerance)
     reached = nodes[-1].index + 1
     _interpolate(nodes, times[:reached], result.q)
-    largest = max(abs(node.determinant) for node in nodes)
+    blocks = [
+        math.copysign(SMALLEST_DETERMINANT * max(map(abs, values)), values[0])
+        for values in zip(*(node.determinants for node in nodes), strict=True)
+    ]
     limits = _Limits(
         min(tolerance, LAST_CORRECTION),
         LARGEST_DISPLACEMENT * spread,
         RESIDUAL_FACTOR * tolerance * equations.magnitude,
-        math.copysign(SMALLEST_DETERMINANT * largest, determinant),
+        blocks,
     )
     code = LaneCode(module, module.ARRAYS, p)
-    blocks = max(1, round(reached / BLOCK))
-    edges = np.linspace(0, reached, blocks + 1).astype(int).tolist()
+    parts = max(1, round(reached / BLOCK))
+    edges = np.linspace(0, reached, parts + 1).astype(int).tolist()
     for start, stop in itertools.pairwise(edges):
         _solve_block(code, times[start:stop], result, slice(start, stop), limits)
     return len(nodes)
@@ -119,7 +122,7 @@ class _Limits:
     correction: float
     displacement: Array
     residual: Array
-    determinant: float
+    determinants: list[float]
 
 
 def _interpolate(nodes: list[Node], times: Array, q: Array) -> None:
@@ -186,9 +189,10 @@ def _solve_block(
         np.maximum(residual, size, out=residual)
         if not np.max(size) <= limit:
             good &= size <= limit
-    determinant = math.prod(at.determinants) / limits.determinant
-    if not np.min(determinant) > 1:
-        good &= determinant > 1
+    for value, smallest in zip(at.determinants, limits.determinants, strict=True):
+        relative = value / smallest
+        if not np.min(relative) > 1:
+            good &= relative > 1
     total: Any = 0.0
     for rows, values in zip((result.q_dot, result.q_ddot), code.rates(at, q, t), strict=True):
         for row, value in zip(rows, values, strict=True):

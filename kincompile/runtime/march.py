@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.runtime.branches import signs, turned
+from kincompile.runtime.linear import solve_linear
 from kincompile.runtime.newton import Attempt, assemble, iterate
 from kincompile.runtime.problem import Point, Problem, norm
 from kincompile.runtime.status import Status
@@ -42,6 +44,9 @@ SINGULAR_SENSITIVITY = 1e7
 """Movement, in scales of the coordinates, for an error of one scale in the equations: beyond this
 rounding has taken half of the digits of q, and a double root cannot be told from two roots."""
 
+AGREEMENT = 1e-6
+"""Part of the terms by which redundant equations may contradict each other in the rates."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
@@ -55,15 +60,15 @@ class State:
         The position with Phi and Phi_q.
     q_dot, q_ddot : ndarray, shape (n,)
         Velocity and acceleration.
-    branch : float
-        Sign of det Phi_q.
+    branch : tuple of float
+        Signs of the determinants of the blocks of Phi_q; empty where equations are redundant.
     """
 
     t: float
     point: Point
     q_dot: Vector
     q_ddot: Vector
-    branch: float
+    branch: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,22 +136,34 @@ def complete(equations: Problem, t: float, point: Point) -> State | Status:
     scale = equations.scale(q)
     # A third right-hand side, of the size of the equations' own terms, costs nothing and shows how
     # near to singular the matrix is.
-    sides = np.empty((q.size, 2))
+    sides = np.empty((point.Phi.size, 2))
     sides[:, 1] = equations.terms(point, scale) * equations.probe
     try:
         sides[:, 0] = module.nu(q, t, p)
-        q_dot, probe = np.linalg.solve(Phi_q, sides).T
+        q_dot, probe = solve_linear(Phi_q, sides).T
         sensitivity = float(np.max(np.abs(probe) / scale))
         if not sensitivity < SINGULAR_SENSITIVITY:
             return Status.SINGULAR if np.isfinite(Phi_q).all() else Status.NOT_FINITE
-        q_ddot = np.linalg.solve(Phi_q, module.gamma(q, q_dot, t, p))
+        gamma = module.gamma(q, q_dot, t, p)
+        q_ddot = solve_linear(Phi_q, gamma)
     except np.linalg.LinAlgError:
         return Status.SINGULAR
     except (ArithmeticError, ValueError):
         return Status.NOT_FINITE
     if not math.isfinite(norm(q_dot) + norm(q_ddot)):
         return Status.NOT_FINITE
-    return State(t, point, q_dot, q_ddot, float(np.linalg.slogdet(Phi_q)[0]))
+    if not (_agree(point, q_dot, sides[:, 0]) and _agree(point, q_ddot, gamma)):
+        return Status.SINGULAR
+    return State(t, point, q_dot, q_ddot, signs(equations, q, t, Phi_q))
+
+
+def _agree(point: Point, rates: Vector, sides: Vector) -> bool:
+    """Say whether redundant equations are all met by the rates that solve them best."""
+    if point.Phi_q.shape[0] == point.Phi_q.shape[1]:
+        return True
+    terms = np.abs(point.Phi_q) @ np.abs(rates) + np.abs(sides)
+    missing = np.abs(point.Phi_q @ rates - sides)
+    return bool(np.max(missing) <= AGREEMENT * np.max(terms))
 
 
 def _step(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome:
@@ -164,7 +181,8 @@ def _step(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome
     following = complete(equations, t, point)
     if isinstance(following, Status):
         return Outcome(following, iterations, None, point)
-    if following.branch != state.branch:  # a singular configuration lies between the two
+    # Where a determinant has changed its sign, a singular configuration lies between the two.
+    if following.branch != state.branch or turned(equations, state.point.Phi_q, point.Phi_q):
         return Outcome(Status.SINGULAR, iterations, None)
     return Outcome(Status.CONVERGED, iterations, following, point)
 

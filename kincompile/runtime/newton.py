@@ -21,6 +21,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.runtime.inputs import read_inputs
+from kincompile.runtime.linear import solve_linear
 from kincompile.runtime.problem import ROUNDING, Point, Problem, norm, problem
 from kincompile.runtime.status import Status
 
@@ -172,7 +173,7 @@ def assemble(
     if careful.status is Status.CONVERGED:
         return careful
     # With all bodies on a line no equation tells which way to bend: so it is for a guess of zeros.
-    bent = guess + NUDGE * equations.reference * equations.probe
+    bent = guess + NUDGE * equations.reference * equations.probe[: guess.size]
     nudged = iterate(equations, t, bent, tolerance, max_iterations, safeguarded_step)
     return nudged if nudged.status is Status.CONVERGED else careful
 
@@ -213,7 +214,7 @@ def iterate(
 def plain_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
     """Apply the whole correction."""
     try:
-        correction = np.asarray(np.linalg.solve(point.Phi_q, -point.Phi), dtype=np.float64)
+        correction = solve_linear(point.Phi_q, -point.Phi)
     except np.linalg.LinAlgError:
         return Status.SINGULAR
     following = equations.at(point.q + correction, t)

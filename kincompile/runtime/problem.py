@@ -39,9 +39,9 @@ class Point:
     ----------
     q : ndarray, shape (n,)
         The position.
-    Phi : ndarray, shape (n,)
-        The constraint vector there.
-    Phi_q : ndarray, shape (n, n)
+    Phi : ndarray, shape (m,)
+        The constraint vector there; m > n where redundant equations agree.
+    Phi_q : ndarray, shape (m, n)
         The Jacobian there.
     residual : float
         Euclidean norm of Phi.
@@ -67,10 +67,10 @@ class Problem:
         Which coordinates are angles.
     reference : ndarray, shape (n,)
         Scale of each coordinate: 1 rad for angles, the size of the mechanism for the others.
-    probe : ndarray, shape (n,)
+    probe : ndarray, shape (m,)
         Numbers of size 1/2 to 1 and either sign without a pattern, which no null vector of a
         mechanism can be expected to be orthogonal to.
-    magnitude : ndarray, shape (n,)
+    magnitude : ndarray, shape (m,)
         What the terms of each equation contribute at a generic position.
     """
 
@@ -128,14 +128,15 @@ class Problem:
 def problem(module: ModuleType, p: Vector, q: Vector, t: float) -> Problem:
     """Set a module's parameters; position and guess tell the size of the mechanism."""
     angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES], dtype=bool)
-    equations = Problem(module, p, angular, np.ones(q.size), _probe(q.size), np.zeros(q.size))
+    m: int = module.N_EQUATIONS
+    equations = Problem(module, p, angular, np.ones(q.size), _probe(m), np.zeros(m))
     lengths = np.abs(np.where(angular, 0.0, (q, module.GUESS)))
     size = np.max(lengths, initial=0.0)
     if size <= NO_SIZE and (point := equations.at(q, t)) is not None:
         size = _size_in_equations(point, angular)
     if size > NO_SIZE:
         equations.reference = np.where(angular, 1.0, size)
-    generic = equations.at(q + equations.reference * equations.probe, t)
+    generic = equations.at(q + equations.reference * equations.probe[: q.size], t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
         equations.magnitude = equations.terms(generic, equations.reference)
     return equations

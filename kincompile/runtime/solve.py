@@ -5,26 +5,32 @@ inputs    checked, in the solver's form          inputs.read_inputs
   -> assemble the first point from the guess     march.start      (newton.assemble)
   -> solve all points together                   grid.solve_grid  (coarse.coarse_march)
   -> follow what cannot be trusted point by point  march.advance  (newton.iterate)
-  -> say how it went                             _message
+  -> find what ends the motion, or go through it   events.locate
+  -> say how it went                             verdict.verdict
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+import warnings
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.errors import InputError, SolveError
+from kincompile.errors import BranchSwitchWarning, InputError, SolveError
+from kincompile.runtime.events import branch_switch, locate, singular_start
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
 from kincompile.runtime.lanes import has_planned_solve
 from kincompile.runtime.large import LargeMarch, LargeState, is_grouped
 from kincompile.runtime.march import SMALL_ERROR, Outcome, State, advance, complete, start
+from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.solution import Solution
 from kincompile.runtime.status import Status
 from kincompile.runtime.variants import read_variants, solve_variants
+from kincompile.runtime.verdict import unassembled, verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,6 +38,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from kincompile.runtime.events import Event, Passage
     from kincompile.runtime.inputs import Values
     from kincompile.runtime.problem import Problem, Vector
 
@@ -40,9 +47,6 @@ if TYPE_CHECKING:
 
 SMALLEST_GRID = 32
 """Points from which on a grid is faster than a march."""
-
-NAMED_EQUATIONS = 3
-"""How many equations a message names."""
 
 
 def solve(
@@ -54,6 +58,7 @@ def solve(
     tolerance: float = 1e-10,
     max_iterations: int = 25,
     method: str | None = None,
+    through: str | None = None,
     throw: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
@@ -80,6 +85,9 @@ def solve(
         ``"march"`` goes from point to point; ``"grid"`` solves all points together and leaves to
         the march what it cannot trust. Both give the same; without a choice the faster is taken,
         which is the compiled march of a module that has one.
+    through : {"smooth"}, optional
+        Go on past a bifurcation, along the branch on which velocity and acceleration are
+        continuous; a `BranchSwitchWarning` says when. Without it the motion ends there.
     throw : bool
         Raise `SolveError` unless every point converged.
     progress : callable, optional
@@ -88,7 +96,8 @@ def solve(
     Returns
     -------
     Solution
-        With a status per point. After a point that failed the others are not tried.
+        With a status per point. After a point that failed the others are not tried; `.events` says
+        what ended the motion where it is a lock-up, a bifurcation or a jump.
 
     Raises
     ------
@@ -102,8 +111,10 @@ def solve(
     sets = read_variants(module, p)
     inputs = read_inputs(module, t, p if sets is None else None, guess, tolerance, max_iterations)
     on_grid = _takes_grid(module, inputs.t.size, method)
+    if through not in (None, "smooth"):
+        raise InputError(f"through is {through!r}: give 'smooth', or nothing.")
     if sets is None:
-        solution = _solve_one(inputs, on_grid, method is None, progress)
+        solution = _solve_one(inputs, on_grid, method is None, through == "smooth", progress)
     else:
         solution = solve_variants(inputs, sets, progress)
     if throw and not solution.success:
@@ -112,7 +123,7 @@ def solve(
 
 
 def _solve_one(
-    inputs: Inputs, on_grid: bool, may_be_compiled: bool, progress: Progress | None
+    inputs: Inputs, on_grid: bool, may_be_compiled: bool, smooth: bool, progress: Progress | None
 ) -> Solution:
     """Solve with one set of parameters."""
     motion = _Motion.over(inputs)
@@ -122,7 +133,10 @@ def _solve_one(
         elif may_be_compiled and _march_compiled(inputs, motion):
             outcome = Outcome(Status.CONVERGED, 0, None)
         else:
-            outcome = _follow(inputs, motion, on_grid, progress)
+            outcome = _follow(inputs, motion, on_grid, smooth, progress)
+    for event in motion.passed:
+        text = f"{inputs.module.NAME} goes through a bifurcation at t = {event.t:.10g}, and on"
+        warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=3)
     return _solution(inputs, motion, outcome)
 
 
@@ -137,6 +151,8 @@ class _Motion:
     residual: Vector
     iterations: NDArray[np.int64]
     statistics: dict[str, int]
+    events: list[Event] = field(default_factory=list)
+    passed: list[Event] = field(default_factory=list)
 
     @classmethod
     def over(cls, inputs: Inputs) -> _Motion:
@@ -171,7 +187,7 @@ class _Motion:
         if outcome.position is not None:
             self.q[index] = outcome.position.q
             self.residual[index] = np.max(np.abs(outcome.position.Phi))
-        elif (point := _unassembled(outcome)) is not None:
+        elif (point := unassembled(outcome)) is not None:
             self.residual[index] = np.max(np.abs(point.Phi))
         if outcome.status is Status.CONVERGED and outcome.state is not None:
             self.q_dot[index] = outcome.state.q_dot
@@ -206,7 +222,9 @@ def _march_compiled(inputs: Inputs, motion: _Motion) -> bool:
     return True
 
 
-def _follow(inputs: Inputs, motion: _Motion, on_grid: bool, progress: Progress | None) -> Outcome:
+def _follow(
+    inputs: Inputs, motion: _Motion, on_grid: bool, smooth: bool, progress: Progress | None
+) -> Outcome:
     """Go through the grid up to its end, or to the first point that fails."""
     times = inputs.t.tolist()
     outcome = start(problem(inputs.module, inputs.p, inputs.guess, times[0]), times[0], inputs)
@@ -216,10 +234,32 @@ def _follow(inputs: Inputs, motion: _Motion, on_grid: bool, progress: Progress |
     # The guess may be rough: from here on the assembled mechanism gives the size.
     assembled = inputs.guess if outcome.position is None else outcome.position.q
     equations = problem(inputs.module, inputs.p, assembled, times[0])
+    index, outcome = _run(equations, inputs, motion, 1, outcome, on_grid, progress)
+    while outcome.status is not Status.CONVERGED:
+        passage = _explain(equations, inputs, motion, index - 1, outcome)
+        if passage is None or not smooth:
+            break
+        motion.passed.append(motion.events[-1])
+        index, outcome = _pass(equations, inputs, motion, index - 1, passage)
+        index, outcome = _run(equations, inputs, motion, index, outcome, on_grid, progress)
+    motion.forget(index)
+    return outcome
+
+
+def _run(
+    equations: Problem,
+    inputs: Inputs,
+    motion: _Motion,
+    index: int,
+    outcome: Outcome,
+    on_grid: bool,
+    progress: Progress | None,
+) -> tuple[int, Outcome]:
+    """Follow a motion from the point before an index as far as it goes; return the next index."""
+    times = inputs.t.tolist()
     trusted = np.zeros(len(times), dtype=bool)
-    if on_grid and outcome.state is not None:
-        trusted = _grid(equations, inputs, motion, outcome.state)
-    index = 1
+    if on_grid and outcome.state is not None and outcome.state.t == times[index - 1]:
+        trusted[index - 1 :] = _grid(equations, inputs, motion, outcome.state, index - 1)
     while index < len(times) and outcome.status is Status.CONVERGED:
         state = outcome.state
         if state is None:
@@ -236,8 +276,51 @@ def _follow(inputs: Inputs, motion: _Motion, on_grid: bool, progress: Progress |
             index += 1
         if progress:
             progress(index, len(times))
-    motion.forget(index)
-    return outcome
+    return index, outcome
+
+
+def _explain(
+    equations: Problem, inputs: Inputs, motion: _Motion, index: int, outcome: Outcome
+) -> Passage | None:
+    """Find the event that ends the motion at a point; return the way through it if there is one."""
+    t, state = float(inputs.t[index]), outcome.state
+    if state is None:
+        if outcome.status is Status.SINGULAR and outcome.position is not None:
+            motion.events += filter(None, [singular_start(equations, outcome.position, t)])
+        return None
+    duration = abs(t - float(inputs.t[0]))
+    found = locate(equations, state, t, duration)
+    if found is not None:
+        motion.events.append(found[0])
+        return found[1]
+    if outcome.attempt is not None and outcome.attempt.status is Status.CONVERGED:
+        q = outcome.attempt.last.q
+        motion.events.append(branch_switch(inputs.module, state, t, q, equations.spread(q)))
+    return None
+
+
+def _pass(
+    equations: Problem, inputs: Inputs, motion: _Motion, index: int, passage: Passage
+) -> tuple[int, Outcome]:
+    """Fill the points within the passage through a bifurcation, and take the next one."""
+    times, after = inputs.t.tolist(), passage.after
+    forward = math.copysign(1.0, after.t - passage.before.t)
+    while index < len(times) and (times[index] - after.t) * forward <= 0:
+        q, q_dot, q_ddot = passage.at(times[index])
+        point = equations.at(q, times[index])
+        if point is None or not equations.holds(point, RESIDUAL_FACTOR * inputs.tolerance):
+            return index + 1, Outcome(Status.SINGULAR, 0, passage.before, None)
+        motion.put(
+            index,
+            Outcome(Status.CONVERGED, 0, State(times[index], point, q_dot, q_ddot, ()), point),
+        )
+        index += 1
+    if index == len(times):
+        return index, Outcome(Status.CONVERGED, 0, after, after.point)
+    outcome = advance(equations, after, times[index], inputs)
+    motion.put(index, outcome)
+    motion.statistics["marched"] += 1
+    return index + 1, outcome
 
 
 def _follow_large(inputs: Inputs, motion: _Motion, progress: Progress | None) -> Outcome:
@@ -265,18 +348,22 @@ def _large_outcome(found: LargeState | Status, good: LargeState | None) -> Outco
     """Return a point of a large mechanism's motion, or how it failed after a good one."""
     if isinstance(found, LargeState):
         point = Point(found.q, found.Phi, np.empty((0, 0)), 0.0)
-        state = State(found.t, point, found.q_dot, found.q_ddot, 0.0)
+        state = State(found.t, point, found.q_dot, found.q_ddot, ())
         return Outcome(Status.CONVERGED, found.iterations, state, point)
     last = None if good is None else _large_outcome(good, None).state
     return Outcome(found, 0, last)
 
 
-def _grid(equations: Problem, inputs: Inputs, motion: _Motion, first: State) -> NDArray[np.bool_]:
-    """Solve all points together, and tell which of them can be trusted."""
-    trusted = np.zeros(inputs.t.size, dtype=bool)
-    result = GridResult(motion.q.T, motion.q_dot.T, motion.q_ddot.T, motion.residual, trusted)
-    motion.statistics["coarse"] = solve_grid(equations, inputs.t, first, inputs.tolerance, result)
-    motion.iterations[1:] = CORRECTIONS_ON_GRID
+def _grid(
+    equations: Problem, inputs: Inputs, motion: _Motion, first: State, index: int
+) -> NDArray[np.bool_]:
+    """Solve all points from an index on together, and tell which of them can be trusted."""
+    times = inputs.t[index:]
+    trusted = np.zeros(times.size, dtype=bool)
+    q, q_dot, q_ddot = (values[index:].T for values in (motion.q, motion.q_dot, motion.q_ddot))
+    result = GridResult(q, q_dot, q_ddot, motion.residual[index:], trusted)
+    motion.statistics["coarse"] += solve_grid(equations, times, first, inputs.tolerance, result)
+    motion.iterations[index + 1 :] = CORRECTIONS_ON_GRID
     return trusted
 
 
@@ -302,7 +389,7 @@ def _taken_up(equations: Problem, motion: _Motion, t: float, index: int) -> Outc
     """Return a point of the grid as one from which the march can go on."""
     if index == motion.status.size - 1:
         point = Point(motion.q[index], np.empty(0), np.empty((0, 0)), 0.0)
-        state = State(t, point, motion.q_dot[index], motion.q_ddot[index], 0.0)
+        state = State(t, point, motion.q_dot[index], motion.q_ddot[index], ())
         return Outcome(Status.CONVERGED, 0, state, point)
     at = equations.at(np.ascontiguousarray(motion.q[index]), t)
     assert at is not None  # it was evaluated on the grid
@@ -310,14 +397,6 @@ def _taken_up(equations: Problem, motion: _Motion, t: float, index: int) -> Outc
     if isinstance(following, Status):
         return Outcome(following, 0, None, at)
     return Outcome(Status.CONVERGED, 0, following, at)
-
-
-def _unassembled(outcome: Outcome) -> Point | None:
-    """Give the position nearest to an assembled one, where the mechanism does not assemble."""
-    attempt = outcome.attempt
-    if attempt is None or not attempt.points or attempt.status is Status.CONVERGED:
-        return None
-    return attempt.last
 
 
 def _solution(inputs: Inputs, motion: _Motion, outcome: Outcome) -> Solution:
@@ -332,51 +411,13 @@ def _solution(inputs: Inputs, motion: _Motion, outcome: Outcome) -> Solution:
         residual=motion.residual,
         iterations=motion.iterations,
         success=outcome.status is Status.CONVERGED,
-        message=_message(inputs, motion, outcome),
+        message=verdict(inputs, motion.status, motion.residual, outcome, motion.events),
         name=module.NAME,
         coordinates=module.COORDINATES,
         equations=module.EQUATIONS,
         units=dict(module.UNITS),
         parameters=dict(zip(module.PARAMETERS, inputs.p.tolist(), strict=True)),
         statistics=motion.statistics,
+        events=motion.events,
+        module=module,
     )
-
-
-def _message(inputs: Inputs, motion: _Motion, outcome: Outcome) -> str:
-    """Say in words how it went."""
-    name, times = inputs.module.NAME, inputs.t
-    if outcome.status is Status.CONVERGED:
-        points = f"all {times.size} points" if times.size > 1 else "the point"
-        return f"{name}: {points} converged; the largest residual is {motion.residual.max():.2g}."
-    index = int(np.argmax(motion.status != Status.CONVERGED))
-    parts = [
-        f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
-        f" ({outcome.status.name}).",
-        _before(outcome, index),
-        _there(inputs.module, outcome),
-        outcome.status.sentence,
-    ]
-    return " ".join(part for part in parts if part)
-
-
-def _before(outcome: Outcome, index: int) -> str:
-    """Say how far the motion was followed."""
-    if outcome.state is None:
-        return ""
-    good = f"The {index} points before it are good" if index > 1 else "The point before it is good"
-    reached = f"; the motion was followed to t = {outcome.state.t:.10g}"
-    return f"{good}{'' if outcome.position else reached}."
-
-
-def _there(module: ModuleType, outcome: Outcome) -> str:
-    """Name the equations that do not hold at the time of failure, or say what else is there."""
-    if outcome.position is not None:
-        return "The position there was found."
-    if outcome.attempt is not None and outcome.attempt.status is Status.CONVERGED:
-        return "A position exists at that time, but the motion does not lead there continuously."
-    point = _unassembled(outcome)
-    if point is None:
-        return ""
-    largest = np.argsort(-np.abs(point.Phi), kind="stable")[:NAMED_EQUATIONS]
-    worst = ", ".join(f"{module.EQUATIONS[row]} = {point.Phi[row]:.3g}" for row in largest)
-    return f"The equations with the largest residuals at the nearest position: {worst}."

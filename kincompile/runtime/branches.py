@@ -1,0 +1,130 @@
+r"""The branch of a motion: the signs of the determinants of the structural blocks of Phi_q.
+
+Two assembled positions of a mechanism that differ in a sign cannot be reached from each other
+without passing a singular configuration. The planned solve of a module has the determinants at
+hand. Where redundant equations forbid one, the determinant of the equations' independent
+combinations takes their place: these turn slowly along a motion, and are those of the point before.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.runtime.lanes import LaneCode, has_planned_solve
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.problem import Problem, Vector
+
+    Signs = NDArray[np.int8]
+
+BLOCK = 2048
+"""Points at a time, so that intermediate arrays stay in the cache."""
+
+
+def determinants(
+    equations: Problem, at: tuple[Vector, float, Vector], reference: Vector
+) -> list[float]:
+    """Return the determinants of the blocks at a position.
+
+    Parameters
+    ----------
+    equations
+        A module with its parameters set.
+    at
+        The position q, the time and Phi_q there.
+    reference : ndarray, shape (m, n)
+        Phi_q at a point near by: where there are no blocks, one determinant is given, relative to
+        that point's.
+    """
+    q, t, Phi_q = at
+    if has_planned_solve(equations.module):
+        module, p = equations.module, equations.p.tolist()
+        try:
+            found = LaneCode(module, module.FLOATS, p).position(q.tolist(), t).determinants
+        except ArithmeticError:  # floats refuse 1/0 in the factors of a singular block
+            found = LaneCode(module, module.ARRAYS, p).position(q[:, np.newaxis], t).determinants
+        return [float(np.ravel(value)[0]) for value in found]
+    basis = np.linalg.svd(reference, full_matrices=False)[0].T
+    sign, size = np.linalg.slogdet(basis @ Phi_q)
+    sign_there, size_there = np.linalg.slogdet(basis @ reference)
+    return [float(sign * sign_there * math.exp(min(size - size_there, 700.0)))]
+
+
+def signs(equations: Problem, q: Vector, t: float, Phi_q: Vector) -> tuple[float, ...]:
+    """Return the signs of the determinants of the blocks; none where equations are redundant."""
+    if has_planned_solve(equations.module):
+        found = determinants(equations, (q, t, Phi_q), Phi_q)
+        return tuple(float(np.sign(value)) for value in found)
+    return (float(np.linalg.slogdet(Phi_q)[0]),) if Phi_q.shape[0] == Phi_q.shape[1] else ()
+
+
+def turned(equations: Problem, before: Vector, after: Vector) -> bool:
+    """Say whether a singular configuration lies between two near Phi_q with redundant equations."""
+    if before.shape[0] == before.shape[1]:
+        return False
+    empty = np.empty(0)
+    return determinants(equations, (empty, 0.0, after), before)[0] <= 0
+
+
+def signatures(module: ModuleType, q: Vector, t: Vector, p: Sequence[float]) -> Signs:
+    """Return the signature of every point of a motion, shape (N, blocks); 0 where q is NaN.
+
+    Parameters
+    ----------
+    module
+        The emitted module.
+    q : ndarray, shape (N, n)
+        Positions.
+    t : ndarray, shape (N,)
+        Times.
+    p
+        Parameters.
+    """
+    with np.errstate(all="ignore"):
+        if has_planned_solve(module):
+            return _planned(module, q, t, p)
+        found = np.isfinite(q).all(axis=1)
+        result = np.zeros((t.size, 1), dtype=np.int8)
+        result[found, 0] = _chained([
+            module.Phi_q(position, time, np.asarray(p, dtype=float))
+            for position, time in zip(q[found], t[found].tolist(), strict=True)
+        ])  # fmt: skip
+        return result
+
+
+def _planned(module: ModuleType, q: Vector, t: Vector, p: Sequence[float]) -> Signs:
+    """Return the signs of the blocks that the planned solve has."""
+    code = LaneCode(module, module.ARRAYS, list(p))
+    parts = []
+    for start in range(0, t.size, BLOCK):
+        lanes, times = q[start : start + BLOCK].T, t[start : start + BLOCK]
+        found = code.position(np.ascontiguousarray(lanes), times).determinants
+        part = np.zeros((times.size, len(found)))
+        for block, values in enumerate(found):
+            part[:, block] = np.sign(values)
+        parts.append(np.nan_to_num(part))
+    unknown = ~np.isfinite(q).all(axis=1)
+    result = np.concatenate(parts).astype(np.int8)
+    result[unknown] = 0
+    return result
+
+
+def _chained(matrices: Sequence[Vector]) -> list[int]:
+    """Return the sign of each matrix; with redundant equations relative to the first one's."""
+    if matrices and matrices[0].shape[0] == matrices[0].shape[1]:
+        return [int(np.linalg.slogdet(matrix)[0]) for matrix in matrices]
+    result: list[int] = []
+    for k, matrix in enumerate(matrices):
+        before = matrices[max(k - 1, 0)]
+        basis = np.linalg.svd(before, full_matrices=False)[0].T
+        sign = np.linalg.slogdet(basis @ matrix)[0] * np.linalg.slogdet(basis @ before)[0]
+        result.append(int(sign) * (result[-1] if result else 1))
+    return result

@@ -1,0 +1,119 @@
+"""How a motion went, in words: the time, the status, what does not hold there, and what to do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.names import body_coordinates, listed
+from kincompile.runtime.events import owner_of_coordinates
+from kincompile.runtime.status import Status
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.events import Event
+    from kincompile.runtime.inputs import Inputs
+    from kincompile.runtime.march import Outcome
+    from kincompile.runtime.problem import Point, Vector
+
+NAMED_EQUATIONS = 3
+"""How many equations a message names."""
+
+NAMED_BODIES = 6
+"""Of how many bodies a message gives the position."""
+
+MET = 1e-9
+"""Residual, relative to the largest, up to which an equation counts as met."""
+
+
+def verdict(
+    inputs: Inputs,
+    status: NDArray[np.int64],
+    residual: Vector,
+    outcome: Outcome,
+    events: Sequence[Event],
+) -> str:
+    """Say in words how a motion went.
+
+    Parameters
+    ----------
+    inputs
+        What was to be solved.
+    status, residual : ndarray, shape (N,)
+        What became of each point.
+    outcome
+        What became of the last point that was tried.
+    events
+        Events on the way, in order.
+    """
+    name, times = inputs.module.NAME, inputs.t
+    if outcome.status is Status.CONVERGED:
+        points = f"all {times.size} points" if times.size > 1 else "the point"
+        passed = "".join(f" Passed: {event.kind} at t = {event.t:.10g}." for event in events)
+        return f"{name}: {points} converged; the largest residual is {residual.max():.2g}.{passed}"
+    index = int(np.argmax(status != Status.CONVERGED))
+    parts = [
+        f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
+        f" ({outcome.status.name}).",
+        _before(outcome, index),
+        _there(inputs.module, outcome),
+        outcome.status.sentence,
+        *(event.message for event in events[-1:]),
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def unassembled(outcome: Outcome) -> Point | None:
+    """Give the position nearest to an assembled one, where the mechanism does not assemble."""
+    attempt = outcome.attempt
+    if attempt is None or not attempt.points or attempt.status is Status.CONVERGED:
+        return None
+    return attempt.last
+
+
+def _before(outcome: Outcome, index: int) -> str:
+    """Say how far the motion was followed."""
+    if outcome.state is None:
+        return ""
+    good = f"The {index} points before it are good" if index > 1 else "The point before it is good"
+    reached = f"; the motion was followed to t = {outcome.state.t:.10g}"
+    return f"{good}{'' if outcome.position else reached}."
+
+
+def _there(module: ModuleType, outcome: Outcome) -> str:
+    """Name the equations that do not hold at the time of failure, or say what else is there."""
+    if outcome.position is not None:
+        return "The position there was found."
+    if outcome.attempt is not None and outcome.attempt.status is Status.CONVERGED:
+        return "A position exists at that time, but the motion does not lead there continuously."
+    point = unassembled(outcome)
+    return "" if point is None else _unmet(module, point)
+
+
+def _unmet(module: ModuleType, point: Point) -> str:
+    """Say by how much which equations are missed at the best position, and where its bodies are."""
+    sizes = np.abs(point.Phi)
+    order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
+    rows = [row for row in order.tolist() if sizes[row] > MET * sizes[order[0]]]
+    worst = ", ".join(f"{module.EQUATIONS[row]} = {point.Phi[row]:.3g}" for row in rows)
+    places = listed(_places(module, point.q), most=NAMED_BODIES)
+    return (
+        f"The equations with the largest residuals at the nearest position: {worst}. "
+        f"There: {places}."
+    )
+
+
+def _places(module: ModuleType, q: Vector) -> Iterator[str]:
+    """Yield where each body is, and the values of coordinates that belong to none."""
+    values = dict(zip(module.COORDINATES, q.tolist(), strict=True))
+    for owner in dict.fromkeys(owner_of_coordinates(module.COORDINATES).values()):
+        if owner in values:
+            yield f"{owner} = {values[owner]:.4g}"
+        else:
+            x, y, phi = (values[name] for name in body_coordinates(owner))
+            yield f"{owner} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
