@@ -15,7 +15,8 @@ from typing import Any
 
 _PUBLIC = {
     "kincompile.compiler": ("compile", "emit", "inspect"),
-    "kincompile.model.files": ("read_model",),
+    "kincompile.model.files": ("read", "read_analysis", "read_model"),
+    "kincompile.model.file_format": ("model_schema",),
     "kincompile.model.mechanism": ("Mechanism",),
     "kincompile.model.system": ("ConstraintSystem",),
     "kincompile.model.equation": ("Equation",),

@@ -10,6 +10,7 @@ SymPy is loaded by the names of `kc` that need it, so that `--help` does not wai
 
 from __future__ import annotations
 
+import json
 import math
 import operator
 import os
@@ -91,8 +92,9 @@ def _end(message: str, code: int) -> NoReturn:
 def cli() -> None:
     """Compile planar mechanisms to numerical code, and run it.
 
-    MODEL is a Python file with one Mechanism or ConstraintSystem at module level; of several, the
-    one called mechanism, system or m. The file is run: use only what you trust.
+    MODEL is a data file (.toml, .json, or .adm of simEngine2D), or a Python file with one Mechanism
+    or ConstraintSystem at module level; of several, the one called mechanism, system or m. A data
+    file never runs code. A Python file is run: use only what you trust.
     """
 
 
@@ -109,23 +111,33 @@ def cli() -> None:
 def compile_command(model: str, output: str, target: str) -> None:
     """Write Phi, Phi_q, nu and gamma of MODEL as a module.
 
-    The module imports NumPy and nothing else: it runs where kincompile is not installed.
+    The module imports NumPy and nothing else: it runs where kincompile is not installed. Where a
+    target has several files, the others are written beside the one named.
     """
     emitted = kc.emit(_read(model), target)
     if output == "-":
-        _print(emitted.source)
+        _print("\n".join(emitted.files.values()))
         return
-    path = _destination(output, emitted)
-    if path.exists() and path.samefile(model):
-        raise InputError(f"{path} is the model itself; give -o another name")
-    write_atomically(path, emitted.source)
-    click.echo(f"Wrote {path}", err=True)
+    folder, main = _destination(output, emitted)
+    for path in (folder / name for name in (main, *emitted.companions)):
+        if path.exists() and path.samefile(model):
+            raise InputError(f"{path} is the model itself; give -o another name")
+        if path.parent.exists():
+            require_writable(path)
+    for path in emitted.write(folder, main):
+        click.echo(f"Wrote {path}", err=True)
 
 
-def _destination(output: str, emitted: Emitted) -> Path:
-    """Return the file to write: the one named, or the usual name in the folder named."""
+def _destination(output: str, emitted: Emitted) -> tuple[Path, str]:
+    """Return the folder to write to, and the name there of the main file."""
     path = Path(output)
-    return path / next(iter(emitted.files)) if path.is_dir() else path
+    usual = next(iter(emitted.files))
+    if path.is_dir() or (emitted.companions and not path.suffix):
+        return path, usual
+    if path.name in emitted.companions:
+        raise InputError(f"{path} is the name of another file that is written; end it as {usual}")
+    require_writable(path)
+    return path.parent, path.name
 
 
 @cli.command()
@@ -143,6 +155,7 @@ def _destination(output: str, emitted: Emitted) -> Path:
     metavar="NAME=VALUE",
     help="Value of a parameter; may be given several times.",
 )
+@click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
 @click.option("-o", "--output", metavar="FILE", help="Write the motion: .csv, .npz or .json.")
 @click.pass_context
 def run(
@@ -151,6 +164,7 @@ def run(
     end: float | None,
     points: int | None,
     assignments: tuple[str, ...],
+    analysis: str | None,
     output: str | None,
 ) -> None:
     """Solve the motion of MODEL over time and summarise it.
@@ -164,6 +178,10 @@ def run(
         require_writable(output)
     values = _values(assignments)
     mechanism = _read(model)
+    if analysis is not None:
+        settings = kc.read_analysis(analysis)
+        end = settings.end if end is None else end
+        points = settings.points if points is None else points
     times = _times(mechanism, end, points)
     module = kc.compile(mechanism)
     with progress_bar() as progress:
@@ -176,6 +194,12 @@ def run(
     if not solution.success:
         click.echo(f"Error: {solution.message}", err=True)
         context.exit(NOT_CONVERGED)
+
+
+@cli.command()
+def schema() -> None:
+    """Show the JSON Schema of a model in TOML or JSON, for editors that check while one writes."""
+    _print(json.dumps(kc.model_schema(), indent=2) + "\n")
 
 
 @cli.command()

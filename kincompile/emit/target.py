@@ -43,8 +43,21 @@ class Emitted:
         """Text of the main file."""
         return next(iter(self.files.values()))
 
-    def write(self, folder: str | Path) -> tuple[Path, ...]:
+    @property
+    def companions(self) -> tuple[str, ...]:
+        """Names of the files beside the main one."""
+        arrays = (f"{self.name}.npz",) if self.arrays else ()
+        return (*list(self.files)[1:], *arrays)
+
+    def write(self, folder: str | Path, main: str | None = None) -> tuple[Path, ...]:
         """Write the files into a folder, which is made if it is missing, and return their paths.
+
+        Parameters
+        ----------
+        folder
+            Where to write.
+        main
+            Another name for the main file.
 
         Raises
         ------
@@ -55,8 +68,8 @@ class Emitted:
         with suppress(OSError):
             Path(folder).mkdir(parents=True, exist_ok=True)
         paths = []
-        for name, text in self.files.items():
-            path = Path(folder) / name
+        for k, (name, text) in enumerate(self.files.items()):
+            path = Path(folder) / (main if main and k == 0 else name)
             write_atomically(path, text)
             paths.append(path)
         if self.arrays:

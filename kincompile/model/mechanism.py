@@ -11,11 +11,12 @@ from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.system import ConstraintSystem
+from kincompile.model.write_model import TextViews
 
 Item = TypeVar("Item", bound=Constraint | Equation)
 
 
-class Mechanism(MatrixViews):
+class Mechanism(MatrixViews, TextViews):
     """Bodies, parameters and constraints, collected one by one.
 
     Nothing is checked while building; `system` checks everything at once, so that all mistakes are

@@ -306,28 +306,43 @@ class _Reader:
                 raise self._error(f"only + - * / ^ are operators; expected {_EXPECTED}", first)
             links.append(first)
             first = first.left
-        terms = [self.read(first, depth + 1)]
+        # One sum of all the terms, one product of all the factors: SymPy would sort a growing sum
+        # again for each term, and multiply a number into a sum that has another factor to come.
+        terms: list[sympy.Expr] = []
+        factors = self._factors(first, depth)
         for link in reversed(links):
             self._count(link, depth)
-            right = self.read(link.right, depth + 1)
             if isinstance(link.op, ast.Add | ast.Sub):
-                # One sum of all the terms: SymPy would sort a growing sum again for each of them.
-                terms.append(right if isinstance(link.op, ast.Add) else -right)
+                terms.append(self._checked(sympy.Mul(*factors), link))
+                factors = self._factors(link.right, depth)
+                if isinstance(link.op, ast.Sub):
+                    factors.insert(0, sympy.S.NegativeOne)
                 continue
-            left = self._checked(sympy.Add(*terms), link)
-            terms = [self._checked(self._combined(left, link, right), link)]
-        return self._checked(sympy.Add(*terms), node)
+            if terms:  # the sum so far stands in brackets
+                total = sympy.Add(*terms, sympy.Mul(*factors))
+                terms, factors = [], [self._checked(total, link)]
+            factors = self._extended(factors, link, self.read(link.right, depth + 1))
+        return self._checked(sympy.Add(*terms, sympy.Mul(*factors)), node)
 
-    def _combined(self, left: sympy.Expr, link: ast.BinOp, right: sympy.Expr) -> sympy.Expr:
+    def _factors(self, node: ast.expr, depth: int) -> list[sympy.Expr]:
+        """Return a value as a list of factors, the sign before it as a factor of its own."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            self._count(node, depth)
+            return [sympy.S.NegativeOne, self.read(node.operand, depth + 2)]
+        return [self.read(node, depth + 1)]
+
+    def _extended(
+        self, factors: list[sympy.Expr], link: ast.BinOp, right: sympy.Expr
+    ) -> list[sympy.Expr]:
+        """Return factors multiplied or divided by a value, or raised to its power."""
         if isinstance(link.op, ast.Mult):
-            return sympy.Mul(left, right)
+            return [*factors, right]
         if isinstance(link.op, ast.Div):
             if right.is_zero:
                 raise self._error("this divides by zero", link.right)
-            return sympy.Mul(left, sympy.Pow(right, -1))
+            return [*factors, sympy.Pow(right, -1)]
         self._check_exponent(right, link.right)
-        power: sympy.Expr = sympy.Pow(left, right)
-        return power
+        return [sympy.Pow(sympy.Mul(*factors), right)]
 
     def _check_exponent(self, exponent: sympy.Expr, node: ast.expr) -> None:
         if exponent.is_number and not abs(exponent) <= MAX_EXPONENT:
@@ -374,7 +389,7 @@ class _Reader:
                 raise self._error(form, item)
             value, condition = item.elts
             pieces.append((self.read(value, depth + 1), self._condition(condition, depth + 1)))
-        if pieces[-1][1] is not sympy.true:
+        if sympy.Or(*(condition for _, condition in pieces)) != sympy.true:
             raise self._error(f"the last piece must hold everywhere else; {form}", node)
         return sympy.Piecewise(*pieces)
 

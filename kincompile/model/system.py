@@ -16,10 +16,11 @@ from kincompile.model.equation import Equation
 from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
+from kincompile.model.write_model import TextViews
 from kincompile.names import body_coordinates, listed, name_problem, rate, unit_problem
 
 
-class ConstraintSystem(MatrixViews):
+class ConstraintSystem(MatrixViews, TextViews):
     """Constraint equations Phi(q, t) = 0, checked.
 
     Parameters

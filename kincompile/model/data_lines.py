@@ -1,0 +1,167 @@
+"""In which line each value of a TOML or JSON text stands.
+
+The texts have been read before, so they are known to be well formed: what is scanned here is their
+outline, strings, brackets, keys and line ends.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from bisect import bisect_left
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Address = tuple[str | int, ...]
+"""The keys and indices that lead to a value, for instance ``("bodies", 0, "guess")``."""
+
+_TOKEN = re.compile(
+    r'"""(?:[^\\]|\\.)*?"{3,5}|' + r"'''.*?'{3,5}|"
+    r'"(?:[^"\\\n]|\\.)*"|' + r"'[^'\n]*'|#[^\n]*|\n|[\[\]{},:=.]|[^\s\[\]{},:=.#\"']+",
+    re.DOTALL,
+)
+_JSON_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{},:]|[^\s\[\]{},:"]+', re.DOTALL)
+
+
+class _Lines:
+    """From offsets to line numbers."""
+
+    def __init__(self, text: str) -> None:
+        self._ends = [found.start() for found in re.finditer("\n", text)]
+
+    def __getitem__(self, offset: int) -> int:
+        return bisect_left(self._ends, offset) + 1
+
+
+def json_lines(text: str) -> Iterator[tuple[Address, int]]:
+    """Yield the address and line of each value of a JSON text, in order; a key twice if it is."""
+    lines = _Lines(text)
+    outline = _Outline(())
+    for found in _JSON_TOKEN.finditer(text):
+        place = outline.take(found[0], ":")
+        if place is not None:
+            yield place, lines[found.start()]
+
+
+class _Outline:
+    """Follows brackets, keys and commas through one value.
+
+    Parameters
+    ----------
+    base
+        Address of the value.
+    """
+
+    def __init__(self, base: Address) -> None:
+        self._stack: list[list[str | int | None]] = []
+        self._base = base
+        self._key: list[str] = []
+
+    @property
+    def depth(self) -> int:
+        """How many brackets are open."""
+        return len(self._stack)
+
+    def take(self, token: str, separator: str) -> Address | None:
+        """Return the address of the value that a token begins, None where it begins none."""
+        inside = self._stack[-1] if self._stack else None
+        if token in ("}", "]"):
+            if inside is not None:
+                self._stack.pop()
+            return None
+        if token == "," and inside is not None:
+            inside[1] = inside[1] + 1 if isinstance(inside[1], int) else None
+            self._key = []
+            return None
+        if inside is not None and inside[0] == "{" and inside[1] is None:
+            return self._take_key(token, separator, inside)
+        address = self._address()
+        if token in ("{", "["):
+            self._stack.append([token, None if token == "{" else 0])
+        return address
+
+    def _take_key(
+        self, token: str, separator: str, inside: list[str | int | None]
+    ) -> Address | None:
+        """Collect a key; it is complete at the separator."""
+        if token == separator:
+            inside[1] = ".".join(self._key)
+        elif token != ".":
+            self._key.append(_unquoted(token))
+        return None
+
+    def _address(self) -> Address:
+        return (*self._base, *(key for _, key in self._stack if key is not None))
+
+
+def toml_lines(text: str) -> dict[Address, int]:
+    """Return the line of each value of a TOML text by its address."""
+    return dict(_TomlScan(text).run())
+
+
+class _TomlScan:
+    """Goes through the statements of a TOML text: table headers and ``key = value``."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._lines = _Lines(text)
+        self._counts: dict[Address, int] = {}
+        self._table: Address = ()
+
+    def run(self) -> Iterator[tuple[Address, int]]:
+        """Yield address and line of each value, in order."""
+        statement: list[str] = []
+        outline: _Outline | None = None
+        for found in _TOKEN.finditer(self._text):
+            token = found[0]
+            if token[0] == "#" or (token == "\n" and outline is not None and outline.depth):
+                continue
+            if token == "\n":
+                yield from self._header(statement, found.start())
+                statement, outline = [], None
+            elif outline is not None:
+                place = outline.take(token, "=")
+                if place is not None:
+                    yield place, self._lines[found.start()]
+            elif token == "=" and statement[:1] != ["["]:
+                outline = _Outline((*self._table, *_key(statement)))
+            else:
+                statement.append(token)
+        yield from self._header(statement, len(self._text))
+
+    def _header(self, statement: list[str], end: int) -> Iterator[tuple[Address, int]]:
+        """Enter the table that a statement ``[a.b]`` or ``[[a.b]]`` opens."""
+        if statement[:1] != ["["]:
+            return
+        is_array = statement[1:2] == ["["]
+        *above, last = _key([token for token in statement if token not in ("[", "]")])
+        address: Address = ()
+        for part in above:
+            address = self._entered((*address, part))
+        address = (*address, last)
+        if is_array:
+            self._counts[address] = self._counts.get(address, -1) + 1
+        self._table = self._entered(address)
+        yield self._table, self._lines[end]
+
+    def _entered(self, address: Address) -> Address:
+        """Return the address of a table; of an array of tables, that of its last one."""
+        return (*address, self._counts[address]) if address in self._counts else address
+
+
+def _key(tokens: list[str]) -> list[str]:
+    """Return the parts of a dotted key."""
+    return [_unquoted(token) for token in tokens if token != "."]
+
+
+def _unquoted(token: str) -> str:
+    """Return a key without its quotes."""
+    if token[0] == '"':
+        try:
+            return str(json.loads(token))
+        except ValueError:  # escapes of TOML that JSON does not have
+            return str(tomllib.loads(f"x = {token}")["x"])
+    return token[1:-1] if token[0] == "'" else token
