@@ -1,0 +1,1 @@
+"""Contenders of the whole analysis: each module builds one for a mechanism."""
