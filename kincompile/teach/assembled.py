@@ -26,7 +26,7 @@ from kincompile.teach.formulas import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from kincompile.ir.inline import Entry
     from kincompile.runtime.newton import NewtonResult
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 
 LARGEST_MATRIX = 9
 """Columns up to which a matrix of numbers is written out."""
+
+WIDEST_TABLE = 30
+"""Columns of Phi_q up to which it is a square table; the entries of a larger one are listed."""
 
 MOST_COORDINATES = 12
 """Coordinates up to which every iterate of Newton's method is written out."""
@@ -160,6 +163,19 @@ def _jacobian(page: Page) -> Section:
         for section in page.situation.code.sections
         for entry in section.entries["Phi_q"]
     }
+    is_wide = len(page.coordinates) > WIDEST_TABLE
+    entries = _listed_entries(page, found) if is_wide else _square_entries(page, found)
+    note = text(
+        "Each entry leads to its derivation, where its line in the emitted module stands. ",
+        f"Numbers at {page.situation.origin}.",
+    )
+    check = Code("print(np.round(Phi_q(q, t, p), 6))")
+    title = ("The Jacobian ", Math(PHI_Q))
+    return Section("jacobian", title, (note, entries, check), (), "expanded")
+
+
+def _square_entries(page: Page, found: Mapping[tuple[int, int], Entry]) -> Block:
+    """Return the entries as a matrix with named rows and columns."""
     rows: Rows = []
     for row, name in enumerate(page.equations):
         line: list[Run | Runs] = [Verbatim(name)]
@@ -167,14 +183,16 @@ def _jacobian(page: Page) -> Section:
             entry = found.get((row, column))
             line.append("" if entry is None else _cell(page, entry))
         rows.append(tuple(line))
-    header: tuple[Run, ...] = ("", *(Verbatim(name) for name in page.coordinates))
-    note = text(
-        "Each entry leads to its derivation, where its line in the emitted module stands. ",
-        f"Numbers at {page.situation.origin}.",
-    )
-    check = Code("print(np.round(Phi_q(q, t, p), 6))")
-    title = ("The Jacobian ", Math(PHI_Q))
-    return Section("jacobian", title, (note, table(header, rows), check), (), "expanded")
+    return table(("", *(Verbatim(name) for name in page.coordinates)), rows)
+
+
+def _listed_entries(page: Page, found: Mapping[tuple[int, int], Entry]) -> Block:
+    """Return the entries one below the other."""
+    rows: Rows = [
+        (Verbatim(page.equations[row]), Verbatim(page.coordinates[column]), _cell(page, entry))
+        for (row, column), entry in found.items()
+    ]
+    return table(("row", "column", "entry"), rows)
 
 
 def _cell(page: Page, entry: Entry) -> Runs:

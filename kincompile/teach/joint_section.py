@@ -203,6 +203,10 @@ def _nu_step(on_page: _JointPage) -> Section:
         for k, block in enumerate(on_page.blocks)
     ]
     blocks += _constant_note(on_page)
+    lines: list[tuple[Run | Runs, ...]] = []
+    for block in on_page.blocks:
+        lines += [(Math(PHI_T), *line) for line in _rule_lines(block.steps.Phi_t)]
+    blocks += _fired(lines)
     return step(on_page.name, 5, "The right side of the velocity equation", "vector", *blocks)
 
 
@@ -225,11 +229,15 @@ def _gamma_step(on_page: _JointPage) -> Section:
         for symbol, steps in zip(GAMMA_TERMS, block.steps.gamma_terms, strict=True):
             lines += [(Math(symbol), *line) for line in _rule_lines(steps)]
     blocks += _constant_note(on_page)
-    if lines:
-        header = ("for", "rule", "applied to", "gives")
-        blocks.append(table(header, lines, "The rules that fired"))
+    blocks += _fired(lines)
     title = "The right side of the acceleration equation, term by term"
     return step(on_page.name, 6, title, "vector", *blocks)
+
+
+def _fired(lines: list[tuple[Run | Runs, ...]]) -> list[Block]:
+    """Return the rules that fired as a table that can be folded away."""
+    header = ("for", "rule", "applied to", "gives")
+    return [table(header, lines, "The rules that fired")] if lines else []
 
 
 def _gamma_lines(on_page: _JointPage, k: int, block: RowBlock) -> Iterator[Block]:

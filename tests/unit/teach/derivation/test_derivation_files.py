@@ -75,6 +75,18 @@ def test_that_the_page_of_the_wrecker_boom_is_small(example_named: Any) -> None:
     assert len(text.encode()) < MOST_BYTES
 
 
+def test_that_the_page_of_a_long_chain_grows_with_its_length() -> None:
+    sizes = []
+    for length in (12, 24):
+        m = kc.Mechanism("chain")
+        links = [m.body(f"link{k}", guess=(k + 0.5, 0, 0)) for k in range(length)]
+        for k, (i, j) in enumerate(zip([m.ground, *links], links, strict=False)):
+            m.add(kc.Revolute(f"A{k}", i, (0.5 if k else 0, 0), j, (-0.5, 0)))
+            m.add(kc.RelativeAngle(f"motor{k}", i, j, kc.t / (k + 1)))
+        sizes.append(len(kc.derivation(m).to_html()))
+    assert sizes[1] < 2.5 * sizes[0]
+
+
 def test_that_every_cell_of_the_jacobian_leads_to_its_line(example_named: Any) -> None:
     example = example_named("four_bar")
     text = kc.derivation(example.model).to_html()
