@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import kincompile as kc
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
-from kincompile.model.spline import fit
+from kincompile.model.spline import SplineTable, fit
 from kincompile.runtime.load import from_source
 from kincompile.structure.counting import unmatched
 
@@ -76,9 +76,14 @@ def tabulated(values: Any) -> tuple[Array, Array]:
     return angles, radius(angles, np, *values)
 
 
+@cache
+def fitted(values: tuple[float, ...]) -> SplineTable:
+    return fit(*tabulated(values))
+
+
 def exact_spline(values: Any, alpha: Any) -> tuple[Any, Any]:
     """Return the tabulated radius and its derivative with 40 digits, piece by piece."""
-    table = fit(*tabulated(values))
+    table = fitted(values)
     first, last = mp.mpf(table.breaks[0]), mp.mpf(table.breaks[-1])
     place = first + (alpha - first) % (last - first)
     piece = max(k for k, start in enumerate(table.breaks[:-1]) if start <= place)
@@ -264,23 +269,29 @@ class Case:
         """Number of equations of the constraint; the rest hold coordinates."""
         return len(BY_HAND[self.kind](self._world([mp.mpf(0)] * len(self.free), mp.mpf(0))))
 
+    @cached_property
+    def exact(self) -> dict[str, Any]:
+        """The attributes with 40 digits, points and axes as numbers of the complex plane."""
+        found = {}
+        for key, value in self.values.items():
+            numbers = [mp.mpf(x) for x in np.atleast_1d(value).tolist()]
+            found[key] = {1: lambda x: x, 2: mp.mpc, 3: lambda *x: x}[len(numbers)](*numbers)
+        return found
+
     def _world(self, q: Any, t: Any) -> SimpleNamespace:
         full = [mp.mpf(0)] * 8
         for place, value in zip(self.free, q, strict=True):
             full[place] = value
-        w = SimpleNamespace(
-            phi_i=full[2], phi_j=full[5], A_i=mp.expj(full[2]), A_j=mp.expj(full[5])
-        )
+        w = SimpleNamespace(**self.exact, phi_i=full[2], phi_j=full[5])
+        w.A_i, w.A_j = mp.expj(full[2]), mp.expj(full[5])
         w.r_i, w.r_j = mp.mpc(full[0], full[1]), mp.mpc(full[3], full[4])
-        for key, value in self.values.items():
-            exact = [mp.mpf(x) for x in np.atleast_1d(value).tolist()]
-            setattr(w, key, mp.mpc(*exact) if len(exact) == 2 else (*exact, exact[0])[-1])
-        w.C = self.driver(t, mp.sin, *map(mp.mpf, self.values["driver"]))
+        w.C = self.driver(t, mp.sin, *self.exact["driver"])
         for alpha, key in zip(full[6:], PROFILES.get(self.kind, ()), strict=False):
-            exact = [mp.mpf(x) for x in self.values[key]]
-            rho, slant = radius(alpha, mp, *exact), slope(alpha, mp, *exact)
+            exact = self.exact[key]
             if self.as_table:
                 rho, slant = exact_spline(self.values[key], alpha)
+            else:
+                rho, slant = radius(alpha, mp, *exact), slope(alpha, mp, *exact)
             setattr(w, f"a{key[3:]}", rho * mp.expj(alpha))
             setattr(w, f"g{key[3:]}", (slant + 1j * rho) * mp.expj(alpha))
         return w

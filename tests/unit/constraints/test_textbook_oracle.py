@@ -33,8 +33,8 @@ def test_that_the_emitted_module_agrees_on_a_batch(case: Any) -> None:
     assert case.deviation(taken) < TOLERANCE
 
 
-def test_that_the_single_functions_agree(case: Any) -> None:
-    module = case.module
+def test_that_the_single_functions_agree(generic_case: Any) -> None:
+    module = generic_case.module
 
     def singly(q: Any, q_dot: Any, t: float, p: Any) -> Any:
         return (
@@ -44,7 +44,7 @@ def test_that_the_single_functions_agree(case: Any) -> None:
             module.gamma(q, q_dot, t, p),
         )
 
-    assert case.deviation(singly) < TOLERANCE
+    assert generic_case.deviation(singly) < TOLERANCE
 
 
 def test_that_the_interpreter_agrees(case: Any) -> None:
