@@ -3,7 +3,7 @@
 mechanism -> system()        ConstraintSystem  names and attributes checked, all problems at once
 system    -> lower           Program           kernels x instances; each type derived once
 program   -> inline          InlineProgram     written out in one graph, where equal values meet
-pattern   -> require_square                    as many equations as coordinates, matched one to one
+pattern   -> redundant_equations               as many equations as coordinates, matched one to one
 program   -> emit_...        Emitted           the files of a target
 emitted   -> from_source     module            loaded, its contract checked
 module    -> make_native     module            its functions replaced by compiled C, for target="c"
@@ -11,15 +11,19 @@ module    -> make_native     module            its functions replaced by compile
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from kincompile.emit.c_target import emit_c
 from kincompile.emit.grouped import emit_grouped
 from kincompile.emit.numpy_target import emit_numpy
-from kincompile.errors import InputError, ModelError, UnsupportedError
+from kincompile.emit.octave_target import emit_octave
+from kincompile.errors import InputError, ModelError, RedundantConstraintWarning, UnsupportedError
 from kincompile.ir.grouping import group
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
+from kincompile.ir.redundancy import rank_report, redundancy_warning, redundant_equations
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed
@@ -35,8 +39,11 @@ if TYPE_CHECKING:
     from kincompile.emit.target import Emitted, Target
     from kincompile.structure.report import Inspection
 
-TARGETS: Mapping[str, Target] = {"numpy": emit_numpy, "c": emit_c}
+TARGETS: Mapping[str, Target] = {"numpy": emit_numpy, "c": emit_c, "octave": emit_octave}
+"""Languages to emit."""
 
+LOADABLE = ("numpy", "c")
+"""Targets whose code this process can call."""
 
 LARGEST_INLINE = 300
 """Coordinates up to which every constraint is written out."""
@@ -52,8 +59,7 @@ def emit(
     model
         A mechanism or a system of free equations.
     target
-        Language of the files: ``"numpy"`` or ``"c"``.
-
+        Language of the files: ``"numpy"``, ``"c"`` or ``"octave"``, which is MATLAB too.
     form : {"inline", "grouped"}, optional
         ``"inline"`` writes every constraint out, with names and comments; ``"grouped"`` writes one
         function per type of constraint, for mechanisms of any size. Without a choice the size
@@ -88,7 +94,16 @@ def emit(
         require_square(system, grouped.pattern())
         return emit_grouped(grouped)
     code = inline(program)
-    require_square(system, code.pattern())
+    redundant = redundant_equations(system, program, code.pattern())
+    if redundant:
+        if target != "numpy":
+            raise UnsupportedError(
+                f"the target {target!r} has no redundant equations, such as {listed(redundant)}; "
+                "use target='numpy', or replace their joint by one with fewer equations"
+            )
+        text = redundancy_warning(system, redundant)
+        warnings.warn(text, RedundantConstraintWarning, stacklevel=2)
+        code = replace(code, program=replace(program, redundant=redundant))
     return TARGETS[target](code)
 
 
@@ -130,6 +145,11 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
+    if target not in LOADABLE:
+        raise UnsupportedError(
+            f"only modules of the targets {listed(LOADABLE)} can be loaded, not {target!r}; "
+            f"kc.emit(model, {target!r}).write(folder) gives the files"
+        )
     emitted = emit(model, target, form)
     if target == "numpy":
         return from_source(emitted.source, model.name, emitted.arrays)
@@ -149,8 +169,8 @@ def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
     Returns
     -------
     Inspection
-        Bodies, constraints, rows and columns, mobility, structural rank and pattern of Phi_q; as
-        text, tables of them.
+        Bodies, constraints, rows and columns, mobility, rank, redundant and conflicting equations,
+        what may still move, blocks in the order of solution; `.to_text()` gives tables of them.
 
     Raises
     ------
@@ -158,4 +178,5 @@ def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
         If the model cannot be used as written; every problem is listed.
     """
     system = _checked(model)
-    return inspect_system(system, inline(lower(system)).pattern())
+    program = lower(system)
+    return inspect_system(system, group(program).pattern(), rank_report(system, program))

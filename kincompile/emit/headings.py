@@ -10,30 +10,30 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import Entry, InlineProgram, Section
 
 
-def header(code: InlineProgram) -> list[str]:
-    """Return the docstring's tables: coordinates, parameters, rows."""
+def header(code: InlineProgram, first: int = 0) -> list[str]:
+    """Return the docstring's tables: coordinates, parameters, rows, which count from `first`."""
     program = code.program
     rows = [("row", "constraint", "", "source")]
     for section in code.sections:
         instance, constraint = section.instance, section.instance.constraint
         driver = " (driver)" if constraint.is_driver else ""
         name = f'{instance.kernel.name} "{instance.name}"{driver}'
-        rows.append((_rows(section), name, " - ".join(instance.bodies), constraint.source))
+        rows.append((_rows(section, first), name, " - ".join(instance.bodies), constraint.source))
     lines = labelled("q", [f"{item.name}{_unit(item.unit)}" for item in program.coordinates])
     if program.parameters:
         lines += labelled("p", [f"{item.name}{_unit(item.unit)}" for item in program.parameters])
     return [*lines, "", *table(rows)]
 
 
-def short_title(section: Section) -> str:
+def short_title(section: Section, first: int = 0) -> str:
     """Return rows, type and name of a constraint, for a comment above its code."""
     instance = section.instance
-    return f'{_rows(section)}  {instance.kernel.name} "{instance.name}"'
+    return f'{_rows(section, first)}  {instance.kernel.name} "{instance.name}"'
 
 
-def title(section: Section) -> str:
+def title(section: Section, first: int = 0) -> str:
     """Return rows, type, name and points of a constraint, for a comment above its rows."""
-    return f"{short_title(section)}: {section.text}"
+    return f"{short_title(section, first)}: {section.text}"
 
 
 def place(quantity: str, entry: Entry, code: InlineProgram) -> str:
@@ -48,7 +48,7 @@ def _unit(unit: str) -> str:
     return f" [{unit}]" if unit else ""
 
 
-def _rows(section: Section) -> str:
-    first = section.instance.first_row
+def _rows(section: Section, first: int) -> str:
+    first += section.instance.first_row
     last = first + len(section.entries["Phi"]) - 1
     return str(first) if first == last else f"{first}-{last}"

@@ -112,6 +112,62 @@ class CPrinter(PythonPrinter):
         return repr(float(value)), ATOM
 
 
+class OctavePrinter(PythonPrinter):
+    """Prints nodes as Octave expressions; `either` and `in_reals` are the template's.
+
+    Parameters
+    ----------
+    nodes, names
+        As for `PythonPrinter`.
+    mechanism
+        Name of the mechanism, with which the functions of its tables begin.
+    """
+
+    powers = "{0}^2"
+
+    def __init__(self, nodes: Sequence[Node], names: Mapping[int, str], mechanism: str) -> None:
+        super().__init__(nodes, names)
+        self._mechanism = mechanism
+
+    def _print(self, node: int, *, own: bool = False) -> tuple[str, int]:
+        if node in self._names and not own:
+            return self._names[node], ATOM
+        match self._nodes[node]:
+            case ("call", name, *arguments):
+                return self._call(name, ", ".join(self.text(k) for k in arguments)), ATOM
+            case ("select", condition, a, b):
+                return f"either({self.text(condition)}, {self.text(a)}, {self.text(b)})", ATOM
+            case ("compare", "!=", a, b):
+                return f"({self.text(a)} ~= {self.text(b)})", ATOM
+            case ("logic", connective, a, b):
+                return f"({self.text(a)} {connective * 2} {self.text(b)})", ATOM
+            case ("table", name, order, a):
+                return f"{self._mechanism}_{name}({order}, {self.text(a)})", ATOM
+        return super()._print(node, own=own)
+
+    def _call(self, name: str, arguments: str) -> str:
+        """Return a call; outside the domain of a function there is no number, nor a complex one."""
+        if name not in OCTAVE_FUNCTIONS:
+            raise UnsupportedError(
+                f"the Octave target has no function {name!r}; use the NumPy target, or write the "
+                "expression with other functions"
+            )
+        call = f"{OCTAVE_FUNCTIONS[name]}({arguments})"
+        return f"in_reals({call})" if name in OCTAVE_PARTIAL else call
+
+
+OCTAVE_PARTIAL = frozenset({"asin", "acos", "acosh", "atanh", "log", "sqrt", "pow"})
+"""Functions that are complex for some real numbers."""
+
+OCTAVE_FUNCTIONS = {
+    **{name: name for name in (
+        "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh",
+        "acosh", "atanh", "exp", "log", "sqrt",
+    )},
+    "pow": "power",
+}  # fmt: skip
+"""Octave's names of elementary functions."""
+
 C_ANGLE_FUNCTIONS = {"cos": "cosine", "sin": "sine"}
 """Functions that the C target has of its own, so that compilers take several points at once."""
 

@@ -53,6 +53,8 @@ def lower(system: ConstraintSystem) -> Program:
         tuple(instances),
         tables,
         _fingerprint(system, graph, instances, tables),
+        system.end,
+        system.points,
     )
 
 

@@ -92,6 +92,10 @@ class Program:
         Splines by name.
     fingerprint
         Digest of all the above: two systems with the same code and data have the same.
+    redundant
+        Names of equations that repeat others at every assembled position, and agree with them.
+    end, points
+        The mechanism's own time grid, for a target that solves too.
     """
 
     name: str
@@ -103,3 +107,6 @@ class Program:
     instances: tuple[Instance, ...]
     tables: Mapping[str, SplineTable]
     fingerprint: str
+    end: float
+    points: int
+    redundant: tuple[str, ...] = ()

@@ -26,7 +26,11 @@ EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
 PINNED = re.search(
     r"^sympy==(\S+)$", (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE
 )
-SUFFIXES = {"numpy": (".py",), "c": (".c", ".h")}
+SUFFIXES = {
+    "numpy": (".py",),
+    "c": (".c", ".h"),
+    "octave": (".m", "_Phi.m", "_Phi_q.m", "_gamma.m", "_nu.m"),
+}
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
 # Runs a golden in an interpreter in which neither kincompile nor SymPy can be imported.
@@ -59,7 +63,7 @@ import kincompile as kc
 for path in sys.argv[1:]:
     names = runpy.run_path(path)
     model = names["mechanism"] if "mechanism" in names else names["system"]
-    for target in ("numpy", "c"):
+    for target in ("numpy", "c", "octave"):
         text = "".join(kc.emit(model, target).files.values())
         print(target, path, hashlib.sha256(text.encode()).hexdigest())
 """
