@@ -11,7 +11,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.files import write_atomically
-from kincompile.runtime.solution import Solution, columns
+from kincompile.runtime.labelled import TIME_UNIT
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+
+    from kincompile.runtime.solution import Solution
 
 
 def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
@@ -30,8 +32,9 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
         The solution, complete or partial.
     path : path-like
         ``.csv``: one row per point, with the columns t, the coordinates, their first and second
-        derivatives, status, residual. ``.npz``: the arrays and names of the solution for
-        `numpy.load`. ``.json``: the same as text, null where a number was not found.
+        derivatives, status, residual; the header has names and units, such as ``x_rod [m]``.
+        ``.npz``: the arrays and names of the solution for `numpy.load`. ``.json``: the same as
+        text, null where a number was not found.
 
     Returns
     -------
@@ -61,8 +64,10 @@ def require_known_suffix(path: str | os.PathLike[str]) -> None:
 
 def _csv(solution: Solution) -> str:
     """Give the table; every number with as many digits as it takes to read it back exactly."""
-    names = [name for order in range(3) for name in columns(solution.coordinates, order)]
-    lines = [",".join(["t", *names, "status", "residual"])]
+    titles = [f"t [{TIME_UNIT}]"]
+    for name, (unit, _) in solution.labelled_columns().items():
+        titles.append(f"{name} [{unit}]" if unit else name)
+    lines = [",".join((*titles, "status", "residual"))]
     numbers = np.column_stack((solution.t, solution.q, solution.q_dot, solution.q_ddot)).tolist()
     ends = zip(solution.status.tolist(), solution.residual.tolist(), strict=True)
     for row, (status, residual) in zip(numbers, ends, strict=True):

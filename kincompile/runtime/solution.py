@@ -10,6 +10,7 @@ import numpy as np
 from kincompile.errors import InputError
 from kincompile.names import listed, rate, suggestion
 from kincompile.runtime.branches import signatures
+from kincompile.runtime.labelled import LabelledViews
 from kincompile.runtime.condition import conditions
 from kincompile.runtime.display import table_html
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Solution:
+class Solution(LabelledViews):
     """Position, velocity and acceleration over a time grid of N points, n coordinates.
 
     Where B variants were solved, all arrays but `t` have a leading axis of length B.

@@ -6,8 +6,11 @@ import pytest
 
 
 def rows_of(path):
+    """Return the rows by the names of their columns, without the units."""
     with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+        titles, *rows = csv.reader(file)
+    names = [title.partition(" [")[0] for title in titles]
+    return [dict(zip(names, row, strict=True)) for row in rows]
 
 
 def test_that_the_summary_is_data_where_no_file_is_written(kincompile, pendulum):

@@ -27,8 +27,9 @@ def test_csv_reads_back_to_the_last_bit(partial, tmp_path):
     with path.open(newline="") as file:
         header, *rows = csv.reader(file)
     assert header == [
-        *("t", "x2", "y2", "phi3", "x2_dot", "y2_dot", "phi3_dot"),
-        *("x2_ddot", "y2_ddot", "phi3_ddot", "status", "residual"),
+        *("t [s]", "x2 [m]", "y2 [m]", "phi3 [rad]"),
+        *("x2_dot [m/s]", "y2_dot [m/s]", "phi3_dot [rad/s]"),
+        *("x2_ddot [m/s^2]", "y2_ddot [m/s^2]", "phi3_ddot [rad/s^2]", "status", "residual"),
     ]
     table = np.array(rows, dtype=float)
     np.testing.assert_array_equal(table[:, 0], partial.t)
