@@ -44,7 +44,7 @@ CASES = {
     "missing suffix": (GOOD, "run model", ["there is no such file; did you mean model.py?"]),
     "a folder": (GOOD, "run .", ["it is a folder; give a file in it"]),
     "another suffix": (GOOD, "run notes.txt", ["notes.txt", "a Python file, ending in .py"]),
-    "a data file": (GOOD, "run model.toml", ["model.toml, line 1: this is not a model for kincompile"]),
+    "a data file": (GOOD, "run model.toml", ["line 1: this is not a model for kincompile"]),
     "not text": ("\x00\x01", "run M", ["model.py", "null bytes"]),
     "syntax error": (NO_PYTHON, "run M", ["model.py, line 2: this is not Python, '(' was never"]),
     "empty": ("", "run M", ["model.py has no Mechanism and no ConstraintSystem", "are: none"]),

@@ -55,7 +55,7 @@ def test_all_that_is_wrong_is_said_at_once(pendulum):
             pendulum,
             "now",
             {"omega": np.nan, "rho": 1},
-            {"x_rod": "left", "phi_rod": np.inf},
+            {"x_rod": "left", "phi_rod": np.inf},  # type: ignore[dict-item]  # what is refused
             tolerance=-1,
             max_iterations=0,
         )
@@ -122,4 +122,4 @@ def test_an_unknown_column_is_named(pendulum):
     with pytest.raises(InputError, match=r"no column 'energy'\. The coordinates are x_rod, .*_dot"):
         solution["energy"]
     with pytest.raises(InputError, match="no column 2"):
-        solution[2]
+        solution[2]  # type: ignore[index]  # what is refused

@@ -176,4 +176,4 @@ def test_an_ill_conditioned_point_in_millimetres_is_accepted(four_bar):
 
 def test_newton_works_at_one_time(problem_3_5_6):
     with pytest.raises(InputError, match="newton works at one time, got 2: use solve for a grid"):
-        newton(problem_3_5_6, [0, 1], START)
+        newton(problem_3_5_6, [0, 1], START)  # type: ignore[arg-type]  # what is refused
