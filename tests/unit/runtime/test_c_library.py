@@ -163,7 +163,14 @@ def test_arguments_beside_the_name_reach_the_compiler(monkeypatch, compiler, cac
     compiler(f'echo "$@" > {tmp_path}/seen; exec REAL "$@"')
     monkeypatch.setenv("CC", f"{os.environ['CC']} -DEXTRA=1")
     assert_right(kc.compile(tiny(), target="c"))
-    assert (tmp_path / "seen").read_text().startswith("-DEXTRA=1 -std=c99 -O3")
+    assert (tmp_path / "seen").read_text().startswith("-DEXTRA=1 -O3 -std=c99")
+
+
+def test_large_sources_are_not_optimized_for_minutes(monkeypatch, compiler, cache, tmp_path):
+    compiler(f'echo "$1" > {tmp_path}/seen; exec REAL "$@"')
+    monkeypatch.setattr(c_library, "LARGEST_VECTORIZED", 1000)
+    assert_right(kc.compile(tiny(), target="c"))
+    assert (tmp_path / "seen").read_text() == "-O1\n"
 
 
 # ---------------------------------------------------------------- the cache
