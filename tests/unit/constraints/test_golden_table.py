@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -65,6 +66,7 @@ def rows_of(key: str) -> list[dict[str, Any]]:
     ]
 
 
+@cache
 def mechanism(key: str) -> kc.Mechanism:
     """Return the constraint between two bodies, and coordinates held until the system is square."""
     m = kc.Mechanism("golden")
@@ -83,12 +85,17 @@ def state(key: str) -> tuple[Any, Any]:
     return np.array(q), np.array(q_dot)
 
 
+@cache
+def compiled(m: kc.Mechanism) -> Any:
+    return kc.compile(m)
+
+
 def by_module(m: kc.Mechanism, q: Any, q_dot: Any) -> Any:
-    return kc.compile(m).kinematics(q, q_dot, S.t)
+    return compiled(m).kinematics(q, q_dot, S.t)
 
 
 def by_single_functions(m: kc.Mechanism, q: Any, q_dot: Any) -> Any:
-    module = kc.compile(m)
+    module = compiled(m)
     return (
         module.Phi(q, S.t), module.Phi_q(q, S.t), module.nu(q, S.t), module.gamma(q, q_dot, S.t),
     )  # fmt: skip
