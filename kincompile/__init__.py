@@ -31,10 +31,13 @@ _PUBLIC = {
     "kincompile.runtime.load": ("load",),
     "kincompile.runtime.results": ("write",),
     "kincompile.runtime.newton": ("newton",),
+    "kincompile.runtime.assemblies": ("assemblies",),
+    "kincompile.runtime.events": ("Event",),
     "kincompile.runtime.solve": ("solve",),
     "kincompile.runtime.solution": ("Solution",),
     "kincompile.runtime.status": ("Status",),
     "kincompile.teach.compare": ("compare", "compare_file"),
+    "kincompile.teach.verify": ("verify",),
     "kincompile.teach.derivation": ("derivation",),
     "kincompile.errors": (
         "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError",

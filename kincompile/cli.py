@@ -204,13 +204,24 @@ def schema() -> None:
 
 @cli.command()
 @click.argument("model")
-def inspect(model: str) -> None:
+@click.option("--verify", is_flag=True, help="Check Phi_q, nu and gamma against Phi alone.")
+@click.pass_context
+def inspect(context: click.Context, model: str, verify: bool) -> None:
     """Show what MODEL is made of, and whether it can be compiled.
 
-    Bodies, parameters, constraints, rows and columns of Phi_q, mobility, structural rank and the
-    pattern of Phi_q. Rows and columns count from 0.
+    Bodies, parameters, constraints, rows and columns of Phi_q, mobility, rank, redundant and
+    conflicting equations, the order of solution and the pattern of Phi_q. Rows and columns count
+    from 0. With --verify, Phi_q, nu and gamma of the emitted module are compared with complex steps
+    of its Phi and the second derivative of Phi along a line, at seeded states; the exit code is 1
+    where one differs.
     """
-    _print(f"{kc.inspect(_read(model))}\n")
+    read = _read(model)
+    _print(f"{kc.inspect(read)}\n")
+    if verify:
+        found = kc.verify(read)
+        _print(f"\n{found}\n")
+        if not found.passed:
+            context.exit(DIFFERENT)
 
 
 @cli.command()

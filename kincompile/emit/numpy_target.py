@@ -95,6 +95,7 @@ def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[st
         "nonzeros": len(pattern),
         "coordinates": indented(quoted(names)),
         "equations": indented(quoted(program.equations)),
+        "redundant": indented(quoted(program.redundant)),
         "parameters": indented(quoted([item.name for item in program.parameters])),
         "units": indented(_units(program)),
         "defaults": indented(wrapped([repr(item.default) for item in program.parameters])),

@@ -93,11 +93,30 @@ def signatures(module: ModuleType, q: Vector, t: Vector, p: Sequence[float]) -> 
             return _planned(module, q, t, p)
         found = np.isfinite(q).all(axis=1)
         result = np.zeros((t.size, 1), dtype=np.int8)
-        result[found, 0] = _chained([
-            module.Phi_q(position, time, np.asarray(p, dtype=float))
-            for position, time in zip(q[found], t[found].tolist(), strict=True)
-        ])  # fmt: skip
+        for k in np.flatnonzero(found).tolist():
+            Phi_q = module.Phi_q(np.ascontiguousarray(q[k]), t[k], np.asarray(p, dtype=float))
+            result[k] = np.linalg.slogdet(Phi_q)[0]
         return result
+
+
+def counted_signatures(q: Vector, t: Vector, passed: Sequence[float]) -> Signs:
+    """Return the signature of a motion with redundant equations, shape (N, 1).
+
+    They have no determinant; the sign is that of the start, and changes with every bifurcation.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N, n)
+        Positions; NaN gives 0.
+    t : ndarray, shape (N,)
+        Times.
+    passed
+        Times of the bifurcations that were passed.
+    """
+    way = np.abs(t - t[0])
+    count = sum(((way > abs(time - t[0])).astype(int) for time in passed), np.zeros(t.size, int))
+    signs = np.where(np.isfinite(q).all(axis=1), 1 - 2 * (count % 2), 0)
+    return signs.astype(np.int8)[:, np.newaxis]
 
 
 def _planned(module: ModuleType, q: Vector, t: Vector, p: Sequence[float]) -> Signs:
@@ -114,17 +133,4 @@ def _planned(module: ModuleType, q: Vector, t: Vector, p: Sequence[float]) -> Si
     unknown = ~np.isfinite(q).all(axis=1)
     result = np.concatenate(parts).astype(np.int8)
     result[unknown] = 0
-    return result
-
-
-def _chained(matrices: Sequence[Vector]) -> list[int]:
-    """Return the sign of each matrix; with redundant equations relative to the first one's."""
-    if matrices and matrices[0].shape[0] == matrices[0].shape[1]:
-        return [int(np.linalg.slogdet(matrix)[0]) for matrix in matrices]
-    result: list[int] = []
-    for k, matrix in enumerate(matrices):
-        before = matrices[max(k - 1, 0)]
-        basis = np.linalg.svd(before, full_matrices=False)[0].T
-        sign = np.linalg.slogdet(basis @ matrix)[0] * np.linalg.slogdet(basis @ before)[0]
-        result.append(int(sign) * (result[-1] if result else 1))
     return result

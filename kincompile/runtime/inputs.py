@@ -29,7 +29,7 @@ class Inputs:
     Attributes
     ----------
     module
-        An emitted module with as many equations as coordinates.
+        An emitted module with as many equations as coordinates, or more that agree.
     t : ndarray, shape (N,)
         The time grid, finite and monotone.
     p : ndarray, shape (k,)
@@ -92,7 +92,7 @@ def _require_module(module: object) -> None:
 def _require_square(module: ModuleType) -> None:
     """Refuse a module whose equations cannot determine its coordinates."""
     m, n = module.N_EQUATIONS, module.N_COORDINATES
-    if m == n:
+    if m == n or (m > n and getattr(module, "REDUNDANT", ())):
         return
     if m < n:
         remedy = f"add {n - m} more (joints or drivers), or hold coordinates that are free"

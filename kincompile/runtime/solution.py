@@ -9,18 +9,17 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import listed, rate, suggestion
-from kincompile.runtime.branches import signatures
-from kincompile.runtime.labelled import LabelledViews
+from kincompile.runtime.branches import counted_signatures, signatures
 from kincompile.runtime.condition import conditions
 from kincompile.runtime.display import table_html
+from kincompile.runtime.events import BIFURCATION, Event
+from kincompile.runtime.labelled import LabelledViews
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import ModuleType
 
     from numpy.typing import NDArray
-
-    from kincompile.runtime.events import Event
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -101,6 +100,9 @@ class Solution(LabelledViews):
         The signs of the determinants of the structural blocks of Phi_q: as long as none changes,
         the motion stays on its branch. It is computed when it is asked for.
         """
+        if len(self.equations) > len(self.coordinates):
+            passed = [event.t for event in self.events if event.kind == BIFURCATION]
+            return counted_signatures(self.q, self.t, passed)
         return self._at_points(signatures)
 
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:

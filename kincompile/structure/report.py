@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from kincompile.errors import StructuralError
 from kincompile.model.resolve import Joint
+from kincompile.names import listed
 from kincompile.structure.counting import require_square, unmatched
+from kincompile.structure.parts import parts_of
 from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.model.bodies import Body, Coordinate, Parameter
     from kincompile.model.resolve import FreeEquation
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.counting import Pattern
+    from kincompile.structure.rank import RankReport
 
 WIDEST_PATTERN = 45
 """Columns of Phi_q up to which the pattern is drawn; beyond, each row names its coordinates."""
@@ -53,9 +56,10 @@ class ConstraintEntry:
     source: str
 
 
-@dataclass(frozen=True, slots=True)
-class Mobility:
-    """Gruebler's count. It counts and looks at no length: a special geometry may move nevertheless.
+class Mobility(int):
+    """Gruebler's count: a number, the coordinates less the equations of the joints.
+
+    It counts and looks at no length: a special geometry may move nevertheless.
 
     Attributes
     ----------
@@ -74,6 +78,13 @@ class Mobility:
     joint_equations: int
     driver_equations: int
 
+    def __new__(cls, bodies: int, others: int, joint_equations: int, driver_equations: int) -> Self:
+        """Count."""
+        self = super().__new__(cls, 3 * bodies + others - joint_equations)
+        self.bodies, self.others = bodies, others
+        self.joint_equations, self.driver_equations = joint_equations, driver_equations
+        return self
+
     @property
     def coordinates(self) -> int:
         """Number of coordinates, three for each body and the others."""
@@ -82,12 +93,20 @@ class Mobility:
     @property
     def degrees_of_freedom(self) -> int:
         """What the joints leave free: coordinates - joint equations."""
-        return self.coordinates - self.joint_equations
+        return int(self)
 
     @property
     def undriven(self) -> int:
         """What the drivers leave free: 0 for a kinematic analysis, less if there are too many."""
-        return self.degrees_of_freedom - self.driver_equations
+        return int(self) - self.driver_equations
+
+
+@dataclass(frozen=True, slots=True)
+class NamedBlock:
+    """Equations that must be solved together, and the coordinates that they determine."""
+
+    equations: tuple[str, ...]
+    coordinates: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +130,18 @@ class Inspection:
         repeat others, and coordinates that nothing determines.
     problem
         Why the system cannot be compiled as it is, "" where it can.
+    rank
+        Rank of Phi_q at generic states at which the joints are assembled.
+    redundant
+        Names of equations that depend on others at every such state, and agree with them.
+    conflicting
+        Names of equations that depend on others and cannot hold together with them.
+    repeated
+        For each redundant and conflicting equation, the constraints that it depends on.
+    free
+        Names of bodies, and of coordinates that belong to none, that may still move.
+    blocks
+        The well determined part of the pattern in the order of solution.
     """
 
     name: str
@@ -123,6 +154,17 @@ class Inspection:
     unmatched_equations: tuple[str, ...]
     unmatched_coordinates: tuple[str, ...]
     problem: str
+    rank: int
+    redundant: tuple[str, ...]
+    conflicting: tuple[str, ...]
+    repeated: Mapping[str, tuple[str, ...]]
+    free: tuple[str, ...]
+    blocks: tuple[NamedBlock, ...]
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """What all equations leave free: coordinates - rank."""
+        return len(self.coordinates) - self.rank
 
     @property
     def equations(self) -> tuple[str, ...]:
@@ -130,11 +172,15 @@ class Inspection:
         return tuple(name for item in self.constraints for name in item.equations)
 
     @property
-    def rank(self) -> int:
-        """Structural rank of Phi_q: its rank for generic numbers in the pattern."""
+    def structural_rank(self) -> int:
+        """Rank of Phi_q for generic numbers in the pattern."""
         return len(self.equations) - len(self.unmatched_equations)
 
     def __str__(self) -> str:
+        """Give the text."""
+        return self.to_text()
+
+    def to_text(self) -> str:
         """Give everything as plain text tables; rows and columns count from 0."""
         sections = {
             "Bodies": _bodies(self),
@@ -143,13 +189,14 @@ class Inspection:
             "Constraints": _constraints(self),
             "Mobility": _mobility_lines(self),
             "Structure of Phi_q": _structure(self),
+            "Order of solution": _blocks(self),
             "Pattern of Phi_q": _pattern(self),
         }
         filled = [[title, *indented(lines)] for title, lines in sections.items() if lines]
         return "\n\n".join("\n".join(lines) for lines in [[_title(self)], *filled])
 
 
-def inspect_system(system: ConstraintSystem, pattern: Pattern) -> Inspection:
+def inspect_system(system: ConstraintSystem, pattern: Pattern, ranks: RankReport) -> Inspection:
     """Count what there is in a system.
 
     Parameters
@@ -158,19 +205,57 @@ def inspect_system(system: ConstraintSystem, pattern: Pattern) -> Inspection:
         A checked system, with as many equations as it may have.
     pattern
         Row and column of each entry of Phi_q that is not identically zero, row by row.
+    ranks
+        Its generic rank.
     """
     equations, coordinates = unmatched(system, pattern)
+    names, columns = system.equations, [item.name for item in system.coordinates]
+    entries = sorted((int(row), int(column)) for row, column in pattern)
+    independent = [(row, column) for row, column in entries if row not in ranks.redundant]
+    shape = len(names), len(columns)
+    constraints = tuple(map(_entry, system.constraints, system.row_offsets))
     return Inspection(
         name=system.name,
         bodies=system.bodies,
         coordinates=system.coordinates,
         parameters=system.parameters,
-        constraints=tuple(map(_entry, system.constraints, system.row_offsets)),
-        mobility=_gruebler(system),
-        pattern=tuple(pattern),
+        constraints=constraints,
+        mobility=gruebler(system),
+        pattern=tuple(entries),
         unmatched_equations=tuple(equations),
         unmatched_coordinates=tuple(coordinates),
-        problem=_problem(system, pattern),
+        problem=_problem(system, pattern, ranks),
+        rank=ranks.rank,
+        redundant=tuple(names[row] for row in ranks.redundant),
+        conflicting=tuple(names[row] for row in ranks.conflicting),
+        repeated={
+            names[row]: _constraints_of(constraints, {names[other] for other in others})
+            for row, others in ranks.partners.items()
+        },
+        free=_owners(system, ranks.free),
+        blocks=tuple(
+            NamedBlock(
+                tuple(names[row] for row in block.rows),
+                tuple(columns[column] for column in block.columns),
+            )
+            for block in parts_of(independent, shape).blocks
+        ),
+    )
+
+
+def _constraints_of(constraints: Sequence[ConstraintEntry], equations: set[str]) -> tuple[str, ...]:
+    """Return the names of the constraints that have some of the equations."""
+    return tuple(item.name for item in constraints if equations.intersection(item.equations))
+
+
+def _owners(system: ConstraintSystem, columns: Sequence[int]) -> tuple[str, ...]:
+    """Return the bodies that columns belong to, and the names of those that belong to none."""
+    count = 3 * len(system.bodies)
+    return tuple(
+        dict.fromkeys(
+            system.bodies[column // 3].name if column < count else system.coordinates[column].name
+            for column in columns
+        )
     )
 
 
@@ -181,14 +266,29 @@ def _entry(item: Joint | FreeEquation, first_row: int) -> ConstraintEntry:
     )
 
 
-def _gruebler(system: ConstraintSystem) -> Mobility:
+def gruebler(system: ConstraintSystem) -> Mobility:
+    """Count coordinates and equations as Gruebler does."""
     drivers = sum(len(item.equation_names) for item in system.constraints if item.is_driver)
     bodies = len(system.bodies)
     others = len(system.coordinates) - 3 * bodies
     return Mobility(bodies, others, len(system.equations) - drivers, drivers)
 
 
-def _problem(system: ConstraintSystem, pattern: Pattern) -> str:
+def _problem(system: ConstraintSystem, pattern: Pattern, ranks: RankReport) -> str:
+    n = len(system.coordinates)
+    drivers = {
+        name for item in system.constraints if item.is_driver for name in item.equation_names
+    }
+    extra = {system.equations[row] for row in ranks.redundant}
+    surplus = len(system.equations) - n
+    if (
+        surplus > 0
+        and len(extra) == surplus
+        and ranks.rank == n
+        and drivers
+        and not drivers & extra
+    ):
+        return ""  # solved in the sense of least squares
     try:
         require_square(system, pattern)
     except StructuralError as error:
@@ -279,9 +379,52 @@ def _structure(found: Inspection) -> list[str]:
     filled = len(found.pattern)
     lines = [
         f"{m} x {n}, {filled} of {m * n} entries are not identically zero",
-        f"structural rank {found.rank} of {min(m, n)}",
+        f"structural rank {found.structural_rank} of {min(m, n)}",
+        f"rank {found.rank} at generic assembled states: {_left(found)}",
     ]
-    return [*lines, *found.problem.splitlines()]
+    return [*lines, *_dependent(found), *found.problem.splitlines()]
+
+
+def _left(found: Inspection) -> str:
+    """Say what may still move."""
+    if not found.degrees_of_freedom:
+        return "nothing may move by itself"
+    free = counted(found.degrees_of_freedom, "degree")
+    return f"{free} of freedom left to {listed(found.free)}"
+
+
+def _dependent(found: Inspection) -> Iterator[str]:
+    """Yield what is wrong with equations that depend on others, and what to do."""
+    for verdict, names in (("redundant", found.redundant), ("conflicting", found.conflicting)):
+        for name in names:
+            others = listed(found.repeated[name])
+            harm = (
+                f"it repeats what {others} demand, harmless as long as the lengths are exact"
+                if verdict == "redundant"
+                else f"it contradicts {others}"
+            )
+            yield f"{verdict}: {name}; {harm}; {_remedy(found, name)}"
+
+
+def _remedy(found: Inspection, name: str) -> str:
+    """Return what would remove an equation that depends on others."""
+    owner = next(item for item in found.constraints if name in item.equations)
+    if owner.is_driver:
+        return f"remove the driver {owner.name}"
+    if owner.kind == "Revolute":
+        return (
+            f"replace the Revolute {owner.name} by a RevoluteTranslational (a point on a line) or "
+            "a Distance"
+        )
+    return f"replace {owner.name} by a constraint with fewer equations, or remove it"
+
+
+def _blocks(found: Inspection) -> list[str]:
+    rows = [
+        [str(k), ", ".join(block.coordinates), ", ".join(block.equations)]
+        for k, block in enumerate(found.blocks, 1)
+    ]
+    return table(("step", "coordinates", "by equations"), rows, right=("step",)) if rows else []
 
 
 def _pattern(found: Inspection) -> list[str]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.structure.report import inspect_system
+from kincompile.structure.report import gruebler
 from kincompile.teach.derivation_page import anchor, counted, is_number, row_range, table
 from kincompile.teach.document import Code, Display, Link, Math, Pattern, Section, Verbatim, text
 from kincompile.teach.formulas import (
@@ -123,8 +123,7 @@ def _pattern(page: Page) -> Section:
 
 
 def _mobility(page: Page) -> Section:
-    found = inspect_system(page.system, page.situation.code.pattern())
-    mobility = found.mobility
+    mobility = gruebler(page.system)
     rows: Rows = [
         ("coordinates", f"3 \N{MULTIPLICATION SIGN} {mobility.bodies} + {mobility.others}",
          str(mobility.coordinates)),

@@ -51,6 +51,14 @@ Mobility
 Structure of Phi_q
   7 x 7, 17 of 49 entries are not identically zero
   structural rank 7 of 7
+  rank 7 at generic assembled states: nothing may move by itself
+
+Order of solution
+  step  coordinates                                by equations
+     1  x_disc                                     shaft.x
+     2  y_disc                                     shaft.y
+     3  phi_disc                                   motor
+     4  x_rocker, y_rocker, phi_rocker, alpha_pin  pivot.x, pivot.y, pin.x, pin.y
 
 Pattern of Phi_q
            disc     rocker   alpha_pin
