@@ -55,10 +55,14 @@ MISSING_GLYPHS = """extra => {
     context.fillText(character, 8, 32);
     return context.getImageData(0, 0, 48, 48).data.join();
   };
-  const missing = new Set();
+  const texts = new Map();  // by font, so that each character is drawn once
   for (const element of document.querySelectorAll('body, main mi, main mo, main mn, code')) {
     const font = getComputedStyle(element).fontFamily;
     const text = element === document.body ? element.innerText + extra : element.textContent;
+    texts.set(font, (texts.get(font) ?? '') + text);
+  }
+  const missing = new Set();
+  for (const [font, text] of texts) {
     const box = drawn('\\u{10FFFD}', font);
     for (const character of new Set(text)) {
       const isInvisible = /\\s|\\p{Default_Ignorable_Code_Point}/u.test(character);
