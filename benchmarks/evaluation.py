@@ -27,8 +27,8 @@ PARAMETERS = (*mechanisms.LENGTHS.values(), mechanisms.OMEGA)
 class Peers:
     """The four-bar, compiled by kincompile and by SymPy."""
 
-    def __init__(self) -> None:
-        self.module = kc.compile(mechanisms.four_bar())
+    def __init__(self, module: ModuleType | None = None) -> None:
+        self.module = kc.compile(mechanisms.four_bar()) if module is None else module
         derived = textbook.derive(textbook.four_bar())
         self.four = textbook.four_functions(derived)
         self.lists = textbook.four_lists(derived)
@@ -70,15 +70,15 @@ class Peers:
             np.array(gamma(q.tolist(), q_dot.tolist(), t, p), float),
         )
 
-    def batch_calls(self) -> Calls:
-        """Return calls that give Phi, Phi_q, nu and gamma of a batch.
+    def batch_calls(self, points: int = POINTS) -> Calls:
+        """Return calls that give Phi, Phi_q, nu and gamma of a batch of so many points.
 
         Those that end in "last" take and give arrays whose last axis is the batch.
         """
         m, p = self.module, PARAMETERS
         rng = np.random.default_rng(2)
-        q, q_dot = rng.normal(size=(2, POINTS, 9))
-        t = np.linspace(0.0, 1.0, POINTS)
+        q, q_dot = rng.normal(size=(2, points, 9))
+        t = np.linspace(0.0, 1.0, points)
         q_last, q_dot_last = np.ascontiguousarray(q.T), np.ascontiguousarray(q_dot.T)
         arrays, kernel = m.ARRAYS, m.LANES["kinematics"]
         return {
@@ -87,8 +87,20 @@ class Peers:
             "four functions": lambda: _four(m, q, q_dot, t),
             "kinematics": lambda: m.kinematics(q, q_dot, t),
             "list, last": lambda: self.numpy(q_last, q_dot_last, t, p),
-            "arrays": lambda: self.assembly.batch(self.numpy(q.T, q_dot.T, t, p), POINTS),
+            "arrays": lambda: self.assembly.batch(self.numpy(q.T, q_dot.T, t, p), points),
         }
+
+    def batch_call_into_arrays(self, points: int) -> Callable[[], Sequence[Any]]:
+        """Return the call of a compiled module that fills the results of a call before again.
+
+        Fetching 40 MB from the system for results takes longer than to compute them.
+        """
+        rng = np.random.default_rng(2)
+        q, q_dot = rng.normal(size=(2, 9, points))
+        t = np.linspace(0.0, 1.0, points)
+        function = self.module.kinematics_batch_last
+        results = function(q, q_dot, t)
+        return lambda: function(q, q_dot, t, out=results)
 
     def check(self) -> None:
         """Check that all give the same numbers, so that only equal work is compared."""

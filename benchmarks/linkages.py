@@ -31,7 +31,8 @@ class Constraint(NamedTuple):
     """A row or two of Phi: its kind, bodies by number, points on them, and a prescribed value.
 
     Kinds: "revolute" (points meet), "height" (y of body i), "angle" (phi of body i), "drive" (phi
-    of body i is value * t).
+    of body i is value * t), "gear" (phi of body j turns by -value times that of body i), "follow"
+    (phi of body j is that of body i).
     """
 
     kind: str
@@ -106,6 +107,10 @@ class Linkage:
                 rows.append(q[3 * c.i + 1] - c.value)
             elif c.kind == "angle":
                 rows.append(q[3 * c.i + 2] - c.value)
+            elif c.kind == "gear":
+                rows.append(q[3 * c.j + 2] + c.value * q[3 * c.i + 2])
+            elif c.kind == "follow":
+                rows.append(q[3 * c.j + 2] - q[3 * c.i + 2])
             else:
                 rows.append(q[3 * c.i + 2] - c.value * t)
         return rows

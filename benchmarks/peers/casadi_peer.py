@@ -101,24 +101,25 @@ def all_four(Phi: Any, q: Any, t: Any, p: Any) -> Any:
 
 def step_function(Phi: Any, q: Any, t: Any, p: Any) -> Any:
     """Return the function (q before, t, p) -> (q, q_dot, q_ddot) of equations in SX."""
-    four = all_four(Phi, q, t, p)
     options = {"abstol": TOLERANCE, "abstolStep": TOLERANCE, "max_iter": MAX_ITERATIONS}
     problem = {"x": q, "p": casadi.vertcat(t, p), "g": Phi}
     root = casadi.rootfinder("root", "fast_newton", problem, options)
     before, time = casadi.MX.sym("before", q.numel()), casadi.MX.sym("time")
     values = casadi.MX.sym("values", p.numel())
     found = root(before, casadi.vertcat(time, values))
-    return _with_rates(four, (before, time, values), found)
+    results = [found, *_rates(all_four(Phi, q, t, p), found, time, values)]
+    return casadi.Function("step", [before, time, values], results)
 
 
-def _with_rates(four: Any, inputs: tuple[Any, Any, Any], q: Any) -> Any:
-    """Return the step function: velocity and acceleration after the position."""
-    before, t, p = inputs
-    _, Phi_q, nu, _ = four(q, 0, t, p)
-    q_dot = casadi.solve(Phi_q, nu)
-    _, Phi_q, _, gamma = four(q, q_dot, t, p)
-    q_ddot = casadi.solve(Phi_q, gamma)
-    return casadi.Function("step", [before, t, p], [q, q_dot, q_ddot])
+def _rates(four: Any, q: Any, t: Any, p: Any) -> tuple[Any, Any]:
+    """Return velocity and acceleration at a position."""
+    symbols = four.sx_in()
+    _, Phi_q, nu, gamma = four(*symbols)
+    velocity = casadi.Function("velocity", [symbols[0], *symbols[2:]], [Phi_q, nu])
+    acceleration = casadi.Function("acceleration", symbols, [gamma])
+    matrix, right_side = velocity(q, t, p)
+    q_dot = casadi.solve(matrix, right_side)
+    return q_dot, casadi.solve(matrix, acceleration(q, q_dot, t, p))
 
 
 CONTENDERS = {

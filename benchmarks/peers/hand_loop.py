@@ -117,6 +117,10 @@ def assemble(
             Phi[row] = q[phi_column] - c.value
             Phi_q[row, phi_column] = 1.0
             row += 1
+        elif c.kind == "gear":
+            Phi[row] = q[3 * c.j + 2] + c.value * q[phi_column]
+            Phi_q[row, 3 * c.j + 2], Phi_q[row, phi_column] = 1.0, c.value
+            row += 1
         elif c.kind == "drive":
             Phi[row] = q[phi_column] - c.value * t
             Phi_q[row, phi_column] = 1.0

@@ -31,12 +31,13 @@ def scan(linkage: Linkage) -> Analysis:
     def Phi(q: Any, t: Any, p: Any) -> Any:
         return jnp.stack([jnp.asarray(row) for row in linkage.residual(jnp, q, t, p)])
 
-    @jax.jit
     def march(times: Any, p: Any, guess: Any) -> Any:
         return jax.lax.scan(lambda q, t: _step(Phi, q, t, p), guess, times)[1]
 
+    compiled = jax.jit(march)
+
     def analyse(times: Vector) -> Motion:
-        q, q_dot, q_ddot = (np.asarray(x) for x in march(times, p, guess))
+        q, q_dot, q_ddot = (np.asarray(x) for x in compiled(times, p, guess))
         return q, q_dot, q_ddot
 
     return analyse

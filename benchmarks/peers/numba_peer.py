@@ -80,7 +80,8 @@ def _loop(
     accelerations: Vector,
 ) -> None:
     n = guess.size
-    q, w, b, matrix = guess.copy(), guess.copy(), np.empty(n), np.empty((n, n))
+    q, b, matrix = guess.copy(), np.empty(n), np.empty((n, n))
+    w: Any = guess.copy()
     for k in range(times.size):
         for _ in range(MAX_ITERATIONS):
             position(q, w, times[k], p, b, matrix)
