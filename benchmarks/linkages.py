@@ -31,8 +31,8 @@ class Constraint(NamedTuple):
     """A row or two of Phi: its kind, bodies by number, points on them, and a prescribed value.
 
     Kinds: "revolute" (points meet), "height" (y of body i), "angle" (phi of body i), "drive" (phi
-    of body i is value * t), "gear" (phi of body j turns by -value times that of body i), "follow"
-    (phi of body j is that of body i).
+    of body i is value * t), "gear" (phi of body j turns by -value times that of body i), "rolling"
+    (the same for gears of radii value, by their centres), "follow" (phi of body j is that of i).
     """
 
     kind: str
@@ -109,6 +109,8 @@ class Linkage:
                 rows.append(q[3 * c.i + 2] - c.value)
             elif c.kind == "gear":
                 rows.append(q[3 * c.j + 2] + c.value * q[3 * c.i + 2])
+            elif c.kind == "rolling":
+                rows.append(_rolling(library, q, c))
             elif c.kind == "follow":
                 rows.append(q[3 * c.j + 2] - q[3 * c.i + 2])
             else:
@@ -123,6 +125,15 @@ def _point(library: Any, q: Any, body: int, s: Point) -> Point:
     x, y, phi = q[3 * body], q[3 * body + 1], q[3 * body + 2]
     c_phi, s_phi = library.cos(phi), library.sin(phi)
     return x + c_phi * s[0] - s_phi * s[1], y + s_phi * s[0] + c_phi * s[1]
+
+
+def _rolling(library: Any, q: Any, c: Constraint) -> Any:
+    """Return the equation of `kc.Gear` (Haug, section 3.4), the gears beside each other."""
+    first, second = _point(library, q, c.i, c.s_i), _point(library, q, c.j, c.s_j)
+    rolled = c.value[0] * q[3 * c.i + 2] + c.value[1] * q[3 * c.j + 2]
+    theta = rolled / (c.value[0] + c.value[1])
+    d_x, d_y = second[0] - first[0], second[1] - first[1]
+    return d_y * library.cos(theta) - d_x * library.sin(theta)
 
 
 def _four_bar(p: Sequence[Any]) -> list[Constraint]:

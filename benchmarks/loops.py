@@ -69,13 +69,17 @@ class Loops:
                 m.add(kc.RelativeAngle(f"E{k}", before[1], crank, 0))
             else:
                 at, other_at = (-before[2] / 2, 0), (-a / 2, 0)
-                radius, other = RADII if k % 2 else RADII[::-1]
+                radius, other = _radii(k)
                 m.add(kc.Gear(f"G{k}", before[0], at, radius, 0, crank, other_at, other, math.pi))
             before = crank, rocker, a
         return m
 
-    def table(self) -> Linkage:
-        """Return the same as a table."""
+    def table(self, *, is_rolling: bool = False) -> Linkage:
+        """Return the same as a table.
+
+        Gears are a ratio of angles, as one writes it who knows that the centres do not move; with
+        `is_rolling` they are the equation that `kc.Gear` has, for centres anywhere.
+        """
         constraints = [Constraint("drive", 0, value=OMEGA)]
         for k, scale in enumerate(self.scales.tolist()):
             a, b, c, d = _lengths(scale)
@@ -88,6 +92,10 @@ class Loops:
             ]
             if k and self.is_chain:
                 constraints.append(Constraint("follow", crank - 1, j=crank))
+            elif k and is_rolling:
+                at, before_at = (-a / 2, 0), (-float(self.scales[k - 1]) / 2, 0)
+                radii = _radii(k)
+                constraints.append(Constraint("rolling", crank - 3, before_at, crank, at, radii))
             elif k:
                 constraints.append(Constraint("gear", crank - 3, j=crank, value=_ratio(k)))
         bodies = tuple(f"body{k}" for k in range(3 * len(self.scales)))
@@ -111,8 +119,13 @@ class Loops:
 
 def _ratio(k: int) -> float:
     """Return how much faster crank k turns than the one before it."""
-    radius, other = RADII if k % 2 else RADII[::-1]
+    radius, other = _radii(k)
     return radius / other
+
+
+def _radii(k: int) -> tuple[float, ...]:
+    """Return the radii of the gears on crank k - 1 and on crank k."""
+    return RADII if k % 2 else RADII[::-1]
 
 
 def _lengths(scale: float) -> tuple[float, float, float, float]:

@@ -30,7 +30,8 @@ UNITS = (1.0, 1e6, 1e-3, 1e-3)
 HEADS = ("N", "contender", "model + compile, s", "peak MB", "all four, ms", "one step, ms")
 NAMES = {
     "kincompile": "kincompile, NumPy",
-    "casadi": "CasADi VM, fast_newton, sparse QR",
+    "casadi": "CasADi VM, fast_newton, sparse QR; gears as a ratio of angles",
+    "casadi-rolling": "CasADi VM, fast_newton, sparse QR; gears by kc.Gear's equation",
     "superlu": "kincompile's values, SciPy's SuperLU",
     "hand": "MATLAB-style loop, dense np.linalg.solve",
 }
@@ -42,7 +43,7 @@ def main(sizes: Sequence[int], plot: str | None) -> None:
     """Measure and print."""
     before = machine.load()
     gears = {(name, "gears", n) for name in NAMES for n in sizes if n <= LARGEST.get(name, n)}
-    chain = {(name, "chain", CHAIN) for name in NAMES if name not in LARGEST}
+    chain = {(name, "chain", CHAIN) for name in NAMES if name not in ("hand", "casadi-rolling")}
     found = measure(sorted((key for key in gears | chain if is_there(key[0])), key=str))
     print_table("N geared four-bar loops", HEADS, rows(found, "gears"))
     print_table("A chain: each crank driven by the rocker before it", HEADS, rows(found, "chain"))
@@ -58,8 +59,8 @@ def main(sizes: Sequence[int], plot: str | None) -> None:
 
 def is_there(name: str) -> bool:
     """Return whether a contender's package is installed; say so if not."""
-    if name == "casadi" and importlib.util.find_spec("casadi") is None:
-        print("skipped: casadi is not installed\n")
+    if name.startswith("casadi") and importlib.util.find_spec("casadi") is None:
+        print(f"{NAMES[name]}: skipped, casadi is not installed\n")
         return False
     return True
 
@@ -118,11 +119,14 @@ def reached(found: Measured, sizes: Sequence[int]) -> Iterator[Target]:
 
 def beside_casadi(found: Measured, n: int) -> Iterator[Target]:
     """Compare with CasADi in the same run: what was to be reached lies below its numbers."""
-    theirs = found.get(("casadi", "gears", n))
-    if theirs:
+    for name in ("casadi", "casadi-rolling"):
+        theirs = found.get((name, "gears", n))
+        if theirs is None:
+            continue
         for what in (BUILD, FOUR, STEP):
             ratio = found["kincompile", "gears", n][what].median / theirs[what].median
-            yield Target(f"N = {n:,}: {HEADS[what + 2]}, x CasADi", ratio, "at most", 1)
+            title = f"N = {n:,}: {HEADS[what + 2].partition(',')[0]}, x {NAMES[name]}"
+            yield Target(title, ratio, "at most", 1)
 
 
 def c_target(n: int) -> str:

@@ -1,8 +1,8 @@
 """One fresh process: `python -m benchmarks.scale_process CONTENDER gears|chain N`.
 
 Prints a list: model and compilation [s], peak memory after it [bytes], one evaluation of Phi,
-Phi_q, nu and gamma [s], one full time step [s]. Imports are not counted in the times, but nothing has
-been compiled before; memory is that of the whole process.
+Phi_q, nu and gamma [s], one full time step [s]. Imports are not counted in the times, but nothing
+has been compiled before; memory is that of the whole process.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import resource
 import sys
+from functools import partial
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
@@ -97,10 +98,10 @@ class SuperLU(Kincompile):
 class Casadi(Contender):
     """CasADi's virtual machine, `fast_newton` and its sparse QR."""
 
-    def __init__(self, loops: Loops) -> None:
+    def __init__(self, loops: Loops, *, is_rolling: bool = False) -> None:
         import casadi
 
-        linkage = loops.table()
+        linkage = loops.table(is_rolling=is_rolling)
         self._guess = np.array(linkage.guess)
         q, t = casadi.SX.sym("q", self._guess.size), casadi.SX.sym("t")
         rows = linkage.residual(casadi, casadi.vertsplit(q), t, [])
@@ -145,6 +146,7 @@ class HandLoop(Contender):
 CONTENDERS: dict[str, Callable[[Loops], Contender]] = {
     "kincompile": Kincompile,
     "casadi": Casadi,
+    "casadi-rolling": partial(Casadi, is_rolling=True),
     "superlu": SuperLU,
     "hand": HandLoop,
 }
