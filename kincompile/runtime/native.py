@@ -285,6 +285,7 @@ class _Functions:
             return None
         time = np.asarray(t)
         batch = _Batch(count=math.prod(shape[:-1]), t=_times(time), p=_numbers(p))
+        batch.kept = time  # C reads through an address: the array must live as long as the batch
         for name, state in zip(STATES, states, strict=False):
             setattr(batch, name, _Numbers(state.ctypes.data, 1, self._n))
         return batch if batch.count else None
