@@ -42,6 +42,16 @@ STRAIGHT = 0.98
 ROOT = 1e-13
 """Length of the piece of curve in which a singular configuration is found."""
 
+AROUND = 2e-3
+"""Distance from a bifurcation, in radians and sizes of the mechanism, at which places on the curve
+are accurate to ten digits."""
+
+OFFSETS = (-2.0, -1.0, 1.0, 2.0)
+"""Where the curve is interpolated around a bifurcation, in that distance."""
+
+ROUGHLY = 1e-6
+"""Imaginary part of a root, relative to its real part, that is a rounding error."""
+
 ROOT_STEPS = 80
 """Steps of the search in that piece; as many halvings as there are bits."""
 
@@ -164,12 +174,38 @@ class Curve:
             place, length = following, min(2 * length, LONGEST)
         return None
 
-    def singular_point(self, bracket: Bracket) -> float:
-        """Return how far along the bracket the singular configuration lies."""
+    def singular_point(self, bracket: Bracket) -> tuple[Place, float] | None:
+        """Return the singular configuration in a bracket, and how far along it lies."""
+        first = bracket.first
         if bracket.turns:
-            return _root(lambda at: self._forward(bracket.first, at), bracket.length)
-        block = self._changed(bracket.first, bracket.second) or 0
-        return _root(lambda at: self._determinant(bracket.first, at, block), bracket.length)
+            at = _root(lambda length: self._forward(first, length), bracket.length)
+            place = self.step(first, at)
+            return None if place is None else (place, at)
+        block = self._changed(first, bracket.second) or 0
+        at = _root(lambda length: self._determinant(first, length, block), bracket.length)
+        return self._between(first, at, block)
+
+    def _between(self, first: Place, at: float, block: int) -> tuple[Place, float] | None:
+        """Return a bifurcation by interpolation of places so far from it that they are accurate."""
+        places = [self.step(first, at + offset * AROUND) for offset in OFFSETS]
+        known = [place for place in places if place is not None]
+        if len(known) < len(OFFSETS):
+            return None
+        powers = np.vander(OFFSETS)
+        values = np.array([
+            [*place.q, place.t, self._value(place, first, block)] for place in known
+        ])  # fmt: skip
+        coefficients = np.linalg.solve(powers, values)
+        roots = np.roots(coefficients[:, -1])
+        real = roots.real[np.abs(roots.imag) <= np.abs(roots.real) * ROUGHLY + ROUGHLY]
+        x = float(real[np.argmin(np.abs(real))]) if real.size else 0.0
+        y = np.vander([x], len(OFFSETS))[0] @ coefficients[:, :-1]
+        place = self._place(y[:-1], float(y[-1]), first.tangent)
+        return None if place is None else (place, at + x * AROUND)
+
+    def _value(self, place: Place, first: Place, block: int) -> float:
+        """Return the determinant of a block at a place."""
+        return determinants(self.equations, (place.q, place.t, place.Phi_q), first.Phi_q)[block]
 
     def _forward(self, place: Place, length: float) -> float | None:
         """Return the tangent's component along time, a length further on."""
@@ -181,7 +217,7 @@ class Curve:
         found = self.step(place, length) if length else place
         if found is None:
             return None
-        return determinants(self.equations, (found.q, found.t, found.Phi_q), place.Phi_q)[block]
+        return self._value(found, place, block)
 
     def _changed(self, before: Place, after: Place) -> int | None:
         """Return the first block whose determinant has changed its sign."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.names import body_coordinates, listed
-from kincompile.runtime.curve import Bracket, Curve, Place
+from kincompile.runtime.curve import Bracket, Curve
 from kincompile.runtime.march import State, complete
 
 if TYPE_CHECKING:
@@ -142,8 +142,10 @@ def locate(
     bracket = start and curve.next_singular(start, latest + LATE * (latest - state.t))
     if not bracket:
         return None
-    at = curve.singular_point(bracket)
-    place = curve.step(bracket.first, at) or _nearer(bracket, at)
+    singular = curve.singular_point(bracket)
+    if singular is None:
+        return None
+    place, at = singular
     if (place.t - latest) * forward > LATE * max(duration, abs(latest - state.t)):
         return None
     kind = LOCK_UP if bracket.turns else BIFURCATION
@@ -200,11 +202,6 @@ def branch_switch(module: ModuleType, state: State, t: float, q: Vector, spread:
         "motion at that time if the jump is wanted.",
         q, {},
     )  # fmt: skip
-
-
-def _nearer(bracket: Bracket, at: float) -> Place:
-    """Return the nearer end of a bracket, where the place between could not be computed."""
-    return bracket.first if at < bracket.length / 2 else bracket.second
 
 
 def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:

@@ -19,7 +19,7 @@ import numpy as np
 
 from kincompile.runtime.branches import signs, turned
 from kincompile.runtime.linear import solve_linear
-from kincompile.runtime.newton import Attempt, assemble, iterate
+from kincompile.runtime.newton import Attempt, assemble, iterate, safeguarded_step
 from kincompile.runtime.problem import Point, Problem, norm
 from kincompile.runtime.status import Status
 
@@ -48,6 +48,20 @@ AGREEMENT = 1e-6
 """Part of the terms by which redundant equations may contradict each other in the rates."""
 
 
+NEARLY_SINGULAR = 30.0
+"""Sensitivity from which on two branches may be so near each other that Newton confuses them."""
+
+KINK, SMOOTH = 8.0, 1e-9
+"""Just past a bifurcation the other branch is as near as the error of the prediction. It shows in
+the velocity: on one branch its error, times the step, is three times that of the position, for
+higher orders some more; on the other it is finite however near the position. Below the second
+number, in radians and sizes of the mechanism, rounding errors decide."""
+
+TOO_NEAR = 1e5
+"""Sensitivity of a sub-step beyond which its rates are too uncertain to go on from: a bifurcation
+is approached to 1e-5 of the way, a lock-up, whose sensitivity grows as a root, to 1e-10."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
     """A point of the motion, complete.
@@ -62,6 +76,8 @@ class State:
         Velocity and acceleration.
     branch : tuple of float
         Signs of the determinants of the blocks of Phi_q; empty where equations are redundant.
+    sensitivity : float
+        Movement, in scales of the coordinates, for an error of one scale in the equations.
     """
 
     t: float
@@ -69,6 +85,7 @@ class State:
     q_dot: Vector
     q_ddot: Vector
     branch: tuple[float, ...]
+    sensitivity: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,25 +120,48 @@ def start(equations: Problem, t: float, inputs: Inputs) -> Outcome:
     iterations = len(attempt.corrections)
     if attempt.status is not Status.CONVERGED:
         return Outcome(attempt.status, iterations, None, attempt=attempt)
+    attempt = _on_branch_of_guess(equations, t, attempt, inputs)
     state = complete(equations, t, attempt.last)
     if isinstance(state, Status):
         return Outcome(state, iterations, None, attempt.last)
     return Outcome(Status.CONVERGED, iterations, state, attempt.last)
 
 
+def _on_branch_of_guess(equations: Problem, t: float, attempt: Attempt, inputs: Inputs) -> Attempt:
+    """Give what small steps from the guess lead to, where Newton's large ones left its branch."""
+    guess, found = attempt.points[0], attempt.last
+    if not leaves_branch(equations, t, guess, found):
+        return attempt
+    limits = inputs.tolerance, inputs.max_iterations
+    careful = iterate(equations, t, guess.q, *limits, safeguarded_step)
+    if careful.status is not Status.CONVERGED:
+        return attempt
+    spread = equations.spread(found.q)
+    near, far = (np.max(np.abs(x.last.q - guess.q) / spread) for x in (careful, attempt))
+    return attempt if near >= far or leaves_branch(equations, t, guess, careful.last) else careful
+
+
+def leaves_branch(equations: Problem, t: float, guess: Point, found: Point) -> bool:
+    """Say whether a guess shows a branch, and a position found from it lies on another."""
+    wanted = signs(equations, guess.q, t, guess.Phi_q)
+    return all(wanted) and signs(equations, found.q, t, found.Phi_q) != wanted
+
+
 def advance(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome:
     """Follow the motion from a good point to time `t`, in sub-steps where need be."""
     step, iterations = t - state.t, 0
+    too_near = max(TOO_NEAR, 10 * state.sensitivity)
     smallest = abs(step) * SMALLEST_PART
     status = Status.NOT_CONVERGED
     for _ in range(MAX_SUBSTEPS):
         whole = abs(step) >= abs(t - state.t)
         outcome = _step(equations, state, t if whole else state.t + step, inputs)
         iterations += outcome.iterations
-        status = outcome.status
+        near = outcome.state is not None and outcome.state.sensitivity > too_near
+        status = Status.SINGULAR if near and not whole else outcome.status
         if whole and outcome.position:
             return Outcome(status, iterations, outcome.state or state, outcome.position)
-        if outcome.state:
+        if outcome.state and not near:
             state, step = outcome.state, 2 * step
         elif abs(step) <= smallest:
             break
@@ -154,7 +194,7 @@ def complete(equations: Problem, t: float, point: Point) -> State | Status:
         return Status.NOT_FINITE
     if not (_agree(point, q_dot, sides[:, 0]) and _agree(point, q_ddot, gamma)):
         return Status.SINGULAR
-    return State(t, point, q_dot, q_ddot, signs(equations, q, t, Phi_q))
+    return State(t, point, q_dot, q_ddot, signs(equations, q, t, Phi_q), sensitivity)
 
 
 def _agree(point: Point, rates: Vector, sides: Vector) -> bool:
@@ -184,7 +224,18 @@ def _step(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome
     # Where a determinant has changed its sign, a singular configuration lies between the two.
     if following.branch != state.branch or turned(equations, state.point.Phi_q, point.Phi_q):
         return Outcome(Status.SINGULAR, iterations, None)
+    if following.sensitivity > NEARLY_SINGULAR:
+        error, kink = np.abs(point.q - predicted), h * _change(state, following)
+        spread = equations.spread(predicted)
+        if np.max(np.abs(kink) / spread) > KINK * np.max(error / spread) + SMOOTH:
+            return Outcome(Status.SINGULAR, iterations, None)
     return Outcome(Status.CONVERGED, iterations, following, point)
+
+
+def _change(state: State, following: State) -> Vector:
+    """Return how far the velocity is from its prediction."""
+    h = following.t - state.t
+    return following.q_dot - (state.q_dot + h * state.q_ddot)
 
 
 def _predicted_well(equations: Problem, error: Vector, move: Vector, predicted: Vector) -> bool:

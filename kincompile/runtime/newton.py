@@ -26,7 +26,7 @@ from kincompile.runtime.problem import ROUNDING, Point, Problem, norm, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -42,8 +42,9 @@ BEND = 0.01
 of random four-bars and six-bars that plain Newton fails from, 0.01 rescues 155, 0.1 133, 0.001 149,
 and Newton's own direction 100."""
 
-NUDGE = 0.3
-"""How far the last attempt starts from the guess, in radians and sizes of the mechanism."""
+NUDGE, RESTARTS = 0.3, 4
+"""How far the first restart is from the guess, in radians and sizes of the mechanism, and how many
+there are, each as much further away."""
 
 SUFFICIENT = 1e-4
 """Armijo's constant: the part of the decrease promised by the linear model that must come true."""
@@ -169,13 +170,30 @@ def assemble(
     plain = iterate(equations, t, guess, tolerance, max_iterations)
     if plain.status is Status.CONVERGED or not plain.points:
         return plain
-    careful = iterate(equations, t, guess, tolerance, max_iterations, safeguarded_step)
-    if careful.status is Status.CONVERGED:
-        return careful
+    best = None
     # With all bodies on a line no equation tells which way to bend: so it is for a guess of zeros.
-    bent = guess + NUDGE * equations.reference * equations.probe[: guess.size]
-    nudged = iterate(equations, t, bent, tolerance, max_iterations, safeguarded_step)
-    return nudged if nudged.status is Status.CONVERGED else careful
+    for start in (guess, *_restarts(equations, guess)):
+        careful = iterate(equations, t, start, tolerance, max_iterations, safeguarded_step)
+        if careful.status is Status.CONVERGED:
+            return careful
+        if best is None or _missed(equations, careful) < _missed(equations, best):
+            best = careful
+    return plain if best is None else best
+
+
+def _restarts(equations: Problem, guess: Vector) -> Iterator[Vector]:
+    """Yield starts around a guess, further and further away."""
+    for k in range(1, RESTARTS + 1):
+        bend = np.roll(equations.probe, k - 1)[: guess.size]
+        yield guess + k * NUDGE * equations.reference * bend
+
+
+def _missed(equations: Problem, attempt: Attempt) -> float:
+    """Return by how much the equations are missed at the end of an attempt, relative to terms."""
+    if not attempt.points:
+        return math.inf
+    magnitude = equations.magnitude
+    return norm(attempt.last.Phi / np.where(magnitude > 0, magnitude, 1.0))
 
 
 def iterate(

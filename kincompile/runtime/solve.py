@@ -24,7 +24,15 @@ from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
 from kincompile.runtime.lanes import has_planned_solve
 from kincompile.runtime.large import LargeMarch, LargeState, is_grouped
-from kincompile.runtime.march import SMALL_ERROR, Outcome, State, advance, complete, start
+from kincompile.runtime.march import (
+    SMALL_ERROR,
+    Outcome,
+    State,
+    advance,
+    complete,
+    leaves_branch,
+    start,
+)
 from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.solution import Solution
@@ -216,6 +224,12 @@ def _march_compiled(inputs: Inputs, motion: _Motion) -> bool:
     states = motion.q.T, motion.q_dot.T, motion.q_ddot.T
     status, iterations = np.empty((2, inputs.t.size), dtype=np.intc)
     if march(inputs, states, motion.residual, status, iterations) < inputs.t.size:
+        return False
+    # A large step of Newton's from the guess may have ended on another branch.
+    time = float(inputs.t[0])
+    equations = problem(inputs.module, inputs.p, inputs.guess, time)
+    guess, found = (equations.at(q, time) for q in (inputs.guess, motion.q[0].copy()))
+    if guess is None or found is None or leaves_branch(equations, time, guess, found):
         return False
     motion.status[:], motion.iterations[:] = status, iterations
     motion.statistics["compiled"] = inputs.t.size

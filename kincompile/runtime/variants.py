@@ -14,6 +14,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import listed
+from kincompile.runtime.coarse import KINK, SMOOTH
 from kincompile.runtime.lanes import LaneCode, has_planned_solve
 from kincompile.runtime.march import SMALL_ERROR, State, advance, complete, start
 from kincompile.runtime.newton import RESIDUAL_FACTOR
@@ -183,6 +184,7 @@ class _Chunk:
         good, iterations = self._correct(predicted, times[index], CORRECTIONS)
         good &= np.max(np.abs(self._q - predicted) / self._spread, axis=0) <= SMALL_ERROR
         good &= (self._signs == signs).all(axis=0)
+        good &= self._is_smooth(before, predicted, h)
         self._record(index, good, iterations)
         for variant in np.flatnonzero(self._alive & ~good).tolist():
             equations = problem(
@@ -194,6 +196,13 @@ class _Chunk:
             else:
                 outcome = advance(equations, state, times[index], self._inputs_of(variant))
                 self._take(index, variant, outcome)
+
+    def _is_smooth(self, before: tuple[Array, Array, Array], predicted: Array, h: float) -> Mask:
+        """Say where the velocity is as well predicted as the position is."""
+        change = self._q_dot - (before[1] + h * before[2])
+        kink = abs(h) * np.max(np.abs(change) / self._spread, axis=0)
+        error = np.max(np.abs(self._q - predicted) / self._spread, axis=0)
+        return np.asarray(kink <= KINK * (error + SMOOTH))
 
     def _correct(self, q: Array, t: float, corrections: int) -> tuple[Mask, NDArray[np.int64]]:
         """Run Newton's method on all variants; keep what it gives, and say where it is good."""
