@@ -57,6 +57,8 @@ class Graph:
             )
         if -EXACT < value < EXACT and value == (whole := int(value)):
             value = whole
+        elif isinstance(value, Fraction) and value.denominator == 1:
+            value = value.numerator
         if value < 0:
             return self._intern(("neg", self._intern(("const", -value))))
         return self._intern(("const", value))

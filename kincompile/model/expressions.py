@@ -169,7 +169,7 @@ def _has_value_everywhere(node: sympy.Piecewise) -> bool:
 
 def unknown_problem(value: Scalar, declared: Collection[str], what: str) -> str | None:
     """Say which symbols nobody declared, or return None."""
-    unknown = sorted(symbol_names(value) - set(declared))
+    unknown = sorted(name for name in symbol_names(value) if name not in declared)
     if not unknown:
         return None
     return (
@@ -187,9 +187,12 @@ def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
     if names - set(values):
         return None
     numbers = {sympy.Symbol(name): sympy.Float(values[name]) for name in names}
-    number = value.xreplace(numbers).evalf()
-    is_number = number.is_number and number.is_real and math.isfinite(float(number))
-    return float(number) if is_number else None
+    try:
+        number = value.xreplace(numbers).evalf()
+        is_number = number.is_number and number.is_real and math.isfinite(float(number))
+        return float(number) if is_number else None
+    except OverflowError:  # exp(exp(exp(9)))
+        return None
 
 
 def depends_on(value: Scalar, names: Iterable[str]) -> bool:

@@ -45,6 +45,9 @@ class FieldReader:
         self.document = document
         self.problems: list[str] = []
         self._places: dict[str, Address] = {}
+        # A large mechanism says "-a/2" thousands of times. Names only come along, but for alpha,
+        # which profiles alone have, and t, which some places do not have.
+        self._parsed: dict[tuple[str, bool, bool], sympy.Expr] = {}
 
     def problem(self, address: Address, text: str) -> None:
         """Note a problem with the value at an address."""
@@ -150,8 +153,11 @@ class FieldReader:
                 self.problem(address, f"expected a number or a formula, not {shown(value)}")
                 return 1.0
             return self.number(value, address)
+        key = value, "alpha" in names, "t" in names
         try:
-            return parse_expression(value, names)
+            if key not in self._parsed:
+                self._parsed[key] = parse_expression(value, names)
+            return self._parsed[key]
         except ExpressionError as error:
             line = f"line {error.line}, " if error.line > 1 else ""
             text = f"{line}column {error.column} of {shown(value)}: {error.problem}"

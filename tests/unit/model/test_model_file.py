@@ -65,6 +65,11 @@ def test_that_a_file_describes_a_mechanism():
     np.testing.assert_allclose(solution.q[0], [np.cos(1), np.sin(1), 1], atol=1e-12)
 
 
+def test_that_a_whole_number_beyond_exact_doubles_compiles():
+    emitted = kc.emit(toml(ARM.replace('"-length"', '"asin(sin(9**64))"')))
+    assert "3752932311025852488225131751057700648533240507401574081000934 * pi" in emitted.source
+
+
 @pytest.mark.parametrize("form", ["toml", "json"])
 def test_that_an_example_reads_back_to_the_same_code(example, form):
     text = example.model.to_toml() if form == "toml" else example.model.to_json()
@@ -166,6 +171,7 @@ LOCATED = {
     "text as end": ("end = 2.0", 'end = "2"', 9, "analysis, end: expected a number, not '2'"),
     "points": ("points = 5", "points = 0", 10, "analysis, points: expected a whole number"),
     "guess": ('[1, 0, "pi/4"]', "[1, 0]", 6, "body 'arm', guess: expected [x, y, phi], not a list"),
+    "beyond": ('"pi/4"', '"exp(exp(exp(exp(9))))"', 6, "guess of phi_arm: exp(exp(exp(exp(9))"),
     "no type": ('type = "Revolute"', 'type = "Revolut"', 13, "constraint 'pin', type: there is no"),
     "missing": ('j = "ground"\n', "", 12, "constraint 'pin': no j; fields are: type, name, i"),
     "body": ('i = "arm"', 'i = "amr"', 15, "constraint 'pin', i: there is no body 'amr'; did you"),
