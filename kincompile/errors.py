@@ -57,6 +57,13 @@ class UnsupportedError(KincompileError, NotImplementedError):
     """A target cannot print this expression or this kind of constraint."""
 
 
+def missing_package(package: str, extra: str) -> UnsupportedError:
+    """Return the error of a package that is installed on request only, by an extra."""
+    return UnsupportedError(
+        f"{package} is not installed; pip install 'kincompile[{extra}]' brings it"
+    )
+
+
 class TemplateError(KincompileError):
     """A template and the data for it do not fit together."""
 

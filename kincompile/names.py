@@ -57,6 +57,15 @@ def rate(name: str, order: int = 1) -> str:
     return f"{name}_{'d' * order}ot"
 
 
+def column_name(name: str) -> str:
+    """Return the column that is meant by ``"rod.phi_dot"``, here ``"phi_rod_dot"``, or as given."""
+    owner, point, quantity = name.partition(".")
+    if not point:
+        return name
+    ending = next((end for end in ("_ddot", "_dot") if quantity.endswith(end)), "")
+    return f"{quantity.removesuffix(ending)}_{owner}{ending}"
+
+
 def body_coordinates(body: str) -> tuple[str, str, str]:
     """Return the names of a body's coordinates."""
     return f"x_{body}", f"y_{body}", f"phi_{body}"

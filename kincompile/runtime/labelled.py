@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from kincompile.errors import InputError, UnsupportedError
-from kincompile.names import rate
+from kincompile.errors import InputError, missing_package
+from kincompile.names import column_name, listed, rate, suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import numpy as np
     from numpy.typing import NDArray
+
+    from kincompile.runtime.events import Event
 
 TIME_UNIT = "s"
 """Unit of t, which every driver and every rate is written in."""
@@ -37,6 +39,27 @@ class LabelledViews:
     message: str
     coordinates: tuple[str, ...]
     units: dict[str, str]
+    events: list[Event]
+
+    def __getitem__(self, column: str) -> NDArray[np.float64]:
+        """Give the column of a coordinate, its rate or its second rate, shape (N,).
+
+        Raises
+        ------
+        InputError
+            When no column has this name; the message lists those that exist.
+        """
+        wanted = column_name(str(column))
+        for order, values in enumerate((self.q, self.q_dot, self.q_ddot)):
+            names = columns(self.coordinates, order)
+            if wanted in names:
+                return values[..., names.index(wanted)]
+        known = [name for order in range(3) for name in columns(self.coordinates, order)]
+        near = suggestion(wanted, known) or "."
+        raise InputError(
+            f"{self.name} has no column {column!r}{near} The coordinates are "
+            f"{listed(self.coordinates)}; add _dot or _ddot for the rates."
+        )
 
     def labelled_columns(self) -> dict[str, tuple[str, NDArray[np.float64]]]:
         """Return unit and values of each coordinate, then of the rates, then of the second rates.
@@ -72,7 +95,7 @@ class LabelledViews:
         try:
             import pandas as pd
         except ImportError:
-            raise _missing("pandas") from None
+            raise missing_package("pandas", "tables") from None
         if self.q.ndim > 2:
             raise InputError(
                 f"{self.name}: a table holds one motion, and these are {len(self.q)} variants; use "
@@ -108,7 +131,7 @@ class LabelledViews:
         try:
             import xarray
         except ImportError:
-            raise _missing("xarray") from None
+            raise missing_package("xarray", "tables") from None
         dimensions = ("variant", "t") if self.q.ndim > 2 else ("t",)
         variables: dict[str, Any] = {
             name: (dimensions, values, {"units": unit} if unit else {})
@@ -121,6 +144,6 @@ class LabelledViews:
         return xarray.Dataset(variables, coords=times, attrs=about)
 
 
-def _missing(name: str) -> UnsupportedError:
-    """Return the error of a package that is installed on request only."""
-    return UnsupportedError(f"{name} is not installed; pip install 'kincompile[tables]' brings it")
+def columns(coordinates: tuple[str, ...], order: int) -> tuple[str, ...]:
+    """Give the names of q, q_dot or q_ddot, for `order` 0, 1 or 2."""
+    return coordinates if order == 0 else tuple(rate(name, order) for name in coordinates)

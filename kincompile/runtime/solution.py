@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.names import listed, rate, suggestion
 from kincompile.runtime.branches import counted_signatures, signatures
 from kincompile.runtime.condition import conditions
 from kincompile.runtime.display import table_html
 from kincompile.runtime.events import BIFURCATION, Event
 from kincompile.runtime.labelled import LabelledViews
+from kincompile.runtime.motion_plot import plot_columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import ModuleType
 
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
 
@@ -28,7 +29,7 @@ class Solution(LabelledViews):
 
     Where B variants were solved, all arrays but `t` have a leading axis of length B.
     ``solution["phi_rod"]``, ``solution["x_crank_dot"]`` and ``solution["x_crank_ddot"]`` give
-    columns by name.
+    columns by name, and so do ``solution["rod.phi"]`` and ``solution["crank.x_dot"]``.
 
     Attributes
     ----------
@@ -128,24 +129,30 @@ class Solution(LabelledViews):
         for item, value in zip(fields(self), state, strict=True):
             object.__setattr__(self, item.name, value)
 
-    def __getitem__(self, column: str) -> NDArray[np.float64]:
-        """Give the column of a coordinate, its rate or its second rate, shape (N,).
+    def plot(self, *names: str, ax: Axes | None = None) -> Axes:
+        """Draw columns over time: coordinates, rates, second rates; events and gaps are marked.
+
+        Parameters
+        ----------
+        *names
+            Columns, as ``"phi_rod_dot"`` or ``"rod.phi_dot"``; without any, all coordinates.
+        ax : matplotlib.axes.Axes, optional
+            Draws all of them into this plot. Without it there is a new figure with a panel for
+            each unit, so that metres and radians do not share an axis.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            `ax`, or the first panel; ``.figure.axes`` has all.
 
         Raises
         ------
         InputError
-            When no column has this name; the message lists those that exist.
+            When no column has such a name; the message lists those that exist.
+        UnsupportedError
+            When matplotlib is not installed.
         """
-        for order, values in enumerate((self.q, self.q_dot, self.q_ddot)):
-            names = columns(self.coordinates, order)
-            if column in names:
-                return values[..., names.index(column)]
-        known = [name for order in range(3) for name in columns(self.coordinates, order)]
-        near = suggestion(str(column), known) or "."
-        raise InputError(
-            f"{self.name} has no column {column!r}{near} The coordinates are "
-            f"{listed(self.coordinates)}; add _dot or _ddot for the rates."
-        )
+        return plot_columns(self, names, ax)
 
     def _repr_html_(self) -> str:
         t = self.t
@@ -169,11 +176,6 @@ class Solution(LabelledViews):
             return f"converged, largest residual {np.max(self.residual):.1e}"
         good = np.count_nonzero(self.status == 0)
         return f"failed, {good} of {self.t.size} points converged; see .message"
-
-
-def columns(coordinates: tuple[str, ...], order: int) -> tuple[str, ...]:
-    """Give the names of q, q_dot or q_ddot, for `order` 0, 1 or 2."""
-    return coordinates if order == 0 else tuple(rate(name, order) for name in coordinates)
 
 
 def _range(values: NDArray[np.float64]) -> tuple[float, float]:
