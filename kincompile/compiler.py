@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.emit.c_target import emit_c
 from kincompile.emit.grouped import emit_grouped
+from kincompile.emit.javascript_target import emit_javascript
 from kincompile.emit.numpy_target import emit_numpy
 from kincompile.emit.octave_target import emit_octave
 from kincompile.errors import InputError, ModelError, RedundantConstraintWarning, UnsupportedError
@@ -39,7 +40,12 @@ if TYPE_CHECKING:
     from kincompile.emit.target import Emitted, Target
     from kincompile.structure.report import Inspection
 
-TARGETS: Mapping[str, Target] = {"numpy": emit_numpy, "c": emit_c, "octave": emit_octave}
+TARGETS: Mapping[str, Target] = {
+    "numpy": emit_numpy,
+    "c": emit_c,
+    "octave": emit_octave,
+    "javascript": emit_javascript,
+}
 """Languages to emit."""
 
 LOADABLE = ("numpy", "c")
@@ -59,7 +65,8 @@ def emit(
     model
         A mechanism or a system of free equations.
     target
-        Language of the files: ``"numpy"``, ``"c"`` or ``"octave"``, which is MATLAB too.
+        Language of the files: ``"numpy"``, ``"c"``, ``"octave"``, which is MATLAB too, or
+        ``"javascript"``.
     form : {"inline", "grouped"}, optional
         ``"inline"`` writes every constraint out, with names and comments; ``"grouped"`` writes one
         function per type of constraint, for mechanisms of any size. Without a choice the size

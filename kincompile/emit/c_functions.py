@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile.emit.functions import inputs_read
 from kincompile.emit.headings import place, title
-from kincompile.emit.layout import broken, wrapped
+from kincompile.emit.layout import assigned, wrapped
 from kincompile.emit.printers import CPrinter
 from kincompile.emit.solving import components, explained
 from kincompile.ir.graph import operands_of
-from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -47,7 +47,7 @@ def evaluator(
     for section, assignments in listing.steps:
         body.append(f"// {title(section)}")
         for item in assignments:
-            body += _assigned(f"const double {item.name}", printer.text(item.node, own=True))
+            body += assigned(f"const double {item.name}", printer.text(item.node, own=True))
     entry_numbers = {place: k for k, place in enumerate(code.pattern())}
     for quantity, rows in listing.results:
         for section, entries in rows:
@@ -57,7 +57,7 @@ def evaluator(
                 index = entry.row
                 if quantity == "Phi_q":
                     index = entry_numbers[entry.row, entry.column]
-                lines = _assigned(f"at->{quantity}[{index}][lane]", printer.text(entry.node))
+                lines = assigned(f"at->{quantity}[{index}][lane]", printer.text(entry.node))
                 comment = place(quantity, entry, code)
                 lines[-1] += f"  // {comment}" if comment else ""
                 body += lines
@@ -107,17 +107,9 @@ def _block_function(name: str) -> list[str]:
 
 def _inputs(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:
     """Return the lines that name the inputs that are read."""
-    coordinates = [item.name for item in program.coordinates]
-    vectors = {
-        "q": coordinates,
-        "q_dot": [rate(name) for name in coordinates],
-        "p": [item.name for item in program.parameters],
-    }
     lines = [
         f"const double {names[member]} = at->{vector}[{k}][lane];"
-        for vector, members in vectors.items()
-        for k, member in enumerate(members)
-        if member in listing.inputs
+        for vector, k, member in inputs_read(program, listing)
     ]
     return [*lines, "const double t = at->t[lane];"] if "t" in listing.inputs else lines
 
@@ -135,14 +127,6 @@ def _frames(listing: Listing, printer: CPrinter) -> list[str]:
         else:
             item = frame.values[0]
             lines.append(f"const double {item.name} = {printer.text(item.node, own=True)};")
-    return lines
-
-
-def _assigned(left: str, text: str) -> list[str]:
-    """Return an assignment, a long one continued with indentation."""
-    first, *rest = broken(text)
-    lines = [f"{left} = {first}", *(f"    {line}" for line in rest)]
-    lines[-1] += ";"
     return lines
 
 
@@ -226,7 +210,7 @@ def _steps(nodes: Iterable[int], listing: SolveListing, printer: CPrinter) -> li
     for node in nodes:
         operation, *content = listing.plan.nodes[node]
         if operation != "linear":
-            lines += _assigned(f"const double {listing.names[node]}", printer.text(node, own=True))
+            lines += assigned(f"const double {listing.names[node]}", printer.text(node, own=True))
         elif content[0] == "determinant":
             lines += _determinant(node, listing, printer)
         elif node not in done:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 from kincompile.emit.naming import NameTable, content_name
 from kincompile.ir.graph import operands_of
+from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.program import Program
 
 EVALUATORS: Mapping[str, tuple[str, ...]] = {
     "Phi": ("Phi",),
@@ -126,6 +128,20 @@ def schedule(
             steps.append((section, tuple(own)))
     functions = _functions(inline, uses, frames)
     return Listing(frames, tuple(steps), results, inputs, functions, names)
+
+
+def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, str]]:
+    """Yield vector, place in it and name of each coordinate, rate and parameter that is read."""
+    coordinates = [item.name for item in program.coordinates]
+    vectors = {
+        "q": coordinates,
+        "q_dot": [rate(name) for name in coordinates],
+        "p": [item.name for item in program.parameters],
+    }
+    for vector, members in vectors.items():
+        for k, member in enumerate(members):
+            if member in listing.inputs:
+                yield vector, k, member
 
 
 def _frames(inline: InlineProgram, uses: Counter[int], table: NameTable) -> tuple[Frame, ...]:

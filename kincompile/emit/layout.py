@@ -22,9 +22,9 @@ def wrapped(items: Iterable[str], width: int = WIDTH - 4) -> list[str]:
     return lines
 
 
-def indented(lines: Iterable[str]) -> str:
-    """Return lines as one text, each indented by a level."""
-    return "\n".join(f"    {line}" for line in lines)
+def indented(lines: Iterable[str], level: int = 1) -> str:
+    """Return lines as one text, each indented by a level or more."""
+    return "\n".join(f"{'    ' * level}{line}".rstrip() for line in lines)
 
 
 def quoted(names: Iterable[str]) -> list[str]:
@@ -69,6 +69,14 @@ def broken(text: str, width: int = WIDTH - 8) -> list[str]:
         spans = [part for span in spans for part in _parts(span, places, width)]
         depths |= dict.fromkeys(places, depth)
     return ["    " * depths[start] + text[start:stop].strip() for start, stop in spans]
+
+
+def assigned(left: str, text: str) -> list[str]:
+    """Return an assignment that a semicolon ends, a long one continued with indentation."""
+    first, *rest = broken(text)
+    lines = [f"{left} = {first}", *(f"    {line}" for line in rest)]
+    lines[-1] += ";"
+    return lines
 
 
 def _places_to_break(text: str) -> dict[int, list[int]]:

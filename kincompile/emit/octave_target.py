@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from kincompile.emit.functions import Listing, schedule
+from kincompile.emit.functions import Listing, inputs_read, schedule
 from kincompile.emit.headings import header, place, title
 from kincompile.emit.layout import broken
 from kincompile.emit.naming import NameTable
@@ -128,17 +128,9 @@ def _column(items: Iterable[tuple[str, float | None]], level: int) -> str:
 
 def _inputs(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:
     """Return the lines that name the inputs that are read."""
-    coordinates = [item.name for item in program.coordinates]
-    vectors = {
-        "q": coordinates,
-        "q_dot": [rate(name) for name in coordinates],
-        "p": [item.name for item in program.parameters],
-    }
     return [
-        f"{names[member]} = {vector}({k});"
-        for vector, members in vectors.items()
-        for k, member in enumerate(members, 1)
-        if member in listing.inputs
+        f"{names[member]} = {vector}({k + 1});"
+        for vector, k, member in inputs_read(program, listing)
     ]
 
 

@@ -112,6 +112,36 @@ class CPrinter(PythonPrinter):
         return repr(float(value)), ATOM
 
 
+class JavaScriptPrinter(PythonPrinter):
+    """Prints nodes as JavaScript expressions; `square` and `spline` are the template's."""
+
+    def _print(self, node: int, *, own: bool = False) -> tuple[str, int]:
+        if node in self._names and not own:
+            return self._names[node], ATOM
+        match self._nodes[node]:
+            case ("pi",):
+                return "Math.PI", ATOM
+            case ("square", a):
+                return f"square({self.text(a)})", ATOM
+            case ("call", name, *arguments):
+                return self._call(name, ", ".join(self.text(k) for k in arguments)), ATOM
+            case ("select", condition, a, b):
+                return f"({self.text(condition)} ? {self.text(a)} : {self.text(b)})", ATOM
+            case ("compare", "==" | "!=" as relation, a, b):
+                return f"({self.text(a)} {relation}= {self.text(b)})", ATOM
+            case ("logic", connective, a, b):
+                return f"({self.text(a)} {connective * 2} {self.text(b)})", ATOM
+        return super()._print(node, own=own)
+
+    def _call(self, name: str, arguments: str) -> str:
+        if name not in JAVASCRIPT_FUNCTIONS:
+            raise UnsupportedError(
+                f"the JavaScript target has no function {name!r}; use the NumPy target, or write "
+                "the expression with other functions"
+            )
+        return f"Math.{name}({arguments})"
+
+
 class OctavePrinter(PythonPrinter):
     """Prints nodes as Octave expressions; `either` and `in_reals` are the template's.
 
@@ -176,3 +206,6 @@ C_FUNCTIONS = frozenset({
     "exp", "log", "sqrt", "pow",
 })  # fmt: skip
 """Functions of C's math.h."""
+
+JAVASCRIPT_FUNCTIONS = C_FUNCTIONS | {"sin", "cos"}
+"""Functions of JavaScript's Math, which has C's names."""

@@ -30,6 +30,7 @@ SUFFIXES = {
     "numpy": (".py",),
     "c": (".c", ".h"),
     "octave": (".m", "_Phi.m", "_Phi_q.m", "_gamma.m", "_nu.m"),
+    "javascript": (".js",),
 }
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
@@ -63,7 +64,7 @@ import kincompile as kc
 for path in sys.argv[1:]:
     names = runpy.run_path(path)
     model = names["mechanism"] if "mechanism" in names else names["system"]
-    for target in ("numpy", "c", "octave"):
+    for target in ("numpy", "c", "octave", "javascript"):
         text = "".join(kc.emit(model, target).files.values())
         print(target, path, hashlib.sha256(text.encode()).hexdigest())
 """
