@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from kincompile.ir.graph import Node
-    from kincompile.ir.program import Program
+    from kincompile.ir.program import Instance, Kernel, Program
     from kincompile.model.spline import SplineTable
 
 Array = NDArray[Any]
@@ -40,7 +40,7 @@ def interpret(
     q, q_dot
         Coordinates and rates, shape (..., n), real or complex.
     t
-        Time, a scalar.
+        Time, a scalar or of shape (...).
     p
         Parameters, shape (k,); the defaults where None.
 
@@ -61,23 +61,35 @@ def interpret(
     values = run(program.values, inputs, program.tables)
 
     shape, m, n = q.shape[:-1], len(program.equations), len(program.coordinates)
-    dtype = np.result_type(q, q_dot, float)
+    dtype = np.result_type(q, q_dot, t, float)
+    every = np.empty((*shape, len(values)), dtype)
+    for node, value in enumerate(values):
+        every[..., node] = value
     Phi, nu, gamma = (np.zeros((*shape, m), dtype) for _ in range(3))
     Phi_q = np.zeros((*shape, m, n), dtype)
-    for instance in program.instances:
-        kernel = instance.kernel
-        bound = {
-            name: values[node] for name, node in zip(kernel.inputs, instance.bindings, strict=True)
-        }
+    for kernel, instances in _by_kernel(program):
+        bindings = np.array([instance.bindings for instance in instances], dtype=np.intp)
+        bound = {name: every[..., bindings[:, k]] for k, name in enumerate(kernel.inputs)}
         results = run(kernel.nodes, bound, program.tables)
+        rows = np.array([instance.first_row for instance in instances])
         for vector, nodes in ((Phi, kernel.Phi), (nu, kernel.nu), (gamma, kernel.gamma)):
             for row, node in enumerate(nodes):
-                vector[..., instance.first_row + row] = results[node]
+                vector[..., rows + row] = results[node]
+        grounded = [[-1 if c is None else c for c in instance.columns] for instance in instances]
+        columns = np.array(grounded, dtype=np.intp).reshape(len(instances), -1)
         for row, local, node in kernel.Phi_q:
-            column_or_ground = instance.columns[local]
-            if column_or_ground is not None:
-                Phi_q[..., instance.first_row + row, column_or_ground] = results[node]
+            moving = np.flatnonzero(columns[:, local] >= 0)
+            entries = np.broadcast_to(results[node], (*shape, len(instances)))
+            Phi_q[..., rows[moving] + row, columns[moving, local]] = entries[..., moving]
     return Phi, Phi_q, nu, gamma
+
+
+def _by_kernel(program: Program) -> list[tuple[Kernel, list[Instance]]]:
+    """Return the instances of each kernel, which run together as arrays."""
+    found: dict[int, tuple[Kernel, list[Instance]]] = {}
+    for instance in program.instances:
+        found.setdefault(id(instance.kernel), (instance.kernel, []))[1].append(instance)
+    return list(found.values())
 
 
 def run(
