@@ -30,7 +30,7 @@ from kincompile.errors import StructuralError
 from kincompile.ir.elimination import plan_entries
 from kincompile.ir.inline import Entry, InlineProgram, Section
 from kincompile.names import listed
-from kincompile.structure.stages import Lanes, Stage, plan_stages
+from kincompile.structure.stages import Chain, Sparse, Stage, plan_stages
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,8 +70,9 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
     _entry_numbers(grouped, order, arrays)
     code += ["", "", *_values_code(grouped, called)]
     solving = [
-        _stage_code(k, stage, program, rows, columns, constants, arrays, code)
+        line
         for k, stage in enumerate(stages)
+        for line in _stage_code(f"stage_{k}", stage, program, constants, arrays, code)
     ]
     source = fill(
         "numpy/grouped.py.jinja", _data(grouped, code, tables, solving, sorted(called), len(rows))
@@ -186,21 +187,26 @@ def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
 
 
 def _stage_code(
-    number: int,
+    key: str,
     stage: Stage,
     program: Program,
-    rows: NDArray[np.intp],
-    columns: NDArray[np.intp],
     constants: NDArray[np.float64],
     arrays: dict[str, NDArray[Any]],
     code: list[str],
-) -> str:
-    """Write the functions and arrays of a stage; return its entry in the module's table."""
-    key = f"stage_{number}"
+) -> list[str]:
+    """Write the functions and arrays of a stage; return its lines in the module's table."""
+    if isinstance(stage, Chain):
+        arrays[f"{key}.links"] = stage.links
+        parts = [
+            line
+            for k, part in enumerate(stage.parts)
+            for line in _stage_code(f"{key}_{k}", part, program, constants, arrays, code)
+        ]
+        return [f'Chain("{key}", (', *(f"    {line}" for line in parts), ")),"]
     arrays[f"{key}.rows"], arrays[f"{key}.columns"] = stage.rows, stage.columns
     arrays[f"{key}.inner"], arrays[f"{key}.outer"] = stage.inner, stage.outer
-    if not isinstance(stage, Lanes):
-        return f'Stage("{key}", None, None, ()),'
+    if isinstance(stage, Sparse):
+        return [f'Stage("{key}", None, None, ()),']
     first = constants[stage.inner[:, 0]] if stage.inner.size else np.empty(0)
     entries = [
         (row, column, None if np.isnan(value) else float(value))
@@ -226,7 +232,7 @@ def _stage_code(
     ]
     code += ["", "", *solve_functions(inline, listing, f"_{key}")]
     outer = "".join(f"{row}, " for row in stage.outer_rows)
-    return f'Stage("{key}", _{key}_factor, _{key}_solve, ({outer})),'
+    return [f'Stage("{key}", _{key}_factor, _{key}_solve, ({outer})),']
 
 
 def _data(

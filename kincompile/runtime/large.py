@@ -22,6 +22,8 @@ from kincompile.runtime.status import Status
 if TYPE_CHECKING:
     from types import ModuleType
 
+    from numpy.typing import NDArray
+
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.problem import Vector
 
@@ -47,8 +49,8 @@ class LargeState:
         The motion.
     Phi : ndarray, shape (n,)
         What is left of the equations.
-    factors
-        Phi_q at the last position but one, factored.
+    signs : ndarray of bool
+        Which determinants of blocks of Phi_q are positive.
     iterations : int
         Newton iterations spent.
     """
@@ -58,7 +60,7 @@ class LargeState:
     q_dot: Vector
     q_ddot: Vector
     Phi: Vector
-    factors: StagedFactors
+    signs: NDArray[np.bool_]
     iterations: int
 
 
@@ -109,7 +111,7 @@ class LargeMarch:
         )
         if error > min(LARGE_ERROR, max(SMALL_ERROR, ALLOWED_PART * float(movement))):
             return Status.NOT_CONVERGED
-        if not np.array_equal(found.factors.signs, state.factors.signs):
+        if not np.array_equal(found.signs, state.signs):
             return Status.SINGULAR  # a singular configuration lies between the two
         return found
 
@@ -159,4 +161,4 @@ class LargeMarch:
         q_ddot = solver.solve(factors, module.gamma(q, q_dot, t, p))
         if not np.isfinite(q_ddot).all():
             return Status.SINGULAR
-        return LargeState(t, q, q_dot, q_ddot, Phi, factors, iterations)
+        return LargeState(t, q, q_dot, q_ddot, Phi, solver.signs(factors), iterations)

@@ -1,4 +1,14 @@
-"""The solve of Phi_q x = b of a large mechanism in stages: blocks as lanes, chains sparsely."""
+r"""The solve of Phi_q x = b of a large mechanism in stages: blocks as lanes, chains, a sparse rest.
+
+In a chain each block needs the one before it: with its diagonal blocks :math:`D` and the entries
+:math:`C` through which blocks hang together, :math:`D x = b - E s` and :math:`s = C x`, where
+:math:`E` says which equation each number of :math:`s` belongs to. With :math:`y = D^{-1} b` and
+:math:`W = D^{-1} E`, which all blocks compute side by side,
+
+.. math:: (1 + C W)\, s = C y, \qquad x = y - W s .
+
+The matrix of :math:`s` is small and lower triangular, with ones on its diagonal.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
     from scipy.sparse.linalg import SuperLU
 
     Array = NDArray[np.float64]
-    Index = NDArray[np.int32]
+    Index = NDArray[np.signedinteger[Any]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,13 +38,10 @@ class StagedFactors:
         Its entries.
     parts
         What each stage keeps: the lanes of the planned solve, or a sparse factorization.
-    signs : ndarray
-        Signs of the determinants of all blocks of lanes.
     """
 
     nonzeros: Array
     parts: list[Any]
-    signs: NDArray[np.bool_]
 
 
 class _SparseStage:
@@ -78,33 +86,209 @@ class _SparseStage:
         np.subtract.at(right, self._outer_rows, nonzeros[self._outer] * x[self._outer_columns])
         x[self.columns] = part.solve(right)
 
+    def determinants(self, part: SuperLU) -> list[Array]:
+        """Return the sign of the determinant, of the one block that this is taken for."""
+        return [np.array([_sign(part)])]
+
 
 class _LaneStage:
     """Equal blocks, each number an array over them."""
 
     def __init__(self, stage: Any, pattern: Index, functions: Any) -> None:
         self._stage, self._functions = stage, functions
-        self._outer_columns = pattern[stage.outer.reshape(-1), 1].reshape(stage.outer.shape)
+        self.rows, self.columns = stage.rows, stage.columns
+        # One pass over all blocks for each row that has entries outside of its block.
+        self._outer = [
+            (row, places, pattern[places, 1])
+            for row, places in zip(stage.outer_rows, stage.outer, strict=True)
+        ]
 
     def factor(self, nonzeros: Array) -> tuple[Any, Any]:
         """Return factors and determinants."""
-        factored: tuple[Any, Any] = self._stage.factor(
-            self._functions, [nonzeros[places] for places in self._stage.varying]
-        )
+        varying = nonzeros.take(self._stage.varying)
+        factored: tuple[Any, Any] = self._stage.factor(self._functions, varying)
         return factored
 
     def solve(self, part: tuple[Any, Any], nonzeros: Array, b: Array, x: Array) -> None:
         """Put the solution into x."""
-        stage = self._stage
-        right = b[stage.rows]
-        for row, places, columns in zip(
-            stage.outer_rows, stage.outer, self._outer_columns, strict=True
-        ):
-            right[row] -= nonzeros[places] * x[columns]
-        for columns, values in zip(
-            stage.columns, stage.solve(self._functions, part[0], right), strict=True
-        ):
-            x[columns] = values
+        self.put(self.solution(part, nonzeros, b, x), x)
+
+    def solution(self, part: tuple[Any, Any], nonzeros: Array, b: Array, x: Array) -> Sequence[Any]:
+        """Return the solution, a number or an array (L,) for each of a block's coordinates."""
+        right = b.take(self.rows)
+        for row, places, columns in self._outer:
+            right[row] -= nonzeros.take(places) * x.take(columns)
+        found: Sequence[Any] = self._stage.solve(self._functions, part[0], right)
+        return found
+
+    def put(self, values: Sequence[Any], x: Array) -> None:
+        """Put a solution into x."""
+        for columns, value in zip(self.columns, values, strict=True):
+            x[columns] = value
+
+    def unit_solution(self, part: tuple[Any, Any], row: int) -> Array:
+        """Return the solution for a right side of one in a row of every block, shape (size, L)."""
+        size, lanes = self.rows.shape
+        right = [float(k == row) for k in range(size)]
+        result = np.empty((size, lanes))
+        for k, value in enumerate(self._stage.solve(self._functions, part[0], right)):
+            result[k] = value
+        return result
+
+    def determinants(self, part: tuple[Any, Any]) -> list[Array]:
+        """Return the determinants of the blocks."""
+        lanes = self.rows.shape[1]
+        return [np.broadcast_to(value, lanes) for value in part[1]]
+
+
+LARGEST_BAND = 32
+"""Numbers before it that a number of s may need, for LAPACK's banded form to be the fastest."""
+
+
+class _ChainStage:
+    """Blocks that need each other, none of them in a circle."""
+
+    def __init__(self, stage: Any, pattern: Index, functions: Any, size: int) -> None:
+        self._parts = [_LaneStage(part, pattern, functions) for part in stage.parts]
+        place = _numbering(stage.links, size)
+        # W: for each part its rows with links, and where in s the number of each block stands.
+        self._units: list[tuple[int, int, Index]] = []
+        # Where a column's entry for a number of s stands in W, by column.
+        unit_columns, unit_places = [], []
+        for number, part in enumerate(self._parts):
+            of_row = place[part.rows]
+            for row in np.flatnonzero((of_row >= 0).any(axis=1)).tolist():
+                self._units.append((number, row, of_row[row]))
+                unit_columns.append(part.columns.reshape(-1))
+                unit_places.append(np.broadcast_to(of_row[row], part.columns.shape).reshape(-1))
+        self._count = stage.links.size
+        self._link_entries(stage, pattern, place, size)
+        self._products(np.concatenate(unit_columns), np.concatenate(unit_places), size)
+
+    def _link_entries(self, stage: Any, pattern: Index, place: Index, size: int) -> None:
+        """Find the entries of C: numbers of the entries, their columns, and their place in s."""
+        own = np.zeros(size, dtype=bool)
+        for part in self._parts:
+            own[part.columns] = True
+        entries = np.concatenate([part.outer.reshape(-1) for part in stage.parts])
+        entries = entries[own[pattern[entries, 1]]]
+        rows, columns = pattern[entries].T
+        self._entries, self._columns, self._rows = entries, columns, place[rows]
+
+    def _products(self, columns: Index, places: Index, size: int) -> None:
+        """Find the products of C and W, and where in the matrix of s each is added.
+
+        `columns` and `places` are those of the entries of W, one after the other.
+        """
+        kept = np.flatnonzero(places >= 0)
+        order = kept[np.argsort(columns[kept], kind="stable")]
+        count = np.bincount(columns[order], minlength=size)
+        first = np.cumsum(count) - count
+        # Every entry of C meets all entries of W in the row of its column.
+        repeats = count[self._columns]
+        which = np.repeat(np.arange(repeats.size), repeats)
+        within = np.arange(which.size) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+        self._of_W = order[first[self._columns[which]] + within]
+        self._of_C = self._entries[which]
+        rows, columns = self._rows[which], places[self._of_W]
+        self._band = int(np.max(rows - columns, initial=0))
+        self._matrix = (
+            _Banded(rows, columns, self._count, self._band)
+            if self._band <= LARGEST_BAND
+            else _Triangular(rows, columns, self._count)
+        )
+
+    def factor(self, nonzeros: Array) -> tuple[list[Any], list[Array], Any]:
+        """Return the factors of the blocks, W, and the matrix of s."""
+        factored = [part.factor(nonzeros) for part in self._parts]
+        units = [
+            self._parts[number].unit_solution(factored[number], row)
+            for number, row, _ in self._units
+        ]
+        flat = np.concatenate([item.reshape(-1) for item in units])
+        products = nonzeros.take(self._of_C) * flat.take(self._of_W)
+        return factored, units, self._matrix.factor(products)
+
+    def solve(
+        self, part: tuple[list[Any], list[Array], Any], nonzeros: Array, b: Array, x: Array
+    ) -> None:
+        """Put the solution into x, whose entries of this chain are zero."""
+        factored, units, matrix = part
+        # All of them before any is put into x: there the other blocks are still zero.
+        found = [
+            lanes.solution(its_factors, nonzeros, b, x)
+            for lanes, its_factors in zip(self._parts, factored, strict=True)
+        ]
+        for lanes, values in zip(self._parts, found, strict=True):
+            lanes.put(values, x)
+        right = _summed(
+            self._rows, nonzeros.take(self._entries) * x.take(self._columns), self._count
+        )
+        s = self._matrix.solve(matrix, right)
+        for (number, _, places), unit in zip(self._units, units, strict=True):
+            # Blocks without a link have the place -1: their number is the zero at the end.
+            share = unit * np.append(s, 0.0).take(places)
+            for columns, values in zip(self._parts[number].columns, share, strict=True):
+                x[columns] -= values
+
+    def determinants(self, part: tuple[list[Any], list[Array], Any]) -> list[Array]:
+        """Return the determinants of the blocks."""
+        return [
+            value
+            for lanes, its_factors in zip(self._parts, part[0], strict=True)
+            for value in lanes.determinants(its_factors)
+        ]
+
+
+class _Banded:
+    """A unit lower triangular matrix whose entries stand near the diagonal, as LAPACK has it."""
+
+    def __init__(self, rows: Index, columns: Index, size: int, band: int) -> None:
+        from scipy.linalg import get_lapack_funcs
+
+        self._tbtrs: Any = get_lapack_funcs("tbtrs", dtype=np.float64)
+        self._shape = size, band + 1
+        self._places = columns * (band + 1) + (rows - columns)
+
+    def factor(self, values: Array) -> Array:
+        """Return the matrix of the values, which are added where their places are the same."""
+        size, width = self._shape
+        return _summed(self._places, values, size * width).reshape(size, width).T
+
+    def solve(self, matrix: Array, right: Array) -> Array:
+        """Return the solution."""
+        solution: Array = self._tbtrs(matrix, right, uplo="L", diag="U")[0]
+        return solution
+
+
+class _Triangular:
+    """A unit lower triangular matrix of any pattern."""
+
+    def __init__(self, rows: Index, columns: Index, size: int) -> None:
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        self._splu: Any = splu
+        diagonal = np.arange(size)
+        ones = np.ones(size + rows.size)
+        pattern = (np.append(diagonal, rows), np.append(diagonal, columns))
+        self._matrix = csc_array((ones, pattern), shape=(size, size))
+        keys = np.repeat(diagonal, np.diff(self._matrix.indptr)) * size + self._matrix.indices
+        self._places = np.searchsorted(keys, columns * size + rows)
+        self._diagonal = np.searchsorted(keys, diagonal * (size + 1))
+
+    def factor(self, values: Array) -> SuperLU:
+        """Return the matrix of the values, which are added where their places are the same."""
+        data = _summed(self._places, values, self._matrix.nnz)
+        data[self._diagonal] += 1.0
+        self._matrix.data = data
+        factored: SuperLU = self._splu(self._matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0)
+        return factored
+
+    def solve(self, matrix: SuperLU, right: Array) -> Array:
+        """Return the solution."""
+        solution: Array = matrix.solve(right)
+        return solution
 
 
 class StagedSolver:
@@ -112,12 +296,7 @@ class StagedSolver:
 
     def __init__(self, module: ModuleType) -> None:
         pattern, size = module.PATTERN, module.N_EQUATIONS
-        self._stages: list[_LaneStage | _SparseStage] = [
-            _LaneStage(stage, pattern, module.ARRAYS)
-            if stage.factor
-            else _SparseStage(stage, pattern, size)
-            for stage in module.STAGES
-        ]
+        self._stages = [_stage(stage, pattern, module.ARRAYS, size) for stage in module.STAGES]
         self._size = size
 
     def factor(self, nonzeros: Array) -> StagedFactors:
@@ -128,22 +307,57 @@ class StagedSolver:
         RuntimeError
             Where a sparse stage is exactly singular.
         """
-        parts = [stage.factor(nonzeros) for stage in self._stages]
-        determinants = [
-            np.atleast_1d(value)
-            for stage, part in zip(self._stages, parts, strict=True)
-            if isinstance(stage, _LaneStage)
-            for value in part[1]
+        return StagedFactors(nonzeros, [stage.factor(nonzeros) for stage in self._stages])
+
+    def signs(self, factors: StagedFactors) -> NDArray[np.bool_]:
+        """Return which determinants of blocks are positive."""
+        found = [
+            value > 0
+            for stage, part in zip(self._stages, factors.parts, strict=True)
+            for value in stage.determinants(part)
         ]
-        signs = np.concatenate(determinants) > 0 if determinants else np.empty(0, dtype=bool)
-        return StagedFactors(nonzeros, parts, signs)
+        return np.concatenate(found) if found else np.empty(0, dtype=bool)
 
     def solve(self, factors: StagedFactors, b: Array) -> Array:
         """Return x of Phi_q x = b, shape (n,)."""
-        x = np.empty(self._size)
+        x = np.zeros(self._size)
         for stage, part in zip(self._stages, factors.parts, strict=True):
             stage.solve(part, factors.nonzeros, b, x)
         return x
+
+
+def _stage(
+    stage: Any, pattern: Index, functions: Any, size: int
+) -> _LaneStage | _ChainStage | _SparseStage:
+    """Return what solves a stage."""
+    if hasattr(stage, "parts"):
+        return _ChainStage(stage, pattern, functions, size)
+    if stage.factor:
+        return _LaneStage(stage, pattern, functions)
+    return _SparseStage(stage, pattern, size)
+
+
+def _sign(factors: SuperLU) -> float:
+    """Return the sign of a determinant from its factorization."""
+    negative = np.count_nonzero(factors.U.diagonal() < 0)
+    for permutation in (factors.perm_r, factors.perm_c):
+        negative += _is_odd(permutation)
+    return -1.0 if negative % 2 else 1.0
+
+
+def _is_odd(permutation: Index) -> int:
+    """Return 1 for an odd permutation, else 0: a circle of k numbers is k - 1 exchanges."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = csr_array((np.ones(permutation.size), (np.arange(permutation.size), permutation)))
+    circles, _ = connected_components(graph, connection="weak")
+    return int(permutation.size - circles) % 2
+
+
+def _summed(places: Index, values: Array, size: int) -> Array:
+    """Return an array with each value added at its place."""
+    return np.asarray(np.bincount(places, values, size), dtype=np.float64)
 
 
 def _numbering(members: Index, size: int) -> Index:

@@ -1,9 +1,10 @@
-"""The order of solution of a large system: equal blocks as lanes, chains as a sparse rest.
+"""The order of solution of a large system: equal blocks as lanes, chains of them, a sparse rest.
 
 The blocks of the block triangular form fall into classes of equal structure. A class whose blocks
 do not need each other is solved as one, each number an array over its blocks. Classes that need
-each other, or themselves, stay together as one sparse system: a chain of loops, each driven by the
-one before, has no parts that could run side by side.
+each other, or themselves, form a chain: loops, each driven by the one before. There too the blocks
+are factored side by side; one after the other go only the few numbers that a block hands on to the
+next. Blocks too large to be written out as straight-line code are left to a sparse factorization.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Lanes:
     places : tuple of (row, column)
         Their place in a block.
     outer : ndarray of int, shape (others, L)
-        Numbers of the entries in columns of earlier stages.
+        Numbers of the entries in columns of other blocks: of earlier stages, or of the same chain.
     outer_rows : tuple of int
         Their row in a block.
     """
@@ -48,6 +49,23 @@ class Lanes:
     places: tuple[tuple[int, int], ...]
     outer: Index
     outer_rows: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Blocks that need each other, none of them in a circle.
+
+    Attributes
+    ----------
+    parts
+        The classes of its blocks.
+    links : ndarray of int, shape (count,)
+        Equations with entries in columns of other blocks of the chain, in an order in which none
+        needs a later one.
+    """
+
+    parts: tuple[Lanes, ...]
+    links: Index
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +86,13 @@ class Sparse:
     outer: Index
 
 
-Stage = Lanes | Sparse
+Stage = Lanes | Chain | Sparse
+
+LARGEST_BLOCK = 40
+"""Equations up to which a block is written out as straight-line code."""
+
+SHARED = 4
+"""Blocks a class, on average, from which on a chain is worth a function for each of its classes."""
 
 
 def plan_stages(
@@ -100,18 +124,24 @@ def plan_stages(
     for block, signature in enumerate(signatures):
         classes.setdefault(signature, []).append(block)
     class_of_block = np.empty(len(signatures), dtype=np.intp)
-    for number, members in enumerate(classes.values()):
-        class_of_block[members] = number
+    members = [np.array(found, dtype=np.intp) for found in classes.values()]
+    for number, found in enumerate(members):
+        class_of_block[found] = number
     needs = np.unique(class_of_block[blocks.outside()], axis=1)
     stages: list[Stage] = []
     for together, is_cyclic in _class_order(needs, len(classes)):
-        chosen = np.flatnonzero(np.isin(class_of_block, together))
-        if is_cyclic:
+        chosen = np.concatenate([members[number] for number in together])
+        largest = int(np.bincount(blocks.of_row)[chosen].max())
+        if largest > LARGEST_BLOCK or (is_cyclic and chosen.size < SHARED * len(together)):
             stages.append(_sparse(chosen, blocks))
-        else:
-            count = len(signatures[chosen[0]])
-            entries = order[starts[chosen][np.newaxis, :] + np.arange(count)[:, np.newaxis]]
-            stages.append(_lanes(chosen, entries, blocks))
+            continue
+        lanes = []
+        for number in together:
+            first = starts[members[number]]
+            count = len(signatures[members[number][0]])
+            entries = order[first + np.arange(count)[:, np.newaxis]]
+            lanes.append(_lanes(members[number], entries, blocks))
+        stages.append(_chain(chosen, tuple(lanes), blocks) if is_cyclic else lanes[0])
     return tuple(stages)
 
 
@@ -216,11 +246,21 @@ def _class_order(needs: Index, count: int) -> list[tuple[list[int], bool]]:
     ]
 
 
+def _chain(chosen: Index, parts: tuple[Lanes, ...], blocks: _Blocks) -> Chain:
+    """Return the stage of blocks that need each other."""
+    heads, tails = blocks.outside()
+    within = np.isin(heads, chosen) & np.isin(tails, chosen)
+    rows = np.unique(blocks.rows[~blocks.is_inner()][within])
+    position = _positions(heads[within], tails[within], int(blocks.of_row.max()) + 1)
+    return Chain(parts, rows[np.argsort(position[blocks.of_row[rows]], kind="stable")])
+
+
 def _sparse(chosen: Index, blocks: _Blocks) -> Sparse:
-    """Return the stage of blocks that need each other, in the order in which they do."""
+    """Return the stage of blocks that are solved by a sparse factorization, in order."""
     own = np.isin(blocks.of_row, chosen)
     rows, columns = np.flatnonzero(own), np.flatnonzero(np.isin(blocks.of_column, chosen))
-    position = _positions(blocks)
+    heads, tails = blocks.outside()
+    position = _positions(heads, tails, int(blocks.of_row.max()) + 1)
     rows = rows[np.lexsort((rows, position[blocks.of_row[rows]]))]
     columns = columns[np.lexsort((columns, position[blocks.of_column[columns]]))]
     entries = np.flatnonzero(own[blocks.rows])
@@ -228,12 +268,23 @@ def _sparse(chosen: Index, blocks: _Blocks) -> Sparse:
     return Sparse(rows, columns, entries[inside], entries[~inside])
 
 
-def _positions(blocks: _Blocks) -> Index:
-    """Return the position of each block in an order in which none needs a later one."""
-    count = int(blocks.of_row.max()) + 1
-    needs: dict[int, set[int]] = {block: set() for block in range(count)}
-    for head, tail in blocks.outside().T.tolist():
-        needs[head].add(tail)
+def _positions(heads: Index, tails: Index, count: int) -> Index:
+    """Return the position of each block in an order in which none needs a later one.
+
+    Each head needs its tail. What a block makes ready follows it at once, so that blocks that hand
+    on numbers to each other stand near each other.
+    """
+    followers: list[list[int]] = [[] for _ in range(count)]
+    missing = np.bincount(heads, minlength=count).tolist()
+    for head, tail in zip(heads.tolist(), tails.tolist(), strict=True):
+        followers[tail].append(head)
+    ready = [block for block, number in enumerate(missing) if number == 0]
     position = np.empty(count, dtype=np.intp)
-    position[list(TopologicalSorter(needs).static_order())] = np.arange(count)
+    for k in range(count):
+        block = ready.pop()
+        position[block] = k
+        for head in followers[block]:
+            missing[head] -= 1
+            if missing[head] == 0:
+                ready.append(head)
     return position

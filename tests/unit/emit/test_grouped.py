@@ -8,7 +8,9 @@ import pytest
 import kincompile as kc
 from kincompile.ir.grouping import group
 from kincompile.ir.lower import lower
-from kincompile.structure.stages import Lanes, Sparse, plan_stages
+from kincompile.runtime import staged
+from kincompile.structure import stages
+from kincompile.structure.stages import Chain, Lanes, Sparse, plan_stages
 
 FUNCTIONS = ("Phi", "Phi_q", "nu", "Phi_q_nonzeros")
 
@@ -146,13 +148,59 @@ def stages_of(link, count=12):
 
 
 def test_independent_loops_are_solved_side_by_side():
-    stages = stages_of("angle")
-    widest = max(stage.rows.shape[1] for stage in stages if isinstance(stage, Lanes))
+    found = stages_of("angle")
+    widest = max(stage.rows.shape[1] for stage in found if isinstance(stage, Lanes))
     assert widest >= 12
-    assert {type(stage) for stage in stages} == {Lanes, Sparse}  # the chain of cranks is sparse
+    assert {type(stage) for stage in found} == {Lanes, Chain}  # the cranks hang together
 
 
-def test_a_chain_of_loops_stays_together():
-    sparse = [stage for stage in stages_of("rocker") if isinstance(stage, Sparse)]
-    assert len(sparse) == 1
-    assert sparse[0].rows.size > 9 * 10
+def test_a_chain_of_loops_hands_on_few_numbers():
+    chains = [stage for stage in stages_of("rocker") if isinstance(stage, Chain)]
+    assert len(chains) == 1
+    assert sum(part.rows.size for part in chains[0].parts) > 9 * 10
+    assert chains[0].links.size <= 5 * 12
+
+
+def test_a_large_block_is_left_to_a_sparse_factorization():
+    size = 50
+    rows = np.repeat(np.arange(size), 2)
+    columns = (rows + np.tile([0, 1], size)) % size  # one circle through all of them
+    found = plan_stages(rows, columns, np.full(rows.size, np.nan), size)
+    assert [type(stage) for stage in found] == [Sparse]
+
+
+def branched(count):
+    """Return a tree: each crank is driven by a rocker before it, and drives two more."""
+    m = loops(count, None)
+    for k in range(1, count):
+        before, crank = m.bodies[3 * ((k - 1) // 2) + 2], m.bodies[3 * k]
+        m.add(kc.RelativeAngle(f"G{k}", before, crank, -3.937))
+    return m
+
+
+@pytest.mark.parametrize("band", [32, 0], ids=["banded", "triangular"])
+@pytest.mark.parametrize("model", [loops(12, "rocker"), branched(15)], ids=["chain", "tree"])
+def test_the_staged_solve_is_that_of_the_dense_matrix(model, band, monkeypatch):
+    monkeypatch.setattr(staged, "LARGEST_BAND", band)
+    module = kc.compile(model, form="grouped")
+    q = module.GUESS + np.random.default_rng(3).normal(scale=0.05, size=module.N_COORDINATES)
+    solver, Phi_q = staged.StagedSolver(module), module.Phi_q(q, 0.1)
+    b = np.random.default_rng(4).normal(size=module.N_EQUATIONS)
+    factors = solver.factor(module.Phi_q_nonzeros(q, 0.1))
+    np.testing.assert_allclose(
+        solver.solve(factors, b), np.linalg.solve(Phi_q, b), rtol=1e-9, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("is_split", [True, False], ids=["chain", "sparse"])
+def test_the_signs_of_blocks_make_up_the_sign_of_the_determinant(is_split, monkeypatch):
+    if not is_split:
+        monkeypatch.setattr(stages, "LARGEST_BLOCK", 0)
+    module = kc.compile(loops(5, "rocker"), form="grouped")
+    solver, found = staged.StagedSolver(module), set()
+    for q in module.GUESS + np.random.default_rng(5).normal(size=(8, module.N_COORDINATES)):
+        factors = solver.factor(module.Phi_q_nonzeros(q, 0.1))
+        ours = np.prod(np.where(solver.signs(factors), 1, -1))
+        found.add((int(ours), int(np.linalg.slogdet(module.Phi_q(q, 0.1))[0])))
+    # The order of rows and columns gives both the same or the opposite sign everywhere.
+    assert found in ({(1, 1), (-1, -1)}, {(1, -1), (-1, 1)})
