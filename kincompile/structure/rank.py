@@ -37,6 +37,13 @@ ASSEMBLED = 1e-9
 DEPENDENT = 1e-6
 """Part of a row that is left when the rows before are taken out of it, below which it depends."""
 
+SETTLED = 1e-8
+"""Last step, in scales of the coordinates, of a position that is known well enough to tell a rank:
+at a singular position equations hold to 1e-12 when the position is still wrong by 1e-6."""
+
+ANGLES_FIRST = 10.0
+"""How much rather a driver is an angle than a length: motors turn."""
+
 
 @dataclass(frozen=True, slots=True)
 class RankReport:
@@ -54,8 +61,10 @@ class RankReport:
         For each redundant and conflicting row, the rows that it depends on.
     free
         Columns that no equation determines.
+    drive
+        As many of them as there are degrees of freedom: with these driven, nothing is free.
     assembled
-        Whether the joints could be assembled; where rows depend on others, with the drivers.
+        Whether joints and drivers, as far as they are independent, could be assembled at the start.
     """
 
     rank: int
@@ -63,6 +72,7 @@ class RankReport:
     conflicting: tuple[int, ...]
     partners: dict[int, tuple[int, ...]]
     free: tuple[int, ...]
+    drive: tuple[int, ...]
     assembled: bool
 
 
@@ -106,6 +116,7 @@ class _Analysis:
         random = np.random.default_rng(SEED)
         size = np.max(np.abs(guess[~angular]), initial=0.0) or 1.0
         self._evaluate = evaluate
+        self._angular = angular
         self._scale = np.where(angular, 1.0, size)
         offsets = random.uniform(-NEAR, NEAR, (STATES, guess.size))
         offsets[0] *= 1e-3
@@ -120,45 +131,37 @@ class _Analysis:
 
     def report(self) -> RankReport:
         """Analyse the joints, then the drivers, then whether all can hold together."""
-        q, held = self._assemble(self._joints)
-        if not held.any():
-            return self._unassembled()
-        scaled = self._scaled(q[held], self._t[held])
+        q, held, settled = self._assemble(self._joints, self._q, self._t)
+        chosen = held & settled if (held & settled).any() else held
         order = [*self._joints, *self._drivers]
-        kept, dependent, matrix = _best(scaled, order)
-        partners = {row: _partners(matrix, row, kept, order) for row in dependent}
-        wrong, together = self._contradictions(q, kept, dependent) if dependent else (set(), True)
+        if chosen.any():
+            kept, dependent, matrix = _best(self._scaled(q[chosen], self._t[chosen]), order)
+            wrong = self._contradictions(q, kept, dependent) if dependent else set()
+            _, together, _ = self._assemble(kept, q[:1], self._t[:1])
+        else:  # which joints are too many, if any, shows elsewhere too
+            kept, dependent, matrix = _best(self._scaled(self._q[1:], self._t[1:]), order)
+            wrong, together = set(dependent), held
+        free, drive = _left_over(matrix[kept], self._angular)
         return RankReport(
             rank=len(kept),
             redundant=tuple(sorted(set(dependent) - wrong)),
             conflicting=tuple(sorted(wrong)),
-            partners=partners,
-            free=_free(matrix[kept]),
-            assembled=together,
+            partners=_partners(matrix, kept, dependent),
+            free=free,
+            drive=drive,
+            assembled=bool(together[0]),
         )
 
-    def _contradictions(
-        self, q: Array, kept: list[int], dependent: list[int]
-    ) -> tuple[set[int], bool]:
-        """Return which dependent rows fail where the independent ones hold; and whether they do."""
-        found, held = self._assemble(kept, q)
+    def _contradictions(self, q: Array, kept: list[int], dependent: list[int]) -> set[int]:
+        """Return which dependent rows fail where the independent ones hold."""
+        found, held, _ = self._assemble(kept, q, self._t)
         if not held.any():
-            return set(), False
+            return set()
         Phi, _ = self._evaluate(found[held], self._t[held])
         moving = self._t[held] > 0  # at the start drivers may agree that do not agree later
         sizes = np.abs(Phi[moving] if moving.any() else Phi) / self._terms
         missed = np.median(sizes, axis=0)
-        return {row for row in dependent if not missed[row] <= ASSEMBLED * 10}, True
-
-    def _unassembled(self) -> RankReport:
-        """Report of joints that cannot be assembled: which of them are too many, if any."""
-        scaled = self._scaled(self._q[1:], self._t[1:])
-        order = [*self._joints, *self._drivers]
-        kept, dependent, matrix = _best(scaled, order)
-        partners = {row: _partners(matrix, row, kept, order) for row in dependent}
-        return RankReport(
-            len(kept), (), tuple(sorted(dependent)), partners, _free(matrix[kept]), assembled=False
-        )
+        return {row for row in dependent if not missed[row] <= ASSEMBLED * 10}
 
     def _scaled(self, q: Array, t: Array) -> Array:
         """Return Phi_q at states with each row of length one and columns in scales."""
@@ -167,35 +170,38 @@ class _Analysis:
         return np.asarray(matrices / np.where(lengths > 0, lengths, 1.0))
 
     def _assemble(
-        self, rows: list[int], start: Array | None = None
-    ) -> tuple[Array, NDArray[np.bool_]]:
-        """Find states at which some rows hold; return them, and which of them are assembled."""
-        q = (self._q if start is None else start).copy()
+        self, rows: list[int], start: Array, t: Array
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Find states at which some rows hold; return them, which do so, and which are settled."""
+        q, step = start.copy(), np.full(len(start), np.inf)
         damping = np.full(len(q), 1e-3)
-        Phi, matrices = self._weighted(q, rows)
+        Phi, matrices = self._weighted(q, t, rows)
         size = np.sum(Phi * Phi, axis=1)
         for _ in range(ITERATIONS):
+            held = np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED / 100
+            settled, stuck = held & (step <= SETTLED), damping >= 1e3
+            if (held | stuck).all() and (settled.any() or not held.any()):
+                break
+            active = np.flatnonzero(~settled & ~stuck)
             try:
-                steps = [_damped(*parts) for parts in zip(matrices, Phi, damping, strict=True)]
+                steps = np.array([_damped(matrices[k], Phi[k], damping[k]) for k in active])
             except (np.linalg.LinAlgError, RuntimeError):  # not finite
                 break
-            moved = q - self._scale * np.array(steps)
-            tried, jacobians = self._weighted(moved, rows)
+            moved = q[active] - self._scale * steps
+            tried, jacobians = self._weighted(moved, t[active], rows)
             reached = np.sum(tried * tried, axis=1)
-            better = reached < size
-            q = np.where(better[:, None], moved, q)
-            Phi = np.where(better[:, None], tried, Phi)
-            matrices = np.where(better[:, None, None], jacobians, matrices)
-            size = np.where(better, reached, size)
-            damping = np.clip(np.where(better, damping / 10, damping * 8), 1e-13, 1e3)
-            held = np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED / 100
-            if (held | (damping >= 1e3)).all():
-                break
-        return q, np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED
+            better = reached < size[active]
+            taken = active[better]
+            q[taken], Phi[taken], matrices[taken] = moved[better], tried[better], jacobians[better]
+            size[taken] = reached[better]
+            step[active] = np.max(np.abs(steps), axis=1)
+            factors = np.where(better, 0.1, 8.0)
+            damping[active] = np.clip(damping[active] * factors, 1e-13, 1e3)
+        return q, np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED, step <= SETTLED
 
-    def _weighted(self, q: Array, rows: list[int]) -> tuple[Array, Array]:
+    def _weighted(self, q: Array, t: Array, rows: list[int]) -> tuple[Array, Array]:
         """Return some rows of Phi and Phi_q, in scales of equations and coordinates."""
-        Phi, Phi_q = self._evaluate(q, self._t)
+        Phi, Phi_q = self._evaluate(q, t)
         terms = self._terms[rows]
         return Phi[:, rows] / terms, Phi_q[:, rows] * (self._scale / terms[:, None])
 
@@ -233,18 +239,35 @@ def _split(matrix: Array, order: Sequence[int]) -> tuple[list[int], list[int]]:
     return kept, dependent
 
 
-def _partners(matrix: Array, row: int, kept: list[int], order: list[int]) -> tuple[int, ...]:
-    """Return the rows that a dependent row is a combination of."""
-    before = set(order[: order.index(row)])
-    rows = [item for item in kept if item in before]
-    shares = np.linalg.lstsq(matrix[rows].T, matrix[row], rcond=None)[0]
-    return tuple(item for item, share in zip(rows, shares, strict=True) if abs(share) > DEPENDENT)
+def _partners(matrix: Array, kept: list[int], dependent: list[int]) -> dict[int, tuple[int, ...]]:
+    """Return the independent rows that each dependent row is a combination of."""
+    if not dependent:
+        return {}
+    shares = np.linalg.lstsq(matrix[kept].T, matrix[dependent].T, rcond=None)[0]
+    return {
+        row: tuple(kept[k] for k in np.flatnonzero(np.abs(share) > DEPENDENT).tolist())
+        for row, share in zip(dependent, shares.T, strict=True)
+    }
 
 
-def _free(matrix: Array) -> tuple[int, ...]:
-    """Return the columns in which some null vector of independent rows is not zero."""
+def _left_over(
+    matrix: Array, angular: NDArray[np.bool_]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the columns that independent rows leave free, and those to drive so that none is.
+
+    A column is free where some null vector is not zero. One column after the other is driven where
+    the null vectors are largest, and those that still move it are taken out.
+    """
     rank, n = matrix.shape
     if rank == n:
-        return ()
+        return (), ()
     null = np.linalg.svd(matrix)[2][rank:]
-    return tuple(np.flatnonzero(np.max(np.abs(null), axis=0) > DEPENDENT).tolist())
+    free = tuple(np.flatnonzero(np.max(np.abs(null), axis=0) > DEPENDENT).tolist())
+    drive = []
+    for _ in range(n - rank):
+        lengths = np.linalg.norm(null, axis=0)
+        column = int(np.argmax(lengths * np.where(angular, ANGLES_FIRST, 1.0)))
+        drive.append(column)
+        along = null[:, column] / lengths[column]
+        null = null - np.outer(along, along @ null)
+    return free, tuple(sorted(drive))
