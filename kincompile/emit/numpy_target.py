@@ -70,6 +70,7 @@ def emit_numpy(code: InlineProgram) -> Emitted:
     data["lanes"] = indented(f'"{name}": _{name},' for name in lanes)
     data["is_planned"] = plan is not None
     data["has_large_blocks"] = plan is not None and plan.has_large_blocks
+    data |= shared_text()
     source = fill("numpy/module.py.jinja", data)
     return Emitted(program.name, {f"{program.name}.py": source})
 
@@ -109,6 +110,17 @@ def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[st
         "array_functions": indented(array_functions(called)),
         "kernels": "\n".join(kernels),
     }
+
+
+def shared_text() -> dict[str, str]:
+    """Return the parts that both forms of a module have in common, by slot."""
+    files = {
+        "arguments": "arguments",
+        "block_functions": "blocks",
+        "cos_sin": "cos_sin",
+        "spline": "spline",
+    }
+    return {slot: fill(f"numpy/{name}.py.jinja", {}).rstrip() for slot, name in files.items()}
 
 
 def scalar_functions(called: Iterable[str]) -> list[str]:
