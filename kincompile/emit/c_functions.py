@@ -36,9 +36,12 @@ ANGLE_FUNCTIONS = frozenset({"cos", "sin", "cos_sin"})
 
 
 def evaluator(
-    name: str, code: InlineProgram, listing: Listing, names: Mapping[str, str]
+    name: str, code: InlineProgram, listing: Listing, names: Mapping[str, str], prefix: str = ""
 ) -> list[str]:
-    """Return a function that evaluates quantities at a point, and the one for a block."""
+    """Return a function that evaluates quantities at a point, and the one for a block.
+
+    Their names begin with the prefix.
+    """
     printer = CPrinter(code.nodes, listing.names)
     has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
     body = ["int64_t far = 0;"] if has_angles else []
@@ -61,7 +64,8 @@ def evaluator(
                 comment = place(quantity, entry, code)
                 lines[-1] += f"  // {comment}" if comment else ""
                 body += lines
-    return [f"// {ABOUT[name]}", *(_with_angles if has_angles else _plain)(name, body)]
+    write = _with_angles if has_angles else _plain
+    return [f"// {ABOUT[name]}", *write(f"{prefix}{name}", body)]
 
 
 def _plain(name: str, body: list[str]) -> list[str]:
@@ -130,8 +134,8 @@ def _frames(listing: Listing, printer: CPrinter) -> list[str]:
     return lines
 
 
-def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
-    """Return the functions that factor Phi_q and that solve Phi_q x = right."""
+def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
+    """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
     printer, plan, names = CPrinter(listing.plan.nodes, listing.names), listing.plan, listing.names
     numbers = {place: k for k, place in enumerate(code.pattern())}
     read = _read(listing, (*listing.factor_steps, *listing.factors, *plan.determinants))
@@ -149,13 +153,13 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     return [
         "// What a solve needs of Phi_q, and the determinants of its blocks.",
         *(f"// {line}" for line in explained(code, plan)),
-        *_plain("factor", factor),
+        *_plain(f"{prefix}factor", factor),
         "",
-        *_solution(listing, printer),
+        *_solution(listing, printer, prefix),
     ]
 
 
-def _solution(listing: SolveListing, printer: CPrinter) -> list[str]:
+def _solution(listing: SolveListing, printer: CPrinter, prefix: str) -> list[str]:
     """Return the function that solves for a right side."""
     plan, names = listing.plan, listing.names
     read = _read(listing, (*listing.solve_steps, *plan.solution))
@@ -169,18 +173,10 @@ def _solution(listing: SolveListing, printer: CPrinter) -> list[str]:
     body += [f"to[{k}][lane] = {printer.text(node)};" for k, node in enumerate(plan.solution)]
     return [
         "// x of Phi_q x = right.",
-        "INLINE void solve_at(const double (*restrict F)[LANES],",
+        f"INLINE void {prefix}solve_at(const double (*restrict F)[LANES],",
         "    const double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)",
         "{",
         *(f"    {line}" for line in (body if listing.factors else ["(void)F;", *body])),
-        "}",
-        "",
-        "static void solve_of_block(const block *at, double (*right)[LANES], double (*to)[LANES],",
-        "    size_t count)",
-        "{",
-        "    for (size_t lane = 0; lane < count; lane++)",
-        "        solve_at((const double (*)[LANES])at->F, (const double (*)[LANES])right, to,",
-        "            lane);",
         "}",
     ]
 

@@ -18,7 +18,7 @@ from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from kincompile.emit.solving import SolveListing
     from kincompile.ir.inline import InlineProgram
@@ -152,6 +152,15 @@ def _block(code: InlineProgram, listing: SolveListing | None) -> str:
         largest = max((len(block.rows) for block in listing.plan.blocks), default=0)
     data = {
         "is_planned": listing is not None,
+        "elementary": elementary(program, called, largest),
+        "functions": "\n".join(lines),
+    }
+    return fill("c/block.c.jinja", data)
+
+
+def elementary(program: Program, called: Collection[str], largest: int) -> str:
+    """Return what the code calls: functions of angles, splines, the solve of blocks of a size."""
+    data = {
         "has_cosine": "cos" in called,
         "has_sine": "sin" in called,
         "tables": "\n\n".join(_splines(program)),
@@ -159,9 +168,8 @@ def _block(code: InlineProgram, listing: SolveListing | None) -> str:
             (len(row) for item in program.tables.values() for row in item.coefficients), default=0
         ),
         "largest_block": largest if largest > LARGEST_CLOSED_FORM else 0,
-        "functions": "\n".join(lines),
     }
-    return fill("c/block.c.jinja", data)
+    return fill("c/elementary.c.jinja", data)
 
 
 def _splines(program: Program) -> Iterable[str]:
