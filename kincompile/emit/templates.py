@@ -48,15 +48,27 @@ def _environment() -> Environment:
 
 
 @cache
-def _template(name: str) -> tuple[Template, frozenset[str]]:
-    """Return a template, read and compiled once, and the names of its slots."""
+def read(name: str) -> str:
+    """Return the text of a file below the folder of templates, as it is: a script, a style sheet.
+
+    Raises
+    ------
+    TemplateError
+        If there is no such file.
+    """
     path = template_root()
     for part in name.split("/"):
         path = path / part
     if not path.is_file():
         raise TemplateError(f"there is no template {name!r}")
+    return path.read_text(encoding="utf-8")
+
+
+@cache
+def _template(name: str) -> tuple[Template, frozenset[str]]:
+    """Return a template, read and compiled once, and the names of its slots."""
     environment = _environment()
-    tree = environment.parse(path.read_text(encoding="utf-8"), name)
+    tree = environment.parse(read(name), name)
     slots = frozenset(meta.find_undeclared_variables(tree))
     code = environment.compile(tree, name)
     return Template.from_code(environment, code, environment.make_globals(None)), slots

@@ -1,0 +1,75 @@
+"""The page of a mechanism: one self-contained HTML file that moves, without a network."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.compiler import compile as compile_model
+from kincompile.emit.templates import fill, read
+from kincompile.errors import StructuralError
+from kincompile.runtime.solve import solve
+from kincompile.view.page_data import Motion, page_json
+
+if TYPE_CHECKING:
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.solution import Solution
+
+STYLES = ("vendor/uplot.css", "style.css")
+"""Style sheets, in order."""
+
+SCRIPTS = (
+    "vendor/uplot.js", "player.js", "draw.js", "stage.js", "plots.js", "tables.js", "newton.js",
+    "start.js",
+)  # fmt: skip
+"""Scripts, in order: each uses those before it."""
+
+
+def page(model: Mechanism | ConstraintSystem, solution: Solution | None = None) -> str:
+    """Return a mechanism, its motion and its numbers as one HTML page.
+
+    Parameters
+    ----------
+    model
+        A mechanism, or a system of free equations, which has plots and no drawing.
+    solution
+        The motion to show, of one set of parameters; without, the model is compiled and solved over
+        its own times. Where that is impossible the page shows the guess, and says why.
+
+    Returns
+    -------
+    str
+        HTML with everything in it: data, style sheets, scripts. It asks for nothing.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written; every problem is listed.
+    """
+    system = model.system()
+    motion = _solved(system) if solution is None else _given(solution)
+    data = {
+        "title": escape(system.name),
+        "style": "\n".join(read(f"view/{name}") for name in STYLES),
+        "licence": read("view/vendor/uplot.LICENSE.txt"),
+        "scripts": [read(f"view/{name}") for name in SCRIPTS],
+        "data": page_json(system, motion),
+    }
+    return fill("view/page.html.jinja", data)
+
+
+def _given(solution: Solution) -> Motion:
+    """Return the motion of a solution."""
+    return Motion(solution, solution.module, solution.message)
+
+
+def _solved(system: ConstraintSystem) -> Motion:
+    """Compile and solve a system over its own times, as far as that goes."""
+    try:
+        module = compile_model(system)
+    except StructuralError as error:
+        return Motion(None, None, str(error))
+    return _given(solve(module, np.linspace(0, system.end, system.points)))

@@ -1,0 +1,245 @@
+'use strict';
+/* Everything is connected here: controls, keys, tabs, messages, themes. */
+
+const byId = id => document.getElementById(id);
+const hasBodies = player.data.drawing.bodies.length > 0;
+
+/* ---- what the solver says ---- */
+
+function showMessages() {
+  const { data } = player;
+  const sizes = [`${data.drawing.bodies.length} bodies`, `${data.coordinates.length} coordinates`,
+    `${data.equations.length} equations`, `${player.count} times`];
+  byId('summary').textContent = (hasBodies ? sizes : sizes.slice(1)).join(', ');
+  if (!data.success) {
+    byId('message').hidden = false;
+    byId('message').textContent = data.message;
+  }
+  for (const event of data.events) {
+    const item = document.createElement('li'), button = document.createElement('button');
+    Object.assign(button, { type: 'button', textContent: event.message });
+    button.addEventListener('click', () => {
+      player.pause();
+      player.setTime(event.t);
+    });
+    item.append(button);
+    byId('events').append(item);
+  }
+}
+
+function showNote(state) {
+  const note = byId('note');
+  note.hidden = state.isFound;
+  if (state.isFound) return;
+  const { status, sentences } = player.data;
+  const shown = hasMotion() ? 'Shown is the last position that was found.'
+    : 'Shown is the start guess; constraints that it violates are red.';
+  note.textContent = `t = ${+state.time.toPrecision(6)}: ${sentences[status[state.index]]} ${shown}`;
+}
+
+/* ---- time ---- */
+
+/* Events, and times without a position, on the time axis. */
+function markTimeline() {
+  if (!(player.duration > 0)) return;
+  const part = time => 100 * Math.abs(time - player.t[0]) / player.duration;
+  const mark = (className, from, to, title) => {
+    const element = document.createElement('span');
+    Object.assign(element, { className, title });
+    element.style.left = `${part(from)}%`;
+    if (to !== null) element.style.width = `${part(to) - part(from)}%`;
+    byId('marks').append(element);
+  };
+  for (const [from, to] of failures()) mark('failed', from, to, 'no position was found');
+  for (const event of player.data.events) mark('event', event.t, null, event.message);
+}
+
+function connectTransport() {
+  const time = byId('time');
+  time.max = player.count - 1;
+  time.addEventListener('input', () => {
+    player.pause();
+    player.setIndex(Number(time.value));
+  });
+  byId('play').addEventListener('click', () => player.toggle());
+  byId('play').disabled = player.count < 2;
+  byId('speed').append(...SPEEDS.map(speed => new Option(`${speed} ×`, speed)));
+  byId('speed').addEventListener('change', event => player.setSpeed(Number(event.target.value)));
+  byId('names').addEventListener('change', event => {
+    stage.showsNames = event.target.checked;
+    player.refresh();
+  });
+}
+
+function showTransport(state) {
+  byId('time').value = state.index;
+  byId('clock').textContent = `t = ${state.time.toFixed(3)} s`;
+  byId('speed').value = player.speed;
+  const isPlaying = player.isPlaying;
+  byId('play').textContent = isPlaying ? '❚❚' : '▶';
+  byId('play').setAttribute('aria-label', isPlaying ? 'Pause' : 'Play');
+}
+
+/* The frames per second of the last frames, and how long the work of one took. */
+function showRate() {
+  const mean = list => list.reduce((sum, value) => sum + value, 0) / list.length;
+  const { frameTimes, drawTimes } = player;
+  if (frameTimes.length < 10) return;
+  byId('rate').textContent =
+    `${(1000 / mean(frameTimes)).toFixed(0)} frames/s, ${mean(drawTimes).toFixed(1)} ms of work each.`;
+}
+
+const KEYS = {
+  ' ': () => player.toggle(),
+  ArrowLeft: event => player.step(event.shiftKey ? -10 : -1),
+  ArrowRight: event => player.step(event.shiftKey ? 10 : 1),
+  Home: () => player.step(-player.count),
+  End: () => player.step(player.count),
+  '+': () => player.faster(1),
+  '=': () => player.faster(1),
+  '-': () => player.faster(-1),
+};
+
+function connectKeys() {
+  document.addEventListener('keydown', event => {
+    const { target } = event;
+    // Keys belong to a field that is filled in, a list that is open, a button that is pressed.
+    const isField = target.matches('select, textarea, input:not([type=range], [type=checkbox])');
+    const isPressed = event.key === ' ' && target.matches('button, [type=checkbox]');
+    const isTab = target.matches('[role=tab]');
+    const isTaken = isField || isPressed || isTab || event.ctrlKey || event.altKey || event.metaKey;
+    const action = KEYS[event.key];
+    if (isTaken || !action) return;
+    event.preventDefault();
+    action(event);
+  });
+}
+
+/* ---- what is pointed at ---- */
+
+function showTip(state) {
+  const tip = byId('tip'), point = stage.hovered || stage.selected;
+  tip.hidden = !point;
+  if (!point) return;
+  const title = document.createElement('strong');
+  title.textContent = point.name;
+  const lines = tipText(point, state).map(text => {
+    const line = document.createElement('div');
+    line.textContent = text;
+    return line;
+  });
+  tip.replaceChildren(title, ` ${point.kind}`, ...lines);
+  const [x, y] = stage.view.toScreen(stage.where(point, state));
+  const left = x + 18 + tip.offsetWidth < stage.width ? x + 18 : x - 18 - tip.offsetWidth;
+  const top = y + 14 + tip.offsetHeight < stage.height ? y + 14 : y - 14 - tip.offsetHeight;
+  tip.style.left = `${Math.max(2, Math.min(left, stage.width - tip.offsetWidth - 2))}px`;
+  tip.style.top = `${Math.max(2, top)}px`;
+}
+
+/* The joint whose path is longest is traced from the start. */
+function traceLongest() {
+  const length = point => {
+    const path = pathOf(point).filter(place => place !== null);
+    return path.reduce((sum, place, k) => (k ? sum + towards(path[k - 1], place)[2] : 0), 0);
+  };
+  const lengths = stage.points.map(length), longest = Math.max(...lengths);
+  if (longest > player.data.drawing.size) stage.traced.add(stage.points[lengths.indexOf(longest)]);
+}
+
+/* ---- tabs and themes ---- */
+
+const panels = {
+  plots: () => plots.show(),
+  numbers: () => numbers.update(player.state),
+  points: () => points.update(player.state),
+  newton: () => {},
+};
+let shownPanel = 'plots';
+
+function showPanel(name) {
+  shownPanel = name;
+  for (const other of Object.keys(panels)) {
+    byId(`panel-${other}`).hidden = other !== name;
+    byId(`tab-${other}`).setAttribute('aria-selected', other === name);
+    byId(`tab-${other}`).tabIndex = other === name ? 0 : -1;
+  }
+  panels[name]();
+}
+
+function connectTabs() {
+  const names = Object.keys(panels).filter(name => !byId(`tab-${name}`).hidden);
+  names.forEach((name, k) => {
+    byId(`tab-${name}`).addEventListener('click', () => showPanel(name));
+    byId(`tab-${name}`).addEventListener('keydown', event => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      const next = names[(k + step + names.length) % names.length];
+      showPanel(next);
+      byId(`tab-${next}`).focus();
+    });
+  });
+}
+
+function showTheme() {
+  stage.takeColours();
+  const isDark = luminance(stage.palette.paper) < 0.5;
+  byId('theme').textContent = isDark ? 'Light' : 'Dark';
+  plots.redraw();
+  player.refresh();
+}
+
+function connectTheme() {
+  byId('theme').addEventListener('click', () => {
+    const isDark = luminance(stage.palette.paper) < 0.5;
+    document.documentElement.dataset.theme = isDark ? 'light' : 'dark';
+    showTheme();
+  });
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', showTheme);
+}
+
+/* ---- start ---- */
+
+function showState(state) {
+  if (hasBodies) {
+    stage.draw(state);
+    showTip(state);
+  }
+  showNote(state);
+  showTransport(state);
+  plots.move(state);
+  if (shownPanel === 'numbers') numbers.update(state);
+  if (shownPanel === 'points') points.update(state);
+}
+
+function start() {
+  byId('stage').hidden = !hasBodies;
+  byId('plain').hidden = hasBodies;
+  byId('tab-points').hidden = !hasBodies;
+  byId('names').parentElement.hidden = !hasBodies;
+  byId('tab-newton').hidden = typeof newtonPanel !== 'function';
+  showMessages();
+  markTimeline();
+  connectTransport();
+  connectKeys();
+  connectTabs();
+  connectTheme();
+  plots.build(byId('panel-plots'));
+  numbers.build(byId('panel-numbers'));
+  if (hasBodies) {
+    points.build(byId('panel-points'));
+    stage.listen();
+    traceLongest();
+  }
+  if (typeof newtonPanel === 'function') newtonPanel(player, stage, byId('panel-newton'));
+  player.onChange(showState);
+  new ResizeObserver(() => {
+    stage.resize();
+    plots.resize();
+    player.refresh();
+  }).observe(byId('left'));
+  setInterval(showRate, 1000);
+  showPanel('plots');
+  showTheme();
+}
+
+start();

@@ -1,0 +1,187 @@
+'use strict';
+/* The numbers of the current time, and the points that can be traced. */
+
+function numberText(value) {
+  if (!Number.isFinite(value)) return '–';
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-4 || size >= 1e7)) return value.toExponential(5);
+  return value.toPrecision(7);
+}
+
+function cell(text, tag = 'td') {
+  const element = document.createElement(tag);
+  element.textContent = text;
+  return element;
+}
+
+function tableOf(header) {
+  const table = document.createElement('table');
+  table.createTHead().insertRow().append(...header.map(text => cell(text, 'th')));
+  table.createTBody();
+  return table;
+}
+
+function wide(table) {
+  const holder = document.createElement('div');
+  holder.className = 'wide';
+  holder.append(table);
+  return holder;
+}
+
+const numbers = {
+  build(panel) {
+    const bar = document.createElement('div');
+    bar.className = 'bar';
+    this.at = document.createElement('span');
+    this.copy = document.createElement('button');
+    Object.assign(this.copy, { type: 'button', textContent: 'Copy', id: 'copy' });
+    this.copy.addEventListener('click', () => copied(this.text()).then(isDone => {
+      this.copy.textContent = isDone ? 'Copied' : 'Not allowed';
+      setTimeout(() => { this.copy.textContent = 'Copy'; }, 1500);
+    }));
+    bar.append(this.at, this.copy);
+    this.motion = tableOf(['coordinate', 'unit', 'position', 'velocity', 'acceleration']);
+    this.rows = player.data.coordinates.map(({ name, unit }) => {
+      const row = this.motion.tBodies[0].insertRow();
+      row.append(cell(name, 'th'), cell(unit), cell(''), cell(''), cell(''));
+      return row;
+    });
+    this.equations = tableOf(['constraint', 'type', '|Phi|']);
+    this.joints = player.data.drawing.joints.map(({ name, kind, is_driver }) => {
+      const row = this.equations.tBodies[0].insertRow();
+      row.append(cell(name, 'th'), cell(is_driver ? `${kind}, driver` : kind), cell(''));
+      return row;
+    });
+    const parameters = tableOf(['parameter', 'value', 'unit']);
+    for (const { name, value, unit } of player.data.parameters) {
+      parameters.tBodies[0].insertRow().append(cell(name, 'th'), cell(numberText(value)), cell(unit));
+    }
+    panel.append(bar, wide(this.motion), wide(this.equations));
+    if (player.data.parameters.length) panel.append(wide(parameters));
+  },
+
+  update(state) {
+    const { data } = player;
+    this.at.textContent = state.isFound ? `t = ${numberText(state.time)} s`
+      : `t = ${numberText(state.time)} s: not found; positions are the last found, or the guess`;
+    this.rows.forEach((row, k) => {
+      row.cells[2].textContent = numberText(state.q[k]);
+      row.cells[3].textContent = state.isFound ? numberText(state.q_dot[k]) : '–';
+      row.cells[4].textContent = state.isFound ? numberText(state.q_ddot[k]) : '–';
+    });
+    this.joints.forEach((row, k) => {
+      const value = residualAt(state, k);
+      row.cells[2].textContent = value === null ? '–' : value.toExponential(2);
+      row.classList.toggle('bad', value > data.violated);
+    });
+  },
+
+  /* The tables as text with tabs, for a spreadsheet: full precision. */
+  text() {
+    const { state, data } = player;
+    const lines = [`t\t${state.time}`, 'coordinate\tunit\tposition\tvelocity\tacceleration'];
+    data.coordinates.forEach(({ name, unit }, k) => lines.push(
+      [name, unit, state.q[k], ...(state.isFound ? [state.q_dot[k], state.q_ddot[k]] : ['', ''])].join('\t')));
+    return `${lines.join('\n')}\n`;
+  },
+};
+
+/* The residual of a constraint at a state, null where it is not known. */
+function residualAt(state, k) {
+  const { arrays, drawing, guessResidual } = player.data;
+  if (!state.isFound) return hasMotion() ? null : guessResidual[k];
+  return finite(arrays.residual[state.index * drawing.joints.length + k]);
+}
+
+/* Copy text; pages opened from a file may have to do it the old way. */
+async function copied(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    const area = document.createElement('textarea');
+    area.value = text;
+    document.body.append(area);
+    area.select();
+    const isDone = document.execCommand('copy');
+    area.remove();
+    return isDone;
+  }
+}
+
+const points = {
+  build(panel) {
+    const table = tableOf(['point', 'what', 'path', 'x', 'y', 'speed', 'acceleration']);
+    this.table = table;
+    this.rows = [];
+    for (const point of stage.points) this.addRow(point);
+    panel.append(wide(table), this.form());
+  },
+
+  addRow(point) {
+    const row = this.table.tBodies[0].insertRow();
+    const box = document.createElement('input');
+    Object.assign(box, { type: 'checkbox', ariaLabel: `Path of ${point.name}` });
+    box.addEventListener('change', () => stage.toggleTrace(point));
+    const holder = cell('');
+    holder.append(box);
+    row.append(cell(point.name, 'th'), cell(point.kind), holder, cell(''), cell(''), cell(''), cell(''));
+    row.addEventListener('pointerenter', () => stage.hover(point));
+    row.addEventListener('pointerleave', () => stage.hover(null));
+    box.addEventListener('focus', () => stage.hover(point));
+    box.addEventListener('blur', () => stage.hover(null));
+    this.rows.push({ row, box, point });
+  },
+
+  /* A point of one's own: a body and its coordinates there. */
+  form() {
+    const form = document.createElement('form');
+    const body = document.createElement('select');
+    body.setAttribute('aria-label', 'Body');
+    body.append(...player.data.drawing.bodies.map((name, frame) => new Option(name, frame)));
+    const [xi, eta] = ['xi', 'eta'].map(name => {
+      const input = document.createElement('input');
+      Object.assign(input, { type: 'number', step: 'any', value: '0', ariaLabel: name });
+      return input;
+    });
+    const add = document.createElement('button');
+    add.textContent = 'Trace this point';
+    form.append('Point of ', body, ' at ', xi, eta, add);
+    form.addEventListener('submit', event => {
+      event.preventDefault();
+      const at = [Number(xi.value), Number(eta.value)];
+      const name = `${player.data.drawing.bodies[body.value]} (${at.join(', ')})`;
+      const point = { name, kind: 'chosen', frame: Number(body.value), point: at };
+      stage.points.push(point);
+      this.addRow(point);
+      stage.toggleTrace(point);
+    });
+    return form;
+  },
+
+  update(state) {
+    for (const { row, box, point } of this.rows) {
+      box.checked = stage.traced.has(point);
+      const [x, y] = stage.where(point, state);
+      const { velocity, acceleration } = ratesInWorld(state, point.frame, point.point);
+      const values = [x, y, Math.hypot(...velocity), Math.hypot(...acceleration)];
+      values.forEach((value, k) => {
+        row.cells[3 + k].textContent = k > 1 && !state.isFound ? '–' : numberText(value);
+      });
+    }
+  },
+};
+
+/* What is shown beside a point that is hovered or selected. */
+function tipText(point, state) {
+  const unit = player.data.lengthUnit;
+  const [x, y] = stage.where(point, state);
+  const lines = [`x = ${numberText(x)}, y = ${numberText(y)} ${unit}`];
+  if (state.isFound) {
+    const { velocity, acceleration } = ratesInWorld(state, point.frame, point.point);
+    const vector = ([a, b]) => `(${numberText(a)}, ${numberText(b)})`;
+    lines.push(`v = ${vector(velocity)}, ${numberText(Math.hypot(...velocity))} ${unit}/s`);
+    lines.push(`a = ${vector(acceleration)}, ${numberText(Math.hypot(...acceleration))} ${unit}/s²`);
+  }
+  return lines;
+}
