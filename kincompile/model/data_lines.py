@@ -74,7 +74,6 @@ class _Outline:
             return None
         if token == "," and inside is not None:
             inside[1] = inside[1] + 1 if isinstance(inside[1], int) else None
-            self._key = []
             return None
         if inside is not None and inside[0] == "{" and inside[1] is None:
             return self._take_key(token, separator, inside)
@@ -88,7 +87,7 @@ class _Outline:
     ) -> Address | None:
         """Collect a key; it is complete at the separator."""
         if token == separator:
-            inside[1] = ".".join(self._key)
+            inside[1], self._key = ".".join(self._key), []
         elif token != ".":
             self._key.append(_unquoted(token))
         return None

@@ -153,9 +153,13 @@ def test_that_any_bytes_are_refused(tmp_path_factory, content):
         check_file(tmp_path_factory.getbasetemp() / f"fuzz.{ending}", ending, content, False)
 
 
+def spin():
+    while True:
+        pass
+
+
 def test_that_the_watch_sees_what_it_is_for(tmp_path):
     with pytest.raises(AssertionError), watched():
         (tmp_path / "x").write_text("written", encoding="utf-8")
     with pytest.raises(TimeoutError), watched(0.05):
-        while True:
-            pass
+        spin()

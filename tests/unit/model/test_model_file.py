@@ -230,6 +230,11 @@ JSON = json.dumps(
         ('"t"', "1" * 5000, "line 14: a number has thousands of digits"),
         ('"t"', "null", "line 14: constraint 'motor', angle: expected a number or a formula"),
         ('"body"', '"name"', "line 13: the key 'name' is given a second time, after line 12"),
+        (
+            '   "name": "arm"',
+            '   "name": "arm",\n   "name": "rod"',
+            "line 7: the key 'name' is given a second time, after line 6; keep one of them",
+        ),
         ('"t"', '"t', "line 14: this is not JSON: Invalid control character"),
         (JSON, "[" * 100_000, "line 1: the file is nested too deeply"),
         (JSON, "7", "line 1: expected names and values, not 7"),
