@@ -39,6 +39,8 @@ _PUBLIC = {
     "kincompile.teach.compare": ("compare", "compare_file"),
     "kincompile.teach.verify": ("verify",),
     "kincompile.teach.derivation": ("derivation",),
+    "kincompile.view.mechanism_plot": ("plot_mechanism",),
+    "kincompile.view.sparsity_plot": ("plot_sparsity",),
     "kincompile.errors": (
         "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError",
         "ContractError", "InputError", "SolveError", "InternalError",

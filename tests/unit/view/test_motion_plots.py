@@ -9,18 +9,9 @@ import sympy
 import kincompile as kc
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
-import matplotlib as mpl
 from matplotlib import pyplot as plt
 
-mpl.use("agg")
-
 T = np.linspace(0.1, 1.0, 40)
-
-
-@pytest.fixture(autouse=True)
-def closed_figures():
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")

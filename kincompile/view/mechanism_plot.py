@@ -1,0 +1,222 @@
+"""A mechanism at one position, drawn by matplotlib from the description of its shapes."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.errors import InputError, missing_package
+from kincompile.names import listed, suggestion
+from kincompile.view.placed import world
+from kincompile.view.shapes import drawing
+from kincompile.view.strokes import strokes
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike, NDArray
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.view.shapes import Drawing
+    from kincompile.view.strokes import Stroke
+
+GROUND_COLOUR, DRIVER_COLOUR, GAP_COLOUR = "0.35", "0.1", "red"
+"""Colours of what stands still, of drivers, and of joints that are not assembled."""
+
+FILL = 0.22
+"""Opacity of the areas of bodies."""
+
+MOST_PARTS = 65
+"""Symbols are at least this part of the diagonal of the plot."""
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "bar": {"linewidth": 5, "alpha": 0.75, "solid_capstyle": "round"},
+    "body": {"linewidth": 2.0},
+    "wheel": {"linewidth": 1.5},
+    "rim": {"linewidth": 1.5},
+    "tick": {"linewidth": 1.5},
+    "rack": {"linewidth": 1.5},
+    "groove": {"linewidth": 1.2},
+    "block": {"linewidth": 1.5},
+    "rod": {"linewidth": 3.0, "color": "0.3", "solid_capstyle": "round"},
+    "piston": {"linewidth": 2.5, "color": "0.3"},
+    "barrel": {"linewidth": 1.5, "edgecolor": "0.3", "facecolor": "0.8"},
+    "slide": {"linewidth": 3.0, "alpha": 0.5},
+    "dimension": {"linewidth": 1.0, "color": "0.4", "linestyle": "--"},
+    "pin": {"linewidth": 1.2, "edgecolor": "0.1", "facecolor": "white"},
+    "stand": {"linewidth": 1.2, "edgecolor": GROUND_COLOUR, "facecolor": "0.92"},
+    "ground": {"linewidth": 1.0},
+    "arrow": {"linewidth": 1.3, "color": DRIVER_COLOUR},
+    "head": {"linewidth": 0, "edgecolor": DRIVER_COLOUR, "facecolor": DRIVER_COLOUR},
+    "gap": {"linewidth": 2.0, "color": GAP_COLOUR, "linestyle": ":"},
+}
+"""What the strokes look like; those without a colour have that of their body."""
+
+
+def plot_mechanism(
+    model: Mechanism | ConstraintSystem,
+    q: ArrayLike | None = None,
+    ax: Axes | None = None,
+    p: Mapping[str, float] | None = None,
+    *,
+    names: bool = False,
+) -> Axes:
+    """Draw a mechanism at a position.
+
+    A joint whose two points are apart, as they may be at the guess, has a red line between them.
+
+    Parameters
+    ----------
+    model
+        A mechanism, or a system with bodies.
+    q : array_like, shape (n,), optional
+        The position, such as a row of ``solution.q``; without it the guess.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; without it a new figure.
+    p : mapping, optional
+        Values of parameters by name, such as ``solution.parameters``; others have their defaults.
+    names
+        Whether the names of the constraints are written at their places.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        With equal scales of x and y, in the unit of length of the model.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written.
+    InputError
+        If it has no bodies, `q` is not a finite position of it, or it has no such parameter.
+    UnsupportedError
+        If matplotlib is not installed.
+    """
+    try:
+        from matplotlib import pyplot as plt
+    except ImportError:
+        raise missing_package("matplotlib", "plot") from None
+    position = position_of(model, q)
+    drawn = drawing(model, checked_parameters(model, p), position)
+    if ax is None:
+        _, ax = plt.subplots(layout="constrained")
+        ax.set_title(drawn.name)
+    draw(ax, model, drawn, position[None])
+    if names:
+        _write_names(ax, drawn, position)
+    return ax
+
+
+def position_of(model: Mechanism | ConstraintSystem, q: ArrayLike | None) -> NDArray[np.float64]:
+    """Return the position that is meant, shape (n,), of a model that can be drawn.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to draw, or `q` is no finite position.
+    """
+    system = model.system()
+    if not system.bodies:
+        raise InputError(
+            f"{system.name} has no bodies, so there is nothing to draw: it is a system of free "
+            "equations. solution.plot() shows its coordinates over time."
+        )
+    names = [item.name for item in system.coordinates]
+    if q is None:
+        return np.array([item.guess for item in system.coordinates], dtype=np.float64)
+    position = np.asarray(q, dtype=np.float64)
+    if position.shape != (len(names),):
+        raise InputError(
+            f"q has the shape {position.shape}, but a position of {system.name} has the shape "
+            f"({len(names)},): {listed(names)}. Give one row of solution.q."
+        )
+    if not np.isfinite(position).all():
+        missing = [name for name, value in zip(names, position, strict=True) if value != value]
+        raise InputError(
+            f"q is not finite ({listed(missing or names)}): no position was found there. Give a "
+            "row of solution.q where solution.status is 0."
+        )
+    return position
+
+
+def checked_parameters(
+    model: Mechanism | ConstraintSystem, p: Mapping[str, float] | None
+) -> dict[str, float]:
+    """Return the parameters that are given, all of which the model has.
+
+    Raises
+    ------
+    InputError
+        If the model has none of such a name.
+    """
+    known = [item.name for item in model.system().parameters]
+    for name in p or {}:
+        if name not in known:
+            raise InputError(
+                f"{model.name} has no parameter {name!r}{suggestion(name, known)}; parameters "
+                f"are: {listed(known)}."
+            )
+    return dict(p or {})
+
+
+def draw(
+    ax: Axes,
+    model: Mechanism | ConstraintSystem,
+    drawn: Drawing,
+    q: NDArray[np.float64],
+) -> list[tuple[Stroke, Any]]:
+    """Draw all strokes at the first of the positions, and return each with its artist.
+
+    Parameters
+    ----------
+    ax, model, drawn
+        Where, of what, and its shapes.
+    q : ndarray, shape (N, n)
+        Positions that the limits of the plot must hold.
+    """
+    x_low, x_high, y_low, y_high = drawn.extent(q)
+    # Gears and cams reach far beyond the joints, by which the shapes are measured.
+    size = max(drawn.size, math.hypot(x_high - x_low, y_high - y_low) / MOST_PARTS)
+    artists = [
+        (stroke, _artist(ax, stroke, q[0], order))
+        for order, stroke in enumerate(strokes(drawn, size))
+    ]
+    unit = model.system().length_unit
+    ax.set_aspect("equal")
+    ax.set_xlim(x_low - size, x_high + size)
+    ax.set_ylim(y_low - size, y_high + size)
+    ax.set_xlabel(f"x [{unit}]" if unit else "x")
+    ax.set_ylabel(f"y [{unit}]" if unit else "y")
+    return artists
+
+
+def _artist(ax: Axes, stroke: Stroke, q: NDArray[np.float64], order: int) -> Any:
+    """Make the artist of a stroke."""
+    colour = f"C{stroke.frame % 10}" if stroke.frame >= 0 else GROUND_COLOUR
+    look, points, zorder = LOOKS[stroke.look], stroke.world(q), 2 + order * 1e-3
+    if not stroke.is_area:
+        (line,) = ax.plot(*points.T, **{"color": colour, "zorder": zorder, **look})
+        return line
+    style = {"edgecolor": colour, "facecolor": (colour, FILL), **look}
+    (area,) = ax.fill(*points.T, zorder=zorder, **style)
+    return area
+
+
+def _write_names(ax: Axes, drawn: Drawing, q: NDArray[np.float64]) -> None:
+    """Write the names of constraints where they are; those of one place together."""
+    at: dict[tuple[float, float], list[str]] = {}
+    for joint in drawn.joints:
+        if joint.place is not None:
+            x, y = world(q[None], joint.place)[0]
+            step = drawn.size * 1e-3
+            at.setdefault((round(x / step) * step, round(y / step) * step), []).append(joint.name)
+    for place, names in at.items():
+        text = ax.annotate(
+            ", ".join(names), place, xytext=(7, 7), textcoords="offset points", fontsize="small",
+            zorder=10,
+        )  # fmt: skip
+        text.set_in_layout(False)  # a long name may leave the plot, but must not shrink it

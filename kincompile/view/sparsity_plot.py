@@ -1,0 +1,163 @@
+"""The pattern of Phi_q, drawn by matplotlib: rows and columns named, blocks outlined."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.compiler import inspect
+from kincompile.errors import InputError, missing_package
+from kincompile.tables import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.structure.report import Inspection
+
+MOST_LABELS = 60
+"""Rows or columns up to which each is named; of more, one in two is, or in three, ..."""
+
+UNKNOWN, KNOWN, OUTLINE = "tab:blue", "lightsteelblue", "tab:orange"
+"""Colours of the entries that a step solves for, of the others, and of the blocks."""
+
+
+def plot_sparsity(
+    model: Mechanism | ConstraintSystem, ax: Axes | None = None, *, order: str = "solution"
+) -> Axes:
+    """Draw which entries of Phi_q are not identically zero, with the names of rows and columns.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system, also one that cannot be compiled yet.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; without it a new figure.
+    order : {"solution", "written"}
+        ``"solution"`` puts rows and columns in the order in which they are solved, and outlines
+        the blocks on the diagonal: each needs the results of earlier ones only. Equations and
+        coordinates that belong to no block are last. ``"written"`` is the order of the model.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Entry (row, column) is the square about that point.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written.
+    InputError
+        If there is no such order.
+    UnsupportedError
+        If matplotlib is not installed.
+    """
+    try:
+        from matplotlib import pyplot as plt
+        from matplotlib.collections import PolyCollection
+    except ImportError:
+        raise missing_package("matplotlib", "plot") from None
+    if order not in ("solution", "written"):
+        raise InputError(f"there is no order {order!r}; orders are: solution, written")
+    found = inspect(model)
+    arranged = _arranged(found, in_blocks=order == "solution")
+    if ax is None:
+        # A fifth of an inch for each name, as far as a page goes.
+        sides = [min(3 + len(names) / 5, 14) for names in (arranged.columns, arranged.rows)]
+        _, ax = plt.subplots(figsize=tuple(sides), layout="constrained")
+    for chosen, colour, label in (
+        (arranged.is_unknown, UNKNOWN, "solved for in its step"),
+        (~arranged.is_unknown, KNOWN, "known by then"),
+    ):
+        squares = list(_squares(arranged.entries[chosen]))
+        ax.add_collection(PolyCollection(squares, color=colour, linewidth=0.4, label=label))
+    if order == "solution":
+        _outline_blocks(ax, found)
+    _name_sides(ax, arranged, set(found.redundant + found.conflicting))
+    sizes = f"{len(arranged.rows)} x {len(arranged.columns)}"
+    ax.set_title(f"{found.name}: Phi_q, {sizes}, {len(found.pattern)} entries")
+    return ax
+
+
+@dataclass(frozen=True, slots=True)
+class _Arranged:
+    """The pattern as it is drawn.
+
+    Attributes
+    ----------
+    rows, columns
+        Names, from top to bottom and from left to right.
+    entries : ndarray of int, shape (nnz, 2)
+        Place of each entry: row and column.
+    is_unknown : ndarray of bool, shape (nnz,)
+        Whether its coordinate is found in the step that its equation belongs to.
+    """
+
+    rows: Sequence[str]
+    columns: Sequence[str]
+    entries: NDArray[np.intp]
+    is_unknown: NDArray[np.bool_]
+
+
+def _arranged(found: Inspection, *, in_blocks: bool) -> _Arranged:
+    """Arrange the pattern in the order of solution, or as it was written."""
+    equations, coordinates = found.equations, [item.name for item in found.coordinates]
+    row_step = {name: k for k, block in enumerate(found.blocks) for name in block.equations}
+    column_step = {name: k for k, block in enumerate(found.blocks) for name in block.coordinates}
+    rows = _by_step(equations, row_step) if in_blocks else equations
+    columns = _by_step(coordinates, column_step) if in_blocks else coordinates
+    row_place = {name: k for k, name in enumerate(rows)}
+    column_place = {name: k for k, name in enumerate(columns)}
+    named = [(equations[row], coordinates[column]) for row, column in found.pattern]
+    return _Arranged(
+        rows,
+        columns,
+        np.array([(row_place[row], column_place[column]) for row, column in named], dtype=np.intp),
+        np.array([row_step.get(row, -1) == column_step.get(column, -2) for row, column in named]),
+    )
+
+
+def _by_step(names: Sequence[str], step: Mapping[str, int]) -> list[str]:
+    """Return names in the order of their steps, those without one last."""
+    return sorted(names, key=lambda name: step.get(name, len(names)))
+
+
+def _squares(entries: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the corners (x, y) of a square about each entry, shape (k, 4, 2)."""
+    corners = np.array(((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)))
+    return entries[:, None, ::-1] + 0.9 * corners
+
+
+def _outline_blocks(ax: Axes, found: Inspection) -> None:
+    """Draw a frame around each block on the diagonal."""
+    start = -0.5
+    width = min(1.5, 60 / len(found.coordinates))  # points; not to hide the entries of many
+    for k, block in enumerate(found.blocks):
+        end = start + len(block.equations)
+        frame = [(start, start), (end, start), (end, end), (start, end), (start, start)]
+        label = "_" if k else f"{counted(len(found.blocks), 'block')}, top to bottom"
+        ax.plot(*zip(*frame, strict=True), color=OUTLINE, linewidth=width, label=label)
+        start = end
+
+
+def _name_sides(ax: Axes, arranged: _Arranged, dependent: set[str]) -> None:
+    """Write the names of rows and columns; those of dependent equations are red."""
+    for axis, names in ((ax.yaxis, arranged.rows), (ax.xaxis, arranged.columns)):
+        step = math.ceil(len(names) / MOST_LABELS)
+        ticks = range(0, len(names), step)
+        axis.set_ticks(ticks, [names[k] for k in ticks], fontsize=8)
+        for label in axis.get_ticklabels():
+            label.set_color("red" if label.get_text() in dependent else "black")
+    ax.xaxis.tick_top()
+    ax.tick_params(axis="x", rotation=90)
+    ax.set_aspect("equal")
+    ax.set_xlim(-0.7, len(arranged.columns) - 0.3)
+    ax.set_ylim(len(arranged.rows) - 0.3, -0.7)
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
