@@ -588,7 +588,7 @@ typedef struct {
 // What became of the points of a block; those that are over are not looked at any more.
 typedef struct {
     int status[LANES], iterations[LANES], is_over[LANES];
-    double residual[LANES];
+    double residual[LANES], sensitivity[LANES];
 } outcome;
 
 // Which coordinates are angles; numbers of size 1/2 to 1 and either sign without a pattern.
@@ -603,6 +603,12 @@ static const double PROBE[] = {
 static const double LARGEST_ERROR = 0.05;
 // Movement, in scales, for an error of one scale in the equations: beyond this Phi_q is singular.
 static const double SINGULAR_SENSITIVITY = 1e7;
+// Sensitivity from which on two branches may be so near each other that Newton confuses them. On one
+// branch the error of the predicted velocity, times the step, is a few times that of the position;
+// on another it is not. Below SMOOTH rounding errors decide.
+static const double NEARLY_SINGULAR = 30, KINK = 8, SMOOTH = 1e-9;
+// Sensitivity of a sub-step beyond which its rates are too uncertain to go on from.
+static const double TOO_NEAR = 1e5;
 // How much larger than the tolerance, relative to its terms, a residual may be at the end, and
 // the residual that rounding leaves.
 static const double RESIDUAL_FACTOR = 10, ROUNDING = 16 * 2.220446049250313e-16;
@@ -675,11 +681,12 @@ static int correct(block *b, const scales *s, size_t count, int max_iterations, 
 // Check that the equations hold and that Phi_q is regular, and solve for velocity and acceleration.
 static void complete(block *b, const scales *s, size_t count, outcome *o)
 {
-    double right[M][LANES], answer[N][LANES], sensitivity[LANES] = { 0 };
+    double right[M][LANES], answer[N][LANES];
     double excess[LANES] = { 0 }, total[LANES] = { 0 };
     position_of_block(b, count);
     factor_of_block(b, count);
     memset(o->residual, 0, sizeof o->residual);
+    memset(o->sensitivity, 0, sizeof o->sensitivity);
     for (int i = 0; i < M; i++) {
         const double part = fmax(RESIDUAL_FACTOR * s->tolerance, ROUNDING);
         for (size_t k = 0; k < count; k++) {
@@ -698,12 +705,12 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
             const double size = fabs(answer[i][k]) / s->reference[i][k];
-            sensitivity[k] = size <= sensitivity[k] ? sensitivity[k] : size;
+            o->sensitivity[k] = size <= o->sensitivity[k] ? o->sensitivity[k] : size;
             total[k] += b->q_dot[i][k] + b->q_ddot[i][k];
         }
     for (size_t k = 0; k < count; k++) {
         const int holds = excess[k] == 0, finite = total[k] - total[k] == 0;
-        const int regular = sensitivity[k] <= SINGULAR_SENSITIVITY;
+        const int regular = o->sensitivity[k] <= SINGULAR_SENSITIVITY;
         if (o->status[k] != EXAMPLE_3_7_5_CONVERGED)
             continue;
         o->status[k] = !(o->residual[k] - o->residual[k] == 0) ? EXAMPLE_3_7_5_NOT_FINITE
@@ -716,12 +723,13 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
 
 // A good point of the motion.
 typedef struct {
-    double t, q[N], q_dot[N], q_ddot[N], determinants[BLOCKS > 0 ? BLOCKS : 1];
+    double t, q[N], q_dot[N], q_ddot[N], determinants[BLOCKS > 0 ? BLOCKS : 1], sensitivity;
 } state;
 
-static void take_up(state *at, const block *b, size_t k)
+static void take_up(state *at, const block *b, const outcome *o, size_t k)
 {
     at->t = b->t[k];
+    at->sensitivity = o->sensitivity[k];
     for (int i = 0; i < BLOCKS; i++)
         at->determinants[i] = b->determinants[i][k];
     for (int i = 0; i < N; i++) {
@@ -731,21 +739,35 @@ static void take_up(state *at, const block *b, size_t k)
     }
 }
 
-// Correct predicted positions; those that end too far from the prediction have not converged.
-static void settle(block *b, const scales *s, size_t count, outcome *o)
+// Whether the velocity of a point is far from its prediction, compared with the position's error.
+static int is_kinked(const block *b, const scales *s, double q_dot[N][LANES], double h,
+    double error, size_t k)
 {
-    double predicted[N][LANES], error[LANES] = { 0 };
-    memcpy(predicted, b->q, sizeof predicted);
+    double kink = 0;
+    for (int i = 0; i < N; i++)
+        kink = fmax(kink, fabs(h * (b->q_dot[i][k] - q_dot[i][k])) / s->reference[i][k]);
+    return kink > KINK * error + SMOOTH;
+}
+
+// Correct predicted positions, h after a good point. Those that end too far from the prediction have
+// not converged; near a singular configuration the velocity must be where it was predicted too.
+static void settle(block *b, const scales *s, const double *h, size_t count, outcome *o)
+{
+    double q[N][LANES], q_dot[N][LANES], error[LANES] = { 0 };
+    memcpy(q, b->q, sizeof q);
+    memcpy(q_dot, b->q_dot, sizeof q_dot);
     correct(b, s, count, MAX_CORRECTIONS, o);
     complete(b, s, count, o);
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
-            const double size = fabs(b->q[i][k] - predicted[i][k]) / s->reference[i][k];
+            const double size = fabs(b->q[i][k] - q[i][k]) / s->reference[i][k];
             error[k] = size <= error[k] ? error[k] : size;
         }
     for (size_t k = 0; k < count; k++)
         if (!(error[k] <= LARGEST_ERROR))
             o->status[k] = EXAMPLE_3_7_5_NOT_CONVERGED;
+        else if (o->sensitivity[k] > NEARLY_SINGULAR && is_kinked(b, s, q_dot, h[k], error[k], k))
+            o->status[k] = EXAMPLE_3_7_5_SINGULAR;
 }
 
 // Where the determinant of a block has changed its sign, a singular configuration lies between.
@@ -763,12 +785,15 @@ static int is_on_branch(const state *from, const block *b, size_t k)
 // q + h q_dot + h^2 q_ddot / 2. Returns how many continue the motion, from the first one on.
 static size_t step(block *b, const scales *s, const state *from, size_t count, outcome *o)
 {
+    double h[LANES];
+    for (size_t k = 0; k < count; k++)
+        h[k] = b->t[k] - from->t;
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
-            const double h = b->t[k] - from->t;
-            b->q[i][k] = from->q[i] + h * (from->q_dot[i] + 0.5 * h * from->q_ddot[i]);
+            b->q[i][k] = from->q[i] + h[k] * (from->q_dot[i] + 0.5 * h[k] * from->q_ddot[i]);
+            b->q_dot[i][k] = from->q_dot[i] + h[k] * from->q_ddot[i];
         }
-    settle(b, s, count, o);
+    settle(b, s, h, count, o);
     for (size_t k = 0; k < count; k++) {
         if (o->status[k] == EXAMPLE_3_7_5_CONVERGED && !is_on_branch(from, b, k))
             o->status[k] = EXAMPLE_3_7_5_SINGULAR;
@@ -783,15 +808,20 @@ static size_t step(block *b, const scales *s, const state *from, size_t count, o
 static int advance(block *b, const scales *s, state *at, double t, outcome *o)
 {
     const double smallest = fabs(t - at->t) * SMALLEST_PART;
+    const double too_near = fmax(TOO_NEAR, 10 * at->sensitivity);
     double h = 0.5 * (t - at->t);
     int iterations = 0;
     for (int k = 0; k < MAX_SUBSTEPS; k++) {
         const int whole = fabs(h) >= fabs(t - at->t);
         b->t[0] = whole ? t : at->t + h;
-        const size_t good = step(b, s, at, 1, o);
+        size_t good = step(b, s, at, 1, o);
         iterations += o->iterations[0];
+        if (good && !whole && o->sensitivity[0] > too_near) {
+            o->status[0] = EXAMPLE_3_7_5_SINGULAR;
+            good = 0;
+        }
         if (good) {
-            take_up(at, b, 0);
+            take_up(at, b, o, 0);
             h *= 2;
         } else if (fabs(h) <= smallest) {
             break;
@@ -850,7 +880,7 @@ size_t example_3_7_5_march(const example_3_7_5_motion *motion)
             b.p[i][k] = motion->p[i];
     assemble(&b, &s, motion->t[0], motion->guess, motion->max_iterations, LANES, &o);
     record(motion, &b, &o, 0, 1);
-    take_up(&at, &b, 0);
+    take_up(&at, &b, &o, 0);
     int status = o.status[0];
     size_t done = status == EXAMPLE_3_7_5_CONVERGED ? 1 : 0, width = 1;
     while (status == EXAMPLE_3_7_5_CONVERGED && done < motion->count) {
@@ -859,7 +889,7 @@ size_t example_3_7_5_march(const example_3_7_5_motion *motion)
         const size_t good = step(&b, &s, &at, count, &o);
         if (good > 0) {
             record(motion, &b, &o, done, good);
-            take_up(&at, &b, good - 1);
+            take_up(&at, &b, &o, good - 1);
             done += good;
             // The fewer iterations, the more points the next prediction can serve.
             if (good < count || o.iterations[good - 1] > 3)
@@ -936,6 +966,7 @@ static void advance_alone(block *b, const scales *s, state *at, size_t k, outcom
     o->status[k] = advance(&alone, &own, at, b->t[k], &found);
     o->iterations[k] = found.iterations[0];
     o->residual[k] = found.residual[0];
+    o->sensitivity[k] = found.sensitivity[0];
     for (int i = 0; i < BLOCKS; i++)
         b->determinants[i][k] = alone.determinants[i][0];
     for (int i = 0; i < N; i++) {
@@ -949,15 +980,18 @@ static void advance_alone(block *b, const scales *s, state *at, size_t k, outcom
 static void step_variants(block *b, const scales *s, double t, size_t count, outcome *o)
 {
     state from[LANES];
-    const double h = t - b->t[0];
-    for (size_t k = 0; k < count; k++)
-        take_up(&from[k], b, k);
-    for (size_t k = 0; k < count; k++)
+    double h[LANES];
+    for (size_t k = 0; k < count; k++) {
+        take_up(&from[k], b, o, k);
+        h[k] = t - b->t[k];
         b->t[k] = t;
+    }
     for (int i = 0; i < N; i++)
-        for (size_t k = 0; k < count; k++)
-            b->q[i][k] += h * (b->q_dot[i][k] + 0.5 * h * b->q_ddot[i][k]);
-    settle(b, s, count, o);
+        for (size_t k = 0; k < count; k++) {
+            b->q[i][k] += h[k] * (b->q_dot[i][k] + 0.5 * h[k] * b->q_ddot[i][k]);
+            b->q_dot[i][k] += h[k] * b->q_ddot[i][k];
+        }
+    settle(b, s, h, count, o);
     for (size_t k = 0; k < count; k++)
         if (!o->is_over[k]
             && (o->status[k] != EXAMPLE_3_7_5_CONVERGED || !is_on_branch(&from[k], b, k)))

@@ -76,6 +76,10 @@ def test_the_march_judges_by_the_numbers_of_the_runtime(example_named):
         "LARGEST_ERROR": march.SMALL_ERROR,
         "SINGULAR_SENSITIVITY": march.SINGULAR_SENSITIVITY,
         "SMALLEST_PART": march.SMALLEST_PART,
+        "NEARLY_SINGULAR": march.NEARLY_SINGULAR,
+        "KINK": march.KINK,
+        "SMOOTH": march.SMOOTH,
+        "TOO_NEAR": march.TOO_NEAR,
         "RESIDUAL_FACTOR": newton.RESIDUAL_FACTOR,
         "ROUNDING": problem.ROUNDING,
     }
