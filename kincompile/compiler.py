@@ -15,12 +15,20 @@ import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from kincompile.emit.c_target import emit_c
 from kincompile.emit.grouped import emit_grouped
 from kincompile.emit.javascript_target import emit_javascript
 from kincompile.emit.numpy_target import emit_numpy
 from kincompile.emit.octave_target import emit_octave
-from kincompile.errors import InputError, ModelError, RedundantConstraintWarning, UnsupportedError
+from kincompile.errors import (
+    InputError,
+    KincompileError,
+    ModelError,
+    RedundantConstraintWarning,
+    UnsupportedError,
+)
 from kincompile.ir.grouping import group
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
@@ -30,12 +38,15 @@ from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native import make_native
+from kincompile.runtime.solve import solve
 from kincompile.structure.counting import require_square
 from kincompile.structure.report import inspect_system
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from types import ModuleType
+
+    from numpy.typing import NDArray
 
     from kincompile.emit.target import Emitted, Target
     from kincompile.structure.report import Inspection
@@ -101,14 +112,15 @@ def emit(
         require_square(system, grouped.pattern())
         return emit_grouped(grouped)
     code = inline(program)
-    redundant = redundant_equations(system, program, code.pattern())
-    if redundant:
+    found = redundant_equations(system, program, code.pattern())
+    if found:
+        redundant = tuple(name for item in found for name in item.equations)
         if target != "numpy":
             raise UnsupportedError(
                 f"the target {target!r} has no redundant equations, such as {listed(redundant)}; "
                 "use target='numpy', or replace their joint by one with fewer equations"
             )
-        text = redundancy_warning(system, redundant)
+        text = redundancy_warning(system, found)
         warnings.warn(text, RedundantConstraintWarning, stacklevel=2)
         code = replace(code, program=replace(program, redundant=redundant))
     return TARGETS[target](code)
@@ -186,4 +198,19 @@ def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
     """
     system = _checked(model)
     program = lower(system)
-    return inspect_system(system, group(program).pattern(), rank_report(system, program))
+    ranks = rank_report(system, program)
+    if not ranks.assembled:
+        guess = _assembled(model)
+        ranks = ranks if guess is None else rank_report(system, program, guess)
+    return inspect_system(system, group(program).pattern(), ranks)
+
+
+def _assembled(model: Mechanism | ConstraintSystem) -> NDArray[np.float64] | None:
+    """Return the position at the start that the runtime finds, with its restarts, or None."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RedundantConstraintWarning)
+        try:
+            position = solve(compile(model), 0.0).q[0]
+        except KincompileError:  # it cannot be compiled, or no equation has a value there
+            return None
+    return position if np.isfinite(position).all() else None

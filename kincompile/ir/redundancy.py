@@ -9,19 +9,28 @@ import numpy as np
 from kincompile.errors import StructuralError
 from kincompile.ir.interpret import interpret
 from kincompile.names import listed
-from kincompile.structure.counting import require_square
+from kincompile.structure.counting import counting_problem, require_square
 from kincompile.structure.rank import RankReport, generic_rank
+from kincompile.structure.remedies import least_squares_will_do, surpluses
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from kincompile.ir.program import Program
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.counting import Pattern
+    from kincompile.structure.remedies import Surplus
 
 
-def rank_report(system: ConstraintSystem, program: Program) -> RankReport:
-    """Return the rank of a system at generic assembled states, with default parameters."""
+def rank_report(
+    system: ConstraintSystem, program: Program, guess: NDArray[np.float64] | None = None
+) -> RankReport:
+    """Return the rank of a system at generic assembled states, with default parameters.
+
+    The guess, shape (n,), is where it is meant to be assembled; without it, the system's own.
+    """
 
     def evaluate(
         q: NDArray[np.float64], t: NDArray[np.float64]
@@ -31,7 +40,7 @@ def rank_report(system: ConstraintSystem, program: Program) -> RankReport:
 
     return generic_rank(
         evaluate,
-        np.array([item.guess for item in system.coordinates]),
+        np.array([item.guess for item in system.coordinates]) if guess is None else guess,
         np.array([item.unit == "rad" for item in system.coordinates]),
         driver_rows(system),
         float(system.end),
@@ -50,68 +59,41 @@ def driver_rows(system: ConstraintSystem) -> list[int]:
 
 def redundant_equations(
     system: ConstraintSystem, program: Program, pattern: Pattern
-) -> tuple[str, ...]:
+) -> tuple[Surplus, ...]:
     """Check that the equations determine the coordinates; return those that are redundant.
 
     Returns
     -------
-    tuple of str
-        Nothing where there are as many equations as coordinates. Where there are more: equations of
-        joints that depend on others at every assembled position, and agree with them.
+    tuple of Surplus
+        Nothing where there are as many equations as coordinates. Where there are more: the
+        constraints with equations that depend on others at every assembled position, and agree
+        with them.
 
     Raises
     ------
     StructuralError
-        Where there are too few equations, or too many that do not agree, or drivers too many.
+        Where there are too few equations, or too many that do not agree.
     """
-    m, n = len(system.equations), len(system.coordinates)
-    if m <= n:
+    if len(system.equations) <= len(system.coordinates):
         require_square(system, pattern)
         return ()
     report = rank_report(system, program)
-    names = system.equations
-    drivers = set(driver_rows(system))
-    surplus = len(report.redundant) == m - n and drivers.isdisjoint(report.redundant)
-    if surplus and drivers and report.rank == n and report.assembled:
-        return tuple(names[row] for row in report.redundant)
-    try:
-        require_square(system, pattern)
-    except StructuralError as error:
-        raise StructuralError(f"{error}{_findings(system, report)}") from None
-    return ()
-
-
-def _findings(system: ConstraintSystem, report: RankReport) -> str:
-    """Return what the rank adds to the counts."""
-    sentences = [""]
-    for verb, rows in (("conflicts with", report.conflicting), ("repeats", report.redundant)):
-        for row in rows:
-            others = listed(partner_constraints(system, report, row))
-            sentences.append(f"{system.equations[row]} {verb} {others}")
+    found = surpluses(system, report)
+    if least_squares_will_do(system, report):
+        return found
+    names = [name for item in found for name in item.equations]
+    sentences = [counting_problem(system, pattern, names)]
+    sentences += [f"{item.text}; {item.remedy}" for item in found]
     if report.free:
         free = [system.coordinates[column].name for column in report.free]
         sentences.append(f"at assembled positions {listed(free)} may still move")
-    return ". ".join(sentences)
+    raise StructuralError(". ".join(sentences))
 
 
-def partner_constraints(system: ConstraintSystem, report: RankReport, row: int) -> list[str]:
-    """Return the names of the constraints that a dependent row is a combination of."""
-    rows = set(report.partners[row])
-    return [
-        item.name
-        for item, first in zip(system.constraints, system.row_offsets, strict=True)
-        if rows & set(range(first, first + len(item.equation_names)))
-    ]
-
-
-def redundancy_warning(system: ConstraintSystem, redundant: tuple[str, ...]) -> str:
+def redundancy_warning(system: ConstraintSystem, found: Sequence[Surplus]) -> str:
     """Return what to tell of redundant equations that agree with the others."""
-    owners = [item for item in system.constraints if set(item.equation_names) & set(redundant)]
-    joints = listed(item.name for item in owners)
+    sentences = ". ".join(f"{item.text}; to remove it, {item.remedy}" for item in found)
     return (
-        f"{system.name!r} is redundant: {listed(redundant)} repeats what the other joints demand, "
-        "as long as the lengths are exactly what they are. All equations are solved together in "
-        "the sense of least squares, and whether they agree is checked at every point. To remove "
-        f"it, replace {joints} by a constraint with one equation less (a Revolute by a "
-        "RevoluteTranslational or a Distance), or leave out the bar"
+        f"{system.name!r} is redundant: all equations are solved together in the sense of least "
+        f"squares, and whether they agree is checked at every point. {sentences}"
     )

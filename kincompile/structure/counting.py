@@ -37,18 +37,35 @@ def require_square(system: ConstraintSystem, pattern: Pattern) -> None:
         With the counts, the coordinates that nothing determines or the equations that are too
         many, and what to do.
     """
+    problem = counting_problem(system, pattern)
+    if problem:
+        raise StructuralError(problem)
+
+
+def counting_problem(
+    system: ConstraintSystem, pattern: Pattern, dependent: Sequence[str] = ()
+) -> str:
+    """Say what is wrong with the numbers of equations and coordinates, "" where nothing is.
+
+    Parameters
+    ----------
+    system, pattern
+        A checked system, and where its Phi_q is not identically zero.
+    dependent
+        Equations known to depend on others, to be named before those that a matching leaves over.
+    """
     n, m = len(system.coordinates), len(system.equations)
     equations, coordinates = unmatched(system, pattern)
     if n == m and not equations:
-        return
+        return ""
     count = f"{system.name!r} has {m} equations for {n} coordinates"
     drivers = [item.name for item in system.constraints if item.is_driver]
     counted = f"{count} (drivers: {listed(drivers)}; {_counts(system)})"
     if m < n:
-        raise StructuralError(_too_few(counted, n - m, coordinates))
+        return _too_few(counted, n - m, coordinates)
     if m > n:
-        raise StructuralError(_too_many(counted, m - n, equations))
-    raise StructuralError(_mismatch(counted, equations, coordinates))
+        return _too_many(counted, m - n, dependent or equations)
+    return _mismatch(counted, equations, coordinates)
 
 
 def _counts(system: ConstraintSystem) -> str:

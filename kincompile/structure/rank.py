@@ -45,7 +45,7 @@ ANGLES_FIRST = 10.0
 """How much rather a driver is an angle than a length: motors turn."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RankReport:
     """The generic rank of a system, and the rows and columns that make it smaller than it might be.
 
@@ -65,6 +65,10 @@ class RankReport:
         As many of them as there are degrees of freedom: with these driven, nothing is free.
     assembled
         Whether joints and drivers, as far as they are independent, could be assembled at the start.
+    nearest : ndarray, shape (n,)
+        The position at the start, or the nearest to one.
+    residuals : ndarray, shape (m,)
+        Phi there.
     """
 
     rank: int
@@ -74,6 +78,8 @@ class RankReport:
     free: tuple[int, ...]
     drive: tuple[int, ...]
     assembled: bool
+    nearest: Array
+    residuals: Array
 
 
 def generic_rank(
@@ -135,12 +141,14 @@ class _Analysis:
         chosen = held & settled if (held & settled).any() else held
         order = [*self._joints, *self._drivers]
         if chosen.any():
-            kept, dependent, matrix = _best(self._scaled(q[chosen], self._t[chosen]), order)
-            wrong = self._contradictions(q, kept, dependent) if dependent else set()
-            _, together, _ = self._assemble(kept, q[:1], self._t[:1])
+            scaled = self._scaled(q[chosen], self._t[chosen])
         else:  # which joints are too many, if any, shows elsewhere too
-            kept, dependent, matrix = _best(self._scaled(self._q[1:], self._t[1:]), order)
-            wrong, together = set(dependent), held
+            q, scaled = self._q, self._scaled(self._q[1:], self._t[1:])
+        kept, dependent, matrix = _best(scaled, order)
+        wrong = self._contradictions(q, kept, dependent) if dependent else set()
+        if not chosen.any() and not wrong:
+            wrong = set(dependent)
+        nearest, together, _ = self._assemble(kept, q[:1], self._t[:1])
         free, drive = _left_over(matrix[kept], self._angular)
         return RankReport(
             rank=len(kept),
@@ -150,6 +158,8 @@ class _Analysis:
             free=free,
             drive=drive,
             assembled=bool(together[0]),
+            nearest=nearest[0],
+            residuals=self._evaluate(nearest, self._t[:1])[0][0],
         )
 
     def _contradictions(self, q: Array, kept: list[int], dependent: list[int]) -> set[int]:

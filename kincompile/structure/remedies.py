@@ -1,0 +1,178 @@
+"""What to do about equations that depend on others, and about coordinates that nothing drives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kincompile.model.resolve import Joint
+from kincompile.names import listed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from kincompile.model.resolve import FreeEquation
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.structure.rank import RankReport
+
+SIMPLER: Mapping[tuple[str, tuple[str, ...]], str] = {
+    ("Revolute", ("x",)): "RelativeY",
+    ("Revolute", ("y",)): "RelativeX",
+    ("Translational", ("normal",)): "RelativeAngle",
+    ("Translational", ("parallel",)): "RevoluteTranslational",
+}
+"""The type that keeps the other equations of a joint, by the joint's type and what is dependent."""
+
+DRIVEN_BY = ("AbsoluteX", "AbsoluteY", "AbsoluteAngle")
+"""The driver of each coordinate of a body."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surplus:
+    """A constraint with equations that depend on those before it.
+
+    Attributes
+    ----------
+    constraint, kind
+        Its name and type, as ``"Revolute"``; ``"Equation"`` for a free one.
+    is_driver
+        Whether it is a function of time.
+    equations
+        Names of its equations that depend on others.
+    conflicting
+        Whether they cannot hold together with those; else they repeat them.
+    repeats
+        Names of the constraints that they depend on.
+    others
+        Names of its equations that do not depend on others, and are to be kept.
+    instead
+        The type of constraint that keeps them; "" where there is none.
+    """
+
+    constraint: str
+    kind: str
+    is_driver: bool
+    equations: tuple[str, ...]
+    conflicting: bool
+    repeats: tuple[str, ...]
+    others: tuple[str, ...]
+    instead: str
+
+    @property
+    def text(self) -> str:
+        """What is wrong, in words."""
+        ending = "s" if len(self.equations) == 1 else ""
+        what, partners = listed(self.equations), listed(self.repeats)
+        if self.conflicting:
+            return f"conflicting: {what} contradict{ending} {partners}"
+        return (
+            f"redundant: {what} repeat{ending} what {partners} demand, harmless as long as the "
+            "lengths are exact"
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What removes it, as a request."""
+        if self.is_driver:
+            return f"remove the driver {self.constraint}: nothing is left for it to move"
+        if not self.conflicting:
+            return self._removal
+        return f"correct the lengths, points or values of {self.constraint}, or {self._removal}"
+
+    @property
+    def _removal(self) -> str:
+        called = f"the {self.kind} {self.constraint}"
+        kept = listed(self.others)
+        if self.kind == "Equation":
+            return f"leave out {listed(self.equations)}"
+        if not self.others:
+            return f"remove {called}"
+        if self.kind == "Revolute":
+            return (
+                f"replace {called} by a point on a line: a {self.instead} with value 0 keeps "
+                f"{kept}, a RevoluteTranslational or a Distance does as well"
+            )
+        if self.instead:
+            return f"replace {called} by a {self.instead}, which keeps {kept}"
+        return f"replace {called} by a constraint that demands {kept} alone, such as an Equation"
+
+
+@dataclass(frozen=True, slots=True)
+class MissingDriver:
+    """A driver that would take a degree of freedom away.
+
+    Attributes
+    ----------
+    kind
+        Its type, as ``"AbsoluteAngle"``; ``"Equation"`` for a coordinate that belongs to no body.
+    drives
+        Name of the body, or of the coordinate.
+    """
+
+    kind: str
+    drives: str
+
+    @property
+    def text(self) -> str:
+        """The driver in words."""
+        if self.kind == "Equation":
+            return f"an equation that gives {self.drives}"
+        return f"{self.kind} of {self.drives}"
+
+
+def surpluses(system: ConstraintSystem, ranks: RankReport) -> tuple[Surplus, ...]:
+    """Return the constraints that have redundant equations, then those with conflicting ones."""
+    return tuple(
+        _surplus(system, ranks, item, [row for row in rows if row in own], conflicting)
+        for conflicting, rows in ((False, ranks.redundant), (True, ranks.conflicting))
+        for item, first in zip(system.constraints, system.row_offsets, strict=True)
+        for own in [range(first, first + len(item.equation_names))]
+        if any(row in own for row in rows)
+    )
+
+
+def _surplus(
+    system: ConstraintSystem,
+    ranks: RankReport,
+    item: Joint | FreeEquation,
+    rows: list[int],
+    conflicting: bool,
+) -> Surplus:
+    kind = item.template.type_name if isinstance(item, Joint) else "Equation"
+    names = tuple(system.equations[row] for row in rows)
+    lost = tuple(name.removeprefix(f"{item.name}.") for name in names)
+    dependent = {system.equations[row] for row in ranks.partners}
+    partners = {system.equations[other] for row in rows for other in ranks.partners[row]}
+    repeats = [other.name for other in system.constraints if partners & set(other.equation_names)]
+    return Surplus(
+        item.name,
+        kind,
+        item.is_driver,
+        names,
+        conflicting,
+        tuple(repeats),
+        tuple(name for name in item.equation_names if name not in dependent),
+        SIMPLER.get((kind, lost), ""),
+    )
+
+
+def missing_drivers(system: ConstraintSystem, ranks: RankReport) -> tuple[MissingDriver, ...]:
+    """Return a driver for each degree of freedom: with all of them, nothing may move by itself."""
+    count = 3 * len(system.bodies)
+    return tuple(
+        MissingDriver(DRIVEN_BY[column % 3], system.bodies[column // 3].name)
+        if column < count
+        else MissingDriver("Equation", system.coordinates[column].name)
+        for column in ranks.drive
+    )
+
+
+def least_squares_will_do(system: ConstraintSystem, ranks: RankReport) -> bool:
+    """Return whether there are too many equations, but all that are too many agree with the others.
+
+    Without a driver nothing moves, and too many equations are a mistake rather than a special
+    geometry.
+    """
+    n, m = len(system.coordinates), len(system.equations)
+    agree = ranks.assembled and ranks.rank == n and len(ranks.redundant) == m - n
+    return m > n and agree and any(item.is_driver for item in system.constraints)

@@ -1,0 +1,247 @@
+"""What is found in a system, as plain text tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.names import listed
+from kincompile.tables import counted, indented, table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from kincompile.model.bodies import Coordinate
+    from kincompile.structure.findings import ConstraintEntry, Findings, Mobility
+
+WIDEST_PATTERN = 45
+"""Columns of Phi_q up to which the pattern is drawn; beyond, each row names its coordinates."""
+
+MISSED, SMALL = 8, 1e-3
+"""How many equations that are missed, and bodies, are named; those far smaller than the largest are
+not."""
+
+IN_A_ROW = 9
+"""How many equations and coordinates of a block are named: the coordinates of three bodies."""
+
+
+def report_text(found: Findings) -> str:
+    """Give everything as plain text tables; rows and columns count from 0."""
+    sections = {
+        "Bodies": _bodies(found),
+        "Other coordinates": _others(found),
+        "Parameters": _parameters(found),
+        "Constraints": _constraints(found),
+        "Mobility": _mobility_lines(found),
+        "Structure of Phi_q": list(_structure(found)),
+        "What to do": list(_advice(found)),
+        "Order of solution": _blocks(found),
+        "Pattern of Phi_q": _pattern(found),
+    }
+    filled = [[title, *indented(lines)] for title, lines in sections.items() if lines]
+    return "\n\n".join("\n".join(lines) for lines in [[_title(found)], *filled])
+
+
+def _title(found: Findings) -> str:
+    m, n = len(found.equations), len(found.coordinates)
+    return f"{found.name}: {counted(n, 'coordinate')}, {counted(m, 'equation')}"
+
+
+def _bodies(found: Findings) -> list[str]:
+    rows = [
+        [
+            body.name,
+            f"{3 * k}-{3 * k + 2}",
+            *_names_and_guesses(found.coordinates[3 * k : 3 * k + 3]),
+        ]
+        for k, body in enumerate(found.bodies)
+    ]
+    return table(("body", "columns", "coordinates", "guess"), rows) if rows else []
+
+
+def _names_and_guesses(coordinates: Sequence[Coordinate]) -> tuple[str, str]:
+    names = ", ".join(_with_unit(item.name, item.unit) for item in coordinates)
+    return names, ", ".join(f"{item.guess:.6g}" for item in coordinates)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _others(found: Findings) -> list[str]:
+    first = 3 * len(found.bodies)
+    rows = [
+        [str(column), *_names_and_guesses([item])]
+        for column, item in enumerate(found.coordinates[first:], first)
+    ]
+    return table(("column", "coordinate", "guess"), rows, right=("column",)) if rows else []
+
+
+def _parameters(found: Findings) -> list[str]:
+    rows = [[item.name, f"{item.default:.10g}", item.unit] for item in found.parameters]
+    return table(("parameter", "default", "unit"), rows) if rows else []
+
+
+def _constraints(found: Findings) -> list[str]:
+    rows = [
+        [_row_range(item), item.name, _kind(item), item.source, item.text]
+        for item in found.constraints
+    ]
+    return table(("rows", "constraint", "type", "source", "between"), rows)
+
+
+def _kind(item: ConstraintEntry) -> str:
+    return f"{item.kind} (driver)" if item.is_driver else item.kind
+
+
+def _row_range(item: ConstraintEntry) -> str:
+    last = item.first_row + len(item.equations) - 1
+    return str(last) if last == item.first_row else f"{item.first_row}-{last}"
+
+
+def _mobility_lines(found: Findings) -> list[str]:
+    count = found.mobility
+    drivers = ", ".join(item.name for item in found.constraints if item.is_driver)
+    terms = [
+        (count.coordinates, "coordinates", _origin(count)),
+        (-count.joint_equations, "joint equations", ""),
+        (count.degrees_of_freedom, "degrees of freedom", "by Gruebler's count"),
+        (-count.driver_equations, "driver equations", drivers),
+        (count.undriven, "left over", _meaning(count.undriven)),
+    ]
+    width = max(len(str(number)) for number, _, _ in terms)
+    rows = [[f"{number:{width}d}", what, note] for number, what, note in terms]
+    return table(("", "", ""), rows)[1:]
+
+
+def _meaning(undriven: int) -> str:
+    if not undriven:
+        return ""
+    return "drivers are missing" if undriven > 0 else "more equations than coordinates"
+
+
+def _origin(count: Mobility) -> str:
+    bodies = f"3 for each of {count.bodies} bodies" if count.bodies else ""
+    others = f"{count.others} that belong to no body" if count.others else ""
+    return ", ".join(part for part in (bodies, others) if part)
+
+
+def _structure(found: Findings) -> Iterator[str]:
+    m, n = len(found.equations), len(found.coordinates)
+    yield f"{m} x {n}, {len(found.pattern)} of {m * n} entries are not identically zero"
+    yield f"structural rank {found.structural_rank} of {min(m, n)}"
+    yield from _parts(found)
+    states = "generic assembled states" if found.is_assembled else "generic states"
+    yield f"rank {found.rank} at {states}: {_left(found)}"
+
+
+def _parts(found: Findings) -> Iterator[str]:
+    """Yield what the pattern alone says, by bodies and constraints."""
+    many, few = found.too_many, found.too_few
+    surplus = len(many.equations) - len(many.coordinates)
+    if surplus:
+        yield (
+            f"too many equations: {listed(found.constraints_of(many.equations))} have "
+            f"{len(many.equations)} for the {len(many.coordinates)} coordinates of "
+            f"{listed(found.owners_of(many.coordinates))}; {surplus} of them can never be "
+            "independent"
+        )
+    if few.coordinates:
+        held_by = found.constraints_of(few.equations)
+        equations = counted(len(few.equations), "equation")
+        yield (
+            f"too few equations: {listed(found.owners_of(few.coordinates))} have "
+            f"{len(few.coordinates)} coordinates, and {equations} for them"
+            + (f" ({listed(held_by)})" if held_by else "")
+        )
+
+
+def _left(found: Findings) -> str:
+    """Say what may still move."""
+    if not found.degrees_of_freedom:
+        return "nothing may move by itself"
+    free = counted(found.degrees_of_freedom, "degree")
+    return f"{free} of freedom left to {listed(found.free)}"
+
+
+def _advice(found: Findings) -> Iterator[str]:
+    """Yield what is wrong, and what to do."""
+    for item in found.surpluses:
+        yield f"{item.text}. Remedy: {item.remedy}."
+    if found.missing_drivers:
+        drivers = listed(item.text for item in found.missing_drivers)
+        what = "drivers are" if len(found.missing_drivers) > 1 else "a driver is"
+        yield f"{what} missing: add, for instance, {drivers}, as a function of kc.t."
+    if not found.is_assembled:
+        yield _unassembled(found)
+    if found.problem:
+        yield found.problem
+
+
+def _unassembled(found: Findings) -> str:
+    """Say by how much which equations are missed at the nearest position, and what to do."""
+    sizes = sorted(zip(map(abs, found.residuals), found.equations, strict=True), reverse=True)
+    missed = [
+        f"{name} by {size:.3g}" for size, name in sizes[:MISSED] if size > SMALL * sizes[0][0]
+    ]
+    places = listed(_places(found), MISSED)
+    return (
+        "cannot be assembled at t = 0, or not from this guess: at the nearest position found, "
+        f"these equations are missed: {listed(missed)}. There: {places}. Change the lengths or "
+        "the drivers so that the links reach each other, or give a guess nearer to the assembled "
+        "mechanism."
+    )
+
+
+def _places(found: Findings) -> Iterator[str]:
+    """Yield where each body is at the nearest position, and what the other coordinates are."""
+    bodies = len(found.bodies)
+    for k, body in enumerate(found.bodies):
+        x, y, phi = found.nearest[3 * k : 3 * k + 3]
+        yield f"{body.name} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+    for item, value in zip(
+        found.coordinates[3 * bodies :], found.nearest[3 * bodies :], strict=True
+    ):
+        yield f"{item.name} = {value:.4g}"
+
+
+def _blocks(found: Findings) -> list[str]:
+    rows = [
+        [str(k), listed(block.coordinates, IN_A_ROW), listed(block.equations, IN_A_ROW)]
+        for k, block in enumerate(found.blocks, 1)
+    ]
+    return table(("step", "coordinates", "by equations"), rows, right=("step",)) if rows else []
+
+
+def _pattern(found: Findings) -> list[str]:
+    if len(found.coordinates) > WIDEST_PATTERN:
+        return _listed_pattern(found)
+    filled = set(found.pattern)
+    groups = list(_groups(found))
+    rows = [["", *(" ".join(labels) for _, _, labels in groups)]] if found.bodies else []
+    for row, name in enumerate(found.equations):
+        marks = [
+            " ".join(
+                ("*" if (row, column) in filled else ".").ljust(len(label))
+                for column, label in enumerate(labels, first)
+            )
+            for _, first, labels in groups
+        ]
+        rows.append([name, *marks])
+    return table(("", *(title for title, _, _ in groups)), rows)
+
+
+def _groups(found: Findings) -> Iterator[tuple[str, int, tuple[str, ...]]]:
+    """Yield title, first column and labels of the columns that stand together."""
+    bodies = len(found.bodies)
+    for k, body in enumerate(found.bodies):
+        yield body.name, 3 * k, ("x", "y", "phi")
+    for column, item in enumerate(found.coordinates[3 * bodies :], 3 * bodies):
+        yield item.name, column, ("",)
+
+
+def _listed_pattern(found: Findings) -> list[str]:
+    names: dict[int, list[str]] = {row: [] for row in range(len(found.equations))}
+    for row, column in found.pattern:
+        names[row].append(found.coordinates[column].name)
+    rows = [[equation, ", ".join(names[row])] for row, equation in enumerate(found.equations)]
+    return table(("equation", "coordinates"), rows)
