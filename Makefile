@@ -66,10 +66,10 @@ demo: $(DEMO_READY)
 	@echo "  demo/wrecker_boom.csv            position, velocity and acceleration over time"
 
 test: $(TEST_READY)
-	@$(PYTEST)
+	@$(PYTEST) --numprocesses=auto
 
 test-slow: $(PAGES_READY)
-	@$(PYTEST) -m slow
+	@$(PYTEST) --numprocesses=auto -m slow
 
 lint: $(LINT_READY)
 	@$(BIN)/ruff check --quiet
