@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from kincompile.model.resolve import Joint
@@ -122,37 +123,38 @@ class MissingDriver:
 
 def surpluses(system: ConstraintSystem, ranks: RankReport) -> tuple[Surplus, ...]:
     """Return the constraints that have redundant equations, then those with conflicting ones."""
-    return tuple(
-        _surplus(system, ranks, item, [row for row in rows if row in own], conflicting)
-        for conflicting, rows in ((False, ranks.redundant), (True, ranks.conflicting))
-        for item, first in zip(system.constraints, system.row_offsets, strict=True)
-        for own in [range(first, first + len(item.equation_names))]
-        if any(row in own for row in rows)
-    )
+    names = system.equations
+    owner = [item for item in system.constraints for _ in item.equation_names]
+    dependent = {names[row] for row in ranks.partners}
+    found: list[Surplus] = []
+    for conflicting, rows in ((False, ranks.redundant), (True, ranks.conflicting)):
+        for item, members in groupby(rows, key=lambda row: owner[row]):
+            own = list(members)
+            partners = sorted({other for row in own for other in ranks.partners[row]})
+            found.append(
+                _surplus(
+                    item,
+                    tuple(names[row] for row in own),
+                    conflicting,
+                    tuple(dict.fromkeys(owner[other].name for other in partners)),
+                    tuple(name for name in item.equation_names if name not in dependent),
+                )
+            )
+    return tuple(found)
 
 
 def _surplus(
-    system: ConstraintSystem,
-    ranks: RankReport,
     item: Joint | FreeEquation,
-    rows: list[int],
+    equations: tuple[str, ...],
     conflicting: bool,
+    repeats: tuple[str, ...],
+    others: tuple[str, ...],
 ) -> Surplus:
     kind = item.template.type_name if isinstance(item, Joint) else "Equation"
-    names = tuple(system.equations[row] for row in rows)
-    lost = tuple(name.removeprefix(f"{item.name}.") for name in names)
-    dependent = {system.equations[row] for row in ranks.partners}
-    partners = {system.equations[other] for row in rows for other in ranks.partners[row]}
-    repeats = [other.name for other in system.constraints if partners & set(other.equation_names)]
+    lost = tuple(name.removeprefix(f"{item.name}.") for name in equations)
+    instead = SIMPLER.get((kind, lost), "")
     return Surplus(
-        item.name,
-        kind,
-        item.is_driver,
-        names,
-        conflicting,
-        tuple(repeats),
-        tuple(name for name in item.equation_names if name not in dependent),
-        SIMPLER.get((kind, lost), ""),
+        item.name, kind, item.is_driver, equations, conflicting, repeats, others, instead
     )
 
 
