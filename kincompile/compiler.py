@@ -34,6 +34,7 @@ from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
 from kincompile.ir.redundancy import rank_report, redundancy_warning, redundant_equations
 from kincompile.model.mechanism import Mechanism
+from kincompile.model.origins import remember_model
 from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed
 from kincompile.runtime.load import from_source
@@ -169,12 +170,13 @@ def compile(  # noqa: A001 - the public name kc.compile
             f"only modules of the targets {listed(LOADABLE)} can be loaded, not {target!r}; "
             f"kc.emit(model, {target!r}).write(folder) gives the files"
         )
-    emitted = emit(model, target, form)
+    system = _checked(model)
+    emitted = emit(system, target, form)
     if target == "numpy":
-        return from_source(emitted.source, model.name, emitted.arrays)
+        return remember_model(from_source(emitted.source, system.name, emitted.arrays), system)
     # The NumPy module has the constants, the checks and the careful march of the compiled one.
-    module = from_source(emit(model, form="inline").source, model.name)
-    return make_native(module, emitted.files)
+    module = from_source(emit(system, form="inline").source, system.name)
+    return remember_model(make_native(module, emitted.files), system)
 
 
 def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
