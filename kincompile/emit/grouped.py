@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.emit.functions import schedule
-from kincompile.emit.layout import indented, wrapped
+from kincompile.emit.layout import indented, quoted, wrapped
 from kincompile.emit.naming import NameTable
 from kincompile.emit.numpy_solve import solve_functions
 from kincompile.emit.numpy_target import (
@@ -22,6 +22,7 @@ from kincompile.emit.numpy_target import (
     array_functions,
     function_body,
     scalar_functions,
+    shared_text,
 )
 from kincompile.emit.solving import schedule_solve
 from kincompile.emit.target import Emitted
@@ -57,6 +58,9 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
     arrays["coordinates"] = _text([item.name for item in program.coordinates])
     arrays["units"] = _text([item.unit for item in program.coordinates])
     arrays["equations"] = _text(program.equations)
+    for name, spline in program.tables.items():
+        arrays[f"{name}.breaks"] = np.array(spline.breaks)
+        arrays[f"{name}.coefficients"] = np.array(spline.coefficients)
     arrays["guess"] = np.array([item.guess for item in program.coordinates])
     stages = plan_stages(rows, columns, constants, len(program.equations))
     if stages is None:
@@ -252,9 +256,16 @@ def _data(
         "n": len(program.coordinates),
         "m": len(program.equations),
         "nonzeros": nonzeros,
-        "parameters": indented(wrapped([f'"{item.name}"' for item in program.parameters])),
+        "k": len(program.parameters),
+        "redundant": indented(quoted(program.redundant)),
+        "is_planned": bool(solving),
+        "parameters": indented(quoted([item.name for item in program.parameters])),
         "parameter_units": indented(
-            [f'"{item.name}": "{item.unit}",' for item in program.parameters]
+            [f"{item.name!r}: {item.unit!r}," for item in program.parameters]
+        ),
+        "tables": "\n".join(
+            f'{name} = _data["{name}.breaks"], _data["{name}.coefficients"]'
+            for name in program.tables
         ),
         "defaults": indented(wrapped([repr(item.default) for item in program.parameters])),
         "scalar_functions": indented(scalar_functions(called)),
@@ -262,6 +273,7 @@ def _data(
         "kernels": "\n".join(code),
         "groups": indented(line for lines in tables for line in lines),
         "stages": indented(solving),
+        **shared_text(),
     }
 
 

@@ -41,10 +41,22 @@ def rich_model() -> kc.Mechanism:
     return rich_mechanism()
 
 
+@pytest.fixture(scope="session", params=["inline", "grouped"])
+def form(request: pytest.FixtureRequest) -> str:
+    """Both forms of a module keep the same contract."""
+    return str(request.param)
+
+
 @pytest.fixture(scope="session")
-def rich() -> Any:
+def rich(form: str) -> Any:
     """A module with two parameters."""
-    return kc.compile(rich_mechanism())
+    return kc.compile(rich_mechanism(), form=form)
+
+
+@pytest.fixture(scope="session")
+def written_out() -> Any:
+    """The module of `rich` whose constraints are written out one by one."""
+    return kc.compile(rich_mechanism(), form="inline")
 
 
 @pytest.fixture(scope="session")
@@ -54,14 +66,14 @@ def tabled_model() -> kc.Mechanism:
 
 
 @pytest.fixture(scope="session")
-def tabled() -> Any:
+def tabled(form: str) -> Any:
     """A module without parameters, with a spline."""
-    return kc.compile(table_mechanism())
+    return kc.compile(table_mechanism(), form=form)
 
 
 @pytest.fixture(scope="session")
-def risky() -> Any:
+def risky(form: str) -> Any:
     """A module whose functions have limited domains."""
     x, y, z = sympy.symbols("x y z")
     equations = [sympy.sqrt(x - 2) - y, sympy.log(y) + 1 / z, sympy.exp(z) - x ** sympy.Float(1.5)]
-    return kc.compile(kc.ConstraintSystem("risky", "x y z", equations))
+    return kc.compile(kc.ConstraintSystem("risky", "x y z", equations), form=form)

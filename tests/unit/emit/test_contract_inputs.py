@@ -233,7 +233,7 @@ def test_that_outside_a_domain_point_and_batch_agree(risky: Any, point: Any) -> 
     assert not np.isfinite(risky.Phi(np.array(point), 0.0)).all()
 
 
-def test_that_cosine_and_sine_are_accurate_at_every_angle(rich: Any) -> None:
+def test_that_cosine_and_sine_are_accurate_at_every_angle(written_out: Any) -> None:
     """Through tan(angle / 2) they are, also where it has its pole."""
     rng = np.random.default_rng(4)
     quarters = np.arange(-8, 9) * (np.pi / 2)
@@ -241,7 +241,7 @@ def test_that_cosine_and_sine_are_accurate_at_every_angle(rich: Any) -> None:
     angles = np.hstack(
         [quarters, *beside, rng.uniform(-20, 20, 300), rng.uniform(-1e8, 1e8, 300), 1e-300, 1e-9]
     )
-    cosine, sine = rich.ARRAYS.cos_sin(angles)
+    cosine, sine = written_out.ARRAYS.cos_sin(angles)
     with mpmath.workdps(40):
         exact = [(float(mpmath.cos(angle)), float(mpmath.sin(angle))) for angle in angles.tolist()]
     assert np.abs(cosine - np.array(exact)[:, 0]).max() < 4e-16

@@ -152,12 +152,12 @@ def test_that_the_planned_solve_takes_batches(rich: Any, batch: tuple[int, ...])
     np.testing.assert_allclose(left, b, rtol=1e-9, atol=1e-9)
 
 
-def test_that_the_lanes_run_on_floats_and_on_arrays(rich: Any) -> None:
+def test_that_the_lanes_run_on_floats_and_on_arrays(written_out: Any) -> None:
     q, q_dot, t, p = arguments("kinematics", ((3,), (3,), (), ()))
-    kernel = rich.LANES["kinematics"]
-    arrays = kernel(rich.ARRAYS, list(q.T), list(q_dot.T), t, list(p))
+    kernel = written_out.LANES["kinematics"]
+    arrays = kernel(written_out.ARRAYS, list(q.T), list(q_dot.T), t, list(p))
     for k in range(3):
-        floats = kernel(rich.FLOATS, q[k].tolist(), q_dot[k].tolist(), float(t), p.tolist())
+        floats = kernel(written_out.FLOATS, q[k].tolist(), q_dot[k].tolist(), float(t), p.tolist())
         assert all(isinstance(value, float | int) for value in floats)
         taken = [np.broadcast_to(value, 3)[k] for value in arrays]
         np.testing.assert_allclose(floats, taken, rtol=1e-13, atol=1e-13)

@@ -4,6 +4,7 @@ import ast
 
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
 from kincompile.ir.grouping import group
@@ -57,6 +58,51 @@ def test_every_example_has_the_same_numbers_in_both_forms(example):
     np.testing.assert_allclose(
         grouped.gamma(q, q_dot, t), written_out.gamma(q, q_dot, t), rtol=1e-12, atol=1e-12
     )
+
+
+@pytest.mark.parametrize("batch", [(), (3,)], ids=["point", "batch"])
+def test_a_complex_step_gives_the_jacobian(rich, batch):
+    rng = np.random.default_rng(9)
+    q, step = rng.normal(size=(*batch, rich.N_COORDINATES)), 1e-30
+    shifted = q[..., np.newaxis, :] + 1j * step * np.eye(rich.N_COORDINATES)
+    by_column = rich.Phi(shifted, 0.3).imag / step
+    np.testing.assert_allclose(np.swapaxes(by_column, -1, -2), rich.Phi_q(q, 0.3), atol=1e-13)
+    by_time = rich.Phi(q, 0.3 + 1j * step).imag / step
+    np.testing.assert_allclose(-by_time, rich.nu(q, 0.3), rtol=1e-13, atol=1e-13)
+    by_parameter = rich.Phi(q, 0.3, rich.DEFAULTS + 1j * step * np.array([1, 0])).imag / step
+    assert np.abs(by_parameter).max() > 0.01
+
+
+def test_the_planned_solve_is_nan_where_a_matrix_is_singular():
+    x, y = sympy.symbols("x y")
+    m = kc.ConstraintSystem("turned", "x y", [x**2 - kc.t, x * y - 1])
+    module = kc.compile(m, form="grouped")
+    q = np.array([(2.0, 1.0), (0.0, 1.0)])
+    found = module.solve(module.Phi_q_nonzeros(q, 0.0), np.ones(2))
+    np.testing.assert_allclose(found[0], np.linalg.solve(module.Phi_q(q[0], 0.0), np.ones(2)))
+    assert np.isnan(found[1]).all()
+
+
+def test_the_frames_of_a_point_are_those_of_its_angles():
+    """They are kept from call to call; a position that is changed in place is another."""
+    module = kc.compile(loops(2, "angle"), form="grouped")
+    q = module.GUESS.copy()
+    before = module.Phi(q, 0.1)
+    q[2] += 0.5
+    after = module.Phi(q, 0.1)
+    assert np.abs(after - before).max() > 0.1
+    np.testing.assert_array_equal(after, module.Phi(q[np.newaxis], 0.1)[0])
+
+
+def test_an_evaluation_may_fill_the_arrays_of_an_earlier_one():
+    module = kc.compile(loops(3, "equation"), form="grouped")
+    q = module.GUESS + 0.1
+    out = module.evaluate(module.GUESS, 0.1)
+    Phi, nonzeros = module.evaluate(q, 0.2, out=out)
+    assert Phi is out[0]
+    assert nonzeros is out[1]
+    np.testing.assert_array_equal(Phi, module.Phi(q, 0.2))
+    np.testing.assert_array_equal(nonzeros, module.Phi_q_nonzeros(q, 0.2))
 
 
 @pytest.mark.parametrize("link", ["angle", "equation", "rocker"])
