@@ -1193,7 +1193,6 @@ static size_t step(block *b, const scales *s, const state *from, size_t count, o
 static int advance(block *b, const scales *s, state *at, double t, outcome *o)
 {
     const double smallest = fabs(t - at->t) * SMALLEST_PART;
-    const double too_near = fmax(TOO_NEAR, 10 * at->sensitivity);
     double h = 0.5 * (t - at->t);
     int iterations = 0;
     for (int k = 0; k < MAX_SUBSTEPS; k++) {
@@ -1201,7 +1200,8 @@ static int advance(block *b, const scales *s, state *at, double t, outcome *o)
         b->t[0] = whole ? t : at->t + h;
         size_t good = step(b, s, at, 1, o);
         iterations += o->iterations[0];
-        if (good && !whole && o->sensitivity[0] > too_near) {
+        // A state that is too near already may be gone away from, not towards the singularity.
+        if (good && !whole && o->sensitivity[0] > fmax(TOO_NEAR, at->sensitivity)) {
             o->status[0] = GEAR_TRAIN_SINGULAR;
             good = 0;
         }

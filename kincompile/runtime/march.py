@@ -150,13 +150,14 @@ def leaves_branch(equations: Problem, t: float, guess: Point, found: Point) -> b
 def advance(equations: Problem, state: State, t: float, inputs: Inputs) -> Outcome:
     """Follow the motion from a good point to time `t`, in sub-steps where need be."""
     step, iterations = t - state.t, 0
-    too_near = max(TOO_NEAR, 10 * state.sensitivity)
     smallest = abs(step) * SMALLEST_PART
     status = Status.NOT_CONVERGED
     for _ in range(MAX_SUBSTEPS):
         whole = abs(step) >= abs(t - state.t)
         outcome = _step(equations, state, t if whole else state.t + step, inputs)
         iterations += outcome.iterations
+        # A state that is too near already may be gone away from, but not towards the singularity.
+        too_near = max(TOO_NEAR, state.sensitivity)
         near = outcome.state is not None and outcome.state.sensitivity > too_near
         status = Status.SINGULAR if near and not whole else outcome.status
         if whole and outcome.position:
