@@ -51,15 +51,17 @@ class Pin:
 
 @dataclass(frozen=True, slots=True)
 class Rail:
-    """A straight piece of a frame, from start to end, on which something slides or rolls.
+    """A straight piece of a frame, from start to end along an axis of unit length.
 
-    `style` is "guide" (a track), "rack" (the pitch line of a rack) or "face" (of a follower).
+    Something slides or rolls on it: `style` is "guide" (a track), "rack" (the pitch line of a rack)
+    or "face" (of a follower).
     """
 
     joint: str
     frame: int
     start: Point
     end: Point
+    axis: Point
     style: str
 
 

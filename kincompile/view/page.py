@@ -11,6 +11,7 @@ from kincompile.compiler import compile as compile_model
 from kincompile.emit.templates import fill, read
 from kincompile.errors import StructuralError
 from kincompile.runtime.solve import solve
+from kincompile.view.newton import newton_script
 from kincompile.view.page_data import Motion, page_json
 
 if TYPE_CHECKING:
@@ -18,12 +19,12 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.solution import Solution
 
-STYLES = ("vendor/uplot.css", "style.css")
+STYLES = ("vendor/uplot.css", "style.css", "newton.css")
 """Style sheets, in order."""
 
 SCRIPTS = (
     "vendor/uplot.js", "player.js", "draw.js", "stage.js", "plots.js", "tables.js", "newton.js",
-    "start.js",
+    "newton_tables.js", "newton_stage.js", "newton_panel.js", "start.js",
 )  # fmt: skip
 """Scripts, in order: each uses those before it."""
 
@@ -55,7 +56,7 @@ def page(model: Mechanism | ConstraintSystem, solution: Solution | None = None) 
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "licence": read("view/vendor/uplot.LICENSE.txt"),
-        "scripts": [read(f"view/{name}") for name in SCRIPTS],
+        "scripts": [newton_script(system), *(read(f"view/{name}") for name in SCRIPTS)],
         "data": page_json(system, motion),
     }
     return fill("view/page.html.jinja", data)

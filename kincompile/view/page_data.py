@@ -123,9 +123,7 @@ def _motion_arrays(
     return arrays, solution.status.tolist(), events
 
 
-def residuals(
-    module: ModuleType | None, shapes: Drawing, q: Array, t: Array, p: Array
-) -> Array:
+def residuals(module: ModuleType | None, shapes: Drawing, q: Array, t: Array, p: Array) -> Array:
     """Return the norm of each constraint's rows of Phi, shape (N, constraints).
 
     NaN where there is no module, or Phi is not finite.

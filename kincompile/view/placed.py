@@ -53,15 +53,12 @@ class Scene:
         Positions that rails must fit; all finite.
     bearings
         The point of each frame at which it first hangs on the ground or on another body.
-    size
-        A length in which marks are measured, about a fiftieth of the mechanism.
     """
 
     values: Mapping[str, float]
     frames: Mapping[str, int]
     q: Array
     bearings: Mapping[int, Place]
-    size: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,13 +165,12 @@ class Placed:
             Interval along the axis that it covers in any case.
         """
         along = _along(self.scene.q, base, axis, follower)
-        margin = 3 * self.scene.size
-        ends = [along.min() - margin, along.max() + margin, *(at_least or ())]
+        ends = [along.min(), along.max(), *(at_least or ())]
         x, y = base.point[0] - offset * axis[1], base.point[1] + offset * axis[0]
         low, high = float(min(ends)), float(max(ends))
         start = (x + low * axis[0], y + low * axis[1])
         end = (x + high * axis[0], y + high * axis[1])
-        return Rail(self.name, base.frame, start, end, style)
+        return Rail(self.name, base.frame, start, end, axis, style)
 
 
 def number(value: Scalar, values: Mapping[str, float]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,6 +42,12 @@ if TYPE_CHECKING:
 
 PARTS = 50
 """Marks are measured in this part of the mechanism's diagonal."""
+
+PITCH_LINE = ("s_P", "s_Q")
+"""Symbols of the points between which a rack is drawn."""
+
+OVERHANG = 3
+"""How far a guide goes on beyond the motion, in sizes of marks."""
 
 SAME_POINT = 1e-9
 """Distance, relative to the coordinates, up to which two points of a body are one."""
@@ -108,17 +114,7 @@ class Drawing:
         q : array_like, shape (n,) or (N, n)
             Positions; those that are not finite are left out.
         """
-        positions = _finite(q)
-        corners = [
-            world(positions, place) + offset
-            for mark in self.marks
-            for place, radius in _reach(mark)
-            for offset in ((-radius, -radius), (radius, radius))
-        ]
-        if not corners or not len(positions):
-            return -1.0, 1.0, -1.0, 1.0
-        points = np.concatenate(corners)
-        (x_low, y_low), (x_high, y_high) = points.min(axis=0), points.max(axis=0)
+        (x_low, y_low), (x_high, y_high) = _box(self.marks, _finite(q))
         pad = 2 * self.size
         return float(x_low - pad), float(x_high + pad), float(y_low - pad), float(y_high + pad)
 
@@ -161,23 +157,25 @@ def drawing(
     values = {item.name: item.default or 0.0 for item in system.parameters} | dict(p or {})
     joints = [item for item in system.constraints if isinstance(item, Joint)]
     attached = _attached(joints, frames, values)
-    scene = Scene(values, frames, positions, _bearings(joints, frames, values),
-                  _size(positions, attached))  # fmt: skip
-    placed = {joint.name: Placed(joint, scene) for joint in joints}
-    marks = [mark for joint in joints for mark in marks_of(joint.written, placed[joint.name])]
-    links = _links(len(frames), attached, marks)
+    scene = Scene(values, frames, positions, _bearings(joints, frames, values))
+    marks = {joint.name: marks_of(joint.written, Placed(joint, scene)) for joint in joints}
+    drawn = _uncovered(itertools.chain(*marks.values()))
+    drawn = [*_links(len(frames), attached, drawn), *drawn]
+    size = _size(drawn, positions)
     labels = [
         JointLabel(
             item.name,
             item.template.type_name if isinstance(item, Joint) else "Equation",
-            _place_of(item, frames, values, scene) if isinstance(item, Joint) else None,
+            _pointed_at(marks[item.name], _attached([item], frames, values))
+            if isinstance(item, Joint)
+            else None,
             item.is_driver,
             (first, len(item.equation_names)),
         )
         for item, first in zip(system.constraints, system.row_offsets, strict=True)
     ]
-    ordered = sorted([*links, *marks], key=_depth)
-    return Drawing(system.name, tuple(frames), tuple(ordered), tuple(labels), scene.size)
+    ordered = sorted((_lengthened(mark, OVERHANG * size) for mark in drawn), key=_depth)
+    return Drawing(system.name, tuple(frames), tuple(ordered), tuple(labels), size)
 
 
 def _finite(q: ArrayLike) -> Array:
@@ -189,12 +187,12 @@ def _finite(q: ArrayLike) -> Array:
 def _attached(
     joints: Iterable[Joint], frames: Mapping[str, int], values: Mapping[str, float]
 ) -> list[Place]:
-    """Return every point that a constraint holds, in its frame."""
+    """Return every point that a constraint holds, in its frame; a rack shows its own."""
     return [
         Place(frame_of(joint, item.symbol, frames), number_pair(joint.points[item.symbol], values))
         for joint in joints
         for item in joint.written.arguments().values()
-        if item.kind is Kind.POINT
+        if item.kind is Kind.POINT and item.symbol not in PITCH_LINE
     ]
 
 
@@ -210,23 +208,56 @@ def _bearings(
     return found
 
 
-def _place_of(
-    joint: Joint, frames: Mapping[str, int], values: Mapping[str, float], scene: Scene
-) -> Place:
-    """Return where a joint is pointed at: at its last point on a moving body."""
-    moving = [place for place in _attached([joint], frames, values) if place.frame != GROUND_FRAME]
-    return moving[-1] if moving else Placed(joint, scene).bearing()
+def _pointed_at(marks: Iterable[Mark], attached: Iterable[Place]) -> Place | None:
+    """Return where a joint is pointed at: at its pin or drive, else at its last moving point."""
+    pins = [mark.second for mark in marks if isinstance(mark, Pin)]
+    drives = [mark.place for mark in marks if isinstance(mark, Drive)]
+    moving = [place for place in attached if place.frame != GROUND_FRAME]
+    found = pins or drives or moving
+    return found[-1] if found else None
 
 
-def _size(q: Array, attached: Iterable[Place]) -> float:
-    """Return a part of the diagonal of what the joints reach; of one point, of a unit square."""
-    points = [world(q, place) for place in attached]
-    points += [q[:, :2]] if q.shape[1] > 1 else []
-    if not points:
-        return 1.0 / PARTS
-    every = np.concatenate(points)
-    diagonal = float(np.hypot(*(every.max(axis=0) - every.min(axis=0))))
-    return (diagonal or 1.0) / PARTS
+def _box(marks: Iterable[Mark], q: Array) -> tuple[Array, Array]:
+    """Return the lower left and the upper right corner of what marks reach at positions q."""
+    corners = [
+        world(q, place) + offset
+        for mark in marks
+        for place, radius in _reach(mark)
+        for offset in (-radius, radius)
+    ]
+    if not corners or not len(q):
+        return np.array((-1.0, -1.0)), np.array((1.0, 1.0))
+    points = np.concatenate(corners)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _size(marks: Iterable[Mark], q: Array) -> float:
+    """Return a part of the diagonal of what marks reach; of a single point, of a unit length."""
+    low, high = _box(marks, q)
+    return (float(np.hypot(*(high - low))) or 1.0) / PARTS
+
+
+def _lengthened(mark: Mark, overhang: float) -> Mark:
+    """Return a guide with more at both ends, so that what slides on it is not at its end."""
+    if not isinstance(mark, Rail) or mark.style != "guide":
+        return mark
+    start, end = np.array(mark.start), np.array(mark.end)
+    along = overhang * np.array(mark.axis)
+    return replace(mark, start=tuple((start - along).tolist()), end=tuple((end + along).tolist()))
+
+
+def _uncovered(marks: Iterable[Mark]) -> list[Mark]:
+    """Return the marks without the slides, and sleeves, that a cylinder takes the place of."""
+    found = list(marks)
+    spans = [mark for mark in found if isinstance(mark, Span)]
+    cylinders = {(mark.first, mark.second) for mark in spans if mark.style == "cylinder"}
+    covered = {
+        mark.joint
+        for mark in spans
+        if mark.style == "slide" and (mark.first, mark.second) in cylinders
+    }
+    slides = (Span, Block)
+    return [mark for mark in found if not (isinstance(mark, slides) and mark.joint in covered)]
 
 
 def _links(count: int, attached: Iterable[Place], marks: Iterable[Mark]) -> list[Link]:

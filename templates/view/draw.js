@@ -189,11 +189,11 @@ function drawRack(pen, mark, from, to) {
 }
 
 function drawCylinder(pen, mark, first, second) {
-  const colours = pen.colours(GROUND, mark.joint);
   const [, , length] = towards(first, second);
+  const [inner, outer] = [mark.second, mark.first].map(place => pen.colours(place.frame, mark.joint));
   const barrel = Math.min(1, (mark.barrel || 0) * pen.view.scale / (length || 1));
-  pen.plate([first, second], 0.9 * pen.unit, colours, false);
-  pen.plate([first, mixed(first, second, barrel)], 2 * pen.unit, colours, false);
+  pen.plate([first, second], 1.1 * pen.unit, inner, false);
+  pen.plate([first, mixed(first, second, barrel)], 2.1 * pen.unit, outer, false);
 }
 
 function drawTeeth(pen, [x, y], mark, angle, strong) {
@@ -306,6 +306,7 @@ const DRAW = {
       pen.stroke(strong, 1.8);
       return;
     }
+    pen.fill(tint);
     pen.stroke(strong, 1.7 * pen.unit + 2.6);
     pen.stroke(pen.palette.paper, 1.7 * pen.unit);
   },

@@ -136,14 +136,19 @@ function showTip(state) {
   tip.style.top = `${Math.max(2, top)}px`;
 }
 
-/* The joint whose path is longest is traced from the start. */
+/* The longest path is traced from the start: of bodies that are not hung on the ground, where there
+   are such, since the others go in circles. */
 function traceLongest() {
+  const pins = player.data.drawing.marks.filter(mark => mark.kind === 'pin');
+  const hung = new Set(pins.filter(pin => pin.first.frame === GROUND).map(pin => pin.second.frame));
+  const free = stage.points.filter(point => !hung.has(point.frame));
+  const candidates = free.length ? free : stage.points;
   const length = point => {
     const path = pathOf(point).filter(place => place !== null);
     return path.reduce((sum, place, k) => (k ? sum + towards(path[k - 1], place)[2] : 0), 0);
   };
-  const lengths = stage.points.map(length), longest = Math.max(...lengths);
-  if (longest > player.data.drawing.size) stage.traced.add(stage.points[lengths.indexOf(longest)]);
+  const lengths = candidates.map(length), longest = Math.max(...lengths);
+  if (longest > player.data.drawing.size) stage.traced.add(candidates[lengths.indexOf(longest)]);
 }
 
 /* ---- tabs and themes ---- */
@@ -152,7 +157,7 @@ const panels = {
   plots: () => plots.show(),
   numbers: () => numbers.update(player.state),
   points: () => points.update(player.state),
-  newton: () => {},
+  newton: () => {},  // follows the player by itself
 };
 let shownPanel = 'plots';
 
@@ -164,6 +169,7 @@ function showPanel(name) {
     byId(`tab-${other}`).tabIndex = other === name ? 0 : -1;
   }
   panels[name]();
+  player.refresh();  // the stage shows Newton's iterates beside their panel only
 }
 
 function connectTabs() {
@@ -216,7 +222,6 @@ function start() {
   byId('plain').hidden = hasBodies;
   byId('tab-points').hidden = !hasBodies;
   byId('names').parentElement.hidden = !hasBodies;
-  byId('tab-newton').hidden = typeof newtonPanel !== 'function';
   showMessages();
   markTimeline();
   connectTransport();
@@ -230,7 +235,7 @@ function start() {
     stage.listen();
     traceLongest();
   }
-  if (typeof newtonPanel === 'function') newtonPanel(player, stage, byId('panel-newton'));
+  newtonPanel(byId('panel-newton'));
   player.onChange(showState);
   new ResizeObserver(() => {
     stage.resize();
