@@ -3,7 +3,7 @@
 // No document here, so that node can test it.
 
 const newton = (() => {
-  "use strict";
+  'use strict';
 
   const TOLERANCE = 1e-10;  // of the last correction, relative to 1 + |q|; it has been applied
   const RESIDUAL_FACTOR = 10;  // how much larger a residual may be, relative to its terms
@@ -73,7 +73,7 @@ const newton = (() => {
 
   // The scale of each coordinate: 1 rad for angles, the size of the mechanism for the others.
   function scales(model, q) {
-    const isAngle = model.COORDINATES.map((name) => model.UNITS[name] === "rad");
+    const isAngle = model.COORDINATES.map((name) => model.UNITS[name] === 'rad');
     const lengths = [...q, ...model.GUESS].filter((_, k) => !isAngle[k % q.length]);
     const size = largest(lengths) || 1;
     return isAngle.map((angular) => (angular ? 1 : size));
@@ -112,24 +112,24 @@ const newton = (() => {
     return (isSmall || crawls(iterates)) && error <= ROUNDING;
   }
 
-  // All iterates from a guess, and how they end: "converged", "singular" (then `dependent` are
-  // columns of Phi_q at the last iterate), "not finite" or "not converged".
+  // All iterates from a guess, and how they end: 'converged', 'singular' (then `dependent` are
+  // columns of Phi_q at the last iterate), 'not finite' or 'not converged'.
   function iterate(model, guess, t, p = model.DEFAULTS) {
     const scale = scales(model, guess);
     const iterates = [iterateAt(model, guess.slice(), t, p, null)];
     const ended = (status, dependent = []) => ({ status, iterates, dependent });
-    if (!isFinite(iterates[0])) return ended("not finite");
+    if (!isFinite(iterates[0])) return ended('not finite');
     for (let k = 1; k <= MOST_ITERATIONS; k += 1) {
       const { q, Phi, factors } = iterates[k - 1];
-      if (factors.dependent.length) return ended("singular", factors.dependent);
+      if (factors.dependent.length) return ended('singular', factors.dependent);
       const step = solve(factors, Phi.map((value) => -value));
       const following = iterateAt(model, q.map((x, j) => x + step[j]), t, p, step);
-      if (!isFinite(following)) return ended("not finite");
+      if (!isFinite(following)) return ended('not finite');
       iterates.push(following);
-      if (hasConverged(iterates, scale)) return ended("converged");
+      if (hasConverged(iterates, scale)) return ended('converged');
     }
     const isNear = missed(iterates[MOST_ITERATIONS], iterates[0], scale) <= 10 * TOLERANCE;
-    return ended(isNear && crawls(iterates) ? "singular" : "not converged");
+    return ended(isNear && crawls(iterates) ? 'singular' : 'not converged');
   }
 
   // How a position differs from another one: the coordinates that do, an angle only modulo a turn,
@@ -138,7 +138,7 @@ const newton = (() => {
     const scale = scales(model, other);
     const apart = { coordinates: [], turned: [] };
     model.COORDINATES.forEach((name, k) => {
-      const isAngle = model.UNITS[name] === "rad";
+      const isAngle = model.UNITS[name] === 'rad';
       const turns = isAngle ? Math.round((q[k] - other[k]) / (2 * Math.PI)) : 0;
       const rest = Math.abs(q[k] - other[k] - 2 * Math.PI * turns);
       if (!(rest <= SAME_POSITION * scale[k])) apart.coordinates.push(name);
@@ -147,9 +147,63 @@ const newton = (() => {
     return apart;
   }
 
-  return { factor, solve, iterate, difference, norm, largest, scales, MOST_ITERATIONS };
+  // What to say of a run: how it ended, and on which branch. `motion` is the position that the
+  // motion has at this time, null where it has none.
+  function statement(model, run, t, p, motion) {
+    const count = run.iterates.length - 1;
+    const iterations = count === 1 ? '1 iteration' : `${count} iterations`;
+    const last = run.iterates[count];
+    switch (run.status) {
+      case 'converged':
+        return `Converged in ${iterations} ${branch(model, last, t, p, motion)}`;
+      case 'singular':
+        return run.dependent.length
+          ? `Stopped after ${iterations}: \u03a6_q is singular there, its columns ` +
+            `${names(model, run.dependent)} depend on each other.`
+          : 'The corrections only halve: \u03a6_q is singular at the position they creep to, its ' +
+            `columns ${names(model, weakColumns(model, last))} depend on each other.`;
+      case 'not finite':
+        return `Stopped after ${iterations}: the equations have no finite value at the next one.`;
+      default:
+        return `No convergence in ${iterations}: the last correction is still ` +
+          `${last.correction.toExponential(1)}. This guess is too far away; kc.solve would start ` +
+          'again from it, with shortened corrections.';
+    }
+  }
+
+  function branch(model, last, t, p, motion) {
+    if (!motion) return 'to a position; the motion has none at this time.';
+    const apart = difference(model, last.q, motion);
+    if (!apart.coordinates.length) {
+      const turned = apart.turned.map(({ name, turns }) => `${name} by ${turns} \u00d7 2\u03c0`);
+      const further = turned.length ? `, turned further: ${turned.join(', ')}` : '';
+      return `to the position of the motion${further}.`;
+    }
+    const here = Math.sign(last.factors.determinant);
+    const there = Math.sign(factor(model.Phi_q(motion, t, p)).determinant);
+    const differ = `Other than in the motion: ${apart.coordinates.join(', ')}.`;
+    if (here === there) {
+      return `to another position, where det \u03a6_q has the sign it has in the motion. ${differ}`;
+    }
+    const signs = { '-1': 'negative', 0: 'zero', 1: 'positive' };
+    return `to the other branch: det \u03a6_q is ${signs[here]} there and ${signs[there]} in the ` +
+      `motion. ${differ}`;
+  }
+
+  const names = (model, columns) => columns.map((k) => model.COORDINATES[k]).join(', ');
+
+  // The columns that nearly depend on each other: one step of inverse iteration.
+  function weakColumns(model, { factors, q }) {
+    if (factors.dependent.length) return factors.dependent;
+    const scale = scales(model, q);
+    const direction = solve(factors, q.map(() => 1)).map((x, k) => x / scale[k]);
+    const most = largest(direction);
+    return [...direction.keys()].filter((k) => Math.abs(direction[k]) > 0.01 * most);
+  }
+
+  return { factor, solve, iterate, statement, scales, norm, largest };
 })();
 
-if (typeof module === "object" && module.exports) {
+if (typeof module === 'object' && module.exports) {
   module.exports = newton;
 }

@@ -1,0 +1,42 @@
+"""The mechanism's functions as a script of the page, for the panel that shows Newton's method."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from kincompile.compiler import emit
+from kincompile.errors import StructuralError, UnsupportedError
+
+if TYPE_CHECKING:
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+MOST_COORDINATES = 60
+"""Coordinates up to which every entry of Phi_q can be looked at."""
+
+
+def newton_script(model: Mechanism | ConstraintSystem) -> str:
+    """Return the script that declares `emitted`: the functions, or `reason`, why there are none.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system of free equations.
+    """
+    count = len(model.system().coordinates)
+    if count > MOST_COORDINATES:
+        return _without(f"{count} coordinates are too many to show Newton's method step by step.")
+    try:
+        source = emit(model, "javascript").source
+    except (StructuralError, UnsupportedError) as error:
+        return _without(f"Newton's method cannot be shown: {error}")
+    # In a function of its own, so that no name of a mechanism meets one of the page.
+    return (
+        f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{source}"
+        "return module.exports;\n})();\n"
+    )
+
+
+def _without(reason: str) -> str:
+    return f"const emitted = {json.dumps({'reason': reason})};\n".replace("<", "\\u003c")

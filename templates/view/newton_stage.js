@@ -1,0 +1,143 @@
+'use strict';
+/* Newton's iterates as ghosts on the stage, and a guess that can be dragged.
+
+   Every body of the guess has a handle: drag the body to move it, its knob to turn it; with the
+   keyboard the arrows move it and + and - turn it. */
+
+const KNOB = 40;  // pixels from a body's origin to the knob that turns it
+const STEP = 1 / 60;  // of the picture's width that an arrow key moves a body; a tenth with Shift
+const TURN = Math.PI / 36;
+
+function svgElement(tag, attributes, text = '') {
+  const made = document.createElementNS('http://www.w3.org/2000/svg', tag);
+  setAttributes(made, attributes);
+  made.textContent = text;
+  return made;
+}
+
+function setAttributes(element, attributes) {
+  Object.entries(attributes).forEach(([name, value]) => element.setAttribute(name, value));
+}
+
+class NewtonStage {
+  /* isShown(): whether ghosts are to be seen now.  onGuess(q): the guess was changed. */
+  constructor(isShown, onGuess) {
+    this.isShown = isShown;
+    this.onGuess = onGuess;
+    this.scene = null;  // { guess, iterates }: those of newton.iterate that are shown
+    this.drag = null;
+    this.layer = svgElement('svg', { class: 'newton-handles', 'aria-label': 'Handles of the guess' });
+    this.handles = player.data.drawing.bodies.map((name, body) => this.handle(name, body));
+    this.layer.append(...this.handles.map(handle => handle.group));
+    stage.canvas.parentElement.append(this.layer);
+    stage.overlays.push((ctx, view, palette) => this.draw(ctx, view, palette));
+  }
+
+  show(scene) {
+    this.scene = scene;
+    stage.draw(player.state);
+  }
+
+  draw(ctx, view, palette) {
+    const isShown = this.scene !== null && this.isShown();
+    this.layer.style.display = isShown ? '' : 'none';
+    if (!isShown) return;
+    // The motion below becomes a shade.
+    Object.assign(ctx, { fillStyle: palette.paper, globalAlpha: 0.7 });
+    ctx.fillRect(0, 0, stage.width, stage.height);
+    ctx.globalAlpha = 1;
+    this.drawGhosts(ctx, view, palette);
+    this.handles.forEach(handle => this.placeHandle(handle, view));
+  }
+
+  /* The guess in one colour, the iterates in another one, the later the stronger. */
+  drawGhosts(ctx, view, palette) {
+    const { guess, iterates } = this.scene;
+    // The style sheet gives them to the layer, where they are resolved for the theme.
+    const { color: guessColour, fill: iterateColour } = getComputedStyle(this.layer);
+    const drawGhost = (q, ghost, alpha) =>
+      drawShapes(ctx, Float64Array.from(q), { view, palette, alpha, ghost });
+    const last = iterates.length - 1;
+    drawGhost(guess, guessColour, last ? 0.5 : 1);
+    for (let k = 1; k < last; k++) drawGhost(iterates[k].q, iterateColour, 0.15 + 0.35 * k / last);
+    if (last) drawGhost(iterates[last].q, iterateColour, 1);
+  }
+
+  /* What a body is dragged by: its link, its origin and the knob. */
+  handle(name, body) {
+    const group = svgElement('g', {
+      tabindex: 0, role: 'group', 'aria-label': `${name}: arrow keys move it, plus and minus turn it`,
+    });
+    const link = svgElement('polygon', { class: 'link' });
+    const arm = svgElement('line', { class: 'arm' });
+    const atOrigin = [svgElement('circle', { class: 'dot', r: 5 }), svgElement('circle', { class: 'grip', r: 16 })];
+    const atKnob = [svgElement('circle', { class: 'dot', r: 6 }), svgElement('circle', { class: 'grip turn', r: 16 })];
+    group.append(svgElement('title', {}, name), link, arm, ...atOrigin, ...atKnob);
+    group.addEventListener('pointerdown', event => this.startDrag(event, group, body));
+    group.addEventListener('pointermove', event => this.moveDrag(event));
+    group.addEventListener('pointerup', () => { this.drag = null; });
+    group.addEventListener('pointercancel', () => { this.drag = null; });
+    group.addEventListener('keydown', event => this.key(event, body));
+    return { body, group, link, arm, atOrigin, atKnob };
+  }
+
+  placeHandle({ body, link, arm, atOrigin, atKnob }, view) {
+    const q = Float64Array.from(this.scene.guess);
+    const phi = q[3 * body + 2];
+    const [x, y] = view.toScreen(inWorld(q, body, [0, 0]));
+    const [knobX, knobY] = [x + KNOB * Math.cos(phi), y - KNOB * Math.sin(phi)];
+    const hull = player.data.drawing.marks.find(mark => mark.kind === 'link' && mark.frame === body);
+    const corners = hull ? hull.points.map(point => view.toScreen(inWorld(q, body, point))) : [];
+    link.setAttribute('points', corners.join(' '));
+    for (const circle of atOrigin) setAttributes(circle, { cx: x, cy: y });
+    for (const circle of atKnob) setAttributes(circle, { cx: knobX, cy: knobY });
+    setAttributes(arm, { x1: x, y1: y, x2: knobX, y2: knobY });
+  }
+
+  pointer(event) {
+    const box = this.layer.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  startDrag(event, group, body) {
+    group.setPointerCapture(event.pointerId);
+    group.focus({ preventScroll: true });
+    this.drag = { body, isTurn: event.target.classList.contains('turn'), from: this.pointer(event) };
+    event.preventDefault();
+  }
+
+  moveDrag(event) {
+    if (!this.drag) return;
+    const { body, isTurn, from } = this.drag;
+    const to = this.pointer(event);
+    this.drag.from = to;
+    if (isTurn) {
+      const [x, y] = stage.view.toScreen(this.scene.guess.slice(3 * body, 3 * body + 2));
+      const turn = Math.atan2(y - to[1], to[0] - x) - Math.atan2(y - from[1], from[0] - x);
+      // The short way, so that whole turns add up.
+      this.change(body, 0, 0, Math.atan2(Math.sin(turn), Math.cos(turn)));
+    } else {
+      const [[x0, y0], [x1, y1]] = [from, to].map(point => stage.view.toWorld(point));
+      this.change(body, x1 - x0, y1 - y0, 0);
+    }
+  }
+
+  key(event, body) {
+    const part = event.shiftKey ? 0.1 : 1;
+    const step = part * STEP * stage.width / stage.view.scale, turn = part * TURN;
+    const change = {
+      ArrowLeft: [-step, 0, 0], ArrowRight: [step, 0, 0], ArrowUp: [0, step, 0],
+      ArrowDown: [0, -step, 0], '+': [0, 0, turn], '=': [0, 0, turn], '-': [0, 0, -turn],
+    }[event.key];
+    if (!change) return;
+    this.change(body, ...change);
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  change(body, x, y, phi) {
+    const guess = this.scene.guess.slice();
+    [x, y, phi].forEach((value, k) => { guess[3 * body + k] += value; });
+    this.onGuess(guess);
+  }
+}
