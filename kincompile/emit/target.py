@@ -31,12 +31,15 @@ class Emitted:
     files
         Text by file name; the first is the main one.
     arrays
-        Arrays that the main file reads from ``<name>.npz`` beside it; none for most targets.
+        Arrays that belong to the main file; none for most targets.
+    companion
+        Name of the file of the arrays, ``<name>.npz`` if it is empty.
     """
 
     name: str
     files: Mapping[str, str]
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    companion: str = ""
 
     @property
     def source(self) -> str:
@@ -46,7 +49,7 @@ class Emitted:
     @property
     def companions(self) -> tuple[str, ...]:
         """Names of the files beside the main one."""
-        arrays = (f"{self.name}.npz",) if self.arrays else ()
+        arrays = (self.companion or f"{self.name}.npz",) if self.arrays else ()
         return (*list(self.files)[1:], *arrays)
 
     def write(self, folder: str | Path, main: str | None = None) -> tuple[Path, ...]:
@@ -73,7 +76,7 @@ class Emitted:
             write_atomically(path, text)
             paths.append(path)
         if self.arrays:
-            path = Path(folder) / f"{self.name}.npz"
+            path = Path(folder) / self.companions[-1]
             write_atomically(path, _packed(self.arrays))
             paths.append(path)
         return tuple(paths)

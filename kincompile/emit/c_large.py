@@ -1,0 +1,246 @@
+"""The C target for large mechanisms: the functions of each type of block, arrays in a file.
+
+The text depends on the number of block types, not on the number of constraints; which coordinates
+and attributes each block has is in ``<name>_c.npz`` beside it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.emit.c_functions import evaluator, solve_functions
+from kincompile.emit.c_target import LANES, RESERVED, array_lines, elementary
+from kincompile.emit.functions import inputs_read, schedule
+from kincompile.emit.layout import assigned
+from kincompile.emit.naming import NameTable
+from kincompile.emit.printers import CPrinter
+from kincompile.emit.solving import schedule_solve
+from kincompile.emit.target import Emitted
+from kincompile.emit.templates import fill
+from kincompile.errors import InternalError
+from kincompile.ir.elimination import plan_entries
+from kincompile.ir.inline import Entry, InlineProgram, Section
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.ir.block_types import BlockType, Run
+    from kincompile.ir.grouping import GroupedProgram
+
+FUNCTIONS: Mapping[str, tuple[str, ...]] = {
+    "position": ("Phi", "Phi_q"),
+    "nu": ("nu",),
+    "gamma": ("gamma",),
+}
+"""What a type evaluates, and the quantities of each."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Written:
+    """A type as text.
+
+    Attributes
+    ----------
+    text
+        Its functions.
+    called
+        Elementary functions that they call.
+    sizes
+        Its numbers of coordinates, equations, entries of Phi_q, parameters, numbers kept of Phi_q
+        and determinants.
+    largest_block
+        Equations of the largest block that its planned solve leaves.
+    """
+
+    text: str
+    called: frozenset[str]
+    sizes: Mapping[str, int]
+    largest_block: int
+
+
+def emit_c_large(
+    grouped: GroupedProgram, types: Sequence[BlockType], runs: Sequence[Run]
+) -> Emitted:
+    """Return a program by block types as C99 source, header and a companion file of arrays.
+
+    Raises
+    ------
+    UnsupportedError
+        If the program calls a function that C does not have.
+    """
+    program = grouped.program
+    written = [_type(number, kind, runs) for number, kind in enumerate(types)]
+    values, called = _values(grouped)
+    called |= {name for item in written for name in item.called}
+    largest = max(item.largest_block for item in written)
+    companion = f"{program.name}_c.npz"
+    about = {
+        "name": program.name,
+        "NAME": program.name.upper(),
+        "n": len(program.coordinates),
+        "m": len(program.equations),
+        "companion": companion,
+    }
+    sizes = {name: max(1, *(item.sizes[name] for item in written)) for name in written[0].sizes}
+    source = {
+        **about,
+        **sizes,
+        "values": len(grouped.values),
+        # eight vectors, four of signs in an eighth of the memory each, and the values
+        "work": 9 * len(program.coordinates) + len(grouped.values) + 1,
+        "lanes": LANES,
+        "fingerprint": program.fingerprint,
+        "defaults": array_lines([repr(item.default) for item in program.parameters]),
+        "elementary": elementary(program, called, largest),
+        "types": "".join(item.text for item in written),
+        "table": "\n".join(
+            _row(k, *pair) for k, pair in enumerate(zip(types, written, strict=True))
+        ),
+        "values_code": "\n".join(f"    {line}" for line in values),
+    }
+    header = {
+        **about,
+        "guard": f"{program.name.upper()}_H",
+        "k": len(program.parameters),
+    }
+    files = {
+        f"{program.name}.c": fill("c/large.c.jinja", source),
+        f"{program.name}.h": fill("c/large.h.jinja", header),
+    }
+    return Emitted(program.name, files, _arrays(grouped, runs), companion)
+
+
+def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
+    """Write the functions of a type."""
+    code, prefix = kind.code, f"type_{number}_"
+    program, pattern = code.program, code.pattern()
+    table = NameTable((*RESERVED, *program.tables))
+    coordinates = [item.name for item in program.coordinates]
+    wanted = [*coordinates, *(rate(name) for name in coordinates)]
+    wanted += [item.name for item in program.parameters]
+    names = {name: table.take(_identifier(name)) for name in wanted}
+    lines: list[str] = []
+    called: set[str] = set()
+    for name, quantities in FUNCTIONS.items():
+        listing = schedule(code, quantities, names, table)
+        called |= set(listing.functions)
+        lines += ["", *evaluator(name, code, listing, names, prefix)]
+    own = dataclasses.replace(
+        code, program=dataclasses.replace(program, coordinates=program.coordinates[: kind.own])
+    )
+    entries = [
+        (entry.row, entry.column, code.number(entry.node))
+        for section in code.sections
+        for entry in section.entries["Phi_q"]
+    ]
+    plan = plan_entries(kind.own, kind.own, [item for item in entries if item[1] < kind.own])
+    if plan is None:
+        raise InternalError(f"the block of {', '.join(program.equations)} has no planned solve")
+    solving = schedule_solve(own, plan, NameTable(RESERVED))
+    lines += ["", *solve_functions(own, solving, prefix)]
+    data = {
+        "number": number,
+        "blocks": sum(run.columns.shape[1] for run in runs if run.type == number),
+        "equations": ", ".join(program.equations),
+        "determined": ", ".join(coordinates[: kind.own]),
+        "read": ", ".join(coordinates[kind.own :]) or "nothing",
+        "functions": "\n".join(lines),
+        "coupling": "\n".join(f"    {line}" for line in _coupling(kind, entries)),
+        "own": kind.own,
+        "slots": len(coordinates),
+    }
+    sizes = {
+        "slots": len(coordinates),
+        "rows": kind.own,
+        "entries": len(pattern),
+        "parameters": len(program.parameters),
+        "factors": len(solving.factors),
+        "determinants": len(plan.determinants),
+    }
+    largest = max((len(block.rows) for block in plan.blocks), default=0)
+    return _Written(fill("c/block_type.c.jinja", data), frozenset(called), sizes, largest)
+
+
+def _identifier(name: str) -> str:
+    """Return a name that C accepts for a coordinate, a rate or a parameter of a block."""
+    return name.replace(" ", "_").replace(".", "_").replace("'", "_prime")
+
+
+def _coupling(kind: BlockType, entries: Sequence[tuple[int, int, Any]]) -> list[str]:
+    """Return the lines that take the columns of earlier blocks off the right side."""
+    lines = [
+        f"right[{row}][lane] -= {_entry(number, value)} * x[{column}][lane];"
+        for number, (row, column, value) in enumerate(entries)
+        if column >= kind.own
+    ]
+    if not lines:
+        return ["(void)at, (void)right, (void)x, (void)lane;"]
+    return lines if any("at->" in line for line in lines) else ["(void)at;", *lines]
+
+
+def _entry(number: int, value: Any) -> str:
+    """Return an entry of Phi_q as text: a plain number, or where it is."""
+    return f"at->Phi_q[{number}][lane]" if value is None else f"({float(value)!r})"
+
+
+def _row(number: int, kind: BlockType, written: _Written) -> str:
+    """Return the entry of a type in the table of types."""
+    sizes = written.sizes["slots"], kind.own, kind.numbers, kind.values
+    numbers = ", ".join(map(str, (*sizes, written.sizes["determinants"])))
+    functions = [f"type_{number}_{name}_of_block" for name in (*FUNCTIONS, "factor")]
+    functions += [f"type_{number}_{name}" for name in ("solve", "follow")]
+    return f"    {{{numbers},\n" + "\n".join(f"        {name}," for name in functions) + "\n    },"
+
+
+def _values(grouped: GroupedProgram) -> tuple[list[str], set[str]]:
+    """Return the code of the values that depend on t, p and contact parameters, and its calls."""
+    program = grouped.program
+    table = NameTable((*RESERVED, *program.tables, "q", "p", "values"))
+    wanted = [item.name for item in (*program.parameters, *program.coordinates)]
+    names = {"t": "t", **{name: table.take(name) for name in wanted}}
+    entries = tuple(Entry(k, 0, node) for k, node in enumerate(grouped.values))
+    sections = (Section(program.instances[0], "", {"values": entries}),)
+    code = InlineProgram(program, program.values, sections, {})
+    listing = schedule(code, ("values",), names, table)
+    printer = CPrinter(code.nodes, listing.names)
+    lines = ["(void)q, (void)t, (void)p, (void)values;"]
+    if {"cos", "sin"} & set(listing.functions):
+        lines += ["const int exact = 1;", "int64_t far = 0;"]
+    lines += [
+        f"const double {names[member]} = {vector}[{k}];"
+        for vector, k, member in inputs_read(program, listing)
+    ]
+    for _, assignments in listing.steps:
+        for item in assignments:
+            lines += assigned(f"const double {item.name}", printer.text(item.node, own=True))
+    for entry in entries:
+        lines += assigned(f"values[{entry.row}]", printer.text(entry.node))
+    return lines, set(listing.functions)
+
+
+def _arrays(grouped: GroupedProgram, runs: Sequence[Run]) -> dict[str, NDArray[Any]]:
+    """Return the data of the blocks, tile by tile."""
+    tiles: list[tuple[int, int, bool]] = []
+    columns, numbers, values = [], [], []
+    for run in runs:
+        for start in range(0, run.columns.shape[1], LANES):
+            lanes = slice(start, start + LANES)
+            tiles.append((run.type, run.columns[:, lanes].shape[1], run.is_chain))
+            columns.append(run.columns[:, lanes].reshape(-1))
+            numbers.append(run.numbers[:, lanes].reshape(-1))
+            values.append(run.values[:, lanes].reshape(-1))
+    angular = [item.unit == "rad" for item in grouped.program.coordinates]
+    return {
+        "angular": np.array(angular, dtype=np.uint8),
+        "columns": np.concatenate(columns).astype(np.int32),
+        "numbers": np.concatenate(numbers),
+        "tiles": np.array(tiles, dtype=np.int32),
+        "values": np.concatenate(values).astype(np.int32),
+    }
