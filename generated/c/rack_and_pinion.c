@@ -22,6 +22,9 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+#ifdef __x86_64__
+#include <emmintrin.h>
+#endif
 
 enum {
     N = 6,  // coordinates
@@ -29,6 +32,7 @@ enum {
     K = 2,  // parameters
     NONZEROS = 15,  // of Phi_q
     LANES = 32,  // points in a block
+    FAR = (4 << 20) / 8 / (3 * M + NONZEROS),  // points whose results leave little of a cache
     FACTORS = 12,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 1,  // blocks of the planned solve
 };
@@ -694,16 +698,43 @@ static void read_rows(double (*rows)[LANES], size_t size, rack_and_pinion_input 
     }
 }
 
+#ifdef __x86_64__
+// Write a number past the caches.
+INLINE void stream(double *to, double number)
+{
+    long long bits;
+    memcpy(&bits, &number, sizeof bits);
+    _mm_stream_si64((long long *)to, bits);
+}
+#endif
+
+// Copy numbers; past the caches if so many are being written that those could not hold them.
+INLINE void copy(double *to, const double *from, size_t size, int is_far)
+{
+#ifdef __x86_64__
+    const size_t first = is_far && (uintptr_t)to % 16 != 0, pairs = is_far ? (size - first) / 2 : 0;
+    if (first)
+        stream(to, *from);
+    for (size_t i = first; i < first + 2 * pairs; i += 2)
+        _mm_stream_pd(to + i, _mm_loadu_pd(from + i));
+    if (is_far && first + 2 * pairs < size)
+        stream(to + size - 1, from[size - 1]);
+    if (is_far)
+        return;
+#endif
+    memcpy(to, from, size * sizeof *to);
+}
+
 // Copy rows to where they are wanted: all of them, or those listed.
-static void write_rows(rack_and_pinion_output to, double (*rows)[LANES], const int *listed, int size,
-    size_t start, size_t count)
+static void store_rows(rack_and_pinion_output to, double (*rows)[LANES], const int *listed, int size,
+    size_t start, size_t count, int is_far)
 {
     if (to.first == NULL)
         return;
     double *first = to.first + (ptrdiff_t)start * to.point;
     for (int n = 0; to.point == 1 && count == LANES && n < size; n++) {
         const int i = listed ? listed[n] : n;
-        memcpy(first + i * to.entry, rows[i], LANES * sizeof *first);
+        copy(first + i * to.entry, rows[i], LANES, is_far);
     }
     for (size_t k = 0; !(to.point == 1 && count == LANES) && k < count; k++)
         for (int n = 0; n < size; n++) {
@@ -712,21 +743,29 @@ static void write_rows(rack_and_pinion_output to, double (*rows)[LANES], const i
         }
 }
 
-// Write the nonzeros of Phi_q into whole matrices: all entries, or only those that are computed.
-static void write_matrices(rack_and_pinion_output to, double (*nonzeros)[LANES],
-    const double *constants, size_t start, size_t count)
+static void write_rows(rack_and_pinion_output to, double (*rows)[LANES], const int *listed, int size,
+    size_t start, size_t count)
 {
+    store_rows(to, rows, listed, size, start, count, 0);
+}
+
+// Write the nonzeros of Phi_q into whole matrices: all entries, or only those that are computed.
+// `matrix` holds the others.
+static void write_matrices(rack_and_pinion_output to, double (*nonzeros)[LANES], double *matrix,
+    int varying_only, size_t start, size_t count, int is_far)
+{
+    const int is_copied = to.entry == 1 && !varying_only;
     for (size_t k = 0; k < count; k++) {
-        double *matrix = to.first + (ptrdiff_t)(start + k) * to.point;
-        if (constants && to.entry == 1)
-            memcpy(matrix, constants, M * N * sizeof *matrix);
-        else if (constants)
-            for (int i = 0; i < M * N; i++)
-                matrix[i * to.entry] = constants[i];
+        double *first = to.first + (ptrdiff_t)(start + k) * to.point;
+        for (int i = 0; !is_copied && !varying_only && i < M * N; i++)
+            first[i * to.entry] = matrix[i];
         for (int v = 0; v < VARYING; v++) {
             const int entry = VARYING_ENTRY[v], *place = rack_and_pinion_pattern[entry];
-            matrix[(place[0] * N + place[1]) * to.entry] = nonzeros[entry][k];
+            const int i = place[0] * N + place[1];
+            *(is_copied ? matrix + i : first + i * to.entry) = nonzeros[entry][k];
         }
+        if (is_copied)
+            copy(first, matrix, M * N, is_far);
     }
 }
 
@@ -759,6 +798,7 @@ int rack_and_pinion_evaluate(const rack_and_pinion_batch *batch)
         | (batch->nu.first ? 4 : 0) | (batch->gamma.first ? 8 : 0);
     if (wanted == 0)
         return 0;
+    const int is_far = batch->count > FAR;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
     if (wants_Phi_q)
         place_constants(&b, matrix, widest);
@@ -775,15 +815,18 @@ int rack_and_pinion_evaluate(const rack_and_pinion_batch *batch)
         if (wants_rates)
             read_rows(b.q_dot, N, batch->q_dot, start, count, check);
         FUNCTION[wanted](&b, count);
-        write_rows(batch->Phi, b.Phi, NULL, M, start, count);
+        store_rows(batch->Phi, b.Phi, NULL, M, start, count, is_far);
         if (batch->Phi_q.first)
-            write_matrices(batch->Phi_q, b.Phi_q, only ? NULL : matrix, start, count);
-        write_rows(batch->nonzeros, b.Phi_q, only ? VARYING_ENTRY : NULL,
-            only ? VARYING : NONZEROS, start, count);
-        write_rows(batch->nu, b.nu, only ? NU_ROW : NULL, only ? NU_ROWS : M, start, count);
-        write_rows(batch->gamma, b.gamma, only ? GAMMA_ROW : NULL, only ? GAMMA_ROWS : M, start,
-            count);
+            write_matrices(batch->Phi_q, b.Phi_q, matrix, only, start, count, is_far);
+        store_rows(batch->nonzeros, b.Phi_q, only ? VARYING_ENTRY : NULL,
+            only ? VARYING : NONZEROS, start, count, is_far);
+        store_rows(batch->nu, b.nu, only ? NU_ROW : NULL, only ? NU_ROWS : M, start, count, is_far);
+        store_rows(batch->gamma, b.gamma, only ? GAMMA_ROW : NULL, only ? GAMMA_ROWS : M, start,
+            count, is_far);
     }
+#ifdef __x86_64__
+    _mm_sfence();
+#endif
     double total = 0;
     for (size_t k = 0; k < widest; k++)
         total += check[k];

@@ -530,13 +530,11 @@ class _Quantity:
     def for_batch(self, count, dtype):
         """Return an array (size, N) with the constant entries in place.
 
-        If there are any, it lies in memory point by point: where most entries are constant, that
-        takes less time than to turn the array round when it is filled.
+        It lies in memory point by point, as it is wanted in the end.
         """
-        if self.is_full:
-            return np.empty((self.size, count), dtype)
-        result = np.empty((count, self.size), dtype)
-        result[:] = self.start
+        result = _empty((count, self.size), dtype)
+        if not self.is_full:
+            result[:] = self.start
         return result.T
 
 
@@ -548,8 +546,9 @@ _NONZEROS = _Quantity((len(PATTERN),), _VARYING, _FIXED, _CONSTANTS)
 _STATES = ("q", "q_dot")
 _SHAPE = (N_COORDINATES,)
 _REAL = np.dtype(float)
-_BLOCK = 2000  # points at a time, so that intermediate arrays stay in the cache
+_BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
 _PARAMETER_LIST = DEFAULTS.tolist()
+_empty = np.empty  # the loader's function in its place uses the memory of earlier results again
 for _array in (DEFAULTS, GUESS, PATTERN):
     _array.flags.writeable = False
 
@@ -587,7 +586,7 @@ def _evaluate_batch(kernel, quantities, t, p, states):
     results = [quantity.for_batch(math.prod(shape), dtype) for quantity in quantities]
     _fill(results, kernel, quantities, t, p, states)
     return tuple(
-        np.ascontiguousarray(result.T).reshape(shape + quantity.shape)
+        result.T.reshape(shape + quantity.shape)
         for quantity, result in zip(quantities, results)
     )
 
@@ -605,17 +604,11 @@ def _evaluate_batch_last(kernel, quantities, t, p, *states):
             f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
             f"({len(PARAMETERS)}, N)"
         )
-    # One array for all: the memory of several goes back to the system and is fetched again with
-    # every call.
-    size = sum([quantity.size for quantity in quantities])
-    memory = np.empty((size, count), np.result_type(*states, t, p))
-    results, start = [], 0
-    for quantity in quantities:
-        result = memory[start:start + quantity.size]
+    dtype = np.result_type(*states, t, p)
+    results = [_empty((quantity.size, count), dtype) for quantity in quantities]
+    for quantity, result in zip(quantities, results):
         if not quantity.is_full:
             result[quantity.fixed] = quantity.constants
-        results.append(result)
-        start += quantity.size
     _fill(results, kernel, quantities, t, p, states)
     return tuple(results)
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from kincompile.errors import ContractError, InputError
 from kincompile.runtime.contract import REMEDY, check
 from kincompile.runtime.display import module_html
+from kincompile.runtime.memory import empty
 
 if TYPE_CHECKING:
     import os
@@ -144,5 +145,6 @@ def _fill(
             f"{filename} cannot be loaded: {type(error).__name__}: {error}. {REMEDY}"
         ) from error
     check(module)
+    module.__dict__["_empty"] = empty
     module.__dict__["_repr_html_"] = partial(module_html, module)
     return module

@@ -17,6 +17,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.runtime.c_library import library
+from kincompile.runtime.memory import LINE, empty
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -294,7 +295,7 @@ class _Functions:
         """Run a batch into new arrays; None where a number is not finite."""
         results = []
         for quantity in quantities:
-            result = np.empty((*shape, *self._shapes[quantity]))
+            result = empty((*shape, *self._shapes[quantity]))
             size = math.prod(self._shapes[quantity])
             setattr(batch, quantity, _Numbers(result.ctypes.data, 1, size))
             results.append(result)
@@ -320,7 +321,7 @@ class _Functions:
                 return _copied(original(q, q_dot, t, p), self._checked(out, sizes))
             results = self._checked(out, sizes, shape[1])
             if results is None:
-                results = _split(np.empty((sum(sizes), shape[1])), sizes)
+                results = tuple([_in_lines(size, shape[1]) for size in sizes])
             time = np.asarray(t)
             batch = _Batch(shape[1], _numbers(q), _numbers(q_dot), _times(time), _numbers(p))
             batch.varying_only = out is not None
@@ -359,7 +360,7 @@ class _Functions:
             if "c" in (nonzeros.dtype.kind, b.dtype.kind):
                 return original(nonzeros, b)
             shape = np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
-            x = np.empty((*shape, self._n))
+            x = empty((*shape, self._n))
             system = _System(math.prod(shape), x=_Numbers(x.ctypes.data, 1, self._n))
             system.nonzeros = _numbers(matrix := _rows(nonzeros, shape, self._shapes["nonzeros"]))
             system.b = _numbers(right := _rows(b, shape, (self._m,)))
@@ -478,6 +479,11 @@ def _copied(results: tuple[Array, ...], out: tuple[Array, ...] | None) -> tuple[
     return out
 
 
-def _split(memory: Array, sizes: Sequence[int]) -> tuple[Array, ...]:
-    """Return one piece of memory as arrays of so many rows."""
-    return tuple(np.split(memory, np.cumsum(sizes)[:-1]))
+def _in_lines(size: int, points: int) -> Array:
+    """Return a new array (size, N) whose rows each begin where a cache line does.
+
+    The rows are an odd number of lines apart: at powers of two they would get in each other's way.
+    """
+    lines = -(-points * NUMBER // LINE) | 1
+    rows: Array = empty((size, lines * LINE // NUMBER))[:, :points]
+    return rows

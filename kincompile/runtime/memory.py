@@ -1,0 +1,73 @@
+"""Memory for large results: that of earlier results which nobody holds any more is used again.
+
+The system hands out memory page by page and clears each page first. For the results of a large
+batch that takes longer than to compute them, and the allocator gives them back with every call.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike, NDArray
+
+    Bytes = NDArray[np.uint8]
+
+SMALLEST, LARGEST = 1 << 18, 1 << 26
+"""Bytes of an array whose memory is kept: less the allocator keeps itself; 64 MiB are Phi_q of
+100,000 points of a four-bar."""
+
+KEPT = 12
+"""Pieces of memory that are kept at most: what three calls of `kinematics` return."""
+
+LINE = 64
+"""Bytes of a cache line. Results begin at one, so that C can write whole lines."""
+
+free: deque[Bytes] = deque(maxlen=KEPT)
+
+
+class _Loan:
+    """Memory that an array has been given; it is free again when the array and all views are gone.
+
+    NumPy keeps it alive for them as it does any object that offers its memory in this way.
+    """
+
+    def __init__(self, memory: Bytes, shape: tuple[int, ...], kind: np.dtype[Any]) -> None:
+        self._memory = memory
+        start = memory.ctypes.data
+        self.__array_interface__ = {
+            "version": 3,
+            "data": (start + -start % LINE, False),
+            "shape": shape,
+            "typestr": kind.str,
+        }
+
+    def __del__(self) -> None:
+        free.append(self._memory)
+
+
+def empty(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
+    """Return a new array of unknown content, as `numpy.empty` does; its memory may be used."""
+    kind = np.dtype(dtype)
+    size = math.prod(shape) * kind.itemsize + LINE
+    if not SMALLEST <= size <= LARGEST:
+        return np.empty(shape, kind)
+    return np.asarray(_Loan(_taken(size), shape, kind))
+
+
+def _taken(size: int) -> Bytes:
+    """Return so many bytes at least: free ones that are not far too many, or new ones."""
+    # Every operation on the deque is atomic: threads may miss a piece and never share one.
+    for _ in range(len(free)):
+        try:
+            memory = free.popleft()
+        except IndexError:
+            break
+        if size <= memory.size <= 2 * size:
+            return memory
+        free.append(memory)
+    return np.empty(size, np.uint8)
