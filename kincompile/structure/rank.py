@@ -28,8 +28,9 @@ NEAR = 0.15
 """How far from the guess a state is sought, in radians and sizes of the mechanism: near enough to
 be the same way of assembling it."""
 
-ITERATIONS = 60
-"""Steps of Levenberg and Marquardt towards an assembled state."""
+ITERATIONS, PATIENCE = 60, 8
+"""Steps of Levenberg and Marquardt towards an assembled state, and how many good ones may go by
+that shorten the residual by less than a hundredth."""
 
 ASSEMBLED = 1e-9
 """Residual, relative to what the terms of an equation contribute, of an assembled state."""
@@ -184,12 +185,12 @@ class _Analysis:
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """Find states at which some rows hold; return them, which do so, and which are settled."""
         q, step = start.copy(), np.full(len(start), np.inf)
-        damping = np.full(len(q), 1e-3)
+        damping, idle = np.full(len(q), 1e-3), np.zeros(len(q), dtype=int)
         Phi, matrices = self._weighted(q, t, rows)
         size = np.sum(Phi * Phi, axis=1)
         for _ in range(ITERATIONS):
             held = np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED / 100
-            settled, stuck = held & (step <= SETTLED), damping >= 1e3
+            settled, stuck = held & (step <= SETTLED), (idle >= PATIENCE) | (damping >= 1e3)
             if (held | stuck).all() and (settled.any() or not held.any()):
                 break
             active = np.flatnonzero(~settled & ~stuck)
@@ -201,6 +202,8 @@ class _Analysis:
             tried, jacobians = self._weighted(moved, t[active], rows)
             reached = np.sum(tried * tried, axis=1)
             better = reached < size[active]
+            fell = reached < 0.98 * size[active]
+            idle[active] = np.where(fell, 0, idle[active] + better)
             taken = active[better]
             q[taken], Phi[taken], matrices[taken] = moved[better], tried[better], jacobians[better]
             size[taken] = reached[better]

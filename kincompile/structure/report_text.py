@@ -8,7 +8,7 @@ from kincompile.names import listed
 from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from kincompile.model.bodies import Coordinate
     from kincompile.structure.findings import ConstraintEntry, Findings, Mobility
@@ -19,6 +19,9 @@ WIDEST_PATTERN = 45
 MISSED, SMALL = 8, 1e-3
 """How many equations that are missed, and bodies, are named; those far smaller than the largest are
 not."""
+
+EXPLAINED = 10
+"""How many redundant or conflicting constraints are explained; the rest are listed."""
 
 IN_A_ROW = 9
 """How many equations and coordinates of a block are named: the coordinates of three bodies."""
@@ -165,8 +168,11 @@ def _left(found: Findings) -> str:
 
 def _advice(found: Findings) -> Iterator[str]:
     """Yield what is wrong, and what to do."""
-    for item in found.surpluses:
+    for item in found.surpluses[:EXPLAINED]:
         yield f"{item.text}. Remedy: {item.remedy}."
+    if len(found.surpluses) > EXPLAINED:
+        rest = listed(name for item in found.surpluses[EXPLAINED:] for name in item.equations)
+        yield f"redundant or conflicting in the same way: {rest}."
     if found.missing_drivers:
         drivers = listed(item.text for item in found.missing_drivers)
         what = "drivers are" if len(found.missing_drivers) > 1 else "a driver is"
@@ -183,7 +189,8 @@ def _unassembled(found: Findings) -> str:
     missed = [
         f"{name} by {size:.3g}" for size, name in sizes[:MISSED] if size > SMALL * sizes[0][0]
     ]
-    places = listed(_places(found), MISSED)
+    touched = found.owners_of(_coordinates_of(found, [name for _, name in sizes[:MISSED]]))
+    places = listed(_places(found, touched), MISSED)
     return (
         "cannot be assembled at t = 0, or not from this guess: at the nearest position found, "
         f"these equations are missed: {listed(missed)}. There: {places}. Change the lengths or "
@@ -192,16 +199,21 @@ def _unassembled(found: Findings) -> str:
     )
 
 
-def _places(found: Findings) -> Iterator[str]:
-    """Yield where each body is at the nearest position, and what the other coordinates are."""
-    bodies = len(found.bodies)
+def _coordinates_of(found: Findings, equations: Collection[str]) -> list[str]:
+    """Return the names of the coordinates in some equations."""
+    rows = {row for row, name in enumerate(found.equations) if name in equations}
+    return [found.coordinates[column].name for row, column in found.pattern if row in rows]
+
+
+def _places(found: Findings, owners: Collection[str]) -> Iterator[str]:
+    """Yield where some bodies are at the nearest position, and other coordinates' values."""
     for k, body in enumerate(found.bodies):
         x, y, phi = found.nearest[3 * k : 3 * k + 3]
-        yield f"{body.name} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
-    for item, value in zip(
-        found.coordinates[3 * bodies :], found.nearest[3 * bodies :], strict=True
-    ):
-        yield f"{item.name} = {value:.4g}"
+        if body.name in owners:
+            yield f"{body.name} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+    for item, value in zip(found.coordinates, found.nearest, strict=True):
+        if item.name in owners:
+            yield f"{item.name} = {value:.4g}"
 
 
 def _blocks(found: Findings) -> list[str]:
