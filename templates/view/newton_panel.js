@@ -11,7 +11,7 @@ const NEWTON_MARKUP = `
     <button type="button" data-guess="model">of the model</button>
     <button type="button" data-guess="motion">of the motion</button>
     <button type="button" data-guess="random">at random</button></div>
-  <div class="buttons" role="group" aria-label="Iterations">
+  <div class="buttons iterating" role="group" aria-label="Iterations">
     <button type="button" data-go="reset">Reset</button>
     <button type="button" data-go="back">Back</button>
     <button type="button" data-go="step">Step</button>

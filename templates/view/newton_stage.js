@@ -7,6 +7,7 @@
 const KNOB = 40;  // pixels from a body's origin to the knob that turns it
 const STEP = 1 / 60;  // of the picture's width that an arrow key moves a body; a tenth with Shift
 const TURN = Math.PI / 36;
+const FARTHEST = 2;  // widths of the motion's picture that a body may be off its edge and be shown
 
 function svgElement(tag, attributes, text = '') {
   const made = document.createElementNS('http://www.w3.org/2000/svg', tag);
@@ -30,6 +31,7 @@ class NewtonStage {
     this.handles = player.data.drawing.bodies.map((name, body) => this.handle(name, body));
     this.layer.append(...this.handles.map(handle => handle.group));
     stage.canvas.parentElement.append(this.layer);
+    stage.extent = () => this.extent();
     stage.overlays.push((ctx, view, palette) => this.draw(ctx, view, palette));
   }
 
@@ -48,6 +50,24 @@ class NewtonStage {
     ctx.globalAlpha = 1;
     this.drawGhosts(ctx, view, palette);
     this.handles.forEach(handle => this.placeHandle(handle, view));
+  }
+
+  /* The picture of the motion, widened by the bodies of guess and iterates. */
+  extent() {
+    const bounds = player.data.extent.slice();
+    if (this.scene === null || !this.isShown()) return bounds;
+    if (this.drag) return this.drag.extent;  // what is dragged must not move by itself
+    const [left, right, low, high] = bounds;
+    const reach = FARTHEST * Math.max(right - left, high - low);
+    for (const q of [this.scene.guess, ...this.scene.iterates.map(iterate => iterate.q)]) {
+      for (let k = 0; k < 3 * this.handles.length; k += 3) {
+        bounds[0] = Math.min(bounds[0], Math.max(q[k], left - reach));
+        bounds[1] = Math.max(bounds[1], Math.min(q[k], right + reach));
+        bounds[2] = Math.min(bounds[2], Math.max(q[k + 1], low - reach));
+        bounds[3] = Math.max(bounds[3], Math.min(q[k + 1], high + reach));
+      }
+    }
+    return bounds;
   }
 
   /* The guess in one colour, the iterates in another one, the later the stronger. */
@@ -75,8 +95,9 @@ class NewtonStage {
     group.append(svgElement('title', {}, name), link, arm, ...atOrigin, ...atKnob);
     group.addEventListener('pointerdown', event => this.startDrag(event, group, body));
     group.addEventListener('pointermove', event => this.moveDrag(event));
-    group.addEventListener('pointerup', () => { this.drag = null; });
-    group.addEventListener('pointercancel', () => { this.drag = null; });
+    for (const kind of ['pointerup', 'pointercancel']) {
+      group.addEventListener(kind, () => this.endDrag());
+    }
     group.addEventListener('keydown', event => this.key(event, body));
     return { body, group, link, arm, atOrigin, atKnob };
   }
@@ -102,7 +123,8 @@ class NewtonStage {
   startDrag(event, group, body) {
     group.setPointerCapture(event.pointerId);
     group.focus({ preventScroll: true });
-    this.drag = { body, isTurn: event.target.classList.contains('turn'), from: this.pointer(event) };
+    const isTurn = event.target.classList.contains('turn');
+    this.drag = { body, isTurn, from: this.pointer(event), extent: this.extent() };
     event.preventDefault();
   }
 
@@ -120,6 +142,11 @@ class NewtonStage {
       const [[x0, y0], [x1, y1]] = [from, to].map(point => stage.view.toWorld(point));
       this.change(body, x1 - x0, y1 - y0, 0);
     }
+  }
+
+  endDrag() {
+    this.drag = null;
+    stage.draw(player.state);
   }
 
   key(event, body) {

@@ -2,6 +2,7 @@
 /* The canvas: what is drawn on it, and what a pointer does there.
 
    stage.view            world to screen, for the size the canvas has now
+   stage.extent          function that gives what the picture must show
    stage.overlays        functions (ctx, view, palette) that draw on top: ghost bodies, handles
    stage.pointer         null, or { down, move, up } that get (world point, event) before hovering;
                          true from `down` keeps the event
@@ -18,6 +19,7 @@ class Stage {
   constructor(canvas) {
     this.canvas = canvas;
     this.ctx = canvas.getContext('2d');
+    this.extent = () => player.data.extent;
     this.overlays = [];
     this.pointer = null;
     this.points = pointsOf(player.data.drawing);
@@ -40,7 +42,6 @@ class Stage {
     this.canvas.style.height = `${height}px`;
     this.ctx.setTransform(dense, 0, 0, dense, 0, 0);
     [this.width, this.height] = [width, height];
-    this.view = new View(player.data.extent, width, height, NEAR);
     this.takeColours();
   }
 
@@ -62,6 +63,7 @@ class Stage {
   }
 
   draw(state) {
+    this.view = new View(this.extent(), this.width, this.height, NEAR);
     const { ctx, view, palette } = this;
     ctx.clearRect(0, 0, this.width, this.height);
     for (const point of this.traced) this.drawPath(point);
