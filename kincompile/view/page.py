@@ -12,7 +12,7 @@ from kincompile.emit.templates import fill, read
 from kincompile.errors import StructuralError
 from kincompile.runtime.solve import solve
 from kincompile.view.newton import newton_script
-from kincompile.view.page_data import Motion, page_json
+from kincompile.view.page_data import page_json
 
 if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
@@ -51,26 +51,24 @@ def page(model: Mechanism | ConstraintSystem, solution: Solution | None = None) 
         If the model cannot be used as written; every problem is listed.
     """
     system = model.system()
-    motion = _solved(system) if solution is None else _given(solution)
+    message = "" if solution is None else solution.message
+    if solution is None:
+        solution, message = _solved(system)
     data = {
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "licence": read("view/vendor/uplot.LICENSE.txt"),
         "scripts": [newton_script(system), *(read(f"view/{name}") for name in SCRIPTS)],
-        "data": page_json(system, motion),
+        "data": page_json(system, solution, message),
     }
     return fill("view/page.html.jinja", data)
 
 
-def _given(solution: Solution) -> Motion:
-    """Return the motion of a solution."""
-    return Motion(solution, solution.module, solution.message)
-
-
-def _solved(system: ConstraintSystem) -> Motion:
-    """Compile and solve a system over its own times, as far as that goes."""
+def _solved(system: ConstraintSystem) -> tuple[Solution | None, str]:
+    """Compile and solve a system over its own times, as far as that goes, and say how far."""
     try:
         module = compile_model(system)
     except StructuralError as error:
-        return Motion(None, None, str(error))
-    return _given(solve(module, np.linspace(0, system.end, system.points)))
+        return None, str(error)
+    solution = solve(module, np.linspace(0, system.end, system.points))
+    return solution, solution.message

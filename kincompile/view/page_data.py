@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import base64
 import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.ir.interpret import interpret
+from kincompile.ir.lower import lower
 from kincompile.runtime.status import Status
 from kincompile.view.shapes import drawing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
     from types import ModuleType
     from typing import TypeAlias
 
@@ -32,57 +32,39 @@ LARGEST_DENSE = 300
 """Coordinates up to which condition number and determinant of Phi_q are computed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """What is known of a motion, for the page.
-
-    Attributes
-    ----------
-    solution
-        The motion, None where the equations cannot determine one.
-    module
-        The emitted module, None where there is none.
-    message
-        What the solver, or the compiler, says.
-    """
-
-    solution: Solution | None
-    module: ModuleType | None
-    message: str
-
-
-def page_json(system: ConstraintSystem, motion: Motion) -> str:
+def page_json(system: ConstraintSystem, solution: Solution | None, message: str) -> str:
     """Return all that the page shows as JSON, safe inside a script element.
 
     Parameters
     ----------
     system
         The mechanism.
-    motion
-        Its motion, as far as there is one.
+    solution
+        Its motion, None where its equations cannot determine one.
+    message
+        What the solver, or the compiler, says.
     """
-    text = json.dumps(page_data(system, motion), allow_nan=False, separators=(",", ":"))
+    data = page_data(system, solution, message)
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 
 
-def page_data(system: ConstraintSystem, motion: Motion) -> dict[str, Any]:
+def page_data(system: ConstraintSystem, solution: Solution | None, message: str) -> dict[str, Any]:
     """Return what the page shows; arrays are little-endian float64 in base64, row by row."""
     guess = np.array([item.guess for item in system.coordinates])
     values = {item.name: item.default or 0.0 for item in system.parameters}
-    if motion.solution is not None:
-        values |= motion.solution.parameters
-    arrays, status, events = _motion_arrays(guess, motion.solution)
+    if solution is not None:
+        values |= solution.parameters
+    p = np.array(list(values.values()))
+    arrays, status, events = _motion(guess, solution)
     t, q = arrays["t"], arrays["q"]
     shapes = drawing(system, values, q)
-    p = np.array(list(values.values()))
-    # The guess is the last row: it is shown where no position was found.
-    checked_t, checked_q = np.append(t, t[0]), np.vstack((q, guess))
-    residual = residuals(motion.module, shapes, checked_q, checked_t, p)
-    arrays |= {"residual": residual[:-1], **_singularity(motion, q, t, p)}
+    if solution is not None and solution.module is not None:
+        arrays |= _checks(solution, solution.module, shapes, p)
     return {
         "name": system.name,
-        "message": motion.message,
-        "success": bool(motion.solution is not None and motion.solution.success),
+        "message": message,
+        "success": solution is not None and solution.success,
         "lengthUnit": system.length_unit,
         "coordinates": [{"name": item.name, "unit": item.unit} for item in system.coordinates],
         "equations": list(system.equations),
@@ -91,7 +73,7 @@ def page_data(system: ConstraintSystem, motion: Motion) -> dict[str, Any]:
             for item in system.parameters
         ],
         "guess": guess.tolist(),
-        "guessResidual": _numbers(residual[-1]),
+        "guessResidual": _at_guess(system, shapes, guess, t[0], p),
         "violated": VIOLATED * (1 + float(np.max(np.abs(guess), initial=0.0))),
         "status": status,
         "sentences": {item.value: f"{item.name}: {item.sentence}" for item in Status},
@@ -107,7 +89,7 @@ def encoded(array: ArrayLike) -> str:
     return base64.b64encode(np.ascontiguousarray(array, dtype="<f8").tobytes()).decode("ascii")
 
 
-def _motion_arrays(
+def _motion(
     guess: Array, solution: Solution | None
 ) -> tuple[dict[str, Array], list[int], list[dict[str, Any]]]:
     """Return arrays, statuses and events of a motion; without one, a single time that failed."""
@@ -123,41 +105,41 @@ def _motion_arrays(
     return arrays, solution.status.tolist(), events
 
 
-def residuals(module: ModuleType | None, shapes: Drawing, q: Array, t: Array, p: Array) -> Array:
-    """Return the norm of each constraint's rows of Phi, shape (N, constraints).
-
-    NaN where there is no module, or Phi is not finite.
-    """
-    result = np.full((len(q), len(shapes.joints)), np.nan)
+def _checks(solution: Solution, module: ModuleType, shapes: Drawing, p: Array) -> dict[str, Array]:
+    """Return residuals, condition number and determinant over time; NaN without a position."""
+    t, q = solution.t, solution.q
     found = np.isfinite(q).all(axis=1)
-    if module is None or not found.any():
-        return result
+    arrays: dict[str, Array] = {"residual": np.full((t.size, len(shapes.joints)), np.nan)}
+    if not found.any():
+        return arrays
     with np.errstate(all="ignore"):
         Phi = module.Phi(np.ascontiguousarray(q[found]), t[found], p)
-    for column, joint in enumerate(shapes.joints):
-        first, count = joint.rows
-        result[found, column] = np.linalg.norm(Phi[:, first : first + count], axis=1)
-    return result
-
-
-def _singularity(motion: Motion, q: Array, t: Array, p: Array) -> dict[str, Array]:
-    """Return condition number and determinant of Phi_q over time, where they can be had."""
-    module, solution = motion.module, motion.solution
-    if module is None or solution is None or q.shape[1] > LARGEST_DENSE:
-        return {}
-    found = np.isfinite(q).all(axis=1)
-    if not found.any():
-        return {}
-    arrays = {"condition": solution.condition}
-    if module.N_EQUATIONS == module.N_COORDINATES:
-        determinant = np.full(len(t), np.nan)
-        with np.errstate(all="ignore"):
-            Phi_q = module.Phi_q(np.ascontiguousarray(q[found]), t[found], p)
-            determinant[found] = np.linalg.det(Phi_q)
-        arrays["determinant"] = determinant
+        arrays["residual"][found] = residuals(Phi, shapes)
+        if q.shape[1] <= LARGEST_DENSE:
+            arrays["condition"] = solution.condition
+            if Phi.shape[-1] == q.shape[-1]:
+                Phi_q = module.Phi_q(np.ascontiguousarray(q[found]), t[found], p)
+                arrays["determinant"] = np.full(t.size, np.nan)
+                arrays["determinant"][found] = np.linalg.det(Phi_q)
     return arrays
 
 
-def _numbers(values: Iterable[float]) -> list[float | None]:
-    """Return numbers for JSON, which has no NaN."""
-    return [float(value) if np.isfinite(value) else None for value in values]
+def residuals(Phi: Array, shapes: Drawing) -> Array:
+    """Return the norm of each constraint's rows of Phi, shape (..., constraints)."""
+    norms = [
+        np.linalg.norm(Phi[..., first : first + count], axis=-1)
+        for first, count in (joint.rows for joint in shapes.joints)
+    ]
+    return np.stack(norms, axis=-1)
+
+
+def _at_guess(
+    system: ConstraintSystem, shapes: Drawing, guess: Array, t: float, p: Array
+) -> list[float | None]:
+    """Return the residual of each constraint at the guess; JSON has no NaN.
+
+    By the interpreter, which also takes systems that cannot be compiled.
+    """
+    with np.errstate(all="ignore"):
+        Phi, _, _, _ = interpret(lower(system), guess, np.zeros_like(guess), t, p)
+    return [float(value) if np.isfinite(value) else None for value in residuals(Phi, shapes)]

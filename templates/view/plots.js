@@ -19,7 +19,7 @@ function plottable(data) {
   const joints = data.drawing.joints;
   groups.push({
     title: 'Residual',
-    items: joints.map(({ name }, k) => ({
+    items: !data.arrays.residual ? [] : joints.map(({ name }, k) => ({
       label: `|Phi| of ${name}`, unit: '', isLog: true,
       values: () => column('residual', k, joints.length).map(aboveZero),
     })),
@@ -186,8 +186,13 @@ function brief(value) {
 
 const plots = {
   list: [],
+  first: null,  // what is plotted when the page opens
 
   build(panel) {
+    if (!hasMotion()) {
+      panel.append('There is no motion to plot.');
+      return;
+    }
     this.groups = plottable(player.data);
     this.holder = document.createElement('div');
     const more = document.createElement('button');

@@ -142,6 +142,13 @@ class Stage {
     return best;
   }
 
+  /* A point with all others of its body that are at the same place. */
+  together(point, state) {
+    const at = this.where(point, state), least = player.data.drawing.size / 100;
+    const isHere = other => other.frame === point.frame && towards(at, this.where(other, state))[2] < least;
+    return [point, ...this.points.filter(other => other !== point && isHere(other))];
+  }
+
   toggleTrace(point) {
     if (!this.traced.delete(point)) this.traced.add(point);
     player.refresh();

@@ -32,9 +32,9 @@ function showNote(state) {
   note.hidden = state.isFound;
   if (state.isFound) return;
   const { status, sentences } = player.data;
-  const shown = hasMotion() ? 'Shown is the last position that was found.'
-    : 'Shown is the start guess; constraints that it violates are red.';
-  note.textContent = `t = ${+state.time.toPrecision(6)}: ${sentences[status[state.index]]} ${shown}`;
+  note.textContent = hasMotion()
+    ? `t = ${+state.time.toPrecision(6)}: ${sentences[status[state.index]]} Shown is the last position that was found.`
+    : 'Shown is the start guess. Constraints that it violates are red.';
 }
 
 /* ---- time ---- */
@@ -122,7 +122,7 @@ function showTip(state) {
   tip.hidden = !point;
   if (!point) return;
   const title = document.createElement('strong');
-  title.textContent = point.name;
+  title.textContent = stage.together(point, state).map(({ name }) => name).join(', ');
   const lines = tipText(point, state).map(text => {
     const line = document.createElement('div');
     line.textContent = text;

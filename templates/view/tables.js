@@ -90,7 +90,7 @@ const numbers = {
 function residualAt(state, k) {
   const { arrays, drawing, guessResidual } = player.data;
   if (!state.isFound) return hasMotion() ? null : guessResidual[k];
-  return finite(arrays.residual[state.index * drawing.joints.length + k]);
+  return arrays.residual ? finite(arrays.residual[state.index * drawing.joints.length + k]) : null;
 }
 
 /* Copy text; pages opened from a file may have to do it the old way. */
