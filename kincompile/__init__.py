@@ -39,6 +39,7 @@ _PUBLIC = {
     "kincompile.teach.compare": ("compare", "compare_file"),
     "kincompile.teach.verify": ("verify",),
     "kincompile.teach.derivation": ("derivation",),
+    "kincompile.view.animation": ("animate",),
     "kincompile.view.mechanism_plot": ("plot_mechanism",),
     "kincompile.view.sparsity_plot": ("plot_sparsity",),
     "kincompile.errors": (

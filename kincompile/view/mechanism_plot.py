@@ -119,12 +119,7 @@ def position_of(model: Mechanism | ConstraintSystem, q: ArrayLike | None) -> NDA
     InputError
         If there is nothing to draw, or `q` is no finite position.
     """
-    system = model.system()
-    if not system.bodies:
-        raise InputError(
-            f"{system.name} has no bodies, so there is nothing to draw: it is a system of free "
-            "equations. solution.plot() shows its coordinates over time."
-        )
+    system = require_bodies(model.system())
     names = [item.name for item in system.coordinates]
     if q is None:
         return np.array([item.guess for item in system.coordinates], dtype=np.float64)
@@ -141,6 +136,22 @@ def position_of(model: Mechanism | ConstraintSystem, q: ArrayLike | None) -> NDA
             "row of solution.q where solution.status is 0."
         )
     return position
+
+
+def require_bodies(system: ConstraintSystem) -> ConstraintSystem:
+    """Return a system that has bodies.
+
+    Raises
+    ------
+    InputError
+        If it has none, so that there is nothing to draw.
+    """
+    if not system.bodies:
+        raise InputError(
+            f"{system.name} has no bodies, so there is nothing to draw: it is a system of free "
+            "equations. solution.plot() shows its coordinates over time."
+        )
+    return system
 
 
 def checked_parameters(
@@ -192,6 +203,16 @@ def draw(
     ax.set_xlabel(f"x [{unit}]" if unit else "x")
     ax.set_ylabel(f"y [{unit}]" if unit else "y")
     return artists
+
+
+def move(artists: list[tuple[Stroke, Any]], q: NDArray[np.float64]) -> None:
+    """Move what `draw` returned to a position, shape (n,)."""
+    for stroke, artist in artists:
+        points = stroke.world(q)
+        if stroke.is_area:
+            artist.set_xy(points)
+        else:
+            artist.set_data(*points.T)
 
 
 def _artist(ax: Axes, stroke: Stroke, q: NDArray[np.float64], order: int) -> Any:

@@ -1,0 +1,204 @@
+"""A motion as an animation by matplotlib: to be shown, or written as GIF or MP4."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.errors import InputError, UnsupportedError, missing_package
+from kincompile.files import require_writable, write_atomically
+from kincompile.model.origins import model_of
+from kincompile.names import listed, suggestion
+from kincompile.runtime.labelled import TIME_UNIT
+from kincompile.view.marks import Place
+from kincompile.view.mechanism_plot import draw, move, require_bodies
+from kincompile.view.placed import world
+from kincompile.view.shapes import drawing
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Iterable, Mapping
+
+    from matplotlib.animation import FuncAnimation
+    from numpy.typing import NDArray
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.solution import Solution
+    from kincompile.view.shapes import Drawing
+
+WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
+"""Matplotlib's writer for each kind of file."""
+
+FRAME_RATE = 25
+"""Most frames a second."""
+
+TICK = 10
+"""What GIF counts the time of a frame in [ms]."""
+
+SHORTEST, LONGEST = 2.0, 20.0
+"""Between these the animation takes as long as the motion [s]."""
+
+
+def animate(
+    solution: Solution,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    model: Mechanism | ConstraintSystem | None = None,
+    seconds: float | None = None,
+    trace: Iterable[str] = (),
+) -> FuncAnimation | Path:
+    """Animate a motion.
+
+    Parameters
+    ----------
+    solution
+        The motion of one set of parameters. Points without a solution are left out.
+    path : path-like, optional
+        File to write, ``.gif`` or ``.mp4``; it appears whole or not at all. MP4 needs ffmpeg.
+    model
+        What moves; needed only where `solution` was solved with a module from a file, as a module
+        from ``kc.compile`` knows its model.
+    seconds
+        How long it plays; without, as long as the motion lasts, but at least 2 s and at most 20 s.
+    trace
+        Names of bodies, whose origins, and of constraints, whose points leave a line.
+
+    Returns
+    -------
+    matplotlib.animation.FuncAnimation or pathlib.Path
+        The animation, to be kept as long as it plays; in a notebook
+        ``IPython.display.HTML(animation.to_jshtml())`` plays it. With `path`, the file written.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to show, or the file cannot be written.
+    UnsupportedError
+        If matplotlib, or for MP4 ffmpeg, is not installed.
+    """
+    try:
+        from matplotlib import animation
+        from matplotlib import pyplot as plt
+    except ImportError:
+        raise missing_package("matplotlib", "plot") from None
+    if path is not None:
+        _require_writer(Path(path), animation.writers.is_available)
+    system = _moving(solution, model)
+    rows, interval = frame_rows(solution, seconds)
+    good = solution.q[solution.status == 0]
+    drawn = drawing(system, solution.parameters, good)
+    figure, ax = plt.subplots(layout="constrained")
+    artists = draw(ax, system, drawn, good)
+    for place in _traced(drawn, trace):
+        ax.plot(*world(good, place).T, color="0.5", linewidth=1, zorder=1)
+    times = _time_texts(solution, rows)
+    ax.set_title(times[0], loc="left")
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # what is laid out once need not be for every frame
+
+    def show(frame: int) -> None:
+        move(artists, solution.q[rows[frame]])
+        ax.set_title(times[frame], loc="left")
+
+    # Half a millisecond more, as the writer of GIF rounds down.
+    moving = animation.FuncAnimation(figure, show, frames=len(rows), interval=interval + 0.5)
+    if path is None:
+        return moving
+    try:
+        return _written(moving, Path(path))
+    finally:
+        plt.close(figure)
+
+
+def frame_rows(solution: Solution, seconds: float | None) -> tuple[NDArray[np.intp], int]:
+    """Choose the points that are shown: those next to equally spaced times.
+
+    Returns
+    -------
+    rows : ndarray of int
+        Indices of points with a solution, one a frame.
+    interval : int
+        Time from frame to frame [ms], a multiple of `TICK`.
+    """
+    good = np.flatnonzero(solution.status == 0)
+    t = solution.t[good]
+    duration = abs(float(t[-1] - t[0]))
+    length = min(max(duration, SHORTEST), LONGEST) if seconds is None else float(seconds)
+    if not (math.isfinite(length) and length > 0):
+        raise InputError(f"seconds is {seconds!r}: give the length of the animation, above 0.")
+    count = max(min(good.size, round(length * FRAME_RATE)), 1)
+    interval = max(round(1000 * length / count / TICK) * TICK, TICK)
+    shown = [int(np.abs(t - time).argmin()) for time in np.linspace(t[0], t[-1], count)]
+    return good[shown], interval
+
+
+def _moving(solution: Solution, model: Mechanism | ConstraintSystem | None) -> ConstraintSystem:
+    """Return the system whose motion it is, if that can be shown."""
+    name = solution.name
+    if solution.q.ndim != 2:
+        raise InputError(
+            f"{name}: an animation shows one motion, and these are {len(solution.q)} variants; "
+            "solve with one of the parameter sets"
+        )
+    if not (solution.status == 0).any():
+        raise InputError(f"{name} has no position that could be shown. {solution.message}")
+    found = model_of(solution.module) if model is None else model.system()
+    if found is None:
+        raise InputError(
+            f"the shapes of {name} are not known, because its module was loaded from a file; give "
+            "its mechanism too: kc.animate(solution, path, model=m)"
+        )
+    names = tuple(item.name for item in found.coordinates)
+    if names != solution.coordinates:
+        raise InputError(
+            f"{found.name} is not the model of this solution of {name}: the coordinates differ"
+        )
+    return require_bodies(found)
+
+
+def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
+    """Refuse a file that cannot be written, before the frames are drawn."""
+    writer = WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise InputError(f"cannot write {path}: end its name in {' or '.join(WRITERS)}.")
+    if not is_available(writer):
+        raise UnsupportedError(
+            f"cannot write {path}: {writer} is not installed. Install it (apt-get install ffmpeg, "
+            "brew install ffmpeg, or from ffmpeg.org), or write a .gif, which needs nothing more."
+        )
+    require_writable(path)
+
+
+def _traced(drawn: Drawing, names: Iterable[str]) -> list[Place]:
+    """Return the points that leave a line."""
+    places = {body: Place(k, (0.0, 0.0)) for k, body in enumerate(drawn.bodies)}
+    places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
+    for name in (chosen := list(names)):
+        if name not in places:
+            raise InputError(
+                f"{drawn.name} has nothing called {name!r} to trace{suggestion(name, places)}; "
+                f"bodies and constraints are: {listed(places)}"
+            )
+    return [places[name] for name in chosen]
+
+
+def _time_texts(solution: Solution, rows: NDArray[np.intp]) -> list[str]:
+    """Return name and time of each frame, and how many points there are no frames of."""
+    duration = float(np.ptp(solution.t)) or 1.0
+    digits = max(0, 2 - math.floor(math.log10(duration)))
+    failed = np.count_nonzero(solution.status)
+    gaps = f"   ({failed} of {solution.t.size} points have no solution)" if failed else ""
+    return [f"{solution.name}   t = {t:.{digits}f} {TIME_UNIT}{gaps}" for t in solution.t[rows]]
+
+
+def _written(moving: FuncAnimation, path: Path) -> Path:
+    """Write all frames to a temporary file, and that to its place."""
+    with tempfile.TemporaryDirectory() as folder:
+        draft = Path(folder, f"animation{path.suffix.lower()}")
+        moving.save(draft, writer=WRITERS[draft.suffix])
+        return write_atomically(path, draft.read_bytes())
