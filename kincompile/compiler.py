@@ -29,7 +29,7 @@ from kincompile.errors import (
     RedundantConstraintWarning,
     UnsupportedError,
 )
-from kincompile.ir.grouping import group
+from kincompile.ir.grouping import GroupedProgram, group
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
 from kincompile.ir.redundancy import rank_report, redundancy_warning, redundant_equations
@@ -65,6 +65,10 @@ LOADABLE = ("numpy", "c")
 
 LARGEST_INLINE = 300
 """Coordinates up to which every constraint is written out."""
+
+LARGEST_REDUNDANT = 1000
+"""Coordinates up to which redundant equations are found, by dense matrices; beyond, there may be no
+more equations than coordinates."""
 
 
 def emit(
@@ -104,17 +108,15 @@ def emit(
         raise InputError(f"there is no form {form!r}; forms are: inline, grouped")
     system = _checked(model)
     program = lower(system)
-    if form == "grouped" or (form is None and len(system.coordinates) > LARGEST_INLINE):
-        if target != "numpy":
-            raise UnsupportedError(
-                f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
-            )
-        grouped = group(program)
-        require_square(system, grouped.pattern())
-        return emit_grouped(grouped)
-    code = inline(program)
-    found = redundant_equations(system, program, code.pattern())
-    if found:
+    is_grouped = form == "grouped" or (form is None and len(system.coordinates) > LARGEST_INLINE)
+    if is_grouped and target != "numpy":
+        raise UnsupportedError(
+            f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
+        )
+    code = group(program) if is_grouped else inline(program)
+    if len(system.coordinates) > LARGEST_REDUNDANT:
+        require_square(system, code.pattern())
+    elif found := redundant_equations(system, program, code.pattern()):
         redundant = tuple(name for item in found for name in item.equations)
         if target != "numpy":
             raise UnsupportedError(
@@ -124,7 +126,7 @@ def emit(
         text = redundancy_warning(system, found)
         warnings.warn(text, RedundantConstraintWarning, stacklevel=2)
         code = replace(code, program=replace(program, redundant=redundant))
-    return TARGETS[target](code)
+    return emit_grouped(code) if isinstance(code, GroupedProgram) else TARGETS[target](code)
 
 
 def _checked(model: Mechanism | ConstraintSystem) -> ConstraintSystem:

@@ -6,32 +6,30 @@ number of constraints; the arrays are in ``<name>.npz`` beside it.
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.emit.functions import schedule
+from kincompile.emit.grouped_solve import (
+    plan_solving,
+    solving_arrays,
+    solving_code,
+    solving_table,
+)
 from kincompile.emit.layout import indented, quoted, wrapped
 from kincompile.emit.naming import NameTable
-from kincompile.emit.numpy_solve import solve_functions
 from kincompile.emit.numpy_target import (
     FORMAT,
     RESERVED,
-    RESERVED_IN_SOLVE,
     array_functions,
     function_body,
     scalar_functions,
     shared_text,
 )
-from kincompile.emit.solving import schedule_solve
 from kincompile.emit.target import Emitted
 from kincompile.emit.templates import fill
-from kincompile.errors import StructuralError
-from kincompile.ir.elimination import plan_entries
 from kincompile.ir.inline import Entry, InlineProgram, Section
-from kincompile.names import listed
-from kincompile.structure.stages import Chain, Sparse, Stage, plan_stages
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +37,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.ir.grouping import Group, GroupedProgram
-    from kincompile.ir.program import Program
 
 FUNCTIONS = {"position": ("Phi", "Phi_q"), "nu": ("nu",), "gamma": ("gamma",)}
 """What is computed together; the right sides alone, because Phi_q is then already at hand."""
@@ -62,24 +59,17 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
         arrays[f"{name}.breaks"] = np.array(spline.breaks)
         arrays[f"{name}.coefficients"] = np.array(spline.coefficients)
     arrays["guess"] = np.array([item.guess for item in program.coordinates])
-    stages = plan_stages(rows, columns, constants, len(program.equations))
-    if stages is None:
-        raise StructuralError(
-            f"{program.name!r}: the equations cannot determine the coordinates; compile it with "
-            "form='inline' for the names"
-        )
     code: list[str] = []
     called: set[str] = set()
     tables = [_group_code(item, grouped, arrays, code, called) for item in grouped.groups]
     _entry_numbers(grouped, order, arrays)
     code += ["", "", *_values_code(grouped, called)]
-    solving = [
-        line
-        for k, stage in enumerate(stages)
-        for line in _stage_code(f"stage_{k}", stage, program, constants, arrays, code)
-    ]
+    stages = plan_solving(program, rows, columns, constants)
+    arrays |= solving_arrays(stages)
+    code += solving_code(stages, program)
     source = fill(
-        "numpy/grouped.py.jinja", _data(grouped, code, tables, solving, sorted(called), len(rows))
+        "numpy/grouped.py.jinja",
+        _data(grouped, code, tables, solving_table(stages), sorted(called), len(rows)),
     )
     return Emitted(program.name, {f"{program.name}.py": source}, _small(arrays))
 
@@ -188,55 +178,6 @@ def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
     ]
     body = function_body(("values",), inline, listing, titled=False)
     return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
-
-
-def _stage_code(
-    key: str,
-    stage: Stage,
-    program: Program,
-    constants: NDArray[np.float64],
-    arrays: dict[str, NDArray[Any]],
-    code: list[str],
-) -> list[str]:
-    """Write the functions and arrays of a stage; return its lines in the module's table."""
-    if isinstance(stage, Chain):
-        arrays[f"{key}.links"] = stage.links
-        parts = [
-            line
-            for k, part in enumerate(stage.parts)
-            for line in _stage_code(f"{key}_{k}", part, program, constants, arrays, code)
-        ]
-        return [f'Chain("{key}", (', *(f"    {line}" for line in parts), ")),"]
-    arrays[f"{key}.rows"], arrays[f"{key}.columns"] = stage.rows, stage.columns
-    arrays[f"{key}.inner"], arrays[f"{key}.outer"] = stage.inner, stage.outer
-    if isinstance(stage, Sparse):
-        return [f'Stage("{key}", None, None, ()),']
-    first = constants[stage.inner[:, 0]] if stage.inner.size else np.empty(0)
-    entries = [
-        (row, column, None if np.isnan(value) else float(value))
-        for (row, column), value in zip(stage.places, first.tolist(), strict=True)
-    ]
-    size = stage.rows.shape[0]
-    plan = plan_entries(size, size, entries)
-    if plan is None:
-        dependent = listed(program.equations[k] for k in stage.rows[:, 0].tolist())
-        raise StructuralError(
-            f"{program.name!r}: the equations {dependent} are dependent for every position; remove "
-            "one of them"
-        )
-    sample = dataclasses.replace(
-        program,
-        equations=tuple(program.equations[k] for k in stage.rows[:, 0].tolist()),
-        coordinates=tuple(program.coordinates[k] for k in stage.columns[:, 0].tolist()),
-    )
-    inline = InlineProgram(sample, (), (), {})
-    listing = schedule_solve(inline, plan, NameTable(RESERVED_IN_SOLVE))
-    arrays[f"{key}.varying"] = stage.inner[
-        [k for k, entry in enumerate(entries) if entry[2] is None]
-    ]
-    code += ["", "", *solve_functions(inline, listing, f"_{key}")]
-    outer = "".join(f"{row}, " for row in stage.outer_rows)
-    return [f'Stage("{key}", _{key}_factor, _{key}_solve, ({outer})),']
 
 
 def _data(

@@ -17,7 +17,8 @@ BLOCK = 512
 """Points at a time, so that memory is bounded."""
 
 LARGEST_DENSE = 300
-"""Coordinates up to which all singular values are computed; beyond, the condition is estimated."""
+"""Coordinates up to which all singular values are computed; beyond, the condition is estimated,
+but where equations are redundant."""
 
 
 def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
@@ -49,7 +50,7 @@ def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
         rows = 1 / np.where(magnitude > 0, magnitude, 1.0)
         for start in range(0, found.size, BLOCK):
             part = found[start : start + BLOCK]
-            if columns.size <= LARGEST_DENSE:
+            if columns.size <= LARGEST_DENSE or rows.size > columns.size:
                 matrices = module.Phi_q(np.ascontiguousarray(q[part]), t[part], p)
                 result[part] = _of_dense(rows[:, np.newaxis] * matrices * columns)
             else:

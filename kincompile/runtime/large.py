@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from kincompile.runtime.problem import Vector
 
 
-def is_grouped(module: ModuleType) -> bool:
-    """Return whether a module is in grouped form."""
-    return getattr(module, "FORM", "") == "grouped"
+def is_staged(module: ModuleType) -> bool:
+    """Return whether the solve of a module is planned in stages: its Phi_q is never made dense."""
+    return bool(getattr(module, "STAGES", ()))
 
 
 SHORTEST = 2.0**-10

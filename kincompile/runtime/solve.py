@@ -23,7 +23,7 @@ from kincompile.runtime.events import branch_switch, locate, singular_start
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
 from kincompile.runtime.lanes import has_planned_solve
-from kincompile.runtime.large import LargeMarch, LargeState, is_grouped
+from kincompile.runtime.large import LargeMarch, LargeState, is_staged
 from kincompile.runtime.march import (
     SMALL_ERROR,
     Outcome,
@@ -136,7 +136,7 @@ def _solve_one(
     """Solve with one set of parameters."""
     motion = _Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
-        if is_grouped(inputs.module):
+        if is_staged(inputs.module):
             outcome = _follow_large(inputs, motion, progress)
         elif may_be_compiled and _march_compiled(inputs, motion):
             outcome = Outcome(Status.CONVERGED, 0, None)
@@ -166,7 +166,7 @@ class _Motion:
     def over(cls, inputs: Inputs) -> _Motion:
         """Make the arrays for a time grid, with nothing reached."""
         points = inputs.t.size
-        if is_grouped(inputs.module):
+        if is_staged(inputs.module):
             q, q_dot, q_ddot = np.full((3, points, inputs.guess.size), np.nan)
         else:  # each coordinate contiguous in memory, as the code of a grid wants it
             q, q_dot, q_ddot = np.full((3, inputs.guess.size, points), np.nan).transpose(0, 2, 1)
