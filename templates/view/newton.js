@@ -153,15 +153,18 @@ const newton = (() => {
     const count = run.iterates.length - 1;
     const iterations = count === 1 ? '1 iteration' : `${count} iterations`;
     const last = run.iterates[count];
+    if (run.dependent.length) {
+      return `Stopped after ${iterations}: \u03a6_q is singular there, ` +
+        `${dependence(model, run.dependent)}.`;
+    }
+    // A double root that was reached to rounding has converged, but not as Newton's method does.
+    if (run.status === 'singular' || (run.status === 'converged' && crawls(run.iterates))) {
+      return `After ${iterations} the corrections still only halve: \u03a6_q is singular at the ` +
+        `position they creep to, ${dependence(model, weakColumns(model, last))}.`;
+    }
     switch (run.status) {
       case 'converged':
         return `Converged in ${iterations} ${branch(model, last, t, p, motion)}`;
-      case 'singular':
-        return run.dependent.length
-          ? `Stopped after ${iterations}: \u03a6_q is singular there, its columns ` +
-            `${names(model, run.dependent)} depend on each other.`
-          : 'The corrections only halve: \u03a6_q is singular at the position they creep to, its ' +
-            `columns ${names(model, weakColumns(model, last))} depend on each other.`;
       case 'not finite':
         return `Stopped after ${iterations}: the equations have no finite value at the next one.`;
       default:
@@ -190,7 +193,10 @@ const newton = (() => {
       `motion. ${differ}`;
   }
 
-  const names = (model, columns) => columns.map((k) => model.COORDINATES[k]).join(', ');
+  function dependence(model, columns) {
+    const names = columns.map((k) => model.COORDINATES[k]).join(', ');
+    return columns.length > 1 ? `its columns ${names} depend on each other` : `its column ${names} vanishes`;
+  }
 
   // The columns that nearly depend on each other: one step of inverse iteration.
   function weakColumns(model, { factors, q }) {
@@ -203,7 +209,3 @@ const newton = (() => {
 
   return { factor, solve, iterate, statement, scales, norm, largest };
 })();
-
-if (typeof module === 'object' && module.exports) {
-  module.exports = newton;
-}

@@ -7,7 +7,7 @@
 const KNOB = 40;  // pixels from a body's origin to the knob that turns it
 const STEP = 1 / 60;  // of the picture's width that an arrow key moves a body; a tenth with Shift
 const TURN = Math.PI / 36;
-const FARTHEST = 2;  // widths of the motion's picture that a body may be off its edge and be shown
+const FARTHEST = 1;  // widths of the motion's picture that a body may be off its edge and be shown
 
 function svgElement(tag, attributes, text = '') {
   const made = document.createElementNS('http://www.w3.org/2000/svg', tag);

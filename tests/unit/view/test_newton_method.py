@@ -1,0 +1,178 @@
+"""Newton's method of the page, in node: LU against NumPy, iterates against the runtime's."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.emit.templates import read
+from kincompile.runtime.newton import iterate
+from kincompile.runtime.problem import problem
+from kincompile.view.newton import MOST_COORDINATES, newton_script
+
+NODE = shutil.which("node") or shutil.which("nodejs")
+STATUSES = {
+    "CONVERGED": "converged", "SINGULAR": "singular", "NOT_FINITE": "not finite",
+    "NOT_CONVERGED": "not converged",
+}  # fmt: skip
+
+node = pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
+
+
+def run(tmp_path, script, expression):
+    """Return what an expression of `newton` and of a script's declarations gives."""
+    text = f"{script}\n{read('view/newton.js')}\nconsole.log(JSON.stringify({expression}))"
+    (tmp_path / "all.js").write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [NODE, "all.js"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def guesses(module):
+    """Return the model's guess and others around it, nearby and far away."""
+    rng = np.random.default_rng(3)
+    angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES])
+    size = np.max(np.abs(np.where(angular, 0, module.GUESS)), initial=0) or 1.0
+    scale = np.where(angular, 1.0, size)
+    spreads = (0.0, 0.03, 0.1, 0.1, 0.3, 0.3)
+    return [module.GUESS + scale * rng.normal(0, spread, scale.size) for spread in spreads]
+
+
+@node
+def test_that_factors_solve_and_give_the_determinant(tmp_path):
+    rng = np.random.default_rng(5)
+    for n in (1, 2, 5, 15):
+        matrix, b = rng.normal(size=(n, n)), rng.normal(size=n)
+        matrix[0, 0] = 0 if n > 1 else matrix[0, 0]
+        text = f"(() => {{ const f = newton.factor({json.dumps(matrix.tolist())});"
+        text += f"return [newton.solve(f, {json.dumps(b.tolist())}), f.determinant]; }})()"
+        x, determinant = run(tmp_path, "", text)
+        np.testing.assert_allclose(x, np.linalg.solve(matrix, b), rtol=1e-11)
+        np.testing.assert_allclose(determinant, np.linalg.det(matrix), rtol=1e-12)
+
+
+@node
+def test_that_columns_that_depend_on_each_other_are_found(tmp_path):
+    matrix = np.random.default_rng(6).normal(size=(5, 5))
+    matrix[:, 3] = 2 * matrix[:, 0] - matrix[:, 2]
+    factors = run(tmp_path, "", f"newton.factor({json.dumps(matrix.tolist())})")
+    assert factors["determinant"] == 0
+    assert factors["dependent"] == [0, 2, 3]
+
+
+@node
+def test_that_iterates_are_those_of_the_runtime(tmp_path, example):
+    module, t = example.module, 0.3
+    starts = [guess.tolist() for guess in guesses(module)]
+    text = f"{json.dumps(starts)}.map(guess => newton.iterate(emitted, guess, {t}))"
+    found = run(tmp_path, newton_script(example.model), text)
+    for guess, attempt in zip(starts, found, strict=True):
+        q = np.array(guess)
+        expected = iterate(problem(module, module.DEFAULTS, q, t), t, q, 1e-10, 25)
+        assert attempt["status"] == STATUSES[expected.status.name]
+        assert len(attempt["iterates"]) == len(expected.points)
+        assert [item["correction"] for item in attempt["iterates"]][1:] == pytest.approx(
+            expected.corrections, rel=1e-6, abs=1e-12
+        )
+        for here, there in zip(attempt["iterates"], expected.points, strict=True):
+            np.testing.assert_allclose(here["q"], there.q, rtol=1e-9, atol=1e-9)
+
+
+def folded():
+    """Return a four-bar whose guess of zeros is singular."""
+    m = kc.Mechanism("folded")
+    crank, coupler, rocker = (m.body(name) for name in ("crank", "coupler", "rocker"))
+    m.add(kc.Revolute("A", m.ground, (0, 0), crank, (-1, 0)))
+    m.add(kc.Revolute("B", crank, (1, 0), coupler, (-2, 0)))
+    m.add(kc.Revolute("C", coupler, (2, 0), rocker, (-1.5, 0)))
+    m.add(kc.Revolute("D", rocker, (1.5, 0), m.ground, (3, 0)))
+    m.add(kc.AbsoluteAngle("motor", crank, 1 + kc.t))
+    return m
+
+
+def stated(tmp_path, m, guess, motion, t=0.0):
+    """Return what the panel says of a run."""
+    guess, motion = (json.dumps(None if q is None else list(q)) for q in (guess, motion))
+    text = f"newton.statement(emitted, newton.iterate(emitted, {guess}, {t}), {t}, "
+    return run(tmp_path, newton_script(m), f"{text}emitted.DEFAULTS, {motion})")
+
+
+@node
+def test_that_the_statement_names_the_branch(tmp_path):
+    m = folded()
+    first, second = kc.assemblies(kc.compile(m))[:2]
+    near = first + 0.01
+    assert stated(tmp_path, m, near, first).endswith("iterations to the position of the motion.")
+    text = stated(tmp_path, m, near, second)
+    assert "to the other branch: det \u03a6_q is " in text
+    assert text.endswith(
+        "Other than in the motion: x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker, "
+        "phi_rocker."
+    )
+    signs = np.sign(np.linalg.det(kc.compile(m).Phi_q(np.array([first, second]), 0.0)))
+    words = {1.0: "positive", -1.0: "negative"}
+    assert f"is {words[signs[0]]} there and {words[signs[1]]} in the motion" in text
+    assert "the motion has none at this time" in stated(tmp_path, m, near, None)
+
+
+@node
+def test_that_the_statement_counts_whole_turns(tmp_path):
+    m = folded()
+    first = kc.assemblies(kc.compile(m))[0]
+    turned = first + np.eye(9)[8] * 4 * np.pi + 1e-3
+    text = stated(tmp_path, m, turned, first)
+    assert text.endswith(
+        "to the position of the motion, turned further: phi_rocker by 2 \u00d7 2\u03c0."
+    )
+
+
+@node
+def test_that_the_statement_names_dependent_columns(tmp_path):
+    m = folded()
+    text = stated(tmp_path, m, [0.0] * 9, None)
+    # On a line only the two lengths along y are determined twice; phi_crank has its driver.
+    assert text.startswith("Stopped after 0 iterations: \u03a6_q is singular there, its columns ")
+    assert set(text.split("columns ")[1].removesuffix(" depend on each other.").split(", ")) == {
+        "y_coupler", "phi_coupler", "y_rocker", "phi_rocker",
+    }  # fmt: skip
+
+
+@node
+def test_that_the_statement_says_where_there_is_no_convergence(tmp_path):
+    x = sympy.Symbol("x")
+    m = kc.ConstraintSystem("none", "x", [x**2 + 1])
+    assert stated(tmp_path, m, [0.3], None).startswith("No convergence in 25 iterations: ")
+    m = kc.ConstraintSystem("double", "x", [(x - 1) ** 2])
+    for far in (0.3, 30.0):
+        text = stated(tmp_path, m, [far], None)
+        assert "iterations the corrections still only halve: \u03a6_q is singular" in text
+        assert text.endswith("its column x vanishes.")
+    m = kc.ConstraintSystem("root", "x", [sympy.sqrt(x) + 1])
+    text = stated(tmp_path, m, [0.3], None)
+    assert text == "Stopped after 0 iterations: the equations have no finite value at the next one."
+
+
+def test_that_the_script_has_no_name_of_the_mechanism_outside():
+    m = folded()
+    assert newton_script(m).startswith("const emitted = (() => {\n")
+    assert "</" not in newton_script(m)
+
+
+def test_that_the_script_says_why_there_are_no_functions():
+    m = kc.Mechanism("many")
+    for k in range(MOST_COORDINATES // 3 + 1):
+        m.body(f"b{k}")
+    m.add(kc.AbsoluteAngle("motor", "b0", kc.t))
+    assert newton_script(m) == (
+        'const emitted = {"reason": "63 coordinates are too many to show Newton\'s method step by '
+        'step."};\n'
+    )
+    m = kc.Mechanism("few")
+    m.add(kc.AbsoluteAngle("motor", m.body("b"), kc.t))
+    assert "Newton's method cannot be shown: " in newton_script(m)
