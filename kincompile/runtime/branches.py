@@ -52,9 +52,11 @@ def determinants(
         except ArithmeticError:  # floats refuse 1/0 in the factors of a singular block
             found = LaneCode(module, module.ARRAYS, p).position(q[:, np.newaxis], t).determinants
         return [float(np.ravel(value)[0]) for value in found]
-    basis = np.linalg.svd(reference, full_matrices=False)[0].T
-    sign, size = np.linalg.slogdet(basis @ Phi_q)
-    sign_there, size_there = np.linalg.slogdet(basis @ reference)
+    if reference.shape[0] != reference.shape[1]:
+        basis = np.linalg.svd(reference, full_matrices=False)[0].T
+        Phi_q, reference = basis @ Phi_q, basis @ reference
+    sign, size = np.linalg.slogdet(Phi_q)
+    sign_there, size_there = np.linalg.slogdet(reference)
     return [float(sign * sign_there * math.exp(min(size - size_there, 700.0)))]
 
 

@@ -247,8 +247,19 @@ class Curve:
         if found is None:
             return None
         _, Phi_q, matrix = found
+        return Place(q, t, Phi_q, matrix, _tangent(matrix, towards))
+
+
+def _tangent(matrix: Vector, towards: Vector) -> Vector:
+    """Return the unit vector that a matrix takes to zero, in a direction."""
+    along = np.zeros(matrix.shape[0] + 1)
+    along[-1] = 1.0
+    try:  # a tenth of the time of singular values
+        tangent = solve_linear(np.vstack((matrix, towards)), along)
+    except np.linalg.LinAlgError:
         tangent = np.linalg.svd(matrix)[2][-1]
-        return Place(q, t, Phi_q, matrix, tangent if tangent @ towards >= 0 else -tangent)
+        tangent = tangent if tangent @ towards >= 0 else -tangent
+    return tangent / np.linalg.norm(tangent)
 
 
 def _root(function: Callable[[float], float | None], length: float) -> float:

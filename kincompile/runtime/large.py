@@ -2,7 +2,8 @@ r"""The march of a large mechanism, whose module is in grouped form.
 
 The steps are those of `march`: predict with :math:`q + h\,\dot q + \tfrac12 h^2\,\ddot q` (Haug,
 section 3.6), correct by Newton, solve for velocity and acceleration, halve a step that fails. Phi_q
-stays sparse, and is factored stage by stage.
+stays sparse, and is factored stage by stage. Where a step fails for good, a mechanism that is not
+too large goes on by the careful march (`solve`), which has the last word.
 """
 
 from __future__ import annotations
@@ -13,9 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.runtime.grid import LAST_CORRECTION
-from kincompile.runtime.march import ALLOWED_PART, LARGE_ERROR, SMALL_ERROR, SMALLEST_PART
+from kincompile.runtime.march import (
+    ALLOWED_PART,
+    KINK,
+    LARGE_ERROR,
+    NEARLY_SINGULAR,
+    SMALL_ERROR,
+    SMALLEST_PART,
+    SMOOTH,
+    TOO_NEAR,
+)
 from kincompile.runtime.newton import RESIDUAL_FACTOR
-from kincompile.runtime.problem import ROUNDING
+from kincompile.runtime.problem import ROUNDING, probe_of
 from kincompile.runtime.staged import StagedFactors, StagedSolver
 from kincompile.runtime.status import Status
 
@@ -86,6 +96,8 @@ class LargeMarch:
         while True:
             whole = abs(step) >= abs(t - state.t)
             found = self._step(state, t if whole else state.t + step)
+            if isinstance(found, LargeState) and not whole and self._is_too_near(found, state):
+                found = Status.SINGULAR
             if isinstance(found, LargeState):
                 iterations += found.iterations
                 state, step = found, 2 * step
@@ -105,15 +117,35 @@ class LargeMarch:
         if isinstance(found, Status):
             return found
         spread = np.where(self._angular, 1.0, self._reach)
-        error, movement = (
-            np.max(np.abs(found.q - predicted) / spread),
-            np.max(np.abs(move) / spread),
+        turn = h * (found.q_dot - state.q_dot - h * state.q_ddot)
+        error, movement, kink = (
+            np.max(np.abs(change) / spread) for change in (found.q - predicted, move, turn)
         )
         if error > min(LARGE_ERROR, max(SMALL_ERROR, ALLOWED_PART * float(movement))):
             return Status.NOT_CONVERGED
         if not np.array_equal(found.signs, state.signs):
             return Status.SINGULAR  # a singular configuration lies between the two
+        if kink > KINK * error + SMOOTH and self._sensitivity(found) > NEARLY_SINGULAR:
+            return Status.SINGULAR
         return found
+
+    def _is_too_near(self, found: LargeState, state: LargeState) -> bool:
+        """Say whether a sub-step leads too near to a singularity to go on from there."""
+        sensitivity = self._sensitivity(found)
+        return sensitivity > TOO_NEAR and sensitivity > self._sensitivity(state)
+
+    def _sensitivity(self, state: LargeState) -> float:
+        """Return the movement, in scales, for an error of one scale in the equations."""
+        spread = np.where(self._angular, 1.0, self._reach)
+        nonzeros = self._module.evaluate(state.q, state.t, self._p)[1]
+        rows, columns = self._module.PATTERN.T
+        terms = np.bincount(rows, np.abs(nonzeros) * spread[columns], state.Phi.size)
+        try:
+            factors = self._solver.factor(nonzeros)
+        except RuntimeError:
+            return np.inf
+        probe = self._solver.solve(factors, terms * probe_of(terms.size))
+        return float(np.max(np.abs(probe) / spread))
 
     def _correct(self, q: Vector, t: float, *, damped: bool = False) -> LargeState | Status:
         """Run Newton's method, and solve for velocity and acceleration where it converges."""

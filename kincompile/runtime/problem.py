@@ -129,7 +129,7 @@ def problem(module: ModuleType, p: Vector, q: Vector, t: float) -> Problem:
     """Set a module's parameters; position and guess tell the size of the mechanism."""
     angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES], dtype=bool)
     m: int = module.N_EQUATIONS
-    equations = Problem(module, p, angular, np.ones(q.size), _probe(m), np.zeros(m))
+    equations = Problem(module, p, angular, np.ones(q.size), probe_of(m), np.zeros(m))
     lengths = np.abs(np.where(angular, 0.0, (q, module.GUESS)))
     size = np.max(lengths, initial=0.0)
     if size <= NO_SIZE and (point := equations.at(q, t)) is not None:
@@ -156,7 +156,7 @@ def _size_in_equations(point: Point, angular: NDArray[np.bool_]) -> float:
     return size if math.isfinite(size) else 0.0
 
 
-def _probe(n: int) -> Vector:
+def probe_of(n: int) -> Vector:
     """Give n numbers of size 1/2 to 1 and either sign: a quasi-random sequence."""
     golden = (math.sqrt(5) - 1) / 2
     sequence = np.arange(1, n + 1) * golden % 1

@@ -53,6 +53,10 @@ if TYPE_CHECKING:
     Progress: TypeAlias = Callable[[int, int], object]
 
 
+LARGEST_CAREFUL = 1000
+"""Coordinates up to which a large mechanism is left to the careful march where its own fails: there
+a step takes a fraction of a second."""
+
 SMALLEST_GRID = 32
 """Points from which on a grid is faster than a march."""
 
@@ -137,7 +141,7 @@ def _solve_one(
     motion = _Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if is_staged(inputs.module):
-            outcome = _follow_large(inputs, motion, progress)
+            outcome = _follow_large(inputs, motion, smooth, progress)
         elif may_be_compiled and _march_compiled(inputs, motion):
             outcome = Outcome(Status.CONVERGED, 0, None)
         else:
@@ -248,7 +252,21 @@ def _follow(
     # The guess may be rough: from here on the assembled mechanism gives the size.
     assembled = inputs.guess if outcome.position is None else outcome.position.q
     equations = problem(inputs.module, inputs.p, assembled, times[0])
-    index, outcome = _run(equations, inputs, motion, 1, outcome, on_grid, progress)
+    return _go_on(equations, inputs, motion, 1, outcome, on_grid, smooth, progress)
+
+
+def _go_on(
+    equations: Problem,
+    inputs: Inputs,
+    motion: _Motion,
+    index: int,
+    outcome: Outcome,
+    on_grid: bool,
+    smooth: bool,
+    progress: Progress | None,
+) -> Outcome:
+    """Go from the point before an index to the end, or to the first point that fails."""
+    index, outcome = _run(equations, inputs, motion, index, outcome, on_grid, progress)
     while outcome.status is not Status.CONVERGED:
         passage = _explain(equations, inputs, motion, index - 1, outcome)
         if passage is None or not smooth:
@@ -337,25 +355,31 @@ def _pass(
     return index + 1, outcome
 
 
-def _follow_large(inputs: Inputs, motion: _Motion, progress: Progress | None) -> Outcome:
-    """Go through the grid with a module in grouped form."""
+def _follow_large(
+    inputs: Inputs, motion: _Motion, smooth: bool, progress: Progress | None
+) -> Outcome:
+    """Go through the grid with the module of a large mechanism."""
     march = LargeMarch(inputs)
     times = inputs.t.tolist()
-    found = march.start(times[0])
-    outcome = _large_outcome(found, None)
+    good, found, index = None, march.start(times[0]), 0
+    outcome = _large_outcome(found, good)
     motion.put(0, outcome)
-    for index in range(1, len(times)):
+    while isinstance(found, LargeState) and (index := index + 1) < len(times):
         if progress:
             progress(index, len(times))
-        if not isinstance(found, LargeState):
-            break
         good, found = found, march.advance(found, times[index])
         outcome = _large_outcome(found, good)
         motion.put(index, outcome)
         motion.statistics["marched"] += 1
-    if progress:
-        progress(len(times), len(times))
-    return outcome
+    if outcome.status is Status.CONVERGED or inputs.guess.size > LARGEST_CAREFUL:
+        if progress:
+            progress(len(times), len(times))
+        return outcome
+    if good is None:
+        return _follow(inputs, motion, False, smooth, progress)
+    equations = problem(inputs.module, inputs.p, good.q, times[0])
+    outcome = _taken_up(equations, motion, good.t, index - 1)
+    return _go_on(equations, inputs, motion, index, outcome, False, smooth, progress)
 
 
 def _large_outcome(found: LargeState | Status, good: LargeState | None) -> Outcome:
