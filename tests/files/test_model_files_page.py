@@ -1,0 +1,38 @@
+"""docs/model_files.md: its example runs, and its tables are those of the code."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+import kincompile as kc
+from kincompile.model.file_format import CONSTRAINTS, FIELDS, constraint_fields
+from kincompile.model.safe_expressions import FUNCTIONS
+
+PAGE = (Path(__file__).parents[2] / "docs" / "model_files.md").read_text(encoding="utf-8")
+
+
+def test_that_the_example_swings(tmp_path):
+    file = tmp_path / "swing.toml"
+    file.write_text(re.findall(r"^```toml\n(.*?)^```", PAGE, re.M | re.S)[0], encoding="utf-8")
+    solution = kc.solve(kc.compile(kc.read(file)), [0.25])
+    phi = -np.pi / 2 + 0.6
+    np.testing.assert_allclose(solution["x_arm"], 0.25 * np.cos(phi), rtol=1e-12)
+    np.testing.assert_allclose(solution["y_arm"], 0.25 * np.sin(phi), rtol=1e-12)
+
+
+def test_that_each_table_has_its_fields():
+    for table in ("model", "analysis", "parameter", "body", "coordinate"):
+        for field in FIELDS[table]:
+            assert f"`{field}`" in PAGE
+
+
+def test_that_each_constraint_type_has_its_fields():
+    for name, constraint in CONSTRAINTS.items():
+        (row,) = re.findall(rf"^\| `{name}` \| ([^(]*?)(?: \(optional\))? \|$", PAGE, re.M)
+        fields = [field for field in constraint_fields(constraint) if field not in ("type", "name")]
+        assert re.findall(r"`(\w+)`", row) == fields
+
+
+def test_that_all_functions_are_named():
+    assert set(FUNCTIONS) <= set(re.findall(r"\w+", PAGE))
