@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,9 +28,6 @@ GROUND_COLOUR, DRIVER_COLOUR, GAP_COLOUR = "0.35", "0.1", "red"
 
 FILL = 0.22
 """Opacity of the areas of bodies."""
-
-MOST_PARTS = 65
-"""Symbols are at least this part of the diagonal of the plot."""
 
 LOOKS: dict[str, dict[str, Any]] = {
     "bar": {"linewidth": 5, "alpha": 0.75, "solid_capstyle": "round"},
@@ -190,16 +186,13 @@ def draw(
         Positions that the limits of the plot must hold.
     """
     x_low, x_high, y_low, y_high = drawn.extent(q)
-    # Gears and cams reach far beyond the joints, by which the shapes are measured.
-    size = max(drawn.size, math.hypot(x_high - x_low, y_high - y_low) / MOST_PARTS)
     artists = [
-        (stroke, _artist(ax, stroke, q[0], order))
-        for order, stroke in enumerate(strokes(drawn, size))
+        (stroke, _artist(ax, stroke, q[0], order)) for order, stroke in enumerate(strokes(drawn))
     ]
     unit = model.system().length_unit
     ax.set_aspect("equal")
-    ax.set_xlim(x_low - size, x_high + size)
-    ax.set_ylim(y_low - size, y_high + size)
+    ax.set_xlim(x_low - drawn.size, x_high + drawn.size)
+    ax.set_ylim(y_low - drawn.size, y_high + drawn.size)
     ax.set_xlabel(f"x [{unit}]" if unit else "x")
     ax.set_ylabel(f"y [{unit}]" if unit else "y")
     return artists

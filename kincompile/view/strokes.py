@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 PIN, BLOCK_LENGTH, BLOCK_HEIGHT, HATCH, TURN = 0.45, 1.6, 0.9, 0.8, 1.9
 """Radius of a pin, half sides of a slider, length of a hatch line, radius of a turning arrow, in
-sizes of the symbols."""
+sizes of the drawing."""
 
 BARREL = 0.6
 """Part of a cylinder's length, or of a telescope's, that is the outer body."""
@@ -101,9 +101,9 @@ def _carried(q: Array, frame: int, points: Array) -> Array:
     return np.array((x, y)) + points @ np.array(((c, s), (-s, c)))
 
 
-def strokes(drawn: Drawing, size: float) -> list[Stroke]:
-    """Return what a drawing consists of, from back to front; `size` is that of its symbols."""
-    return [stroke for mark in drawn.marks for stroke in _of(mark, size)]
+def strokes(drawn: Drawing) -> list[Stroke]:
+    """Return what a drawing consists of, from back to front."""
+    return [stroke for mark in drawn.marks for stroke in _of(mark, drawn.size)]
 
 
 def _of(mark: Mark, size: float) -> Iterable[Stroke]:
@@ -161,7 +161,7 @@ def _pin(mark: Pin, size: float) -> list[Stroke]:
 
 
 def _hatching(low: float, high: float, height: float, side: float = -1.0) -> Array:
-    """Return slanted lines along the x axis at a height, to one side, in sizes of the symbols."""
+    """Return slanted lines along the x axis at a height, to one side, in sizes of the drawing."""
     gap = (np.nan, np.nan)
     feet = np.arange(low + HATCH / 2, high + 1e-9, HATCH)
     ends = [(gap, (x, height), (x - HATCH / 2, height + side * HATCH)) for x in feet]
@@ -170,10 +170,7 @@ def _hatching(low: float, high: float, height: float, side: float = -1.0) -> Arr
 
 def _rail(mark: Rail, size: float) -> list[Stroke]:
     """Draw two parallel lines, hatched on the ground, the teeth of a rack, or a thick face."""
-    start, end = _array(mark.start), _array(mark.end)
-    way = end - start
-    length = float(np.hypot(*way))
-    axis = way / length
+    start, end, axis = _array(mark.start), _array(mark.end), _array(mark.axis)
 
     def along(points: Array) -> Array:
         """Turn sizes along and to the left of the rail into points of its frame."""
@@ -181,7 +178,7 @@ def _rail(mark: Rail, size: float) -> list[Stroke]:
 
     if mark.style == "face":
         return [Stroke("bar", mark.frame, np.stack((start, end)))]
-    reach = length / size
+    reach = float((end - start) @ axis) / size
     if mark.style == "rack":
         teeth = _hatching(0.0, reach, 0.0)
         line = np.concatenate([_array(((0, 0), (reach, 0))), teeth])
