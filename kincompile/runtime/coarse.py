@@ -14,6 +14,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from kincompile.runtime.lanes import LaneCode, Lanes
 
 TARGET_ERROR = 0.0006
@@ -56,7 +59,11 @@ class Node:
 
 
 def coarse_march(
-    code: LaneCode, first: Node, times: Sequence[float], spread: Sequence[float], tolerance: float
+    code: LaneCode,
+    first: Node,
+    times: NDArray[np.float64],
+    spread: Sequence[float],
+    tolerance: float,
 ) -> list[Node]:
     """Follow the motion over a time grid in as few steps as the prediction allows.
 
@@ -102,13 +109,13 @@ def _step(
     code: LaneCode,
     node: Node,
     index: int,
-    times: Sequence[float],
+    times: NDArray[np.float64],
     spread: Sequence[float],
     tolerance: float,
 ) -> tuple[Node, float] | None:
     """Return the point at `index` and the error of its prediction; None without convergence."""
-    t = times[index]
-    h = t - times[node.index]
+    t = float(times[index])
+    h = t - float(times[node.index])
     predicted = [
         x + h * (v + 0.5 * h * a) for x, v, a in zip(node.q, node.q_dot, node.q_ddot, strict=True)
     ]

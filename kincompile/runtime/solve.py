@@ -244,14 +244,14 @@ def _follow(
     inputs: Inputs, motion: _Motion, on_grid: bool, smooth: bool, progress: Progress | None
 ) -> Outcome:
     """Go through the grid up to its end, or to the first point that fails."""
-    times = inputs.t.tolist()
-    outcome = start(problem(inputs.module, inputs.p, inputs.guess, times[0]), times[0], inputs)
+    t = float(inputs.t[0])
+    outcome = start(problem(inputs.module, inputs.p, inputs.guess, t), t, inputs)
     motion.put(0, outcome)
     if progress:
-        progress(1, len(times))
+        progress(1, inputs.t.size)
     # The guess may be rough: from here on the assembled mechanism gives the size.
     assembled = inputs.guess if outcome.position is None else outcome.position.q
-    equations = problem(inputs.module, inputs.p, assembled, times[0])
+    equations = problem(inputs.module, inputs.p, assembled, t)
     return _go_on(equations, inputs, motion, 1, outcome, on_grid, smooth, progress)
 
 
@@ -288,7 +288,7 @@ def _run(
     progress: Progress | None,
 ) -> tuple[int, Outcome]:
     """Follow a motion from the point before an index as far as it goes; return the next index."""
-    times = inputs.t.tolist()
+    times = inputs.t
     trusted = np.zeros(len(times), dtype=bool)
     if on_grid and outcome.state is not None and outcome.state.t == times[index - 1]:
         trusted[index - 1 :] = _grid(equations, inputs, motion, outcome.state, index - 1)
@@ -299,10 +299,10 @@ def _run(
         stop = _end_of_run(trusted, index)
         if stop > index and _continues(equations, motion, state, index):
             motion.status[index:stop] = Status.CONVERGED
-            outcome = _taken_up(equations, motion, times[stop - 1], stop - 1)
+            outcome = _taken_up(equations, motion, float(times[stop - 1]), stop - 1)
             index = stop
         else:
-            outcome = advance(equations, state, times[index], inputs)
+            outcome = advance(equations, state, float(times[index]), inputs)
             motion.put(index, outcome)
             motion.statistics["marched"] += 1
             index += 1
