@@ -1,25 +1,24 @@
-// Newton's method for Phi(q, t) = 0 on emitted functions, step for step as the runtime's plain
-// attempt does it: Phi_q dq = -Phi, q + dq, until the correction is small and the equations hold.
-// No document here, so that node can test it.
+'use strict';
+/* Newton's method for Phi(q, t) = 0 on emitted functions, step for step as the runtime's plain
+   attempt does it: Phi_q dq = -Phi, q + dq, until the correction is small and the equations hold.
+   No document here, so that node can test it. */
 
 const newton = (() => {
-  'use strict';
-
   const TOLERANCE = 1e-10;  // of the last correction, relative to 1 + |q|; it has been applied
   const RESIDUAL_FACTOR = 10;  // how much larger a residual may be, relative to its terms
   const ROUNDING = 16 * Number.EPSILON;  // all that floating point has to give, relative to terms
   const MOST_ITERATIONS = 25;
   const SAME_POSITION = 1e-6;  // relative to the scale of a coordinate
 
-  const norm = (vector) => Math.hypot(...vector);
-  const largest = (vector) => vector.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
+  const norm = vector => Math.hypot(...vector);
+  const largest = vector => vector.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
 
-  // Factor a square matrix with partial pivoting: rows of L and U in one, the order of the rows,
-  // and the determinant. Where a pivot vanishes, `dependent` holds the columns whose combination
-  // is zero, and there is no solution.
+  /* Factor a square matrix with partial pivoting: rows of L and U in one, the order of the rows,
+     and the determinant. Where a pivot vanishes, `dependent` holds the columns whose combination
+     is zero, and there is no solution. */
   function factor(matrix) {
     const n = matrix.length;
-    const rows = matrix.map((row) => row.slice());
+    const rows = matrix.map(row => row.slice());
     const order = rows.map((_, k) => k);
     let determinant = 1;
     for (let k = 0; k < n; k += 1) {
@@ -27,7 +26,7 @@ const newton = (() => {
       for (let i = k + 1; i < n; i += 1) {
         if (Math.abs(rows[i][k]) > Math.abs(rows[best][k])) best = i;
       }
-      const rounding = n * Number.EPSILON * largest(matrix.map((row) => row[k]));
+      const rounding = n * Number.EPSILON * largest(matrix.map(row => row[k]));
       if (!(Math.abs(rows[best][k]) > rounding)) {
         return { rows, order, determinant: 0, dependent: dependentColumns(rows, k) };
       }
@@ -45,14 +44,14 @@ const newton = (() => {
     return { rows, order, determinant, dependent: [] };
   }
 
-  // The columns that take part where column k is a combination of those before it.
+  /* The columns that take part where column k is a combination of those before it. */
   function dependentColumns(rows, k) {
-    const weights = upperSolution(rows, rows.slice(0, k).map((row) => row[k]));
+    const weights = upperSolution(rows, rows.slice(0, k).map(row => row[k]));
     const most = Math.max(1, largest(weights));
-    return [...weights.keys()].filter((j) => Math.abs(weights[j]) > 1e-9 * most).concat(k);
+    return [...weights.keys()].filter(j => Math.abs(weights[j]) > 1e-9 * most).concat(k);
   }
 
-  // x of U x = b, U in the first rows of a factored matrix.
+  /* x of U x = b, U in the first rows of a factored matrix. */
   function upperSolution(rows, b) {
     const x = b.slice();
     for (let k = x.length - 1; k >= 0; k -= 1) {
@@ -62,24 +61,24 @@ const newton = (() => {
     return x;
   }
 
-  // x of A x = b from the factors of A.
+  /* x of A x = b from the factors of A. */
   function solve({ rows, order }, b) {
-    const y = order.map((k) => b[k]);
+    const y = order.map(k => b[k]);
     for (let k = 0; k < y.length; k += 1) {
       for (let j = 0; j < k; j += 1) y[k] -= rows[k][j] * y[j];
     }
     return upperSolution(rows, y);
   }
 
-  // The scale of each coordinate: 1 rad for angles, the size of the mechanism for the others.
+  /* The scale of each coordinate: 1 rad for angles, the size of the mechanism for the others. */
   function scales(model, q) {
-    const isAngle = model.COORDINATES.map((name) => model.UNITS[name] === 'rad');
+    const isAngle = model.COORDINATES.map(name => model.UNITS[name] === 'rad');
     const lengths = [...q, ...model.GUESS].filter((_, k) => !isAngle[k % q.length]);
     const size = largest(lengths) || 1;
-    return isAngle.map((angular) => (angular ? 1 : size));
+    return isAngle.map(angular => (angular ? 1 : size));
   }
 
-  // An iterate: the position, what the equations say there, and the correction that led to it.
+  /* An iterate: the position, what the equations say there, and the correction that led to it. */
   function iterateAt(model, q, t, p, step) {
     const Phi = model.Phi(q, t, p);
     const Phi_q = model.Phi_q(q, t, p);
@@ -87,10 +86,10 @@ const newton = (() => {
     return { q, Phi, Phi_q, factors, step, correction: step ? norm(step) : NaN };
   }
 
-  const isFinite = ({ Phi, Phi_q }) => [Phi, ...Phi_q].every((row) => row.every(Number.isFinite));
+  const isFinite = ({ Phi, Phi_q }) => [Phi, ...Phi_q].every(row => row.every(Number.isFinite));
 
-  // By how much the equations are missed, relative to what their terms contribute here or at the
-  // guess: at a dead point a whole row of Phi_q may vanish.
+  /* By how much the equations are missed, relative to what their terms contribute here or at the
+     guess: at a dead point a whole row of Phi_q may vanish. */
   function missed(iterate, guess, scale) {
     const terms = (Phi_q, i) => Phi_q[i].reduce((sum, x, j) => sum + Math.abs(x) * scale[j], 0);
     return largest(iterate.Phi.map((value, i) => {
@@ -98,9 +97,9 @@ const newton = (() => {
     }));
   }
 
-  // Whether the corrections shrink no faster than towards a double root, by halves.
+  /* Whether the corrections shrink no faster than towards a double root, by halves. */
   function crawls(iterates) {
-    const [before, last] = iterates.slice(-2).map((iterate) => iterate.correction);
+    const [before, last] = iterates.slice(-2).map(iterate => iterate.correction);
     return last > before / 4;
   }
 
@@ -112,8 +111,8 @@ const newton = (() => {
     return (isSmall || crawls(iterates)) && error <= ROUNDING;
   }
 
-  // All iterates from a guess, and how they end: 'converged', 'singular' (then `dependent` are
-  // columns of Phi_q at the last iterate), 'not finite' or 'not converged'.
+  /* All iterates from a guess, and how they end: 'converged', 'singular' (then `dependent` are
+     columns of Phi_q at the last iterate), 'not finite' or 'not converged'. */
   function iterate(model, guess, t, p = model.DEFAULTS) {
     const scale = scales(model, guess);
     const iterates = [iterateAt(model, guess.slice(), t, p, null)];
@@ -122,7 +121,7 @@ const newton = (() => {
     for (let k = 1; k <= MOST_ITERATIONS; k += 1) {
       const { q, Phi, factors } = iterates[k - 1];
       if (factors.dependent.length) return ended('singular', factors.dependent);
-      const step = solve(factors, Phi.map((value) => -value));
+      const step = solve(factors, Phi.map(value => -value));
       const following = iterateAt(model, q.map((x, j) => x + step[j]), t, p, step);
       if (!isFinite(following)) return ended('not finite');
       iterates.push(following);
@@ -132,8 +131,8 @@ const newton = (() => {
     return ended(isNear && crawls(iterates) ? 'singular' : 'not converged');
   }
 
-  // How a position differs from another one: the coordinates that do, an angle only modulo a turn,
-  // and the angles that are whole turns away.
+  /* How a position differs from another one: the coordinates that do, an angle only modulo a turn,
+     and the angles that are whole turns away. */
   function difference(model, q, other) {
     const scale = scales(model, other);
     const apart = { coordinates: [], turned: [] };
@@ -147,8 +146,8 @@ const newton = (() => {
     return apart;
   }
 
-  // What to say of a run: how it ended, and on which branch. `motion` is the position that the
-  // motion has at this time, null where it has none.
+  /* What to say of a run: how it ended, and on which branch. `motion` is the position that the
+     motion has at this time, null where it has none. */
   function statement(model, run, t, p, motion) {
     const count = run.iterates.length - 1;
     const iterations = count === 1 ? '1 iteration' : `${count} iterations`;
@@ -194,17 +193,18 @@ const newton = (() => {
   }
 
   function dependence(model, columns) {
-    const names = columns.map((k) => model.COORDINATES[k]).join(', ');
-    return columns.length > 1 ? `its columns ${names} depend on each other` : `its column ${names} vanishes`;
+    const names = columns.map(k => model.COORDINATES[k]).join(', ');
+    return columns.length > 1 ? `its columns ${names} depend on each other`
+      : `its column ${names} vanishes`;
   }
 
-  // The columns that nearly depend on each other: one step of inverse iteration.
+  /* The columns that nearly depend on each other: one step of inverse iteration. */
   function weakColumns(model, { factors, q }) {
     if (factors.dependent.length) return factors.dependent;
     const scale = scales(model, q);
     const direction = solve(factors, q.map(() => 1)).map((x, k) => x / scale[k]);
     const most = largest(direction);
-    return [...direction.keys()].filter((k) => Math.abs(direction[k]) > 0.01 * most);
+    return [...direction.keys()].filter(k => Math.abs(direction[k]) > 0.01 * most);
   }
 
   return { factor, solve, iterate, statement, scales, norm, largest };

@@ -90,8 +90,10 @@ class NewtonStage {
     });
     const link = svgElement('polygon', { class: 'link' });
     const arm = svgElement('line', { class: 'arm' });
-    const atOrigin = [svgElement('circle', { class: 'dot', r: 5 }), svgElement('circle', { class: 'grip', r: 16 })];
-    const atKnob = [svgElement('circle', { class: 'dot', r: 6 }), svgElement('circle', { class: 'grip turn', r: 16 })];
+    // A dot is seen, the larger grip around it is what a finger finds.
+    const circles = (...kinds) =>
+      kinds.map(([kind, r]) => svgElement('circle', { class: kind, r }));
+    const atOrigin = circles(['dot', 5], ['grip', 16]), atKnob = circles(['dot', 6], ['grip turn', 16]);
     group.append(svgElement('title', {}, name), link, arm, ...atOrigin, ...atKnob);
     group.addEventListener('pointerdown', event => this.startDrag(event, group, body));
     group.addEventListener('pointermove', event => this.moveDrag(event));
