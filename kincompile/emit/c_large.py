@@ -55,6 +55,8 @@ class _Written:
     sizes
         Its numbers of coordinates, equations, entries of Phi_q, parameters, numbers kept of Phi_q
         and determinants.
+    is_chain
+        Whether blocks of the type may need each other.
     largest_block
         Equations of the largest block that its planned solve leaves.
     """
@@ -62,6 +64,7 @@ class _Written:
     text: str
     called: frozenset[str]
     sizes: Mapping[str, int]
+    is_chain: bool
     largest_block: int
 
 
@@ -145,7 +148,7 @@ def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
         raise InternalError(f"the block of {', '.join(program.equations)} has no planned solve")
     solving = schedule_solve(own, plan, NameTable(RESERVED))
     lines += ["", *solve_functions(own, solving, prefix)]
-    data = {
+    data: dict[str, Any] = {
         "number": number,
         "blocks": sum(run.columns.shape[1] for run in runs if run.type == number),
         "equations": ", ".join(program.equations),
@@ -153,8 +156,11 @@ def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
         "read": ", ".join(coordinates[kind.own :]) or "nothing",
         "functions": "\n".join(lines),
         "coupling": "\n".join(f"    {line}" for line in _coupling(kind, entries)),
+        "is_chain": any(run.is_chain for run in runs if run.type == number),
+        "taking": "\n".join(f"        {line}" for line in _taking(kind, entries)),
+        "coupled": ", ".join(map(str, kind.coupled())),
+        "n_coupled": len(kind.coupled()),
         "own": kind.own,
-        "slots": len(coordinates),
     }
     sizes = {
         "slots": len(coordinates),
@@ -165,7 +171,9 @@ def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
         "determinants": len(plan.determinants),
     }
     largest = max((len(block.rows) for block in plan.blocks), default=0)
-    return _Written(fill("c/block_type.c.jinja", data), frozenset(called), sizes, largest)
+    return _Written(
+        fill("c/block_type.c.jinja", data), frozenset(called), sizes, data["is_chain"], largest
+    )
 
 
 def _identifier(name: str) -> str:
@@ -185,6 +193,16 @@ def _coupling(kind: BlockType, entries: Sequence[tuple[int, int, Any]]) -> list[
     return lines if any("at->" in line for line in lines) else ["(void)at;", *lines]
 
 
+def _taking(kind: BlockType, entries: Sequence[tuple[int, int, Any]]) -> list[str]:
+    """Return the lines that write down the columns of earlier blocks."""
+    place = {column: k for k, column in enumerate(kind.coupled())}
+    return [
+        f"taken[{place[column]}][{row}][lane] = {_entry(number, value)};"
+        for number, (row, column, value) in enumerate(entries)
+        if column in place
+    ]
+
+
 def _entry(number: int, value: Any) -> str:
     """Return an entry of Phi_q as text: a plain number, or where it is."""
     return f"at->Phi_q[{number}][lane]" if value is None else f"({float(value)!r})"
@@ -195,7 +213,7 @@ def _row(number: int, kind: BlockType, written: _Written) -> str:
     sizes = written.sizes["slots"], kind.own, kind.numbers, kind.values
     numbers = ", ".join(map(str, (*sizes, written.sizes["determinants"])))
     functions = [f"type_{number}_{name}_of_block" for name in (*FUNCTIONS, "factor")]
-    functions += [f"type_{number}_{name}" for name in ("solve", "follow")]
+    functions += [f"type_{number}_solve", f"type_{number}_follow" if written.is_chain else "NULL"]
     return f"    {{{numbers},\n" + "\n".join(f"        {name}," for name in functions) + "\n    },"
 
 
@@ -227,13 +245,16 @@ def _values(grouped: GroupedProgram) -> tuple[list[str], set[str]]:
 
 def _arrays(grouped: GroupedProgram, runs: Sequence[Run]) -> dict[str, NDArray[Any]]:
     """Return the data of the blocks, tile by tile."""
-    tiles: list[tuple[int, int, bool]] = []
+    tiles: list[tuple[int, int, bool, bool]] = []
     columns, numbers, values = [], [], []
     for run in runs:
         for start in range(0, run.columns.shape[1], LANES):
             lanes = slice(start, start + LANES)
-            tiles.append((run.type, run.columns[:, lanes].shape[1], run.is_chain))
-            columns.append(run.columns[:, lanes].reshape(-1))
+            own = run.columns[:, lanes]
+            is_regular = own.shape[1] > 2 and not np.diff(own, 2).any()
+            tiles.append((run.type, own.shape[1], run.is_chain, is_regular))
+            first = np.stack((own[:, 0], own[:, 1] - own[:, 0]), axis=1) if is_regular else own
+            columns.append(first.reshape(-1))
             numbers.append(run.numbers[:, lanes].reshape(-1))
             values.append(run.values[:, lanes].reshape(-1))
     angular = [item.unit == "rad" for item in grouped.program.coordinates]
