@@ -107,8 +107,8 @@ def emit(
     if form not in (None, "inline", "grouped"):
         raise InputError(f"there is no form {form!r}; forms are: inline, grouped")
     system = _checked(model)
-    program = lower(system)
     is_grouped = form == "grouped" or (form is None and len(system.coordinates) > LARGEST_INLINE)
+    program = lower(system, share_equations=is_grouped)
     if is_grouped and target != "numpy":
         raise UnsupportedError(
             f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import sympy
 
+from kincompile.ir.equation_shapes import EquationShapes
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
 from kincompile.ir.kernels import constraint_kernel, derivative_name, equation_kernel
@@ -21,26 +22,37 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from kincompile.calculus.template import Template
+    from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
     from kincompile.model.system import ConstraintSystem
 
 
-def lower(system: ConstraintSystem) -> Program:
-    """Return the program of a system: kernels x instances."""
+def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program:
+    """Return the program of a system: kernels x instances.
+
+    With `share_equations` free equations of equal structure are instances of one kernel, as joints
+    of one type are; without it each is a kernel of its own, in the order in which it is written.
+    """
     columns = {item.name: column for column, item in enumerate(system.coordinates)}
     graph = Graph()
-    binder = _Binder(graph)
+    binder, shapes = _Binder(graph), EquationShapes(columns)
     instances = []
     tables: dict[str, SplineTable] = {}
     for first_row, constraint in zip(system.row_offsets, system.constraints, strict=True):
+        names: tuple[str | None, ...] = constraint.columns
         if isinstance(constraint, FreeEquation):
-            kernel = equation_kernel(constraint)
-            bindings = tuple(graph.input(name) for name in kernel.inputs)
+            shared = shapes.shared(constraint) if share_equations else None
+            if shared is None:
+                kernel = equation_kernel(constraint)
+                bindings = tuple(graph.input(name) for name in kernel.inputs)
+            else:
+                kernel, names = shared.kernel, shared.columns
+                bindings = binder.bind_equation(shared)
         else:
             kernel = constraint_kernel(constraint.template)
             bindings = binder.bind(constraint, kernel)
             tables.update(_tables(constraint))
-        own = tuple(None if name is None else columns[name] for name in constraint.columns)
+        own = tuple(None if name is None else columns[name] for name in names)
         instances.append(Instance(kernel, constraint, first_row, own, bindings))
     frames = tuple((body.name, columns[body_coordinates(body.name)[2]]) for body in system.bodies)
     return Program(
@@ -65,6 +77,7 @@ def _fingerprint(
     tables: dict[str, SplineTable],
 ) -> str:
     kernels = {instance.kernel.name: instance.kernel for instance in instances if instance.bodies}
+    first = {id(instance.kernel): instance.name for instance in reversed(instances)}
     content = (
         system.name,
         system.coordinates,
@@ -75,8 +88,7 @@ def _fingerprint(
         [
             (
                 instance.name,
-                # A free equation is a kernel of its own.
-                instance.kernel.name if instance.bodies else instance.kernel,
+                _kernel_mark(instance, first[id(instance.kernel)]),
                 instance.bindings,
                 instance.columns,
             )
@@ -85,6 +97,13 @@ def _fingerprint(
         sorted(tables.items()),
     )
     return hashlib.sha256(repr(content).encode()).hexdigest()[:32]
+
+
+def _kernel_mark(instance: Instance, first: str) -> Kernel | str:
+    """Return what tells kernels apart: of a free equation the code, or who was first to have it."""
+    if instance.bodies:
+        return instance.kernel.name
+    return instance.kernel if first == instance.name else first
 
 
 def _tables(joint: Joint) -> dict[str, SplineTable]:
@@ -112,6 +131,14 @@ class _Binder:
             known[f"{symbol}.x"], known[f"{symbol}.y"] = self._convert(x), self._convert(y)
         functions = _function_nodes(joint, self._convert)
         return tuple(known[name] if name in known else functions(name) for name in kernel.inputs)
+
+    def bind_equation(self, equation: SharedEquation) -> tuple[int, ...]:
+        """Return the node of each of the inputs of a shared kernel."""
+        values = (equation.values[name] for name in equation.kernel.inputs)
+        return tuple(
+            self._graph.input(value) if isinstance(value, str) else self._convert(value)
+            for value in values
+        )
 
     def _coordinates(self, joint: Joint) -> dict[str, int]:
         """Return the template's coordinates, rates and frames as nodes of the system's own."""

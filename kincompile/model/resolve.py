@@ -133,6 +133,11 @@ class Scope:
         return frozenset((*self.coordinates, *self.parameters, "t"))
 
     @cached_property
+    def places(self) -> dict[str, int]:
+        """The number of each coordinate."""
+        return {name: place for place, name in enumerate(self.coordinates)}
+
+    @cached_property
     def coordinate_names(self) -> frozenset[str]:
         """The coordinates, for membership."""
         return frozenset(self.coordinates)
@@ -162,7 +167,7 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
     if len(scope.problems) > before:
         return None
     occurring = set().union(*(symbol_names(expression) for expression in expressions))
-    columns = tuple(name for name in scope.coordinates if name in occurring)
+    columns = tuple(sorted(occurring & scope.places.keys(), key=scope.places.__getitem__))
     return FreeEquation(equation.name, tuple(expressions), columns, equation.equation_names)
 
 
