@@ -23,7 +23,7 @@ BENCH_READY := $(VENV)/bench.stamp
 .PHONY: help demo test test-slow lint format types goldens update-goldens bench clean
 
 help:
-	@echo "make demo            compile the wrecker boom, run it, say what was written"
+	@echo "make demo            compile the wrecker boom, run it, show it on a page"
 	@echo "make test            run the tests                 make test-slow    packaging, pages in a browser"
 	@echo "make lint            ruff check, ruff format       make format       repair what ruff can"
 	@echo "make types           mypy                          make bench        the benchmarks"
@@ -60,10 +60,12 @@ demo: $(DEMO_READY)
 	@mkdir -p demo
 	@$(BIN)/kincompile compile examples/wrecker_boom.py -o demo/wrecker_boom_kinematics.py
 	@$(BIN)/kincompile run examples/wrecker_boom.py -o demo/wrecker_boom.csv
+	@$(BIN)/kincompile view examples/wrecker_boom.py -o demo/wrecker_boom.html
 	@echo
 	@echo "Written:"
 	@echo "  demo/wrecker_boom_kinematics.py  Phi, Phi_q, nu and gamma as a NumPy module, to read or to import"
 	@echo "  demo/wrecker_boom.csv            position, velocity and acceleration over time"
+	@echo "  demo/wrecker_boom.html           the motion on a page: open it in a browser"
 
 test: $(TEST_READY)
 	@$(PYTEST) --numprocesses=auto

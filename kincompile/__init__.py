@@ -40,7 +40,9 @@ _PUBLIC = {
     "kincompile.teach.verify": ("verify",),
     "kincompile.teach.derivation": ("derivation",),
     "kincompile.view.animation": ("animate",),
+    "kincompile.view.gallery": ("gallery",),
     "kincompile.view.mechanism_plot": ("plot_mechanism",),
+    "kincompile.view.page": ("page",),
     "kincompile.view.sparsity_plot": ("plot_sparsity",),
     "kincompile.errors": (
         "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError",
@@ -63,6 +65,8 @@ def __getattr__(name: str) -> Any:
         # The compiling side is loaded as a whole at its first use, so that no later call pays for
         # an import.
         import_module("kincompile.compiler")
+        if "IPython" in sys.modules:
+            import_module("kincompile.view.notebook")
     value = globals()[name] = getattr(import_module(module), name)
     return value
 

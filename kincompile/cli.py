@@ -1,4 +1,4 @@
-"""The command line: `kincompile compile | run | inspect | derive MODEL`, `compare MODEL HAND`.
+"""The command line: `kincompile compile | run | inspect | derive | view | compare MODEL`.
 
 stdout is data, stderr messages. Exit codes: 0 done; 2 wrong usage or model, or a file that cannot
 be read or written; 3 the motion did not converge; 130 interrupted; 1 is kept for `compare`, where
@@ -298,6 +298,61 @@ def derive(model: str, output: str, at: float, assignments: tuple[str, ...]) -> 
     state = {"t": at, **_values(assignments)}
     kc.derivation(_read(model), state).write(output)
     click.echo(f"Wrote {output}", err=True)
+
+
+@cli.command()
+@click.argument("models", nargs=-1, required=True, metavar="MODEL...")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="FILE",
+    help="Page to write, .html; a folder gets a page of each model, and index.html.",
+)
+@click.option("--end", type=float, help="Last time.  [default: the model's own]")
+@click.option(
+    "--points",
+    type=click.IntRange(min=1),
+    help="Number of equally spaced times from 0 to the end.  [default: the model's own]",
+)
+@click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Value of a parameter; may be given several times.",
+)
+@click.pass_context
+def view(
+    context: click.Context,
+    models: tuple[str, ...],
+    output: str,
+    end: float | None,
+    points: int | None,
+    assignments: tuple[str, ...],
+) -> None:
+    """Write a page that shows MODEL in motion, with plots and numbers.
+
+    The page is one file that needs no network: open it in a browser. Of several models, each gets
+    a page in a folder, whose index.html links them. Where the motion does not converge, the page
+    shows what was found, or the start guess, and the exit code is 3.
+    """
+    is_page = Path(output).suffix == ".html"
+    if is_page:
+        require_writable(output)
+    if is_page and len(models) > 1:
+        raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
+    values = _values(assignments)
+    read = [_read(model) for model in models]
+    pages = [kc.page(model, t=_times(model, end, points), p=values) for model in read]
+    written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
+    for path in written:
+        click.echo(f"Wrote {path}", err=True)
+    failed = [item for item in pages if not item.success]
+    for item in failed:
+        click.echo(f"Error: {item.message}", err=True)
+    if failed:
+        context.exit(NOT_CONVERGED)
 
 
 def _print_coloured(table: Any) -> None:

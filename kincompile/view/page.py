@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
 from kincompile.emit.templates import fill, read
-from kincompile.errors import StructuralError
+from kincompile.errors import InputError, StructuralError
+from kincompile.files import write_atomically
 from kincompile.runtime.solve import solve
 from kincompile.view.newton import newton_script
-from kincompile.view.page_data import page_json
+from kincompile.view.page_data import as_json, page_data
 
 if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike
+
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.solution import Solution
@@ -28,47 +36,116 @@ SCRIPTS = (
 )  # fmt: skip
 """Scripts, in order: each uses those before it."""
 
+FRAME_HEIGHT = 720
+"""Height of a page inside a notebook [pixels]."""
 
-def page(model: Mechanism | ConstraintSystem, solution: Solution | None = None) -> str:
-    """Return a mechanism, its motion and its numbers as one HTML page.
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A page that is ready to be written.
+
+    Attributes
+    ----------
+    name
+        Name of the mechanism.
+    html
+        The page with everything in it: data, style sheets, scripts. It asks for nothing.
+    data
+        What it shows, as `page_data` gives it.
+    """
+
+    name: str
+    html: str
+    data: Mapping[str, Any]
+
+    @property
+    def success(self) -> bool:
+        """Whether a position was found at every time."""
+        return bool(self.data["success"])
+
+    @property
+    def message(self) -> str:
+        """What the solver, or the compiler, says."""
+        return str(self.data["message"])
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page to a file, in one step, and return its path.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be written; says why.
+        """
+        return write_atomically(path, self.html)
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{escape(self.html)}" title="{escape(self.name)}" '
+            f'style="width: 100%; height: {FRAME_HEIGHT}px; border: 0"></iframe>'
+        )
+
+    def __repr__(self) -> str:
+        """Return name and size."""
+        return f"<Page of {self.name!r}: {len(self.html) / 1e6:.2f} MB>"
+
+
+def page(
+    model: Mechanism | ConstraintSystem,
+    solution: Solution | None = None,
+    *,
+    t: ArrayLike | None = None,
+    p: Mapping[str, float] | None = None,
+) -> Page:
+    """Return a page that shows a mechanism, its motion and its numbers.
 
     Parameters
     ----------
     model
         A mechanism, or a system of free equations, which has plots and no drawing.
     solution
-        The motion to show, of one set of parameters; without, the model is compiled and solved over
-        its own times. Where that is impossible the page shows the guess, and says why.
-
-    Returns
-    -------
-    str
-        HTML with everything in it: data, style sheets, scripts. It asks for nothing.
+        The motion to show, of one set of parameters; without, the model is compiled and solved.
+        Where that is impossible the page shows the guess, what it violates, and says why.
+    t : array_like, shape (N,), optional
+        Times to solve for; without, those of the model.
+    p
+        Parameters to solve with, by name; others have their defaults.
 
     Raises
     ------
     ModelError
         If the model cannot be used as written; every problem is listed.
+    InputError
+        If times or parameters cannot be used, or the solution has several variants.
     """
     system = model.system()
-    message = "" if solution is None else solution.message
     if solution is None:
-        solution, message = _solved(system)
-    data = {
+        times = np.linspace(0, system.end, system.points) if t is None else t
+        solution, message = _solved(system, times, p)
+    else:
+        message = solution.message
+    if solution is not None and solution.q.ndim != 2:
+        raise InputError(
+            f"this Solution of {solution.name} holds {len(solution.q)} variants, and a page shows "
+            "one motion: solve with the parameters of one of them"
+        )
+    shown = page_data(system, solution, message)
+    slots = {
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "licence": read("view/vendor/uplot.LICENSE.txt"),
         "scripts": [newton_script(system), *(read(f"view/{name}") for name in SCRIPTS)],
-        "data": page_json(system, solution, message),
+        "data": as_json(shown),
     }
-    return fill("view/page.html.jinja", data)
+    return Page(system.name, fill("view/page.html.jinja", slots), shown)
 
 
-def _solved(system: ConstraintSystem) -> tuple[Solution | None, str]:
-    """Compile and solve a system over its own times, as far as that goes, and say how far."""
+def _solved(
+    system: ConstraintSystem, t: ArrayLike, p: Mapping[str, float] | None
+) -> tuple[Solution | None, str]:
+    """Compile and solve a system, as far as that goes, and say how far."""
     try:
         module = compile_model(system)
     except StructuralError as error:
         return None, str(error)
-    solution = solve(module, np.linspace(0, system.end, system.points))
+    solution = solve(module, t, p)
     return solution, solution.message

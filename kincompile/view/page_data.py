@@ -14,10 +14,11 @@ from kincompile.runtime.status import Status
 from kincompile.view.shapes import drawing
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from types import ModuleType
     from typing import TypeAlias
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.solution import Solution
@@ -32,8 +33,8 @@ LARGEST_DENSE = 300
 """Coordinates up to which condition number and determinant of Phi_q are computed."""
 
 
-def page_json(system: ConstraintSystem, solution: Solution | None, message: str) -> str:
-    """Return all that the page shows as JSON, safe inside a script element.
+def page_data(system: ConstraintSystem, solution: Solution | None, message: str) -> dict[str, Any]:
+    """Return what the page shows, as plain data and arrays.
 
     Parameters
     ----------
@@ -44,13 +45,6 @@ def page_json(system: ConstraintSystem, solution: Solution | None, message: str)
     message
         What the solver, or the compiler, says.
     """
-    data = page_data(system, solution, message)
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
-
-
-def page_data(system: ConstraintSystem, solution: Solution | None, message: str) -> dict[str, Any]:
-    """Return what the page shows; arrays are little-endian float64 in base64, row by row."""
     guess = np.array([item.guess for item in system.coordinates])
     values = {item.name: item.default or 0.0 for item in system.parameters}
     if solution is not None:
@@ -80,12 +74,21 @@ def page_data(system: ConstraintSystem, solution: Solution | None, message: str)
         "events": events,
         "drawing": shapes.to_json(),
         "extent": shapes.extent(np.vstack((q, guess)) if np.isnan(q).all() else q),
-        "arrays": {name: encoded(array) for name, array in arrays.items()},
+        "arrays": arrays,
     }
 
 
-def encoded(array: ArrayLike) -> str:
-    """Return an array as base64 of its little-endian float64, row by row."""
+def as_json(data: Mapping[str, Any]) -> str:
+    """Return data of a page as JSON that is safe inside a script element.
+
+    Arrays become base64 of their little-endian float64, row by row.
+    """
+    arrays = {name: _encoded(array) for name, array in data["arrays"].items()}
+    text = json.dumps({**data, "arrays": arrays}, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def _encoded(array: Array) -> str:
     return base64.b64encode(np.ascontiguousarray(array, dtype="<f8").tobytes()).decode("ascii")
 
 

@@ -3,7 +3,7 @@
 
    drawShapes(ctx, q, style) draws the mechanism at coordinates q, any number of times on one canvas.
    style: { view, palette } and, where wanted, alpha, ghost (one colour for everything), violated (a
-   set of joint names that are drawn as broken). */
+   set of joint names that are drawn as broken), drawing (of another mechanism than the player's). */
 
 const GROUND = -1;
 
@@ -330,7 +330,7 @@ const DRAW = {
 };
 
 function drawShapes(ctx, q, style) {
-  const drawing = player.data.drawing;
+  const drawing = style.drawing ?? player.data.drawing;
   const pen = new Pen(ctx, q, style, drawing.size);
   ctx.save();
   ctx.globalAlpha = style.alpha ?? 1;
@@ -340,12 +340,12 @@ function drawShapes(ctx, q, style) {
 }
 
 /* A barrel keeps its length: most of the shortest that the cylinder has in the motion. */
-function measureBarrels() {
-  for (const mark of player.data.drawing.marks) {
+function measureBarrels(motion) {
+  for (const mark of motion.data.drawing.marks) {
     if (mark.kind !== 'span' || mark.style !== 'cylinder') continue;
     let shortest = Infinity;
-    for (let k = 0; k < player.count; k++) {
-      const q = player.solved(k).q;
+    for (let k = 0; k < motion.count; k++) {
+      const q = motion.solved(k).q;
       const ends = [mark.first, mark.second].map(place => inWorld(q, place.frame, place.point));
       shortest = Math.min(shortest, towards(...ends)[2]);
     }
@@ -353,4 +353,42 @@ function measureBarrels() {
   }
 }
 
-measureBarrels();
+/* ---- colours ---- */
+
+const HUES = {  // strong colours of the bodies, on light and on dark paper
+  light: ['#2563eb', '#b45309', '#047857', '#7c3aed', '#0e7490', '#be185d', '#4d7c0f', '#475569'],
+  dark: ['#7aa7ff', '#f0b35a', '#4fd1a5', '#b99aff', '#4cc9e0', '#f48cc0', '#a5cf5a', '#a9b6c9'],
+};
+const COLOURS = ['paper', 'ink', 'quiet', 'line', 'tint', 'bad', 'velocity', 'acceleration', 'drive'];
+
+/* The colours of the style sheet, and so of the theme; of each body a strong one and a tint. */
+function paletteNow() {
+  const probe = document.createElement('span');
+  document.body.append(probe);
+  const palette = Object.fromEntries(COLOURS.map(name => {
+    probe.style.color = `var(--${name})`;
+    return [name, getComputedStyle(probe).color];
+  }));
+  probe.remove();
+  palette.isDark = luminance(palette.paper) < 0.5;
+  palette.bodies = HUES[palette.isDark ? 'dark' : 'light'].map(
+    hue => [hue, blended(hue, palette.paper, palette.isDark ? 0.32 : 0.22)]);
+  palette.badTint = blended(palette.bad, palette.paper, 0.25);
+  return palette;
+}
+
+/* Red, green and blue of a colour, from 0 to 255. */
+function channels(colour) {
+  if (colour.startsWith('#')) return [1, 3, 5].map(k => parseInt(colour.slice(k, k + 2), 16));
+  return colour.match(/[\d.]+/g).slice(0, 3).map(Number);
+}
+
+function blended(colour, paper, part) {
+  const over = channels(paper);
+  return `rgb(${channels(colour).map((c, k) => Math.round(part * c + (1 - part) * over[k])).join()})`;
+}
+
+function luminance(colour) {
+  const [r, g, b] = channels(colour);
+  return (0.3 * r + 0.6 * g + 0.1 * b) / 255;
+}

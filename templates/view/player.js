@@ -1,5 +1,5 @@
 'use strict';
-/* The motion and its time. `player` is what the other scripts share:
+/* The motion and its time. `player`, made in stage.js, is what the other scripts share:
 
    player.data        what the page was given, arrays decoded (rows of n numbers, one after another)
    player.state       { index, time, q, q_dot, q_ddot, isFound } that is shown now
@@ -15,8 +15,8 @@ function decoded(text) {
   return new Float64Array(bytes.buffer);
 }
 
-function readData(element) {
-  const data = JSON.parse(element.textContent);
+/* Data as the page was given it, its arrays as numbers. */
+function withArrays(data) {
   for (const [name, text] of Object.entries(data.arrays)) data.arrays[name] = decoded(text);
   return data;
 }
@@ -178,5 +178,3 @@ function remember(list, value) {
   list.push(value);
   if (list.length > 240) list.shift();
 }
-
-const player = new Player(readData(document.getElementById('data')));

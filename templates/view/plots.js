@@ -75,7 +75,6 @@ class Plot {
     const series = [order(Array.from(player.t)), order(item.values())];
     this.chart = new uPlot(this.options(item), series, this.holder);
     this.chart.over.append(this.cursor);
-    this.move(player.state);
   }
 
   options(item) {
@@ -99,7 +98,10 @@ class Plot {
       hooks: {
         drawClear: [chart => this.shadeFailures(chart)],
         draw: [chart => this.drawEvents(chart)],
-        ready: [chart => this.listen(chart)],
+        ready: [chart => {
+          this.listen(chart);
+          this.move(player.state);
+        }],
       },
     };
   }
@@ -144,6 +146,7 @@ class Plot {
   }
 
   move(state) {
+    if (this.chart.status !== 1) return;  // uPlot lays out a little later, and then calls `ready`
     const x = this.chart.valToPos(state.time, 'x');
     this.cursor.style.transform = `translateX(${x}px)`;
     this.cursor.hidden = !(x >= 0 && x <= this.chart.over.clientWidth);

@@ -10,10 +10,6 @@
 
 const NEAR = 16;  // pixels within which a point is meant, twice that with a finger
 const ARROW = 0.2;  // part of the canvas that the longest velocity and acceleration take
-const HUES = {  // strong colours of the bodies, on light and on dark paper
-  light: ['#2563eb', '#b45309', '#047857', '#7c3aed', '#0e7490', '#be185d', '#4d7c0f', '#475569'],
-  dark: ['#7aa7ff', '#f0b35a', '#4fd1a5', '#b99aff', '#4cc9e0', '#f48cc0', '#a5cf5a', '#a9b6c9'],
-};
 
 class Stage {
   constructor(canvas) {
@@ -42,24 +38,7 @@ class Stage {
     this.canvas.style.height = `${height}px`;
     this.ctx.setTransform(dense, 0, 0, dense, 0, 0);
     [this.width, this.height] = [width, height];
-    this.takeColours();
-  }
-
-  /* Canvas colours follow the style sheet, and so the theme. */
-  takeColours() {
-    const probe = document.createElement('span');
-    document.body.append(probe);
-    const colour = name => {
-      probe.style.color = `var(--${name})`;
-      return getComputedStyle(probe).color;
-    };
-    const names = ['paper', 'ink', 'quiet', 'line', 'tint', 'bad', 'velocity', 'acceleration', 'drive'];
-    this.palette = Object.fromEntries(names.map(name => [name, colour(name)]));
-    const isDark = luminance(this.palette.paper) < 0.5;
-    this.palette.bodies = HUES[isDark ? 'dark' : 'light'].map(
-      hue => [hue, blended(hue, this.palette.paper, isDark ? 0.32 : 0.22)]);
-    this.palette.badTint = blended(this.palette.bad, this.palette.paper, 0.25);
-    probe.remove();
+    this.palette = paletteNow();
   }
 
   draw(state) {
@@ -249,20 +228,6 @@ function violatedJoints() {
   return new Set(broken.map(joint => joint.name));
 }
 
-/* Red, green and blue of a colour, from 0 to 255. */
-function channels(colour) {
-  if (colour.startsWith('#')) return [1, 3, 5].map(k => parseInt(colour.slice(k, k + 2), 16));
-  return colour.match(/[\d.]+/g).slice(0, 3).map(Number);
-}
-
-function blended(colour, paper, part) {
-  const over = channels(paper);
-  return `rgb(${channels(colour).map((c, k) => Math.round(part * c + (1 - part) * over[k])).join()})`;
-}
-
-function luminance(colour) {
-  const [r, g, b] = channels(colour);
-  return (0.3 * r + 0.6 * g + 0.1 * b) / 255;
-}
-
+const player = new Player(withArrays(JSON.parse(document.getElementById('data').textContent)));
+measureBarrels(player);
 const stage = new Stage(document.getElementById('canvas'));

@@ -8,8 +8,13 @@ const hasBodies = player.data.drawing.bodies.length > 0;
 
 function showMessages() {
   const { data } = player;
-  const sizes = [`${data.drawing.bodies.length} bodies`, `${data.coordinates.length} coordinates`,
-    `${data.equations.length} equations`, `${player.count} times`];
+  const counted = (count, one, several) => `${count} ${count === 1 ? one : several}`;
+  const sizes = [
+    counted(data.drawing.bodies.length, 'body', 'bodies'),
+    counted(data.coordinates.length, 'coordinate', 'coordinates'),
+    counted(data.equations.length, 'equation', 'equations'),
+    counted(player.count, 'time', 'times'),
+  ];
   byId('summary').textContent = (hasBodies ? sizes : sizes.slice(1)).join(', ');
   if (!data.success) {
     byId('message').hidden = false;
@@ -129,11 +134,21 @@ function showTip(state) {
     return line;
   });
   tip.replaceChildren(title, ` ${point.kind}`, ...lines);
-  const [x, y] = stage.view.toScreen(stage.where(point, state));
-  const left = x + 18 + tip.offsetWidth < stage.width ? x + 18 : x - 18 - tip.offsetWidth;
-  const top = y + 14 + tip.offsetHeight < stage.height ? y + 14 : y - 14 - tip.offsetHeight;
-  tip.style.left = `${Math.max(2, Math.min(left, stage.width - tip.offsetWidth - 2))}px`;
-  tip.style.top = `${Math.max(2, top)}px`;
+  const [left, top] = placeOfTip(tip, stage.view.toScreen(stage.where(point, state)), state);
+  tip.style.left = `${left}px`;
+  tip.style.top = `${top}px`;
+}
+
+/* Beside the point or in a corner: the first place that hides the fewest other points. */
+function placeOfTip(tip, [x, y], state) {
+  const [wide, tall] = [tip.offsetWidth, tip.offsetHeight];
+  const [right, low] = [stage.width - wide - 4, stage.height - tall - 4];
+  const beside = [[x + 18, y + 14], [x - 18 - wide, y + 14], [x + 18, y - 14 - tall], [x - 18 - wide, y - 14 - tall]];
+  const inside = beside.filter(([a, b]) => a >= 4 && a <= right && b >= 4 && b <= low);
+  const others = stage.points.map(other => stage.view.toScreen(stage.where(other, state)));
+  const hidden = ([a, b]) => others.filter(([u, v]) => u > a && u < a + wide && v > b && v < b + tall).length;
+  const places = [...inside, [4, 4], [right, 4], [4, low], [right, low]];
+  return places.reduce((best, place) => (hidden(place) < hidden(best) ? place : best));
 }
 
 /* The longest path is traced from the start: of bodies that are not hung on the ground, where there
@@ -187,17 +202,15 @@ function connectTabs() {
 }
 
 function showTheme() {
-  stage.takeColours();
-  const isDark = luminance(stage.palette.paper) < 0.5;
-  byId('theme').textContent = isDark ? 'Light' : 'Dark';
+  stage.palette = paletteNow();
+  byId('theme').textContent = stage.palette.isDark ? 'Light' : 'Dark';
   plots.redraw();
   player.refresh();
 }
 
 function connectTheme() {
   byId('theme').addEventListener('click', () => {
-    const isDark = luminance(stage.palette.paper) < 0.5;
-    document.documentElement.dataset.theme = isDark ? 'light' : 'dark';
+    document.documentElement.dataset.theme = stage.palette.isDark ? 'light' : 'dark';
     showTheme();
   });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', showTheme);

@@ -1,0 +1,54 @@
+'use strict';
+/* Every card's mechanism in motion, while it can be seen; at rest for those who ask for it. */
+
+const MARGIN = 10;
+const REST = 0.3;  // part of the motion that is shown at rest
+
+class Card {
+  constructor(element) {
+    this.motion = new Player(withArrays(JSON.parse(element.querySelector('script').textContent)));
+    this.canvas = element.querySelector('canvas');
+    this.isSeen = true;
+    measureBarrels(this.motion);
+    new IntersectionObserver(([entry]) => { this.isSeen = entry.isIntersecting; }).observe(this.canvas);
+  }
+
+  draw(seconds, palette) {
+    const { canvas, motion } = this, { drawing, extent } = motion.data;
+    const dense = devicePixelRatio || 1, { clientWidth, clientHeight } = canvas;
+    canvas.width = Math.round(clientWidth * dense);
+    canvas.height = Math.round(clientHeight * dense);
+    const ctx = canvas.getContext('2d');
+    ctx.scale(dense, dense);
+    if (!drawing.bodies.length) {
+      Object.assign(ctx, { font: 'italic 1.6rem serif', fillStyle: palette.quiet, textAlign: 'center' });
+      ctx.fillText('Φ(q, t) = 0', clientWidth / 2, clientHeight / 2);
+      return;
+    }
+    const elapsed = motion.duration ? (motion.speed * seconds) % motion.duration : 0;
+    const view = new View(extent, clientWidth, clientHeight, MARGIN);
+    drawShapes(ctx, motion.between(elapsed).q, { view, palette, drawing });
+  }
+}
+
+function startGallery() {
+  const cards = [...document.querySelectorAll('.card')].map(element => new Card(element));
+  const isStill = matchMedia('(prefers-reduced-motion: reduce)').matches;
+  const atRest = card => REST * card.motion.duration / card.motion.speed;
+  let palette = paletteNow();
+  const drawAll = () => cards.forEach(card => card.draw(atRest(card), palette));
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+    palette = paletteNow();
+    drawAll();
+  });
+  addEventListener('resize', drawAll);
+  drawAll();
+  if (isStill) return;
+  const frame = now => {
+    for (const card of cards) if (card.isSeen) card.draw(atRest(card) + now / 1000, palette);
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+}
+
+startGallery();
