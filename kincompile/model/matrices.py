@@ -16,6 +16,7 @@ from kincompile.model.display import constraints_html, equations_latex, problems
 from kincompile.model.expressions import alpha, as_sympy, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.names import rate
+from kincompile.pictures import picture_html
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -87,7 +88,8 @@ class MatrixViews:
             system = self.system()
         except ModelError as error:
             return problems_html(self.name, str(error))
-        return constraints_html(self.name, len(system.coordinates), system.constraints)
+        table = constraints_html(self.name, len(system.coordinates), system.constraints)
+        return table + picture_html(self)
 
     def _repr_latex_(self) -> str | None:
         try:

@@ -8,10 +8,11 @@ import numpy as np
 
 from kincompile.errors import missing_package
 from kincompile.names import column_name
+from kincompile.runtime.figures import figure_html
 from kincompile.runtime.labelled import TIME_UNIT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -45,14 +46,25 @@ def plot_columns(solution: LabelledViews, names: Sequence[str], ax: Axes | None)
     if ax is not None:
         draw_columns(ax, solution, [name for group in columns.values() for name in group])
         return ax
-    height = 1.2 + 2.4 * len(columns)
-    figure = plt.figure(figsize=(7.2, height), layout="constrained")
+    figure = plt.figure(figsize=_size_of(columns), layout="constrained")
     return draw_panels(figure, solution, columns)
 
 
-def draw_panels(
-    figure: Figure, solution: LabelledViews, columns: dict[str, list[str]] | None = None
-) -> Axes:
+def plot_html(solution: LabelledViews) -> str:
+    """Return the plot of all coordinates as HTML; "" where matplotlib is not installed."""
+    columns = columns_by_unit(solution, ())
+    title = f"the coordinates of {solution.name} over time"
+    return figure_html(
+        title, _size_of(columns), lambda figure: draw_panels(figure, solution, columns)
+    )
+
+
+def _size_of(columns: Mapping[str, object]) -> tuple[float, float]:
+    """Return width and height of a figure [inch]."""
+    return 7.2, 1.2 + 2.4 * len(columns)
+
+
+def draw_panels(figure: Figure, solution: LabelledViews, columns: dict[str, list[str]]) -> Axes:
     """Draw columns into a figure, a panel for each unit, and return the first panel.
 
     Parameters
@@ -62,11 +74,10 @@ def draw_panels(
     solution
         The motion.
     columns
-        Names of columns by unit; without any, those of all coordinates.
+        Names of columns by unit.
     """
-    groups = list((columns or columns_by_unit(solution, ())).values())
-    panels = figure.subplots(len(groups), sharex=True, squeeze=False)[:, 0]
-    for panel, group in zip(panels, groups, strict=True):
+    panels = figure.subplots(len(columns), sharex=True, squeeze=False)[:, 0]
+    for panel, group in zip(panels, columns.values(), strict=True):
         draw_columns(panel, solution, group)
         panel.label_outer()
     figure.suptitle(solution.name)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
+from kincompile.pictures import picture_html
 from kincompile.runtime.branches import counted_signatures, signatures
 from kincompile.runtime.condition import conditions
 from kincompile.runtime.display import table_html
 from kincompile.runtime.events import BIFURCATION, Event
 from kincompile.runtime.labelled import LabelledViews
-from kincompile.runtime.motion_plot import plot_columns
+from kincompile.runtime.motion_plot import plot_columns, plot_html
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -155,14 +156,25 @@ class Solution(LabelledViews):
         return plot_columns(self, names, ax)
 
     def _repr_html_(self) -> str:
-        t = self.t
-        header = ("coordinate", "unit", f"t = {t[0]:g}", f"t = {t[-1]:g}", "smallest", "largest")
+        title = f"{self.t.size} points from t = {self.t[0]:g} to {self.t[-1]:g}. {self.message}"
+        table = table_html(self.name, title, *self._extremes())
+        return table + (picture_html(self) or plot_html(self))
+
+    def _extremes(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Return header and rows of a table: ends of the motion, if it is one, and extremes."""
+        columns = self.q.reshape(-1, len(self.coordinates)).T
+        values = [_range(column) for column in columns]
+        header: tuple[str, ...] = ("smallest", "largest")
+        if self.q.ndim == 2:
+            header = f"t = {self.t[0]:g}", f"t = {self.t[-1]:g}", *header
+            values = [
+                (column[0], column[-1], *both) for column, both in zip(columns, values, strict=True)
+            ]
         rows = [
-            (name, self.units.get(name, ""), *(f"{x:.6g}" for x in (q[0], q[-1], *_range(q))))
-            for name, q in zip(self.coordinates, self.q.T, strict=True)
+            (name, self.units.get(name, ""), *(f"{x:.6g}" for x in row))
+            for name, row in zip(self.coordinates, values, strict=True)
         ]
-        title = f"{t.size} points from t = {t[0]:g} to {t[-1]:g}. {self.message}"
-        return table_html(self.name, title, header, rows)
+        return ("coordinate", "unit", *header), rows
 
     def __repr__(self) -> str:
         """Give the name, the grid and the outcome in one line."""
@@ -178,7 +190,7 @@ class Solution(LabelledViews):
         return f"failed, {good} of {self.t.size} points converged; see .message"
 
 
-def _range(values: NDArray[np.float64]) -> tuple[float, float]:
+def _range(values: NDArray[np.float64]) -> tuple[float, ...]:
     """Give the smallest and the largest of the values that were found."""
     found = values[np.isfinite(values)]
     return (float(found.min()), float(found.max())) if found.size else (np.nan, np.nan)

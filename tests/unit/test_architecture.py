@@ -21,6 +21,7 @@ FLOORS = {
     "errors": 0,
     "files": 0,
     "names": 0,
+    "pictures": 0,
     "tables": 0,
     "calculus": 1,
     "derive": 2,

@@ -1,0 +1,49 @@
+"""What a mechanism and its motion look like in a notebook; importing this registers it.
+
+A mechanism is drawn at its guess; a motion is played on its page, in a frame and without a server.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.model.mechanism import Mechanism
+from kincompile.model.origins import model_of
+from kincompile.model.system import ConstraintSystem
+from kincompile.pictures import picture_html
+from kincompile.runtime.figures import figure_html
+from kincompile.runtime.solution import Solution
+from kincompile.view.mechanism_plot import draw, position_of
+from kincompile.view.page import page
+from kincompile.view.shapes import drawing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_PLAYED = 30_000
+"""Numbers in q up to which a motion is played: a page of a megabyte or two."""
+
+
+@picture_html.register(Mechanism)
+@picture_html.register(ConstraintSystem)
+def model_picture(model: Mechanism | ConstraintSystem) -> str:
+    """Return an image of a mechanism at its guess; "" without bodies, or without matplotlib."""
+    system = model.system()
+    if not system.bodies:
+        return ""
+
+    def draw_guess(figure: Figure) -> None:
+        ax = figure.subplots()
+        ax.set_title("start guess", fontsize="medium")
+        draw(ax, system, drawing(system), position_of(system, None)[None])
+
+    return figure_html(f"{system.name} at its start guess", (5.0, 3.6), draw_guess)
+
+
+@picture_html.register(Solution)
+def motion_picture(solution: Solution) -> str:
+    """Return the player of a motion; "" where the model is not known, or the page too large."""
+    system = model_of(solution.module)
+    if system is None or solution.q.ndim != 2 or solution.q.size > MOST_PLAYED:
+        return ""
+    return page(system, solution)._repr_html_()
