@@ -22,9 +22,10 @@ from kincompile.runtime.newton import newton
 from kincompile.runtime.problem import problem
 from kincompile.runtime.status import Status
 from kincompile.tables import indented, table
+from kincompile.teach.oracles import ORACLES, Oracle
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
@@ -34,22 +35,16 @@ Array = NDArray[Any]
 STATES, SEED = 6, 1989
 """States of each kind, generic ones and assembled ones."""
 
-STEP = 1e-30
-"""Complex step: no difference is taken, so that it may be as small as one likes."""
+ALL_SHOWN = 60
+"""Equations up to which each has lines of its own; beyond, the largest errors stand for all."""
 
-RADIUS, POINTS = 0.05, 16
-"""Circle around s = 0 over which Cauchy's integral gives the second derivative."""
-
-DIFFERENCE = 1e-3
-"""Step of the differences that judge where Phi cannot be continued to complex numbers."""
-
-ALLOWED, ALLOWED_OF_DIFFERENCES = 1e-8, 1e-5
-"""Error, relative to what the terms of an equation contribute, up to which numbers agree."""
+LARGEST = 10
+"""How many of the largest errors of each quantity stand for all."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """The comparison of one quantity of one constraint's rows.
+    """The comparison of one quantity of one equation.
 
     Attributes
     ----------
@@ -57,6 +52,8 @@ class Check:
         ``"Phi_q"``, ``"nu"`` or ``"gamma"``.
     equation
         Name of the equation.
+    coordinate
+        Of Phi_q, the coordinate of the entry with the largest error; else "".
     oracle
         What it was compared with.
     error
@@ -67,9 +64,16 @@ class Check:
 
     quantity: str
     equation: str
+    coordinate: str
     oracle: str
     error: float
     passed: bool
+
+    @property
+    def entry(self) -> str:
+        """The entry as in ``Phi_q of A.x by phi_rod``."""
+        by = f" by {self.coordinate}" if self.coordinate else ""
+        return f"{self.quantity} of {self.equation}{by}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,27 +106,48 @@ class Verification:
 
     def to_text(self) -> str:
         """Give the table and the verdict as plain text."""
+        shown = self._shown()
         rows = [
             [
                 check.equation,
                 check.quantity,
+                check.coordinate,
                 check.oracle,
                 f"{check.error:.1e}",
                 "agrees" if check.passed else "DIFFERS",
             ]
-            for check in self.checks
+            for check in shown
         ]
-        header = ("equation", "quantity", "compared with", "error", "verdict")
-        generic, assembled = self.states
-        wrong = [
-            f"{check.quantity} of {check.equation}" for check in self.checks if not check.passed
-        ]
-        verdict = f"DIFFERS: {', '.join(wrong)}" if wrong else "all agree"
+        header = ("equation", "quantity", "worst by", "compared with", "error", "verdict")
+        rest = len(self.checks) - len(shown)
+        more = [f"  {rest} more comparisons agree better than these"] if rest else []
         return "\n".join([
             f"Verification of {self.name}",
             *indented(table(header, rows, right=("error",))),
-            f"  {generic} generic and {assembled} assembled states: {verdict}",
+            *more,
+            f"  {self._verdict()}",
         ])  # fmt: skip
+
+    def _shown(self) -> list[Check]:
+        """Return the checks to be shown: all, or what differs and the largest errors."""
+        if len(self.checks) <= 3 * ALL_SHOWN:
+            return list(self.checks)
+        shown: set[Check] = {check for check in self.checks if not check.passed}
+        for quantity in ORACLES:
+            own = [check for check in self.checks if check.quantity == quantity]
+            shown |= set(sorted(own, key=lambda check: -check.error)[:LARGEST])
+        return [check for check in self.checks if check in shown]
+
+    def _verdict(self) -> str:
+        generic, assembled = self.states
+        wrong = [check.entry for check in self.checks if not check.passed]
+        verdict = f"DIFFERS: {', '.join(wrong)}" if wrong else "all agree"
+        if not assembled:
+            verdict += (
+                "; no assembled position was found near the guess, so that none is among them "
+                "(`kincompile inspect` says what does not fit)"
+            )
+        return f"{generic} generic and {assembled} assembled states: {verdict}"
 
     def __str__(self) -> str:
         """Give the text."""
@@ -197,89 +222,90 @@ def _is_finite(module: ModuleType, q: Array, t: float) -> bool:
 
 
 def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
-    """Yield what each oracle says of each equation."""
-    scale = problem(module, module.DEFAULTS, module.GUESS, 0.0).reference
-    for quantity, exact, rough in (
-        ("Phi_q", "complex step", "differences"),
-        ("nu", "complex step in t", "differences in t"),
-        ("gamma", "line oracle, contour", "line oracle, differences"),
-    ):
-        errors = np.max([_errors(module, state, quantity, scale, _EXACT) for state in states], 0)
-        doubtful = ~(errors <= ALLOWED)
-        # Beside a corner, and within a spline, complex numbers do not tell.
-        second = errors
-        if doubtful.any():
-            second = np.max(
-                [_errors(module, state, quantity, scale, _ROUGH) for state in states], 0
-            )
+    """Yield what the oracles say of each equation."""
+    reference = problem(module, module.DEFAULTS, module.GUESS, 0.0).reference
+    for quantity in ORACLES:
+        given, size = _given(module, states, quantity, reference)
+        error, limit, judge = _judged(module, states, quantity, given, size)
+        # The entry and the state at which an equation is worst, compared with what is allowed.
+        columns = np.argmax(error, axis=2)
+        errors = np.max(error, axis=2)
+        worst = np.argmax(errors / limit, axis=0)
         for row, equation in enumerate(module.EQUATIONS):
-            error = float(second[row] if doubtful[row] else errors[row])
-            limit = ALLOWED_OF_DIFFERENCES if doubtful[row] else ALLOWED
-            oracle = rough if doubtful[row] else exact
-            yield Check(quantity, equation, oracle, error, error <= limit)
+            at = worst[row], row
+            column = module.COORDINATES[columns[at]] if quantity == "Phi_q" else ""
+            yield Check(
+                quantity,
+                equation,
+                column,
+                ORACLES[quantity][judge[at]][0],
+                float(errors[at]),
+                bool(errors[at] <= limit[at]),
+            )
 
 
-def _errors(
-    module: ModuleType,
-    state: State,
-    quantity: str,
-    scale: Array,
-    derivatives: tuple[Callable[..., Array], Callable[..., Array]],
-) -> Array:
-    """Return the relative error of each equation at a state; infinite where it cannot be judged."""
-    q, q_dot, t = state
-    first, second = derivatives
-    Phi_q = module.Phi_q(q, t)
-    terms = np.abs(Phi_q) @ scale
-    terms = np.where(terms > 0, terms, 1.0)
-    try:
-        if quantity == "Phi_q":
-            columns = [first(module, q, t, direction, 0.0) for direction in np.eye(q.size)]
-            away = np.abs(np.array(columns).T - Phi_q) * scale
-            return np.asarray(np.nan_to_num(np.max(away, axis=1) / terms, nan=np.inf))
-        if quantity == "nu":
-            found, given = -first(module, q, t, 0 * q, 1.0), module.nu(q, t)
-        else:
-            found, given = -second(module, q, t, q_dot, 1.0), module.gamma(q, q_dot, t)
-            terms = terms * max(1.0, float(np.max(np.abs(q_dot / scale))) ** 2)
-    except (ArithmeticError, TypeError, ValueError):
-        return np.full(len(terms), np.inf)
-    away = np.abs(found - given) / np.maximum(terms, np.abs(given))
-    return np.asarray(np.nan_to_num(away, nan=np.inf))
+def _given(
+    module: ModuleType, states: list[State], quantity: str, reference: Array
+) -> tuple[Array, Array]:
+    """Return what the module gives, and what errors are relative to, both (states, m, k).
+
+    Of Phi_q k is n, else 1. An equation's error is relative to what its terms contribute.
+    """
+    Phi_q = np.array([module.Phi_q(q, t) for q, _, t in states])
+    terms = np.abs(Phi_q) @ reference
+    terms = np.where(terms > 0, terms, 1.0)[:, :, np.newaxis]
+    if quantity == "Phi_q":
+        return Phi_q, terms / reference
+    if quantity == "nu":
+        given = np.array([module.nu(q, t) for q, _, t in states])
+    else:
+        given = np.array([module.gamma(q, q_dot, t) for q, q_dot, t in states])
+        fastest = np.array([np.max(np.abs(q_dot / reference)) for _, q_dot, _ in states])
+        terms = terms * np.maximum(1.0, fastest**2)[:, np.newaxis, np.newaxis]
+    given = given[:, :, np.newaxis]
+    return given, np.maximum(terms, np.abs(given))
 
 
-def _complex_step(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the derivative of Phi along a direction of (q, t)."""
-    moved = module.Phi(q + 1j * STEP * along, t + 1j * STEP * time if time else t)
-    return np.asarray(np.imag(moved) / STEP)
+def _judged(
+    module: ModuleType, states: list[State], quantity: str, given: Array, size: Array
+) -> tuple[Array, Array, Array]:
+    """Return errors (states, m, k), the allowed ones and the number of the oracle (states, m).
+
+    What disagrees with the exact oracle may be wrong, or the oracle may: Phi need not have a
+    continuation to complex numbers. It is believed where it agrees with the plain one.
+    """
+    exact, plain = ORACLES[quantity]
+    found = _estimates(module, states, quantity, exact)
+    error = _away(found, given, size)
+    limit, judge = np.full(error.shape[:2], exact[2]), np.zeros(error.shape[:2], dtype=int)
+    if (error > exact[2]).any():
+        other = _estimates(module, states, quantity, plain)
+        doubted = np.max(_away(found, other, size), axis=2) > plain[2]
+        error[doubted] = _away(other, given, size)[doubted]
+        limit[doubted], judge[doubted] = plain[2], 1
+    return error, limit, judge
 
 
-def _contour(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the second derivative of Phi along a line, by Cauchy's integral over a circle."""
-    turns = np.exp(2j * np.pi * np.arange(POINTS) / POINTS)
-    values = [module.Phi(q + RADIUS * s * along, t + RADIUS * s * time) for s in turns]
-    total = sum(value / s**2 for value, s in zip(values, turns, strict=True))
-    return np.asarray(np.real(total) * 2 / (POINTS * RADIUS**2))
+def _away(found: Array, given: Array, size: Array) -> Array:
+    """Return how far numbers are apart; infinitely, where one of them is not finite."""
+    return np.asarray(np.nan_to_num(np.abs(found - given) / size, nan=np.inf))
 
 
-def _difference(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the derivative of Phi along a direction by central differences of fourth order."""
-    near, far = (
-        module.Phi(q + h * along, t + h * time) - module.Phi(q - h * along, t - h * time)
-        for h in (DIFFERENCE, 2 * DIFFERENCE)
-    )
-    return np.asarray((8 * near - far) / (12 * DIFFERENCE))
-
-
-def _second_difference(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the second derivative of Phi along a line by differences of fourth order."""
-    here = module.Phi(q, t)
-    near, far = (
-        module.Phi(q + h * along, t + h * time) + module.Phi(q - h * along, t - h * time) - 2 * here
-        for h in (DIFFERENCE, 2 * DIFFERENCE)
-    )
-    return np.asarray((16 * near - far) / (12 * DIFFERENCE**2))
-
-
-_EXACT = (_complex_step, _contour)
-_ROUGH = (_difference, _second_difference)
+def _estimates(module: ModuleType, states: list[State], quantity: str, oracle: Oracle) -> Array:
+    """Return what an oracle gives for a quantity at all states, (states, m, k); NaN for nothing."""
+    _, derivative, _ = oracle
+    found = []
+    for q, q_dot, t in states:
+        along, time = (
+            (np.eye(q.size), 0.0)
+            if quantity == "Phi_q"
+            else (np.zeros((1, q.size)), 1.0)
+            if quantity == "nu"
+            else (q_dot[np.newaxis], 1.0)
+        )
+        try:
+            rates = derivative(module, q, t, along, time).T
+        except (ArithmeticError, TypeError, ValueError):
+            rates = np.full((len(module.EQUATIONS), len(along)), np.nan)
+        found.append(rates if quantity == "Phi_q" else -rates)
+    return np.array(found)
