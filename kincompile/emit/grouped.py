@@ -49,7 +49,7 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
         "numbers": grouped.numbers,
         "angles": np.array(grouped.angles, dtype=np.intp),
     }
-    rows, columns, constants, order = _pattern(grouped)
+    rows, columns, constants, order = pattern_of(grouped)
     arrays["pattern"] = np.stack((rows, columns), axis=1)
     arrays["constants"] = np.nan_to_num(constants)
     arrays["coordinates"] = _text([item.name for item in program.coordinates])
@@ -74,7 +74,7 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
     return Emitted(program.name, {f"{program.name}.py": source}, _small(arrays))
 
 
-def _pattern(
+def pattern_of(
     grouped: GroupedProgram,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp]]:
     """Return rows, columns and constants of Phi_q row by row, and the order of its entries."""

@@ -96,7 +96,7 @@ SHARED = 4
 
 
 def plan_stages(
-    rows: Index, columns: Index, constants: Values, size: int
+    rows: Index, columns: Index, constants: Values, size: int, shared: int = SHARED
 ) -> tuple[Stage, ...] | None:
     """Split a large square system into stages.
 
@@ -108,6 +108,9 @@ def plan_stages(
         Its value where it is a plain number, NaN where it varies.
     size
         Number of equations, and of coordinates.
+    shared
+        Blocks a class, on average, that a chain must have; others are left to a sparse
+        factorization.
 
     Returns
     -------
@@ -132,7 +135,7 @@ def plan_stages(
     for together, is_cyclic in _class_order(needs, len(classes)):
         chosen = np.concatenate([members[number] for number in together])
         largest = int(np.bincount(blocks.of_row)[chosen].max())
-        if largest > LARGEST_BLOCK or (is_cyclic and chosen.size < SHARED * len(together)):
+        if largest > LARGEST_BLOCK or (is_cyclic and chosen.size < shared * len(together)):
             stages.append(_sparse(chosen, blocks))
             continue
         lanes = []
