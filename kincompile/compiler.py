@@ -11,12 +11,14 @@ module    -> make_native     module            its functions replaced by compile
 
 from __future__ import annotations
 
+import logging
 import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.emit.c_large import emit_c_grouped, emit_c_large, split_into_types
 from kincompile.emit.c_target import emit_c
 from kincompile.emit.grouped import emit_grouped
 from kincompile.emit.javascript_target import emit_javascript
@@ -39,18 +41,22 @@ from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native import make_native
+from kincompile.runtime.native_large import make_native_large
 from kincompile.runtime.solve import solve
 from kincompile.structure.counting import require_square
 from kincompile.structure.report import inspect_system
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from types import ModuleType
 
     from numpy.typing import NDArray
 
     from kincompile.emit.target import Emitted, Target
+    from kincompile.ir.inline import InlineProgram
     from kincompile.structure.report import Inspection
+
+LOG = logging.getLogger(__name__)
 
 TARGETS: Mapping[str, Target] = {
     "numpy": emit_numpy,
@@ -59,6 +65,12 @@ TARGETS: Mapping[str, Target] = {
     "javascript": emit_javascript,
 }
 """Languages to emit."""
+
+GROUPED_TARGETS: Mapping[str, Callable[[GroupedProgram], Emitted]] = {
+    "numpy": emit_grouped,
+    "c": emit_c_grouped,
+}
+"""Languages that have a form for large mechanisms."""
 
 LOADABLE = ("numpy", "c")
 """Targets whose code this process can call."""
@@ -102,17 +114,27 @@ def emit(
     UnsupportedError
         If there is no such target, or it cannot print the mechanism.
     """
+    _check_target(target, form)
+    return _emitted(_lowered(_checked(model), target, form), target)
+
+
+def _check_target(target: str, form: str | None) -> None:
     if target not in TARGETS:
         raise UnsupportedError(f"there is no target {target!r}; targets are: {listed(TARGETS)}")
     if form not in (None, "inline", "grouped"):
         raise InputError(f"there is no form {form!r}; forms are: inline, grouped")
-    system = _checked(model)
+
+
+def _lowered(
+    system: ConstraintSystem, target: str, form: str | None
+) -> InlineProgram | GroupedProgram:
+    """Return the program of a system in the form that a target is to print."""
     is_grouped = form == "grouped" or (form is None and len(system.coordinates) > LARGEST_INLINE)
-    program = lower(system, share_equations=is_grouped)
-    if is_grouped and target != "numpy":
+    if is_grouped and target not in GROUPED_TARGETS:
         raise UnsupportedError(
             f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
         )
+    program = lower(system, share_equations=is_grouped)
     code = group(program) if is_grouped else inline(program)
     if len(system.coordinates) > LARGEST_REDUNDANT:
         require_square(system, code.pattern())
@@ -124,9 +146,16 @@ def emit(
                 "use target='numpy', or replace their joint by one with fewer equations"
             )
         text = redundancy_warning(system, found)
-        warnings.warn(text, RedundantConstraintWarning, stacklevel=2)
+        warnings.warn(text, RedundantConstraintWarning, stacklevel=3)
         code = replace(code, program=replace(program, redundant=redundant))
-    return emit_grouped(code) if isinstance(code, GroupedProgram) else TARGETS[target](code)
+    return code
+
+
+def _emitted(code: InlineProgram | GroupedProgram, target: str) -> Emitted:
+    """Return the files of a target."""
+    if isinstance(code, GroupedProgram):
+        return GROUPED_TARGETS[target](code)
+    return TARGETS[target](code)
 
 
 def _checked(model: Mechanism | ConstraintSystem) -> ConstraintSystem:
@@ -151,7 +180,8 @@ def compile(  # noqa: A001 - the public name kc.compile
     target
         ``"numpy"``, or ``"c"``: the same module, but its functions are compiled by the machine's
         own C compiler, which takes a second or two the first time; after that they come from the
-        user's cache.
+        user's cache. Of a large mechanism `solve` is compiled, and nothing where its equations do
+        not split into equal blocks.
     form : {"inline", "grouped"}, optional
         As for `emit`.
 
@@ -172,13 +202,25 @@ def compile(  # noqa: A001 - the public name kc.compile
             f"only modules of the targets {listed(LOADABLE)} can be loaded, not {target!r}; "
             f"kc.emit(model, {target!r}).write(folder) gives the files"
         )
+    _check_target(target, form)
     system = _checked(model)
-    emitted = emit(system, target, form)
-    if target == "numpy":
-        return remember_model(from_source(emitted.source, system.name, emitted.arrays), system)
+    code = _lowered(system, target, form)
     # The NumPy module has the constants, the checks and the careful march of the compiled one.
-    module = from_source(emit(system, form="inline").source, system.name)
-    return remember_model(make_native(module, emitted.files), system)
+    emitted = _emitted(code, "numpy")
+    module = from_source(emitted.source, system.name, emitted.arrays)
+    return remember_model(_compiled(module, code) if target == "c" else module, system)
+
+
+def _compiled(module: ModuleType, code: InlineProgram | GroupedProgram) -> ModuleType:
+    """Replace what C does faster in a loaded NumPy module."""
+    if not isinstance(code, GroupedProgram):
+        return make_native(module, emit_c(code).files)
+    split = split_into_types(code)
+    if split is None:
+        LOG.info("%s does not split into equal blocks and stays NumPy's", module.NAME)
+        return module
+    emitted = emit_c_large(code, *split)
+    return make_native_large(module, emitted.files, emitted.arrays)
 
 
 def inspect(model: Mechanism | ConstraintSystem) -> Inspection:

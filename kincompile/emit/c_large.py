@@ -15,16 +15,19 @@ import numpy as np
 from kincompile.emit.c_functions import evaluator, solve_functions
 from kincompile.emit.c_target import LANES, RESERVED, array_lines, elementary
 from kincompile.emit.functions import inputs_read, schedule
+from kincompile.emit.grouped import pattern_of
 from kincompile.emit.layout import assigned
 from kincompile.emit.naming import NameTable
 from kincompile.emit.printers import CPrinter
 from kincompile.emit.solving import schedule_solve
 from kincompile.emit.target import Emitted
 from kincompile.emit.templates import fill
-from kincompile.errors import InternalError
-from kincompile.ir.elimination import plan_entries
+from kincompile.errors import UnsupportedError
+from kincompile.ir.block_types import block_types
+from kincompile.ir.elimination import jacobian_entries
 from kincompile.ir.inline import Entry, InlineProgram, Section
 from kincompile.names import rate
+from kincompile.structure.stages import plan_stages
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -66,6 +69,35 @@ class _Written:
     sizes: Mapping[str, int]
     is_chain: bool
     largest_block: int
+
+
+def emit_c_grouped(grouped: GroupedProgram) -> Emitted:
+    """Return a large program as C99 source, header and a companion file of arrays.
+
+    Raises
+    ------
+    UnsupportedError
+        If the program does not split into equal blocks, or calls a function that C does not have.
+    """
+    split = split_into_types(grouped)
+    if split is None:
+        raise UnsupportedError(
+            f"the equations of {grouped.program.name!r} do not split into blocks of few types, "
+            "which is what the target 'c' writes for a large mechanism; use target='numpy'"
+        )
+    return emit_c_large(grouped, *split)
+
+
+def split_into_types(
+    grouped: GroupedProgram,
+) -> tuple[tuple[BlockType, ...], tuple[Run, ...]] | None:
+    """Return the block types of a program and their order of solution, None if it has none."""
+    size = len(grouped.program.equations)
+    if size != len(grouped.program.coordinates):
+        return None
+    rows, columns, constants, _ = pattern_of(grouped)
+    stages = plan_stages(rows, columns, constants, size, shared=1)
+    return None if stages is None else block_types(grouped, stages)
 
 
 def emit_c_large(
@@ -138,14 +170,8 @@ def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
     own = dataclasses.replace(
         code, program=dataclasses.replace(program, coordinates=program.coordinates[: kind.own])
     )
-    entries = [
-        (entry.row, entry.column, code.number(entry.node))
-        for section in code.sections
-        for entry in section.entries["Phi_q"]
-    ]
-    plan = plan_entries(kind.own, kind.own, [item for item in entries if item[1] < kind.own])
-    if plan is None:
-        raise InternalError(f"the block of {', '.join(program.equations)} has no planned solve")
+    plan, entries = kind.plan, jacobian_entries(code)
+    assert plan is not None  # or there were no types
     solving = schedule_solve(own, plan, NameTable(RESERVED))
     lines += ["", *solve_functions(own, solving, prefix)]
     data: dict[str, Any] = {
@@ -221,7 +247,8 @@ def _values(grouped: GroupedProgram) -> tuple[list[str], set[str]]:
     """Return the code of the values that depend on t, p and contact parameters, and its calls."""
     program = grouped.program
     table = NameTable((*RESERVED, *program.tables, "q", "p", "values"))
-    wanted = [item.name for item in (*program.parameters, *program.coordinates)]
+    wanted = [item.name for item in program.parameters]
+    wanted += [item.name for item in program.coordinates]
     names = {"t": "t", **{name: table.take(name) for name in wanted}}
     entries = tuple(Entry(k, 0, node) for k, node in enumerate(grouped.values))
     sections = (Section(program.instances[0], "", {"values": entries}),)

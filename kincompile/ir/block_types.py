@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.ir.elimination import jacobian_entries, plan_entries
 from kincompile.ir.graph import Graph, operands_of
 from kincompile.ir.inline import Entry, InlineProgram, Section
 from kincompile.model.bodies import Parameter
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from kincompile.ir.elimination import SolvePlan
     from kincompile.ir.grouping import Group, GroupedProgram, Source
     from kincompile.structure.stages import Stage
 
@@ -45,6 +47,8 @@ class BlockType:
     ----------
     code
         Its equations in its coordinates: first those it determines, then those it reads.
+    plan
+        How it is solved for those it determines; None where its equations are dependent.
     own
         Number of coordinates it determines, and of equations.
     numbers, values
@@ -52,6 +56,7 @@ class BlockType:
     """
 
     code: InlineProgram
+    plan: SolvePlan | None
     own: int
     numbers: int
     values: int
@@ -107,7 +112,7 @@ def block_types(
     -------
     types, runs
         The types, and the runs in the order of solution; None where some equations do not split
-        into blocks, or the blocks have too little in common.
+        into blocks, or are dependent, or the blocks have too little in common.
     """
     finder = _Finder(grouped)
     runs: list[Run] = []
@@ -120,6 +125,8 @@ def block_types(
             return None
         if sum(item.own for item in finder.types) > LARGEST_TYPES:
             return None
+    if any(item.plan is None for item in finder.types):
+        return None
     return tuple(finder.types), tuple(runs)
 
 
@@ -370,7 +377,9 @@ class _Writer:
             instances=tuple(section.instance for section in sections),
         )
         code = InlineProgram(of_block, tuple(block.graph.nodes), sections, block.hints)
-        return BlockType(code, rows.size, len(block.numbers), len(block.values))
+        inner = [entry for entry in jacobian_entries(code) if entry[1] < rows.size]
+        plan = plan_entries(rows.size, rows.size, inner)
+        return BlockType(code, plan, rows.size, len(block.numbers), len(block.values))
 
     def _section(self, part: _Part, block: _Block) -> Section:
         """Return the rows of a constraint."""

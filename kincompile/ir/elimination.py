@@ -70,12 +70,17 @@ class SolvePlan:
 
 def plan_solve(code: InlineProgram) -> SolvePlan | None:
     """Plan the solve of a square system; None where it is structurally singular."""
-    entries = [
+    size = len(code.program.equations), len(code.program.coordinates)
+    return plan_entries(*size, jacobian_entries(code))
+
+
+def jacobian_entries(code: InlineProgram) -> list[tuple[int, int, Constant | None]]:
+    """Return row, column and, where it is one, number of each entry not identically zero."""
+    return [
         (entry.row, entry.column, code.number(entry.node))
         for section in code.sections
         for entry in section.entries["Phi_q"]
     ]
-    return plan_entries(len(code.program.equations), len(code.program.coordinates), entries)
 
 
 def plan_entries(
