@@ -6,7 +6,8 @@ const PAUSE = 700;  // milliseconds between the steps of a run
 const NEWTON_MARKUP = `
   <p>\u03a6<sub>q</sub>\u202f\u0394q = \u2212\u03a6, then q + \u0394q, until \u0394q is small: from a
     <b class="guess">guess</b> through its <b class="iterate">iterates</b>, at the time that is shown.
-    <span class="hint">Drag a body of the guess, or turn it by its knob.</span></p>
+    <span class="hint">Drag a body of the guess, or turn it by its knob; by keys, <kbd>Tab</kbd>
+      to it, then arrows and <kbd>+</kbd> <kbd>\u2212</kbd>.</span></p>
   <div class="buttons" role="group" aria-label="Guess">Guess
     <button type="button" data-guess="model">of the model</button>
     <button type="button" data-guess="motion">of the motion</button>

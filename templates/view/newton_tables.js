@@ -9,6 +9,7 @@ const newtonTables = (() => {
 
   const brief = x => (x === 0 ? '0' : x.toExponential(0));
   const scientific = x => (Number.isFinite(x) ? x.toExponential(2) : '\u2013');
+  const twoDigits = x => (Math.abs(x) < 0.01 ? brief(x) : +x.toPrecision(2));
   const logarithm = x => Math.max(LOWEST, Math.log10(Math.abs(x)));
 
   function row(cells) {
@@ -155,7 +156,7 @@ const newtonTables = (() => {
       shade(element, 0.15 + 0.85 * Math.sqrt(Math.abs(value) / most));
       const isRounding = Math.abs(value) < 1e-14 * most;
       if (model.N_COORDINATES <= MOST_DIGITS) {
-        element.textContent = isRounding ? 0 : +value.toPrecision(2);
+        element.textContent = isRounding ? 0 : twoDigits(value);
       }
     }
   }

@@ -199,6 +199,21 @@ def test_that_a_body_is_dragged_and_turned(open_panel: Any) -> None:
     page.close()
 
 
+def test_that_a_finger_drags_a_body_and_not_the_page(open_panel: Any) -> None:
+    page = open_panel("slider_crank", 390)
+    before, scale = guess_of(page), page.evaluate("stage.view.scale")
+    box = page.locator(".newton-handles g").nth(1).locator(".grip").first.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    fingers = page.context.new_cdp_session(page)
+    for kind, dx, dy in (("Start", 0, 0), ("Move", 8, 12), ("Move", 16, 24), ("End", 0, 0)):
+        points = [] if kind == "End" else [{"x": x + dx, "y": y + dy}]
+        fingers.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points})
+    moved = guess_of(page) - before
+    np.testing.assert_allclose(moved[3:5] * scale, (16, -24), atol=1e-4)
+    assert page.evaluate("scrollY") == 0
+    page.close()
+
+
 def test_that_keys_move_a_body_and_not_the_time(open_panel: Any) -> None:
     page = open_panel("four_bar")
     before = guess_of(page)
