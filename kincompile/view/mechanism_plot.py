@@ -52,6 +52,15 @@ LOOKS: dict[str, dict[str, Any]] = {
 }
 """What the strokes look like; those without a colour have that of their body."""
 
+NAME: dict[str, Any] = {
+    "xytext": (9, 9),
+    "textcoords": "offset points",
+    "fontsize": "small",
+    "zorder": 10,
+    "bbox": {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
+}
+"""How the name of a joint is written: beside it, on a pale ground."""
+
 
 def plot_mechanism(
     model: Mechanism | ConstraintSystem,
@@ -229,8 +238,5 @@ def _write_names(ax: Axes, drawn: Drawing, q: NDArray[np.float64]) -> None:
             step = drawn.size * 1e-3
             at.setdefault((round(x / step) * step, round(y / step) * step), []).append(joint.name)
     for place, names in at.items():
-        text = ax.annotate(
-            ", ".join(names), place, xytext=(7, 7), textcoords="offset points", fontsize="small",
-            zorder=10,
-        )  # fmt: skip
+        text = ax.annotate(", ".join(names), place, **NAME)
         text.set_in_layout(False)  # a long name may leave the plot, but must not shrink it
