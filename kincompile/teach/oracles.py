@@ -32,6 +32,11 @@ SAME = 1e-9
 """Part of an equation's terms by which Phi of complex numbers may be away from Phi of real ones."""
 
 
+def value(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
+    """Return Phi itself, shape (1, m), whatever the direction."""
+    return np.asarray(module.Phi(q, t)[np.newaxis])
+
+
 def complex_step(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
     """Return the derivative of Phi along directions.
 
@@ -74,9 +79,9 @@ def differences(module: ModuleType, q: Array, t: float, along: Array, time: floa
     return _slope(lambda h: np.asarray(module.Phi(q + h * along, t + h * time)), DIFFERENCE)
 
 
-def _slope(value: Callable[[float], Array], h: float) -> Array:
+def _slope(function: Callable[[float], Array], h: float) -> Array:
     """Return the derivative of a function at 0 by central differences of fourth order."""
-    near, far = value(h) - value(-h), value(2 * h) - value(-2 * h)
+    near, far = function(h) - function(-h), function(2 * h) - function(-2 * h)
     return np.asarray((8 * near - far) / (12 * h))
 
 
@@ -94,6 +99,7 @@ Oracle = tuple[str, "Callable[[ModuleType, Array, float, Array, float], Array]",
 """What it is called, what it gives, and the error up to which numbers agree with it."""
 
 ORACLES: Mapping[str, tuple[Oracle, Oracle]] = {
+    "Phi": (("Phi alone", value, 1e-12), ("Phi alone", value, 1e-12)),
     "Phi_q": (("complex step", complex_step, 1e-8), ("differences", differences, 1e-5)),
     "nu": (("complex step in t", complex_step, 1e-8), ("differences in t", differences, 1e-5)),
     "gamma": (
