@@ -14,7 +14,7 @@ DOCS = Path(__file__).resolve().parents[3] / "docs"
 def test_that_the_programs_run_and_draw_the_picture(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = (DOCS / "plots.md").read_text(encoding="utf-8")
-    names = {}
+    names: dict[str, object] = {}
     for program in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
         exec(compile(program, "plots.md", "exec"), names)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
