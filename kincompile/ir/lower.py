@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from kincompile.calculus.template import Template
     from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
+    from kincompile.model.expressions import Scalar
     from kincompile.model.system import ConstraintSystem
 
 
@@ -120,17 +121,48 @@ class _Binder:
         self._graph = graph
         self._convert = Converter(graph, graph.input).convert
         self._bodies: dict[str, tuple[int, ...]] = {}
+        self._numbers: dict[float, int] = {}
+        self._orders: dict[int, tuple[Kernel, tuple[int | str, ...]]] = {}
 
     def bind(self, joint: Joint, kernel: Kernel) -> tuple[int, ...]:
         """Return the node of each of the kernel's inputs."""
-        known = self._coordinates(joint)
-        for symbol, value in joint.scalars.items():
-            if symbol != "C":
-                known[symbol] = self._convert(value)
-        for symbol, (x, y) in joint.points.items():
-            known[f"{symbol}.x"], known[f"{symbol}.y"] = self._convert(x), self._convert(y)
+        known = self._known(joint)
         functions = _function_nodes(joint, self._convert)
-        return tuple(known[name] if name in known else functions(name) for name in kernel.inputs)
+        return tuple(
+            functions(place) if isinstance(place, str) else known[place]
+            for place in self._order(joint, kernel)
+        )
+
+    def _known(self, joint: Joint) -> list[int]:
+        """Return the nodes of coordinates, rates and frames, then of scalars and points."""
+        known = [node for body in joint.bodies for node in self._body(body)]
+        for name in joint.columns[3 * len(joint.bodies) :]:
+            assert name is not None
+            known += self._graph.input(name), self._graph.input(rate(name))
+        known += [self._value(value) for symbol, value in joint.scalars.items() if symbol != "C"]
+        known += [self._value(value) for point in joint.points.values() for value in point]
+        return known
+
+    def _order(self, joint: Joint, kernel: Kernel) -> tuple[int | str, ...]:
+        """Return where each of the kernel's inputs stands in `_known`; the name of a function."""
+        if id(kernel) not in self._orders:
+            names = [name for item in joint.template.frames for name in _frame_inputs(item.index)]
+            for contact in joint.template.contacts:
+                names += contact.alpha.name, contact.alpha_dot.name
+            names += [symbol for symbol in joint.scalars if symbol != "C"]
+            names += [f"{symbol}.{axis}" for symbol in joint.points for axis in "xy"]
+            places = {name: place for place, name in enumerate(names)}
+            order = tuple(places.get(name, name) for name in kernel.inputs)
+            self._orders[id(kernel)] = kernel, order
+        return self._orders[id(kernel)][1]
+
+    def _value(self, value: Scalar) -> int:
+        """Return the node of an attribute; a number that was there before costs little."""
+        if not isinstance(value, float):
+            return self._convert(value)
+        if value not in self._numbers:
+            self._numbers[value] = self._convert(value)
+        return self._numbers[value]
 
     def bind_equation(self, equation: SharedEquation) -> tuple[int, ...]:
         """Return the node of each of the inputs of a shared kernel."""
@@ -139,18 +171,6 @@ class _Binder:
             self._graph.input(value) if isinstance(value, str) else self._convert(value)
             for value in values
         )
-
-    def _coordinates(self, joint: Joint) -> dict[str, int]:
-        """Return the template's coordinates, rates and frames as nodes of the system's own."""
-        known: dict[str, int] = {}
-        for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
-            known.update(zip(_frame_inputs(frame.index), self._body(body), strict=True))
-        names = joint.columns[3 * len(joint.bodies) :]
-        for contact, name in zip(joint.template.contacts, names, strict=True):
-            assert name is not None
-            known[contact.alpha.name] = self._graph.input(name)
-            known[contact.alpha_dot.name] = self._graph.input(rate(name))
-        return known
 
     def _body(self, body: Body) -> tuple[int, ...]:
         """Return a body's coordinates, rates, cosine and sine; of the ground they are numbers."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from numbers import Integral, Rational, Real
 from typing import TYPE_CHECKING, cast
 
@@ -48,14 +49,17 @@ _KNOWN = (
 )  # fmt: skip
 
 
+_LARGEST = sys.float_info.max
+
+
 class NotAnExpressionError(ValueError):
     """A value that is neither a finite real number nor a SymPy expression; it says what it is."""
 
 
 def as_expression(value: object) -> Scalar:
     """Return a number as int or float, anything else as a SymPy expression."""
-    if type(value) is float and math.isfinite(value):  # the common case, and the cheapest
-        return value
+    if (type(value) is float or type(value) is int) and -_LARGEST <= value <= _LARGEST:
+        return value  # the common case, and the cheapest
     if isinstance(value, bool):
         raise NotAnExpressionError(f"{value} is a truth value, not a number")
     if isinstance(value, Integral | Rational):

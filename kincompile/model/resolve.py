@@ -312,7 +312,9 @@ def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
 
 def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
     # A generator would be used up here, a set has no order.
-    is_list = isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
+    is_list = type(given) is tuple or (
+        isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
+    )
     try:
         xi, eta = tuple(given) if is_list else ()
     except (TypeError, ValueError):
