@@ -1,8 +1,7 @@
 """Newton's panel of the page in headless Chromium: steps, guesses, numbers, keys, both widths."""
 
 import json
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,44 +11,29 @@ import kincompile as kc
 from kincompile.runtime.newton import iterate
 from kincompile.runtime.problem import problem
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 EXAMPLES = ("four_bar", "slider_crank", "wrecker_boom", "cam_flat_follower", "problem_3_5_6")
 TIME = 0.3
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed"),
-]
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
 def open_panel(
-    tmp_path_factory: pytest.TempPathFactory, example_named: Any
-) -> Iterator[Callable[..., Any]]:
-    """Return a function that opens a mechanism's page at Newton's panel, with what it says."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    open_file: Any, tmp_path_factory: pytest.TempPathFactory, example_named: Any
+) -> Callable[..., Any]:
+    """Return a function that opens the page of a mechanism, or of an example, at Newton's panel."""
     folder = tmp_path_factory.mktemp("pages")
-    with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
 
-        def opened(model: Any, width: int = 1280, scheme: str = "light") -> Any:
-            model = example_named(model).model if isinstance(model, str) else model
-            path = folder / f"{model.name}.html"
-            if not path.exists():
-                kc.page(model).write(path)
-            page = browser.new_page(
-                viewport={"width": width, "height": 900}, color_scheme=scheme, has_touch=width < 600
-            )
-            page.said = []
-            page.on("console", lambda message: page.said.append(message.text))
-            page.on("pageerror", lambda error: page.said.append(str(error)))
-            page.goto(path.as_uri())
-            page.get_by_role("tab", name="Newton").click()
-            return page
+    def opened(model: Any, width: int = 1280, scheme: str = "light") -> Any:
+        model = example_named(model).model if isinstance(model, str) else model
+        path = folder / f"{model.name}.html"
+        if not path.exists():
+            kc.page(model).write(path)
+        page = open_file(path, width, scheme)
+        page.get_by_role("tab", name="Newton").click()
+        return page
 
-        yield opened
-        browser.close()
+    return opened
 
 
 def press(page: Any, name: str, times: int = 1) -> None:
