@@ -200,8 +200,10 @@ def draw(
     ]
     unit = model.system().length_unit
     ax.set_aspect("equal")
-    ax.set_xlim(x_low - drawn.size, x_high + drawn.size)
-    ax.set_ylim(y_low - drawn.size, y_high + drawn.size)
+    # Stands and arrows reach up to four sizes beyond their places, of which the extent has two.
+    room = 2 * drawn.size
+    ax.set_xlim(x_low - room, x_high + room)
+    ax.set_ylim(y_low - room, y_high + room)
     ax.set_xlabel(f"x [{unit}]" if unit else "x")
     ax.set_ylabel(f"y [{unit}]" if unit else "y")
     return artists

@@ -247,7 +247,7 @@ def _drive(mark: Drive, size: float) -> list[Stroke]:
         heading = np.array((-np.sin(angles[-1]), np.cos(angles[-1])))
     else:
         heading = _array(mark.axis)
-        line = size * np.outer((1.0, 5.0), heading)
+        line = size * np.outer((0.8, 2.8), heading)
     return [
         Stroke("arrow", mark.place.frame, line, mark.place),
         Stroke("head", mark.place.frame, _head(line[-1], heading, size), mark.place, is_area=True),

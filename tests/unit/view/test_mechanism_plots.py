@@ -102,10 +102,31 @@ def test_that_parameters_change_the_shapes(slider_crank):
     assert has_line(ax, "C0", [(0, 0), (0.2 * np.cos(0.7), 0.2 * np.sin(0.7))])
 
 
-def test_that_everything_lies_within_the_limits(example):
-    if not example.model.system().bodies:
-        pytest.skip("nothing to draw")
-    ax = kc.plot_mechanism(example.model, example.solution.q[7])
+MECHANISMS = (
+    "cam_flat_follower", "double_pendulum", "four_bar", "gear_train", "inverted_slider_crank",
+    "rack_and_pinion", "simple_pendulum", "slider_crank", "slot_follower", "wrecker_boom",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_that_everything_lies_within_the_limits(example_named, name):
+    example = example_named(name)
+    require_all_within(kc.plot_mechanism(example.model, example.solution.q[7]))
+
+
+@pytest.mark.parametrize("kind", [kc.AbsoluteX, kc.AbsoluteY])
+def test_that_the_arrow_of_a_driver_lies_within_the_limits(kind):
+    m = kc.Mechanism("pulled")
+    block = m.body("block", guess=(1, 1, 0))
+    m.add(kind("pull", block, (0, 0), 1 + kc.t))
+    ax = kc.plot_mechanism(m)
+    require_all_within(ax)
+    (arrow,) = lines(ax, "0.1")
+    along = np.ptp(arrow, axis=0) > 0
+    assert along.tolist() == [kind is kc.AbsoluteX, kind is kc.AbsoluteY]
+
+
+def require_all_within(ax):
     (x_low, x_high), (y_low, y_high) = ax.get_xlim(), ax.get_ylim()
     points = np.concatenate([*areas(ax), *(np.column_stack(line.get_data()) for line in ax.lines)])
     x, y = points[np.isfinite(points).all(axis=1)].T
