@@ -128,8 +128,8 @@ def emit_c_large(
         **about,
         **sizes,
         "values": len(grouped.values),
-        # eight vectors, four of signs in an eighth of the memory each, and the values
-        "work": 9 * len(program.coordinates) + len(grouped.values) + 1,
+        # two vectors, two of signs in an eighth of their memory, and the values
+        "work": 3 * len(program.coordinates) + len(grouped.values) + 1,
         "lanes": LANES,
         "fingerprint": program.fingerprint,
         "defaults": array_lines([repr(item.default) for item in program.parameters]),

@@ -89,6 +89,26 @@ class LargeMarch:
         """Assemble the mechanism at the first time, from the guess."""
         return self._correct(self._inputs.guess, t, damped=True)
 
+    def run_compiled(
+        self,
+        first: int,
+        states: tuple[Vector, Vector, Vector],
+        residual: Vector,
+        iterations: NDArray[np.int64],
+    ) -> int:
+        """Let the module's own march, if it has one, fill the points from `first` on.
+
+        Returns how many it could; those before `first` are good.
+        """
+        march = getattr(self._module, "march", None)
+        if march is None:
+            return 0
+        return int(march(self._inputs, first, self._reach, states, residual, iterations))
+
+    def take_up(self, q: Vector, t: float) -> LargeState | Status:
+        """Return the state at a position that is known to be good."""
+        return self._correct(q, t)
+
     def advance(self, state: LargeState, t: float) -> LargeState | Status:
         """Follow the motion from a good point to time `t`, in sub-steps where need be."""
         step, iterations = t - state.t, 0

@@ -14,7 +14,7 @@ import numpy as np
 from kincompile.runtime.c_library import library
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
     from ctypes import CDLL
     from types import ModuleType
 
@@ -45,9 +45,12 @@ class _Motion(Structure):
 
     _fields_ = (
         ("count", c_size_t),
-        *((name, c_void_p) for name in ("t", "p", "guess")),
+        ("t", c_void_p),
+        ("p", c_void_p),
+        ("reach", c_double),
         ("tolerance", c_double),
         ("max_iterations", c_int),
+        ("is_started", c_int),
         *((name, c_void_p) for name in ("q", "q_dot", "q_ddot", "residual")),
         *((name, c_void_p) for name in ("status", "iterations", "work")),
     )
@@ -92,24 +95,33 @@ def _march(
 
     def march(
         inputs: Inputs,
-        states: Sequence[Array],
+        first: int,
+        reach: float,
+        states: tuple[Array, Array, Array],
         residual: Array,
-        status: NDArray[np.intc],
-        iterations: NDArray[np.intc],
+        iterations: NDArray[np.int64],
     ) -> int:
-        """Follow the motion from the guess as long as every point converges.
+        """Follow the motion as long as every step converges, undivided.
 
-        Fills position, velocity and acceleration, (N, n) each, and of every point the largest
-        absolute value of Phi, the `Status` and the Newton iterations, (N,) each. Returns how many
-        points converged, from the first one on.
+        Goes from the guess if `first` is 0, otherwise from the good point before it. Fills
+        position, velocity and acceleration, (N, n) each, and of every point the largest absolute
+        value of Phi and the Newton iterations, (N,) each. `reach` is the size of the mechanism.
+        Returns how many points converged, from `first` on.
         """
-        assert len(kept) == len(ARRAYS)  # the library reads them where they are
-        t, p, guess, work = inputs.t, inputs.p, inputs.guess, np.empty(size)
-        motion = _Motion(t.size, t.ctypes.data, p.ctypes.data, guess.ctypes.data)
+        assert kept  # the library reads these arrays where they are
+        known = min(first, 1)
+        rows, work = slice(first - known, None), np.empty(size)
+        times, (status, counts) = inputs.t[rows], np.empty((2, inputs.t.size), dtype=np.intc)
+        if not known:
+            states[0][0] = inputs.guess
+        motion = _Motion(times.size, times.ctypes.data, inputs.p.ctypes.data, reach)
         motion.tolerance, motion.max_iterations = inputs.tolerance, inputs.max_iterations
-        motion.q, motion.q_dot, motion.q_ddot = (state.ctypes.data for state in states)
-        motion.residual, motion.status = residual.ctypes.data, status.ctypes.data
-        motion.iterations, motion.work = iterations.ctypes.data, work.ctypes.data
-        return int(run(byref(data), byref(motion)))
+        motion.is_started, motion.work = known, work.ctypes.data
+        motion.q, motion.q_dot, motion.q_ddot = (state[rows].ctypes.data for state in states)
+        motion.residual, motion.status = residual[rows].ctypes.data, status.ctypes.data
+        motion.iterations = counts.ctypes.data
+        done = max(int(run(byref(data), byref(motion))) - known, 0)
+        iterations[first : first + done] = counts[known : known + done]
+        return done
 
     return march

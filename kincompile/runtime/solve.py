@@ -41,7 +41,7 @@ from kincompile.runtime.variants import read_variants, solve_variants
 from kincompile.runtime.verdict import unassembled, verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from types import ModuleType
 
     from numpy.typing import ArrayLike, NDArray
@@ -141,7 +141,7 @@ def _solve_one(
     motion = _Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if is_staged(inputs.module):
-            outcome = _follow_large(inputs, motion, smooth, progress)
+            outcome = _follow_large(inputs, motion, may_be_compiled, smooth, progress)
         elif may_be_compiled and _march_compiled(inputs, motion):
             outcome = Outcome(Status.CONVERGED, 0, None)
         else:
@@ -356,21 +356,31 @@ def _pass(
 
 
 def _follow_large(
-    inputs: Inputs, motion: _Motion, smooth: bool, progress: Progress | None
+    inputs: Inputs,
+    motion: _Motion,
+    may_be_compiled: bool,
+    smooth: bool,
+    progress: Progress | None,
 ) -> Outcome:
-    """Go through the grid with the module of a large mechanism."""
-    march = LargeMarch(inputs)
-    times = inputs.t.tolist()
-    good, found, index = None, march.start(times[0]), 0
-    outcome = _large_outcome(found, good)
-    motion.put(0, outcome)
-    while isinstance(found, LargeState) and (index := index + 1) < len(times):
-        if progress:
+    """Go through the grid with the module of a large mechanism.
+
+    Where it has a march of its own, that goes as far as it can, here one point is added, and so on.
+    """
+    march, times = LargeMarch(inputs), inputs.t.tolist()
+    good, outcome, index = None, Outcome(Status.CONVERGED, 0, None), 0
+    while outcome.status is Status.CONVERGED and index < len(times):
+        done = _run_compiled(march, motion, index) if may_be_compiled else 0
+        if done:
+            good, index = None, index + done
+        if index < len(times):
+            good, found = _next_large(march, motion, times, index, good)
+            outcome = _large_outcome(found, good)
+            motion.put(index, outcome)
+            motion.statistics["marched"] += index > 0
+            if isinstance(found, LargeState):
+                good, index = found, index + 1
+        if progress and index < len(times):
             progress(index, len(times))
-        good, found = found, march.advance(found, times[index])
-        outcome = _large_outcome(found, good)
-        motion.put(index, outcome)
-        motion.statistics["marched"] += 1
     if outcome.status is Status.CONVERGED or inputs.guess.size > LARGEST_CAREFUL:
         if progress:
             progress(len(times), len(times))
@@ -380,6 +390,30 @@ def _follow_large(
     equations = problem(inputs.module, inputs.p, good.q, times[0])
     outcome = _taken_up(equations, motion, good.t, index - 1)
     return _go_on(equations, inputs, motion, index, outcome, False, smooth, progress)
+
+
+def _run_compiled(march: LargeMarch, motion: _Motion, index: int) -> int:
+    """Let compiled code fill the points from an index on; return how many it could."""
+    states = motion.q, motion.q_dot, motion.q_ddot
+    done = march.run_compiled(index, states, motion.residual, motion.iterations)
+    if done:
+        motion.status[index : index + done] = Status.CONVERGED
+        motion.statistics["compiled"] = motion.statistics.get("compiled", 0) + done
+    return done
+
+
+def _next_large(
+    march: LargeMarch, motion: _Motion, times: Sequence[float], index: int, good: LargeState | None
+) -> tuple[LargeState | None, LargeState | Status]:
+    """Return the state before a point, which is found again if it is not given, and the point."""
+    if index == 0:
+        return None, march.start(times[0])
+    if good is None:
+        known = march.take_up(motion.q[index - 1], times[index - 1])
+        if isinstance(known, Status):
+            return None, known
+        good = known
+    return good, march.advance(good, times[index])
 
 
 def _large_outcome(found: LargeState | Status, good: LargeState | None) -> Outcome:
