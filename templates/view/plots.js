@@ -170,13 +170,13 @@ function optionGroup(group) {
   return element;
 }
 
-/* Pieces of time [from, to] without a position. */
+/* Pieces of time [from, to] in which something was not found. */
 function failures() {
-  const pieces = [];
+  const { status } = player.data, pieces = [];
   for (let k = 0; k < player.count; k++) {
-    if (player.isFound(k)) continue;
+    if (status[k] === 0) continue;
     const begin = player.t[Math.max(0, k - 1)];
-    while (k + 1 < player.count && !player.isFound(k + 1)) k++;
+    while (k + 1 < player.count && status[k + 1] !== 0) k++;
     pieces.push([begin, player.t[k]]);
   }
   return pieces;

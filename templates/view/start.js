@@ -33,18 +33,19 @@ function showMessages() {
 }
 
 function showNote(state) {
-  const note = byId('note');
-  note.hidden = state.isFound;
-  if (state.isFound) return;
-  const { status, sentences } = player.data;
+  const note = byId('note'), { status, sentences } = player.data;
+  const isGood = status[state.index] === 0;
+  note.hidden = isGood;
+  if (isGood) return;
+  const shown = state.isFound ? '' : ' Shown is the last position that was found.';
   note.textContent = hasMotion()
-    ? `t = ${+state.time.toPrecision(6)}: ${sentences[status[state.index]]} Shown is the last position that was found.`
+    ? `t = ${+state.time.toPrecision(6)}: ${sentences[status[state.index]]}${shown}`
     : 'Shown is the start guess. Constraints that it violates are red.';
 }
 
 /* ---- time ---- */
 
-/* Events, and times without a position, on the time axis. */
+/* Events, and times at which something was not found, on the time axis. */
 function markTimeline() {
   if (!(player.duration > 0)) return;
   const part = time => 100 * Math.abs(time - player.t[0]) / player.duration;
@@ -55,7 +56,7 @@ function markTimeline() {
     if (to !== null) element.style.width = `${part(to) - part(from)}%`;
     byId('marks').append(element);
   };
-  for (const [from, to] of failures()) mark('failed', from, to, 'no position was found');
+  for (const [from, to] of failures()) mark('failed', from, to, 'not found');
   for (const event of player.data.events) mark('event', event.t, null, event.message);
 }
 
