@@ -89,7 +89,7 @@ class MatrixViews:
         except ModelError as error:
             return problems_html(self.name, str(error))
         table = constraints_html(self.name, len(system.coordinates), system.constraints)
-        return table + picture_html(self)
+        return table + picture_html(system)
 
     def _repr_latex_(self) -> str | None:
         try:

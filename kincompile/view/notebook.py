@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.model.mechanism import Mechanism
 from kincompile.model.origins import model_of
 from kincompile.model.system import ConstraintSystem
 from kincompile.pictures import picture_html
@@ -20,16 +19,17 @@ from kincompile.view.shapes import drawing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_PLAYED = 30_000
-"""Numbers in q up to which a motion is played: a page of a megabyte or two."""
+MOST_DRAWN = 300
+"""Bodies up to which a mechanism is drawn: a second."""
+
+MOST_PLAYED = 20_000
+"""Numbers in q up to which a motion is played: a page of about a megabyte."""
 
 
-@picture_html.register(Mechanism)
 @picture_html.register(ConstraintSystem)
-def model_picture(model: Mechanism | ConstraintSystem) -> str:
+def system_picture(system: ConstraintSystem) -> str:
     """Return an image of a mechanism at its guess; "" without bodies, or without matplotlib."""
-    system = model.system()
-    if not system.bodies:
+    if not 0 < len(system.bodies) <= MOST_DRAWN:
         return ""
 
     def draw_guess(figure: Figure) -> None:
