@@ -44,6 +44,7 @@ def rank_report(
         np.array([item.unit == "rad" for item in system.coordinates]),
         driver_rows(system),
         float(system.end),
+        system.equations,
     )
 
 

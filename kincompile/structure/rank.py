@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
+from kincompile.errors import InputError
+from kincompile.names import listed
+
 Array: TypeAlias = NDArray[np.float64]
 Evaluate: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
 """Gives Phi (S, m) and Phi_q (S, m, n) at states q (S, n), t (S,)."""
@@ -89,6 +92,7 @@ def generic_rank(
     angular: NDArray[np.bool_],
     drivers: Sequence[int],
     end: float,
+    names: Sequence[str],
 ) -> RankReport:
     """Find the rank of Phi_q at generic assembled states, and the rows that depend on others.
 
@@ -104,9 +108,24 @@ def generic_rank(
         Rows that are functions of time.
     end
         The motion lasts from 0 to this time.
+    names
+        Of the equations, for messages.
+
+    Raises
+    ------
+    InputError
+        If an equation has no finite value, or derivative, anywhere near the guess.
     """
     with np.errstate(all="ignore"):
-        return _Analysis(evaluate, guess, angular, drivers, end).report()
+        analysis = _Analysis(evaluate, guess, angular, drivers, end)
+        undefined = [names[row] for row in analysis.undefined()]
+        if undefined:
+            raise InputError(
+                f"these equations have no finite value near the guess: {listed(undefined)}. Look "
+                "for a division by zero, or a square root or logarithm of a negative number; or "
+                "give a guess where they have one"
+            )
+        return analysis.report()
 
 
 class _Analysis:
@@ -130,11 +149,18 @@ class _Analysis:
         self._q = guess + offsets * self._scale
         self._t = np.append(0.0, random.uniform(0, end, STATES - 1))
         _, Phi_q = evaluate(self._q, self._t)
-        terms = np.nanmax(np.abs(Phi_q) @ self._scale, axis=0)
+        sizes = np.abs(Phi_q) @ self._scale
+        terms = np.max(np.where(np.isfinite(sizes), sizes, 0.0), axis=0)
         self._terms = np.where(terms > 0, terms, 1.0)
         m = terms.size
         self._drivers = list(drivers)
         self._joints = [row for row in range(m) if row not in set(drivers)]
+
+    def undefined(self) -> list[int]:
+        """Return the rows that are finite at none of the states."""
+        Phi, Phi_q = self._evaluate(self._q, self._t)
+        finite = np.isfinite(Phi) & np.isfinite(Phi_q).all(axis=2)
+        return [int(row) for row in np.flatnonzero(~finite.any(axis=0))]
 
     def report(self) -> RankReport:
         """Analyse the joints, then the drivers, then whether all can hold together."""

@@ -64,6 +64,11 @@ class Surplus:
         """What is wrong, in words."""
         ending = "s" if len(self.equations) == 1 else ""
         what, partners = listed(self.equations), listed(self.repeats)
+        if not self.repeats:
+            return (
+                f"{'conflicting' if self.conflicting else 'redundant'}: {what} determine{ending} "
+                "nothing, for at assembled positions all its derivatives are zero"
+            )
         if self.conflicting:
             return f"conflicting: {what} contradict{ending} {partners}"
         return (

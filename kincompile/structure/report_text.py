@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from kincompile.names import listed
@@ -185,7 +186,15 @@ def _advice(found: Findings) -> Iterator[str]:
 
 def _unassembled(found: Findings) -> str:
     """Say by how much which equations are missed at the nearest position, and what to do."""
-    sizes = sorted(zip(map(abs, found.residuals), found.equations, strict=True), reverse=True)
+    values = dict(zip(found.equations, found.residuals, strict=True))
+    undefined = [name for name, value in values.items() if not math.isfinite(value)]
+    if undefined:
+        return (
+            "cannot be assembled at t = 0, where these equations have no finite value: "
+            f"{listed(undefined)}. Look for a division by zero, or a square root or logarithm of a "
+            "negative number."
+        )
+    sizes = sorted(((abs(value), name) for name, value in values.items()), reverse=True)
     missed = [
         f"{name} by {size:.3g}" for size, name in sizes[:MISSED] if size > SMALL * sizes[0][0]
     ]

@@ -36,6 +36,10 @@ Array = NDArray[Any]
 STATES, SEED = 6, 1989
 """States of each kind, generic ones and assembled ones."""
 
+FAR = 100.0
+"""How far from the guess, in radians and sizes of the mechanism, an assembled position may be: far
+away a coordinate has no digits left for a difference."""
+
 ALL_SHOWN = 60
 """Equations up to which each has lines of its own; beyond, the largest errors stand for all."""
 
@@ -229,7 +233,8 @@ def _states(module: ModuleType) -> tuple[list[State], int]:
         if _is_finite(module, guess + away, t):
             generic.append((guess + away, 3 * rates, t))
         found = newton(module, t, guess)
-        if found.status is Status.CONVERGED:
+        is_near = np.max(np.abs(found.q - guess) / reference, initial=0.0) <= FAR
+        if found.status is Status.CONVERGED and is_near:
             assembled.append((found.q, 3 * rates, t))
     return generic + assembled, len(assembled)
 
