@@ -8,6 +8,7 @@ const newton = (() => {
   const RESIDUAL_FACTOR = 10;  // how much larger a residual may be, relative to its terms
   const ROUNDING = 16 * Number.EPSILON;  // all that floating point has to give, relative to terms
   const MOST_ITERATIONS = 25;
+  const MOST_NAMES = 6;  // in a statement
   const SAME_POSITION = 1e-6;  // relative to the scale of a coordinate
 
   const norm = vector => Math.hypot(...vector);
@@ -183,7 +184,9 @@ const newton = (() => {
     }
     const here = Math.sign(last.factors.determinant);
     const there = Math.sign(factor(model.Phi_q(motion, t, p)).determinant);
-    const differ = `Other than in the motion: ${apart.coordinates.join(', ')}.`;
+    const more = apart.coordinates.length - MOST_NAMES;
+    const named = apart.coordinates.slice(0, MOST_NAMES).join(', ');
+    const differ = `Other than in the motion: ${named}${more > 0 ? ` and ${more} more` : ''}.`;
     if (here === there) {
       return `to another position, where det \u03a6_q has the sign it has in the motion. ${differ}`;
     }

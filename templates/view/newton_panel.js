@@ -41,6 +41,8 @@ class NewtonPanel {
     this.p = player.data.parameters.map(parameter => parameter.value);
     root.innerHTML = NEWTON_MARKUP;
     this.cells = newtonTables.jacobian(this.part('.jacobian'), model, (i, j) => this.entry(i, j));
+    this.rows = newtonTables.coordinates(this.part('.coordinates'), model,
+      (k, value) => this.start(this.guess.map((x, j) => (j === k ? value : x))));
     const hasBodies = player.data.drawing.bodies.length > 0;
     this.part('.hint').hidden = !hasBodies;
     if (hasBodies) this.stage = new NewtonStage(() => this.isShown, guess => this.start(guess));
@@ -83,6 +85,7 @@ class NewtonPanel {
     this.motion = player.state.isFound ? Array.from(player.state.q) : null;
     this.run = newton.iterate(this.model, this.guess, this.t, this.p);
     this.last = this.run.iterates.length - 1;
+    newtonTables.guessValues(this.rows, this.guess);
     this.go(0);
   }
 
@@ -93,6 +96,7 @@ class NewtonPanel {
   }
 
   toggleRun() {
+    if (this.last === 0) return;
     if (this.timer) {
       this.stop();
       this.render();
@@ -128,18 +132,18 @@ class NewtonPanel {
     newtonTables.convergence(this.part('.convergence'), iterates, this.last);
     newtonTables.iterations(this.part('.iterations'), iterates);
     newtonTables.residuals(this.part('.residuals'), iterates, player.data.drawing.joints);
-    newtonTables.coordinates(
-      this.part('.coordinates'), this.model, this.guess, current, guess => this.start(guess));
+    newtonTables.coordinateValues(this.rows, current);
     newtonTables.jacobianValues(this.cells, this.model, current.Phi_q);
     this.renderButtons();
   }
 
   renderButtons() {
     const isStart = this.shown === 0, isEnd = this.shown === this.last;
-    this.part('[data-go=reset]').disabled = isStart;
-    this.part('[data-go=back]').disabled = isStart;
-    this.part('[data-go=step]').disabled = isEnd;
-    this.part('[data-go=run]').disabled = this.last === 0;
+    // Not disabled, since the next key press would be the page's: a space plays the motion.
+    const isUseless = { reset: isStart, back: isStart, step: isEnd, run: this.last === 0 };
+    for (const [go, useless] of Object.entries(isUseless)) {
+      this.part(`[data-go=${go}]`).ariaDisabled = String(useless);
+    }
     this.part('[data-go=run]').textContent = this.timer ? 'Stop' : 'Run';
     this.part('[data-guess=motion]').disabled = !this.motion;
     this.part('.count').textContent = isStart ? 'the guess' : `iterate ${this.shown}`;

@@ -7,6 +7,7 @@
 const KNOB = 40;  // pixels from a body's origin to the knob that turns it
 const STEP = 1 / 60;  // of the picture's width that an arrow key moves a body; a tenth with Shift
 const TURN = Math.PI / 36;
+const MARGIN = 5;  // sizes of a mark that are seen around the origin of a body
 const FARTHEST = 1;  // widths of the motion's picture that a body may be off its edge and be shown
 
 function svgElement(tag, attributes, text = '') {
@@ -59,12 +60,13 @@ class NewtonStage {
     if (this.drag) return this.drag.extent;  // what is dragged must not move by itself
     const [left, right, low, high] = bounds;
     const reach = FARTHEST * Math.max(right - left, high - low);
+    const around = MARGIN * player.data.drawing.size;
     for (const q of [this.scene.guess, ...this.scene.iterates.map(iterate => iterate.q)]) {
       for (let k = 0; k < 3 * this.handles.length; k += 3) {
-        bounds[0] = Math.min(bounds[0], Math.max(q[k], left - reach));
-        bounds[1] = Math.max(bounds[1], Math.min(q[k], right + reach));
-        bounds[2] = Math.min(bounds[2], Math.max(q[k + 1], low - reach));
-        bounds[3] = Math.max(bounds[3], Math.min(q[k + 1], high + reach));
+        bounds[0] = Math.min(bounds[0], Math.max(q[k] - around, left - reach));
+        bounds[1] = Math.max(bounds[1], Math.min(q[k] + around, right + reach));
+        bounds[2] = Math.min(bounds[2], Math.max(q[k + 1] - around, low - reach));
+        bounds[3] = Math.max(bounds[3], Math.min(q[k + 1] + around, high + reach));
       }
     }
     return bounds;
@@ -81,6 +83,28 @@ class NewtonStage {
     drawGhost(guess, guessColour, last ? 0.5 : 1);
     for (let k = 1; k < last; k++) drawGhost(iterates[k].q, iterateColour, 0.15 + 0.35 * k / last);
     if (last) drawGhost(iterates[last].q, iterateColour, 1);
+    this.drawNumbers(ctx, view, palette);
+  }
+
+  /* The number of each iterate at the body that moves farthest, where there is room for it. */
+  drawNumbers(ctx, view, palette) {
+    const { iterates } = this.scene;
+    const origin = ({ q }, body) => view.toScreen([q[3 * body], q[3 * body + 1]]);
+    const way = body => iterates.reduce((sum, iterate, k) =>
+      (k ? sum + towards(origin(iterates[k - 1], body), origin(iterate, body))[2] : 0), 0);
+    const ways = this.handles.map((_, body) => way(body));
+    const body = ways.indexOf(Math.max(...ways));
+    Object.assign(ctx, { font: 'bold 12px system-ui, sans-serif', lineWidth: 3,
+      textAlign: 'center', textBaseline: 'middle', strokeStyle: palette.paper, fillStyle: palette.ink });
+    const taken = [];
+    iterates.forEach((iterate, k) => {
+      const at = origin(iterate, body);
+      if (k === 0 || taken.some(other => towards(at, other)[2] < 14)) return;
+      taken.push(at);
+      ctx.strokeText(k, ...at);
+      ctx.fillText(k, ...at);
+    });
+    ctx.textAlign = 'start';
   }
 
   /* What a body is dragged by: its link, its origin and the knob. */

@@ -92,31 +92,42 @@ const newtonTables = (() => {
     element.style.setProperty('--part', `${Math.round(75 * part)}%`);
   }
 
-  /* The guess as fields, with the iterate and its correction beside it. */
-  function coordinates(table, model, guess, iterate, onGuess) {
-    fill(table, ['coordinate', 'guess', 'q', '\u0394q'], model.COORDINATES.map((name, k) => {
-      const unit = model.UNITS[name];
-      const holder = cell('');
-      holder.append(guessField(name, guess, k, onGuess));
-      return row([
-        cell(unit ? `${name} [${unit}]` : name, 'th'),
-        holder,
-        cell(numberText(iterate.q[k])),
-        cell(iterate.step ? scientific(iterate.step[k]) : ''),
-      ]);
-    }));
+  /* The guess as fields, with place for the iterate and its correction; onGuess(k, value): the
+     k-th coordinate was typed.  Rows are returned, and stay, so that a field keeps its focus. */
+  function coordinates(table, model, onGuess) {
+    const rows = model.COORDINATES.map((name, k) => {
+      const unit = model.UNITS[name], holder = cell('');
+      holder.append(guessField(name, value => onGuess(k, value)));
+      return row([cell(unit ? `${name} [${unit}]` : name, 'th'), holder, cell(''), cell('')]);
+    });
+    fill(table, ['coordinate', 'guess', 'q', '\u0394q'], rows);
+    return rows;
   }
 
-  function guessField(name, guess, k, onGuess) {
+  function guessField(name, onValue) {
     const field = document.createElement('input');
     Object.assign(field, { type: 'text', inputMode: 'decimal', ariaLabel: `Guess of ${name}` });
-    field.value = +guess[k].toPrecision(9);
     field.addEventListener('change', () => {
       const value = Number(field.value.trim().replace('\u2212', '-') || NaN);
       field.ariaInvalid = String(!Number.isFinite(value));
-      if (Number.isFinite(value)) onGuess(guess.map((x, j) => (j === k ? value : x)));
+      if (Number.isFinite(value)) onValue(value);
     });
     return field;
+  }
+
+  function guessValues(rows, guess) {
+    rows.forEach(({ cells }, k) => {
+      const field = cells[1].firstChild;
+      field.value = +guess[k].toPrecision(9);
+      field.ariaInvalid = 'false';
+    });
+  }
+
+  function coordinateValues(rows, { q, step }) {
+    rows.forEach(({ cells }, k) => {
+      cells[2].textContent = numberText(q[k]);
+      cells[3].textContent = step ? scientific(step[k]) : '';
+    });
   }
 
   /* Phi_q as a grid, whose cells are returned by row and column; onEntry(i, j): one is looked at. */
@@ -161,5 +172,8 @@ const newtonTables = (() => {
     }
   }
 
-  return { convergence, iterations, residuals, coordinates, jacobian, jacobianValues };
+  return {
+    convergence, iterations, residuals, coordinates, guessValues, coordinateValues, jacobian,
+    jacobianValues,
+  };
 })();
