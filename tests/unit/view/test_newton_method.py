@@ -84,6 +84,25 @@ def test_that_iterates_are_those_of_the_runtime(tmp_path, example):
             np.testing.assert_allclose(here["q"], there.q, rtol=1e-9, atol=1e-9)
 
 
+@node
+def test_that_iterates_are_those_of_the_lecture(tmp_path, example_named):
+    """Reference case R3, to the digits printed there."""
+    example = example_named("problem_3_5_6")
+    text = "newton.iterate(emitted, [0.2, 0.2, Math.PI / 4], 0).iterates"
+    found = run(tmp_path, newton_script(example.model), text)
+    expected = [
+        (0.4232233047, 0.1767766953, 0.7853981634), (0.38125, 0.1348033906, 1.0228350305),
+        (0.3813100372, 0.1215644989, 1.06347535), (0.3812500401, 0.1210317905, 1.065432028),
+        (0.38125, 0.1210307296, 1.0654358165),
+    ]  # fmt: skip
+    np.testing.assert_allclose([item["q"] for item in found[1:6]], expected, atol=6e-11)
+    corrections = (0.2244281, 0.2447443, 0.0427423, 2.028785e-3, 3.93443e-6, 1.511e-11)
+    assert [item["correction"] for item in found[1:]] == pytest.approx(corrections, rel=1e-3)
+    residuals = (0.2382603, 0.0503680, 7.86896e-3, 2.70813e-4, 5.58e-7, 2.1e-12)
+    norms = [np.linalg.norm(item["Phi"]) for item in found[:6]]
+    assert norms == pytest.approx(residuals, rel=0.02)
+
+
 def folded():
     """Return a four-bar whose guess of zeros is singular."""
     m = kc.Mechanism("folded")
@@ -156,6 +175,16 @@ def test_that_the_statement_says_where_there_is_no_convergence(tmp_path):
     m = kc.ConstraintSystem("root", "x", [sympy.sqrt(x) + 1])
     text = stated(tmp_path, m, [0.3], None)
     assert text == "Stopped after 0 iterations: the equations have no finite value at the next one."
+
+
+@node
+def test_that_a_lock_up_is_named(tmp_path, example_named):
+    m = example_named("problem_3_5_6").model
+    # At t = 4.5 sin(phi3) = -1: the last position, and Phi_q is singular there.
+    text = stated(tmp_path, m, [0.85, 0.0, -1.4], None, 4.5)
+    assert "the corrections still only halve: \u03a6_q is singular" in text
+    assert "phi3" in text
+    assert stated(tmp_path, m, [0.85, 0.0, -1.4], None, 4.6).startswith("No convergence in 25 ")
 
 
 def test_that_the_script_has_no_name_of_the_mechanism_outside():
