@@ -1,5 +1,6 @@
 """`Solution.plot`: the curves are the closed form's, the labels have units, gaps are said."""
 
+import dataclasses
 import sys
 
 import numpy as np
@@ -98,6 +99,14 @@ def test_that_failed_points_are_a_shaded_gap_and_an_event_is_marked(stops):
     (span,) = ax.patches
     np.testing.assert_allclose(span.get_extents().transformed(ax.transData.inverted()).x0, 0.95)
     assert ax.get_xlim()[1] >= 2
+
+
+def test_that_a_failed_point_is_a_gap_even_if_it_has_a_position(arm):
+    status = np.zeros(T.size, dtype=int)
+    status[10:13] = kc.Status.SINGULAR
+    ax = dataclasses.replace(arm, status=status).plot("phi_bar")
+    assert np.flatnonzero(np.isnan(data(ax.lines[0])[1])).tolist() == [10, 11, 12]
+    assert legend(ax) == ["phi_bar", f"no solution: 3 of {T.size} points"]
 
 
 def test_that_variants_are_curves_of_one_name(example_named):
