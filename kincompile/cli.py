@@ -1,8 +1,8 @@
 """The command line: `kincompile compile | run | inspect | derive | view | compare MODEL`.
 
 stdout is data, stderr messages. Exit codes: 0 done; 2 wrong usage or model, or a file that cannot
-be read or written; 3 the motion did not converge; 130 interrupted; 1 is kept for `compare`, where
-an entry is different.
+be read or written; 3 the motion did not converge; 130 interrupted; 1 is kept for an entry that is
+different: in `compare`, and in `inspect --verify`.
 No traceback reaches a user, unless the environment variable KINCOMPILE_TRACEBACK asks for one.
 
 SymPy is loaded by the names of `kc` that need it, so that `--help` does not wait for it.
@@ -209,11 +209,12 @@ def schema() -> None:
 def inspect(context: click.Context, model: str, verify: bool) -> None:
     """Show what MODEL is made of, and whether it can be compiled.
 
-    Bodies, parameters, constraints, rows and columns of Phi_q, mobility, rank, redundant and
-    conflicting equations, the order of solution and the pattern of Phi_q. Rows and columns count
-    from 0. With --verify, Phi_q, nu and gamma of the emitted module are compared with complex steps
-    of its Phi and the second derivative of Phi along a line, at seeded states; the exit code is 1
-    where one differs.
+    Bodies, parameters, constraints, rows and columns of Phi_q, mobility, rank, the order of
+    solution and the pattern of Phi_q; and what to do about missing drivers, about redundant and
+    conflicting equations, and where it cannot be assembled. Rows and columns count from 0. With
+    --verify, Phi_q, nu and gamma of the emitted module are compared with complex steps of its Phi
+    and the second derivative of Phi along a line, at seeded states; the exit code is 1 where one
+    differs.
     """
     read = _read(model)
     _print(f"{kc.inspect(read)}\n")

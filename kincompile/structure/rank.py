@@ -192,8 +192,8 @@ class _Analysis:
     def _contradictions(self, q: Array, kept: list[int], dependent: list[int]) -> set[int]:
         """Return which dependent rows fail where the independent ones hold."""
         found, held, _ = self._assemble(kept, q, self._t)
-        if not held.any():
-            return set()
+        if not held.any():  # the drivers lead where the joints cannot follow
+            return set(dependent) & set(self._drivers)
         Phi, _ = self._evaluate(found[held], self._t[held])
         moving = self._t[held] > 0  # at the start drivers may agree that do not agree later
         sizes = np.abs(Phi[moving] if moving.any() else Phi) / self._terms

@@ -194,7 +194,9 @@ def _unassembled(found: Findings) -> str:
             f"{listed(undefined)}. Look for a division by zero, or a square root or logarithm of a "
             "negative number."
         )
-    sizes = sorted(((abs(value), name) for name, value in values.items()), reverse=True)
+    dependent = {*found.redundant, *found.conflicting}
+    tried = ((abs(value), name) for name, value in values.items() if name not in dependent)
+    sizes = sorted(tried, reverse=True)
     missed = [
         f"{name} by {size:.3g}" for size, name in sizes[:MISSED] if size > SMALL * sizes[0][0]
     ]
