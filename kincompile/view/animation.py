@@ -92,9 +92,10 @@ def animate(
     rows, interval = frame_rows(solution, seconds)
     good = solution.q[solution.status == 0]
     drawn = drawing(system, solution.parameters, good)
+    traced = _traced(drawn, trace)
     figure, ax = plt.subplots(layout="constrained")
     artists = draw(ax, system, drawn, good)
-    for place in _traced(drawn, trace):
+    for place in traced:
         ax.plot(*world(good, place).T, color="0.5", linewidth=1, zorder=1)
     times = _time_texts(solution, rows)
     ax.set_title(times[0], loc="left")

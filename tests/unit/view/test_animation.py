@@ -210,6 +210,7 @@ def test_that_what_cannot_be_shown_is_refused(arm, motion, example_named):
         kc.animate(motion, seconds=-1)
     with pytest.raises(kc.InputError, match=r"nothing called 'baar' .* mean 'bar'\?"):
         kc.animate(motion, trace=["baar"])
+    assert plt.get_fignums() == []
 
 
 def test_that_a_motion_without_a_position_says_why(example_named):
