@@ -73,7 +73,8 @@ class NewtonPanel {
       if (go) moves[go]();
     });
     player.onChange(state => {
-      if (!player.isPlaying && state.time !== this.t) this.start(this.guess);
+      // A hidden panel takes the time when it is shown, of which it is told too.
+      if (this.isShown && state.time !== this.t) this.start(this.guess);
     });
   }
 

@@ -266,6 +266,16 @@ def test_that_ghosts_are_beside_their_panel_only(open_panel: Any) -> None:
     assert layer.is_visible()
     page.get_by_role("tab", name="Plots").click()
     assert not layer.is_visible()
+    page.evaluate("player.setIndex(100)")
+    page.get_by_role("tab", name="Newton").click()
+    assert layer.is_visible()
+    press(page, "of the motion")
+    assert to_the_end(page) == "Converged in 1 iteration to the position of the motion."
+    press(page, "Reset")
+    page.evaluate("player.play()")
+    layer.wait_for(state="hidden")
+    page.evaluate("player.pause()")
+    layer.wait_for()
     page.close()
 
 
