@@ -66,7 +66,7 @@ const newtonTables = (() => {
     fill(table, heads, iterates.map(({ Phi, correction, factors }, k) => row([
       String(k),
       scientific(correction),
-      k ? Math.log10(correction).toFixed(1) : '',
+      k ? Math.log10(correction).toFixed(1).replace('-0.0', '0.0') : '',
       order(iterates, k),
       scientific(newton.norm(Phi)),
       scientific(factors.determinant),
