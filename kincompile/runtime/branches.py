@@ -1,9 +1,10 @@
 r"""The branch of a motion: the signs of the determinants of the structural blocks of Phi_q.
 
 Two assembled positions of a mechanism that differ in a sign cannot be reached from each other
-without passing a singular configuration. The planned solve of a module has the determinants at
-hand. Where redundant equations forbid one, the determinant of the equations' independent
-combinations takes their place: these turn slowly along a motion, and are those of the point before.
+without passing a singular configuration. The planned solve of a module, in one piece or in stages,
+has the determinants at hand. Where redundant equations forbid one, the determinant of the
+equations' independent combinations takes their place: these turn slowly along a motion, and are
+those of the point before.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.runtime.lanes import LaneCode, has_planned_solve
+from kincompile.runtime.staged import StagedSolver, is_staged
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,6 +54,9 @@ def determinants(
         except ArithmeticError:  # floats refuse 1/0 in the factors of a singular block
             found = LaneCode(module, module.ARRAYS, p).position(q[:, np.newaxis], t).determinants
         return [float(np.ravel(value)[0]) for value in found]
+    if equations.staged is not None:
+        entries = tuple(equations.module.PATTERN.T)
+        return _staged(equations.staged, Phi_q[entries], reference[entries])
     if reference.shape[0] != reference.shape[1]:
         basis = np.linalg.svd(reference, full_matrices=False)[0].T
         Phi_q, reference = basis @ Phi_q, basis @ reference
@@ -62,10 +67,21 @@ def determinants(
 
 def signs(equations: Problem, q: Vector, t: float, Phi_q: Vector) -> tuple[float, ...]:
     """Return the signs of the determinants of the blocks; none where equations are redundant."""
-    if has_planned_solve(equations.module):
+    if equations.staged is not None or has_planned_solve(equations.module):
         found = determinants(equations, (q, t, Phi_q), Phi_q)
         return tuple(float(np.sign(value)) for value in found)
     return (float(np.linalg.slogdet(Phi_q)[0]),) if Phi_q.shape[0] == Phi_q.shape[1] else ()
+
+
+def _staged(solver: StagedSolver, nonzeros: Vector, reference: Vector) -> list[float]:
+    """Return the determinants of a large mechanism's blocks; zeros where it cannot be factored."""
+    for entries, part in ((nonzeros, 1.0), (reference, 0.0)):
+        try:
+            found: list[float] = (part * solver.determinants(solver.factor(entries))).tolist()
+        except RuntimeError:
+            continue
+        return found
+    return [0.0]
 
 
 def turned(equations: Problem, before: Vector, after: Vector) -> bool:
@@ -93,12 +109,7 @@ def signatures(module: ModuleType, q: Vector, t: Vector, p: Sequence[float]) -> 
     with np.errstate(all="ignore"):
         if has_planned_solve(module):
             return _planned(module, q, t, p)
-        found = np.isfinite(q).all(axis=1)
-        result = np.zeros((t.size, 1), dtype=np.int8)
-        for k in np.flatnonzero(found).tolist():
-            Phi_q = module.Phi_q(np.ascontiguousarray(q[k]), t[k], np.asarray(p, dtype=float))
-            result[k] = np.linalg.slogdet(Phi_q)[0]
-        return result
+        return _one_by_one(module, q, t, np.asarray(p, dtype=np.float64))
 
 
 def counted_signatures(q: Vector, t: Vector, passed: Sequence[float]) -> Signs:
@@ -119,6 +130,24 @@ def counted_signatures(q: Vector, t: Vector, passed: Sequence[float]) -> Signs:
     count = sum(((way > abs(time - t[0])).astype(int) for time in passed), np.zeros(t.size, int))
     signs = np.where(np.isfinite(q).all(axis=1), 1 - 2 * (count % 2), 0)
     return signs.astype(np.int8)[:, np.newaxis]
+
+
+def _one_by_one(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Signs:
+    """Return the signs of the blocks of a large mechanism, or of the whole determinant."""
+    solver = StagedSolver(module) if is_staged(module) else None
+    signs: dict[int, Vector] = {}
+    for k in np.flatnonzero(np.isfinite(q).all(axis=1)).tolist():
+        at = np.ascontiguousarray(q[k]), t[k], p
+        if solver is None:
+            signs[k] = np.linalg.slogdet(module.Phi_q(*at))[0]
+        else:
+            nonzeros = module.Phi_q_nonzeros(*at)
+            signs[k] = np.sign(_staged(solver, nonzeros, nonzeros))
+    blocks = max((np.size(found) for found in signs.values()), default=1)
+    result = np.zeros((t.size, blocks), dtype=np.int8)
+    for k, found in signs.items():
+        result[k] = found
+    return result
 
 
 def _planned(module: ModuleType, q: Vector, t: Vector, p: Sequence[float]) -> Signs:

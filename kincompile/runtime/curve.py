@@ -167,7 +167,7 @@ class Curve:
                     return None
                 continue
             turns = following.tangent[-1] * place.tangent[-1] <= 0
-            if turns or self._changed(place, following) is not None:
+            if turns or self._changed(place, following):
                 return Bracket(place, following, length, turns)
             if (following.t - latest) * forward > 0:
                 return None
@@ -181,9 +181,11 @@ class Curve:
             at = _root(lambda length: self._forward(first, length), bracket.length)
             place = self.step(first, at)
             return None if place is None else (place, at)
-        block = self._changed(first, bracket.second) or 0
-        at = _root(lambda length: self._determinant(first, length, block), bracket.length)
-        return self._between(first, at, block)
+        blocks = self._changed(first, bracket.second)
+        at = _root(lambda length: self._least(first, length, blocks), bracket.length)
+        before = self.step(first, at - AROUND)
+        parts = np.zeros(len(blocks)) if before is None else self._parts(first, before, blocks)
+        return self._between(first, at, blocks[int(np.argmin(parts))])
 
     def _between(self, first: Place, at: float, block: int) -> tuple[Place, float] | None:
         """Return a bifurcation by interpolation of places so far from it that they are accurate."""
@@ -212,23 +214,24 @@ class Curve:
         found = self.step(place, length) if length else place
         return None if found is None else float(found.tangent[-1])
 
-    def _determinant(self, place: Place, length: float, block: int) -> float | None:
-        """Return the determinant of a block, a length further on."""
+    def _least(self, place: Place, length: float, blocks: list[int]) -> float | None:
+        """Return what is left of the determinants of blocks, a length further on, of the least."""
         found = self.step(place, length) if length else place
-        if found is None:
-            return None
-        return self._value(found, place, block)
+        return None if found is None else float(np.min(self._parts(place, found, blocks)))
 
-    def _changed(self, before: Place, after: Place) -> int | None:
-        """Return the first block whose determinant has changed its sign."""
-        pairs = zip(
-            *(
-                determinants(self.equations, (place.q, place.t, place.Phi_q), before.Phi_q)
-                for place in (before, after)
-            ),
-            strict=True,
+    def _parts(self, before: Place, after: Place, blocks: list[int] | slice) -> Vector:
+        """Return the determinants of blocks, as parts of what they were."""
+        there, here = (
+            np.array(determinants(self.equations, (place.q, place.t, place.Phi_q), before.Phi_q))
+            for place in (before, after)
         )
-        return next((block for block, (a, b) in enumerate(pairs) if a * b <= 0), None)
+        with np.errstate(all="ignore"):
+            return np.asarray((here / there)[blocks])
+
+    def _changed(self, before: Place, after: Place) -> list[int]:
+        """Return the blocks whose determinant has changed its sign, or is zero."""
+        parts = self._parts(before, after, slice(None))
+        return [int(block) for block in np.flatnonzero(~(parts > 0))]
 
     def _derivatives(self, q: Vector, t: float) -> tuple[Vector, Vector, Vector] | None:
         """Return Phi, Phi_q, and the scaled derivatives by q and t, or None where not finite."""

@@ -207,10 +207,12 @@ def branch_switch(module: ModuleType, state: State, t: float, q: Vector, spread:
 def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:
     """Name what moves, and say what to do."""
     spread = equations.spread(q)
-    null = np.linalg.svd(Phi_q * spread)[2][-1]
-    null = null / null[np.argmax(np.abs(null))]
+    _, sizes, directions = np.linalg.svd(Phi_q * spread)
+    null = directions[-1] / directions[-1][np.argmax(np.abs(directions[-1]))]
     module = equations.module
-    bodies = _involved(module, null)
+    # Equal loops become singular together: then several movements are free.
+    free = directions[np.append(sizes[:-1] <= IN_RANGE * sizes[0], True)]
+    bodies = _involved(module, np.linalg.norm(free, axis=0))
     return Event(
         kind, t, bodies, _message(kind, t, bodies), q,
         dict(zip(module.COORDINATES, null.tolist(), strict=True)),

@@ -38,11 +38,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.problem import Vector
 
 
-def is_staged(module: ModuleType) -> bool:
-    """Return whether the solve of a module is planned in stages: its Phi_q is never made dense."""
-    return bool(getattr(module, "STAGES", ()))
-
-
 SHORTEST = 2.0**-10
 """Part of a Newton correction below which it is given up."""
 
@@ -213,4 +208,4 @@ class LargeMarch:
         q_ddot = solver.solve(factors, module.gamma(q, q_dot, t, p))
         if not np.isfinite(q_ddot).all():
             return Status.SINGULAR
-        return LargeState(t, q, q_dot, q_ddot, Phi, solver.signs(factors), iterations)
+        return LargeState(t, q, q_dot, q_ddot, Phi, solver.determinants(factors) > 0, iterations)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from kincompile.runtime.staged import StagedSolver, is_staged
+
 if TYPE_CHECKING:
     from types import ModuleType
 
@@ -72,6 +74,8 @@ class Problem:
         mechanism can be expected to be orthogonal to.
     magnitude : ndarray, shape (m,)
         What the terms of each equation contribute at a generic position.
+    staged : StagedSolver or None
+        The planned solve of a large mechanism.
     """
 
     module: ModuleType
@@ -80,6 +84,7 @@ class Problem:
     reference: Vector
     probe: Vector
     magnitude: Vector
+    staged: StagedSolver | None = None
 
     def at(self, q: Vector, t: float) -> Point | None:
         """Evaluate the equations, or give None where they have no finite value."""
@@ -130,6 +135,7 @@ def problem(module: ModuleType, p: Vector, q: Vector, t: float) -> Problem:
     angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES], dtype=bool)
     m: int = module.N_EQUATIONS
     equations = Problem(module, p, angular, np.ones(q.size), probe_of(m), np.zeros(m))
+    equations.staged = StagedSolver(module) if is_staged(module) else None
     lengths = np.abs(np.where(angular, 0.0, (q, module.GUESS)))
     size = np.max(lengths, initial=0.0)
     if size <= NO_SIZE and (point := equations.at(q, t)) is not None:

@@ -23,7 +23,7 @@ from kincompile.runtime.events import branch_switch, locate, singular_start
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
 from kincompile.runtime.lanes import has_planned_solve
-from kincompile.runtime.large import LargeMarch, LargeState, is_staged
+from kincompile.runtime.large import LargeMarch, LargeState
 from kincompile.runtime.march import (
     SMALL_ERROR,
     Outcome,
@@ -36,6 +36,7 @@ from kincompile.runtime.march import (
 from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.solution import Solution
+from kincompile.runtime.staged import is_staged
 from kincompile.runtime.status import Status
 from kincompile.runtime.variants import read_variants, solve_variants
 from kincompile.runtime.verdict import unassembled, verdict
@@ -369,7 +370,7 @@ def _follow_large(
     march, times = LargeMarch(inputs), inputs.t.tolist()
     good, outcome, index = None, Outcome(Status.CONVERGED, 0, None), 0
     while outcome.status is Status.CONVERGED and index < len(times):
-        done = _run_compiled(march, motion, index) if may_be_compiled else 0
+        done = _run_compiled(march, motion, index) if may_be_compiled and index else 0
         if done:
             good, index = None, index + done
         if index < len(times):

@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     Index = NDArray[np.signedinteger[Any]]
 
 
+def is_staged(module: ModuleType) -> bool:
+    """Return whether the solve of a module is planned in stages."""
+    return bool(getattr(module, "STAGES", ()))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class StagedFactors:
     """Phi_q, factored.
@@ -87,8 +92,8 @@ class _SparseStage:
         x[self.columns] = part.solve(right)
 
     def determinants(self, part: SuperLU) -> list[Array]:
-        """Return the sign of the determinant, of the one block that this is taken for."""
-        return [np.array([_sign(part)])]
+        """Return the determinant of the one block that this is taken for."""
+        return [np.array([_determinant(part)])]
 
 
 class _LaneStage:
@@ -309,14 +314,14 @@ class StagedSolver:
         """
         return StagedFactors(nonzeros, [stage.factor(nonzeros) for stage in self._stages])
 
-    def signs(self, factors: StagedFactors) -> NDArray[np.bool_]:
-        """Return which determinants of blocks are positive."""
+    def determinants(self, factors: StagedFactors) -> Array:
+        """Return the determinants of all blocks, up to constant factors."""
         found = [
-            value > 0
+            value
             for stage, part in zip(self._stages, factors.parts, strict=True)
             for value in stage.determinants(part)
         ]
-        return np.concatenate(found) if found else np.empty(0, dtype=bool)
+        return np.concatenate(found) if found else np.empty(0)
 
     def solve(self, factors: StagedFactors, b: Array) -> Array:
         """Return x of Phi_q x = b, shape (n,)."""
@@ -337,12 +342,18 @@ def _stage(
     return _SparseStage(stage, pattern, size)
 
 
-def _sign(factors: SuperLU) -> float:
-    """Return the sign of a determinant from its factorization."""
-    negative = np.count_nonzero(factors.U.diagonal() < 0)
+LARGEST_POWER = 600.0
+"""Power of e beyond which the size of a determinant is not told: floating point ends at 709."""
+
+
+def _determinant(factors: SuperLU) -> float:
+    """Return a determinant from its factorization."""
+    pivots = factors.U.diagonal()
+    negative = np.count_nonzero(pivots < 0)
     for permutation in (factors.perm_r, factors.perm_c):
         negative += _is_odd(permutation)
-    return -1.0 if negative % 2 else 1.0
+    power = np.clip(np.sum(np.log(np.abs(pivots))), -LARGEST_POWER, LARGEST_POWER)
+    return float((-1.0 if negative % 2 else 1.0) * np.exp(power))
 
 
 def _is_odd(permutation: Index) -> int:
