@@ -5,6 +5,7 @@ degrees of freedom. The source lecture does not publish its dimensions: those us
 
 The chassis stands still and is the ground, its origin on the road below the pivot of the boom. Both
 drivers follow the cycloidal law: velocity and acceleration are zero at the start and at the end.
+The outlines are what the bodies look like on a page; the motion does not know them.
 """
 
 import numpy as np
@@ -20,11 +21,24 @@ extension_reach = mechanism.parameter("extension_reach", 0.30, unit="m")
 extension_stroke = mechanism.parameter("extension_stroke", 1.70, unit="m")
 
 chassis = mechanism.ground
-boom = mechanism.body("boom", guess=(1.5, 1.9, 0.2))
-extension = mechanism.body("extension", guess=(2.0, 2.0, 0.2))
-barrel = mechanism.body("barrel", guess=(0.9, 1.2, 1.0))
-rod = mechanism.body("rod", guess=(1.1, 1.3, 1.0))
-hook = mechanism.body("hook", guess=(3.3, 1.8, 0.0))
+beam = [
+    (-1.62, -0.12), (-0.45, -0.16), (-0.28, -0.28), (-0.12, -0.28), (0.05, -0.16), (1.5, -0.12),
+    (1.5, 0.12), (-1.62, 0.12),
+]  # fmt: skip
+claw = [
+    (-0.035, 0.47), (0.035, 0.47), (0.035, 0.2), (0.12, 0.12), (0.14, 0), (0.08, -0.1),
+    (-0.04, -0.13), (-0.14, -0.06), (-0.16, 0.04), (-0.09, 0.05), (-0.07, -0.02), (-0.02, -0.06),
+    (0.05, -0.04), (0.075, 0.01), (0.06, 0.08), (-0.035, 0.17),
+]  # fmt: skip
+box = [(-1.3, -0.07), (1.38, -0.07), (1.38, 0.07), (-1.3, 0.07)]
+tube = [(-0.53, -0.08), (0.45, -0.08), (0.45, 0.08), (-0.53, 0.08)]
+piston = [(-0.45, -0.04), (0.52, -0.04), (0.52, 0.04), (-0.45, 0.04)]
+
+boom = mechanism.body("boom", guess=(1.5, 1.9, 0.2), outline=beam)
+extension = mechanism.body("extension", guess=(2.0, 2.0, 0.2), outline=box)
+barrel = mechanism.body("barrel", guess=(0.9, 1.2, 1.0), outline=tube)
+rod = mechanism.body("rod", guess=(1.1, 1.3, 1.0), outline=piston)
+hook = mechanism.body("hook", guess=(3.3, 1.8, 0.0), outline=claw)
 
 along = (1, 0)
 pivot, mouth, lug = (-1.5, 0), (1.5, 0), (-0.2, -0.2)  # on the boom, 3 m long

@@ -17,11 +17,13 @@ if TYPE_CHECKING:
 class Body:
     """A planar rigid body with coordinates x, y [length] of its origin and angle phi [rad].
 
-    Made by `Mechanism.body`; the ground is `Mechanism.ground`.
+    Made by `Mechanism.body`; the ground is `Mechanism.ground`. The corners of its outline, in its
+    own frame, are for pictures alone.
     """
 
     name: str
     guess: tuple[Scalar, Scalar, Scalar] = (0, 0, 0)
+    outline: tuple[tuple[Scalar, Scalar], ...] = ()
     is_ground: bool = field(default=False, kw_only=True)
 
     def _coordinate(self, index: int) -> sympy.Expr:

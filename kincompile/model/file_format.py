@@ -100,6 +100,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     "body": {
         "name": Field(_NAME),
         "guess": Field({**_POINT, "minItems": 3, "maxItems": 3}, is_required=False),
+        "outline": Field({"type": "array", "items": _POINT, "minItems": 3}, is_required=False),
     },
     "coordinate": {"name": Field(_NAME), "guess": Field(_EXPRESSION, is_required=False)},
     "profile": {key: Field(_TABLE["properties"][key]) for key in ("angles", "radii", "smoothness")},

@@ -64,7 +64,7 @@ class Mechanism(MatrixViews, TextViews):
         self.parameters.append(Parameter(name, default, unit))
         return sympy.Symbol(str(name))
 
-    def body(self, name: str, guess: Any = (0, 0, 0)) -> Body:
+    def body(self, name: str, guess: Any = (0, 0, 0), outline: Any = ()) -> Body:
         """Add a body with coordinates (x, y, phi) and return it.
 
         Parameters
@@ -74,8 +74,12 @@ class Mechanism(MatrixViews, TextViews):
         guess
             Start values of x, y [length] and phi [rad] for Newton's method, numbers or expressions
             of parameters.
+        outline
+            Corners (xi, eta) of a closed polygon in the body's frame [length], in order, numbers or
+            expressions of parameters: what the body looks like. Without, it is drawn as a link
+            through its joint points. The outlines of bodies added before hide it.
         """
-        body = Body(name, guess)
+        body = Body(name, guess, outline)
         self.bodies.append(body)
         return body
 

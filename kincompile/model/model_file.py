@@ -210,6 +210,7 @@ class _ModelReader(FieldReader):
         name = self.name(row, address, "a body")
         guess = row.get("guess", [0, 0, 0])
         start = self.expressions(guess, (*address, "guess"), self._names, "[x, y, phi]", 3)
+        outline = self._outline(row.get("outline", []), (*address, "outline"))
         if not name:
             return None
         if name == GROUND.name or name in self._bodies:
@@ -221,7 +222,21 @@ class _ModelReader(FieldReader):
         for coordinate in body_coordinates(name):
             self._names[coordinate] = sympy.Symbol(coordinate)
             self.stands(f"guess of {coordinate}", (*address, "guess"))
-        return Body(name, (start[0], start[1], start[2]))
+        self.stands(f"outline of {name}", (*address, "outline"))
+        return Body(name, (start[0], start[1], start[2]), outline)
+
+    def _outline(
+        self, given: Any, address: Address
+    ) -> tuple[tuple[float | sympy.Expr, float | sympy.Expr], ...]:
+        """Return the corners of a body's outline."""
+        if not isinstance(given, list):
+            self.problem(address, f"expected a list of corners [xi, eta], not {shown(given)}")
+            return ()
+        corners = [
+            self.expressions(corner, (*address, k), self._names, "[xi, eta]", 2)
+            for k, corner in enumerate(given)
+        ]
+        return tuple((xi, eta) for xi, eta in corners)
 
     def _coordinate(self, address: Address, row: Row) -> tuple[str, float | sympy.Expr] | None:
         self.has_fields(address, row, FIELDS["coordinate"])

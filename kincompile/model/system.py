@@ -94,6 +94,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             *_free_coordinates(coordinates, guess, defaults, problems),
             *_contact_coordinates(written, defaults, problems),
         ]
+        _check_outlines(bodies, defaults, problems)
         _check_names(name, bodies, found, declared, written, problems)
         scope = Scope(
             {body.name: body for body in bodies},
@@ -244,6 +245,26 @@ def _body_coordinates(
                 Coordinate(name, _number(value, f"guess of {name}", values, problems), kind)
             )
     return found
+
+
+def _check_outlines(
+    bodies: tuple[Body, ...], values: dict[str, float], problems: list[str]
+) -> None:
+    """Check that every outline is a list of corners, or none."""
+    for body in bodies:
+        where = f"outline of {body.name}"
+        try:
+            corners = [tuple(corner) for corner in body.outline]
+        except TypeError:
+            problems.append(f"{where}: {body.outline!r} is not a list of corners (xi, eta)")
+            continue
+        if len(corners) in (1, 2):
+            problems.append(f"{where}: {len(corners)} corners are no polygon; give 3 or more")
+        for k, corner in enumerate(corners, 1):
+            if len(corner) != 2:
+                problems.append(f"{where}: corner {k}, {corner!r}, is not a pair (xi, eta)")
+            for number in corner:
+                _number(number, f"{where}, corner {k}", values, problems)
 
 
 def _free_coordinates(

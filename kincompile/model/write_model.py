@@ -61,10 +61,7 @@ def model_data(system: CheckedModel) -> dict[str, Any]:
     """Return a system as the values of a model file."""
     sections = {
         "parameters": [_parameter(item) for item in system.parameters],
-        "bodies": [
-            {"name": body.name, "guess": [value(item) for item in body.guess]}
-            for body in system.bodies
-        ],
+        "bodies": [_body(item) for item in system.bodies],
         "coordinates": [
             {"name": item.name, "guess": item.guess} for item in _free_coordinates(system)
         ],
@@ -82,6 +79,12 @@ def model_data(system: CheckedModel) -> dict[str, Any]:
 def _parameter(item: Parameter) -> dict[str, Any]:
     row = {"name": item.name, "default": item.default}
     return {**row, "unit": item.unit} if item.unit else row
+
+
+def _body(item: Body) -> dict[str, Any]:
+    row: dict[str, Any] = {"name": item.name, "guess": [value(number) for number in item.guess]}
+    corners = [[value(number) for number in corner] for corner in item.outline]
+    return {**row, "outline": corners} if corners else row
 
 
 def _free_coordinates(system: CheckedModel) -> Iterable[Coordinate]:

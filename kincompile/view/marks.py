@@ -119,3 +119,24 @@ class Drive:
 
 
 Mark: TypeAlias = Link | Outline | Pin | Rail | Block | Span | Wheel | Profile | Drive
+
+
+def moves_with(mark: Mark) -> set[int]:
+    """Return the frames that a mark moves with."""
+    return {place.frame for place, _ in reach(mark)}
+
+
+def reach(mark: Mark) -> list[tuple[Place, float]]:
+    """Return the points of a mark, each with how far it reaches beyond."""
+    match mark:
+        case Wheel():
+            return [(mark.place, mark.radius)]
+        case Link() | Outline() | Profile():
+            points = mark.points
+        case Rail():
+            points = (mark.start, mark.end)
+        case Pin() | Span():
+            return [(mark.first, 0.0), (mark.second, 0.0)]
+        case Block() | Drive():
+            return [(mark.place, 0.0)]
+    return [(Place(mark.frame, point), 0.0) for point in points]

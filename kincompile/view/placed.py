@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.model.expressions import alpha, depends_on, evaluate
+from kincompile.model.expressions import alpha, as_expression, depends_on, evaluate
 from kincompile.view.marks import GROUND_FRAME, Pin, Place, Point, Profile, Rail, Span, Wheel
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ class Placed:
 
 def number(value: Scalar, values: Mapping[str, float]) -> float:
     """Return the number of an expression of parameters; zero where it has none."""
-    return evaluate(value, dict(values)) or 0.0
+    return evaluate(as_expression(value), dict(values)) or 0.0
 
 
 def number_pair(pair: tuple[Scalar, Scalar], values: Mapping[str, float]) -> Point:

@@ -11,20 +11,19 @@ import numpy as np
 from kincompile.model.constraint import Kind
 from kincompile.model.joints import Revolute
 from kincompile.model.resolve import Joint
+from kincompile.view.body_shapes import links, outlines
 from kincompile.view.joint_shapes import marks_of
 from kincompile.view.marks import (
     GROUND_FRAME,
     Block,
     Drive,
-    Link,
     Mark,
-    Outline,
     Pin,
     Place,
-    Profile,
     Rail,
     Span,
-    Wheel,
+    moves_with,
+    reach,
 )
 from kincompile.view.placed import Placed, Scene, frame_of, number_pair, world
 
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
-    from kincompile.view.marks import Point
 
     Array: TypeAlias = NDArray[np.float64]
 
@@ -48,9 +46,6 @@ PITCH_LINE = ("s_P", "s_Q")
 
 OVERHANG = 3
 """How far a guide goes on beyond the motion, in sizes of marks."""
-
-SAME_POINT = 1e-9
-"""Distance, relative to the coordinates, up to which two points of a body are one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +99,7 @@ class Drawing:
     @property
     def ground(self) -> tuple[Mark, ...]:
         """The marks that stand still."""
-        return tuple(mark for mark in self.marks if _frames(mark) == {GROUND_FRAME})
+        return tuple(mark for mark in self.marks if moves_with(mark) == {GROUND_FRAME})
 
     def extent(self, q: ArrayLike) -> tuple[float, float, float, float]:
         """Return smallest x, largest x, smallest y, largest y of all marks.
@@ -159,23 +154,31 @@ def drawing(
     attached = _attached(joints, frames, values)
     scene = Scene(values, frames, positions, _bearings(joints, frames, values))
     marks = {joint.name: marks_of(joint.written, Placed(joint, scene)) for joint in joints}
-    drawn = _uncovered(itertools.chain(*marks.values()))
-    drawn = [*_links(len(frames), attached, drawn), *drawn]
+    bodies: list[Mark] = [*outlines(system.bodies, values)]
+    drawn = _uncovered(itertools.chain(*marks.values()), set().union(*map(moves_with, bodies)))
+    bodies += links(len(frames), attached, [*bodies, *drawn])
+    drawn = [*bodies, *drawn]
     size = _size(drawn, positions)
-    labels = [
+    places = {
+        joint.name: _pointed_at(marks[joint.name], _attached([joint], frames, values))
+        for joint in joints
+    }
+    ordered = sorted((_lengthened(mark, OVERHANG * size) for mark in drawn), key=_depth)
+    return Drawing(system.name, tuple(frames), tuple(ordered), _labels(system, places), size)
+
+
+def _labels(system: ConstraintSystem, places: Mapping[str, Place | None]) -> tuple[JointLabel, ...]:
+    """Return the constraints as they are pointed at, in order."""
+    return tuple(
         JointLabel(
             item.name,
             item.template.type_name if isinstance(item, Joint) else "Equation",
-            _pointed_at(marks[item.name], _attached([item], frames, values))
-            if isinstance(item, Joint)
-            else None,
+            places.get(item.name),
             item.is_driver,
             (first, len(item.equation_names)),
         )
         for item, first in zip(system.constraints, system.row_offsets, strict=True)
-    ]
-    ordered = sorted((_lengthened(mark, OVERHANG * size) for mark in drawn), key=_depth)
-    return Drawing(system.name, tuple(frames), tuple(ordered), tuple(labels), size)
+    )
 
 
 def _finite(q: ArrayLike) -> Array:
@@ -222,7 +225,7 @@ def _box(marks: Iterable[Mark], q: Array) -> tuple[Array, Array]:
     corners = [
         world(q, place) + offset
         for mark in marks
-        for place, radius in _reach(mark)
+        for place, radius in reach(mark)
         for offset in (-radius, radius)
     ]
     if not corners or not len(q):
@@ -246,87 +249,23 @@ def _lengthened(mark: Mark, overhang: float) -> Mark:
     return replace(mark, start=tuple((start - along).tolist()), end=tuple((end + along).tolist()))
 
 
-def _uncovered(marks: Iterable[Mark]) -> list[Mark]:
-    """Return the marks without the slides, and sleeves, that a cylinder takes the place of."""
+def _uncovered(marks: Iterable[Mark], outlined: set[int]) -> list[Mark]:
+    """Return the marks without slides and sleeves that are seen otherwise.
+
+    A cylinder takes the place of its slide; two outlined bodies show by themselves how they slide.
+    """
     found = list(marks)
     spans = [mark for mark in found if isinstance(mark, Span)]
     cylinders = {(mark.first, mark.second) for mark in spans if mark.style == "cylinder"}
     covered = {
         mark.joint
         for mark in spans
-        if mark.style == "slide" and (mark.first, mark.second) in cylinders
+        if (mark.style == "slide" and (mark.first, mark.second) in cylinders)
+        or {mark.first.frame, mark.second.frame} <= outlined
     }
-    slides = (Span, Block)
-    return [mark for mark in found if not (isinstance(mark, slides) and mark.joint in covered)]
-
-
-def _links(count: int, attached: Iterable[Place], marks: Iterable[Mark]) -> list[Link]:
-    """Return each body's hull; a body of one point only where no mark shows it."""
-    shown = {frame for mark in marks for frame in _frames(mark)}
-    links = []
-    for frame in range(count):
-        points = _distinct(place.point for place in attached if place.frame == frame)
-        if len(points) < 2:
-            points = _distinct([*points, (0.0, 0.0)])
-        if len(points) > 1 or frame not in shown:
-            links.append(Link(frame, _hull(points)))
-    return links
-
-
-def _distinct(points: Iterable[Point]) -> list[Point]:
-    """Return the points without repetitions."""
-    found: list[Point] = []
-    for point in points:
-        tolerance = SAME_POINT * (1 + max(map(abs, point)))
-        if all(max(abs(a - b) for a, b in zip(point, other, strict=True)) > tolerance
-               for other in found):  # fmt: skip
-            found.append(point)
-    return found
-
-
-def _hull(points: Iterable[Point]) -> tuple[Point, ...]:
-    """Return the convex hull, counterclockwise; of points on a line the two ends.
-
-    Andrew's monotone chain.
-    """
-    ordered = sorted(points)
-    if len(ordered) < 3:
-        return tuple(ordered)
-    chains = []
-    for chain in (ordered, ordered[::-1]):
-        kept: list[Point] = []
-        for point in chain:
-            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
-                kept.pop()
-            kept.append(point)
-        chains.append(kept[:-1])
-    return tuple(itertools.chain(*chains))
-
-
-def _turn(a: Point, b: Point, c: Point) -> float:
-    """Return twice the signed area of a triangle."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _frames(mark: Mark) -> set[int]:
-    """Return the frames that a mark moves with."""
-    return {place.frame for place, _ in _reach(mark)}
-
-
-def _reach(mark: Mark) -> list[tuple[Place, float]]:
-    """Return the points of a mark, each with how far it reaches beyond."""
-    match mark:
-        case Wheel():
-            return [(mark.place, mark.radius)]
-        case Link() | Outline() | Profile():
-            points = mark.points
-        case Rail():
-            points = (mark.start, mark.end)
-        case Pin() | Span():
-            return [(mark.first, 0.0), (mark.second, 0.0)]
-        case Block() | Drive():
-            return [(mark.place, 0.0)]
-    return [(Place(mark.frame, point), 0.0) for point in points]
+    return [
+        mark for mark in found if not (isinstance(mark, Span | Block) and mark.joint in covered)
+    ]
 
 
 _DEPTHS = ("rail", "wheel", "profile", "outline", "link", "span", "block", "pin", "drive")

@@ -12,7 +12,18 @@ import kincompile as kc
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.joints import Revolute
 from kincompile.view.joint_shapes import DRAWINGS
-from kincompile.view.marks import Block, Drive, Link, Pin, Place, Profile, Rail, Span, Wheel
+from kincompile.view.marks import (
+    Block,
+    Drive,
+    Link,
+    Outline,
+    Pin,
+    Place,
+    Profile,
+    Rail,
+    Span,
+    Wheel,
+)
 from kincompile.view.placed import world
 from kincompile.view.shapes import drawing
 
@@ -224,6 +235,20 @@ def test_that_a_drawing_is_plain_data(example):
     data = json.loads(json.dumps(drawing(example.model).to_json(), allow_nan=False))
     kinds = {mark["kind"] for mark in data["marks"]}
     assert kinds <= {
-        "link", "pin", "rail", "block", "span", "wheel", "profile", "drive",
+        "link", "outline", "pin", "rail", "block", "span", "wheel", "profile", "drive",
     }  # fmt: skip
     assert data["bodies"] == [body.name for body in example.model.system().bodies]
+
+
+def test_that_an_outline_takes_the_place_of_the_link_and_hides_what_slides_in_it():
+    m = kc.Mechanism("telescope")
+    a = m.parameter("a", 2.0)
+    outer = m.body("outer", outline=[(0, 0), (a, 0), (a, 1), (0, 1)])
+    inner = m.body("inner", guess=(1, 0, 0), outline=[(0, 0), (1, 0), (0, 1)])
+    m.add(kc.Translational("slide", outer, (0, 0), (1, 0), inner, (1, 0), (1, 0)))
+    m.add(kc.TranslationalDistance("reach", outer, (0, 0), (1, 0), inner, (1, 0), kc.t))
+    drawn = drawing(m, {"a": 3.0})
+    assert drawn.marks == (
+        Outline(1, ((0, 0), (1, 0), (0, 1))),
+        Outline(0, ((0, 0), (3, 0), (3, 1), (0, 1))),
+    )

@@ -1,0 +1,90 @@
+"""What bodies look like: the outline that was given, or the hull of their joint points."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+from kincompile.view.marks import Link, Outline, moves_with
+from kincompile.view.placed import number_pair
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from kincompile.model.bodies import Body
+    from kincompile.view.marks import Mark, Place, Point
+
+SAME_POINT = 1e-9
+"""Distance, relative to the coordinates, up to which two points of a body are one."""
+
+
+def outlines(bodies: Iterable[Body], values: Mapping[str, float]) -> list[Outline]:
+    """Return the outlines of those bodies that have one, with the values of parameters.
+
+    From back to front: the first body hides what slides in it.
+    """
+    found = [
+        Outline(frame, tuple(number_pair(corner, values) for corner in body.outline))
+        for frame, body in enumerate(bodies)
+        if len(body.outline)
+    ]
+    return found[::-1]
+
+
+def links(count: int, attached: Iterable[Place], marks: Sequence[Mark]) -> list[Link]:
+    """Return the hulls of bodies without an outline; of one point only where no mark shows it.
+
+    Parameters
+    ----------
+    count
+        Number of bodies.
+    attached
+        Points that joints hold.
+    marks
+        What is drawn besides, outlines among it.
+    """
+    outlined = {mark.frame for mark in marks if isinstance(mark, Outline)}
+    shown = {frame for mark in marks for frame in moves_with(mark)}
+    found = []
+    for frame in sorted(set(range(count)) - outlined):
+        points = _distinct(place.point for place in attached if place.frame == frame)
+        if len(points) < 2:
+            points = _distinct([*points, (0.0, 0.0)])
+        if len(points) > 1 or frame not in shown:
+            found.append(Link(frame, _hull(points)))
+    return found
+
+
+def _distinct(points: Iterable[Point]) -> list[Point]:
+    """Return the points without repetitions."""
+    found: list[Point] = []
+    for point in points:
+        tolerance = SAME_POINT * (1 + max(map(abs, point)))
+        if all(max(abs(a - b) for a, b in zip(point, other, strict=True)) > tolerance
+               for other in found):  # fmt: skip
+            found.append(point)
+    return found
+
+
+def _hull(points: Iterable[Point]) -> tuple[Point, ...]:
+    """Return the convex hull, counterclockwise; of points on a line the two ends.
+
+    Andrew's monotone chain.
+    """
+    ordered = sorted(points)
+    if len(ordered) < 3:
+        return tuple(ordered)
+    chains = []
+    for chain in (ordered, ordered[::-1]):
+        kept: list[Point] = []
+        for point in chain:
+            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
+                kept.pop()
+            kept.append(point)
+        chains.append(kept[:-1])
+    return tuple(itertools.chain(*chains))
+
+
+def _turn(a: Point, b: Point, c: Point) -> float:
+    """Return twice the signed area of a triangle."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
