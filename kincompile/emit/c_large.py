@@ -118,7 +118,6 @@ def emit_c_large(
     companion = f"{program.name}_c.npz"
     about = {
         "name": program.name,
-        "NAME": program.name.upper(),
         "n": len(program.coordinates),
         "m": len(program.equations),
         "companion": companion,
@@ -128,8 +127,8 @@ def emit_c_large(
         **about,
         **sizes,
         "values": len(grouped.values),
-        # two vectors, two of signs in an eighth of their memory, and the values
-        "work": 3 * len(program.coordinates) + len(grouped.values) + 1,
+        # a vector, signs of two points in an eighth of the memory each, and the values
+        "work": 2 * len(program.coordinates) + len(grouped.values),
         "lanes": LANES,
         "fingerprint": program.fingerprint,
         "defaults": array_lines([repr(item.default) for item in program.parameters]),
@@ -142,6 +141,7 @@ def emit_c_large(
     }
     header = {
         **about,
+        "NAME": program.name.upper(),
         "guard": f"{program.name.upper()}_H",
         "k": len(program.parameters),
     }
@@ -246,7 +246,7 @@ def _row(number: int, kind: BlockType, written: _Written) -> str:
 def _values(grouped: GroupedProgram) -> tuple[list[str], set[str]]:
     """Return the code of the values that depend on t, p and contact parameters, and its calls."""
     program = grouped.program
-    table = NameTable((*RESERVED, *program.tables, "q", "p", "values"))
+    table = NameTable((*RESERVED, *program.tables, "p", "values"))
     wanted = [item.name for item in program.parameters]
     wanted += [item.name for item in program.coordinates]
     names = {"t": "t", **{name: table.take(name) for name in wanted}}
@@ -255,7 +255,7 @@ def _values(grouped: GroupedProgram) -> tuple[list[str], set[str]]:
     code = InlineProgram(program, program.values, sections, {})
     listing = schedule(code, ("values",), names, table)
     printer = CPrinter(code.nodes, listing.names)
-    lines = ["(void)q, (void)t, (void)p, (void)values;"]
+    lines = ["(void)t, (void)p, (void)values;"]
     if {"cos", "sin"} & set(listing.functions):
         lines += ["const int exact = 1;", "int64_t far = 0;"]
     lines += [

@@ -50,9 +50,8 @@ class _Motion(Structure):
         ("reach", c_double),
         ("tolerance", c_double),
         ("max_iterations", c_int),
-        ("is_started", c_int),
         *((name, c_void_p) for name in ("q", "q_dot", "q_ddot", "residual")),
-        *((name, c_void_p) for name in ("status", "iterations", "work")),
+        *((name, c_void_p) for name in ("iterations", "work")),
     )
 
 
@@ -103,25 +102,21 @@ def _march(
     ) -> int:
         """Follow the motion as long as every step converges, undivided.
 
-        Goes from the guess if `first` is 0, otherwise from the good point before it. Fills
-        position, velocity and acceleration, (N, n) each, and of every point the largest absolute
-        value of Phi and the Newton iterations, (N,) each. `reach` is the size of the mechanism.
-        Returns how many points converged, from `first` on.
+        Goes from the good point before `first`. Fills position, velocity and acceleration, (N, n)
+        each, and of every point the largest absolute value of Phi and the Newton iterations, (N,)
+        each. `reach` is the size of the mechanism. Returns how many points converged, from `first`
+        on.
         """
         assert kept  # the library reads these arrays where they are
-        known = min(first, 1)
-        rows, work = slice(first - known, None), np.empty(size)
-        times, (status, counts) = inputs.t[rows], np.empty((2, inputs.t.size), dtype=np.intc)
-        if not known:
-            states[0][0] = inputs.guess
+        times, work = inputs.t[first - 1 :], np.empty(size)
+        counts = np.empty(times.size, dtype=np.intc)
         motion = _Motion(times.size, times.ctypes.data, inputs.p.ctypes.data, reach)
         motion.tolerance, motion.max_iterations = inputs.tolerance, inputs.max_iterations
-        motion.is_started, motion.work = known, work.ctypes.data
-        motion.q, motion.q_dot, motion.q_ddot = (state[rows].ctypes.data for state in states)
-        motion.residual, motion.status = residual[rows].ctypes.data, status.ctypes.data
-        motion.iterations = counts.ctypes.data
-        done = max(int(run(byref(data), byref(motion))) - known, 0)
-        iterations[first : first + done] = counts[known : known + done]
+        motion.q, motion.q_dot, motion.q_ddot = (x[first - 1 :].ctypes.data for x in states)
+        motion.residual, motion.iterations = residual[first - 1 :].ctypes.data, counts.ctypes.data
+        motion.work = work.ctypes.data
+        done = max(int(run(byref(data), byref(motion))) - 1, 0)
+        iterations[first : first + done] = counts[1 : done + 1]
         return done
 
     return march
