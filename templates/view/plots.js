@@ -246,20 +246,17 @@ const plots = {
   },
 };
 
-/* The coordinate that moves most: of bodies an angle, which says most. */
+/* The coordinate that is plotted first: of bodies an angle, that of the largest acceleration, so that
+   it is not one that a motor turns steadily; where all are steady, the one that goes farthest. */
 function liveliest() {
-  const { data, n, count } = player;
-  const ranges = data.coordinates.map((_, k) => {
-    let low = Infinity, high = -Infinity;
-    for (let row = 0; row < count; row++) {
-      const value = data.arrays.q[row * n + k];
-      if (value < low) low = value;
-      if (value > high) high = value;
-    }
-    return high - low;
+  const { data, n } = player, bodies = data.drawing.bodies.length;
+  const candidates = data.coordinates.map((_, k) => k)
+    .filter(k => bodies === 0 || (k < 3 * bodies && k % 3 === 2));
+  const sizes = name => candidates.map(k => {
+    const values = data.arrays[name].filter((value, place) => place % n === k && Number.isFinite(value));
+    return values.reduce((most, value) => Math.max(most, Math.abs(value - values[0])), 0);
   });
-  const preferred = data.coordinates.map((_, k) => k)
-    .filter(k => data.drawing.bodies.length === 0 || k % 3 === 2 && k < 3 * data.drawing.bodies.length);
-  const best = preferred.reduce((a, b) => (ranges[b] > 1.001 * ranges[a] ? b : a), preferred[0]);
-  return data.coordinates[best].name;
+  const accelerations = sizes('q_ddot');
+  const chosen = Math.max(...accelerations) > 1e-9 ? accelerations : sizes('q');
+  return data.coordinates[candidates[chosen.indexOf(Math.max(...chosen))]].name;
 }

@@ -9,6 +9,7 @@
    stage.points          what can be pointed at: joints and the origins of bodies */
 
 const NEAR = 16;  // pixels within which a point is meant, twice that with a finger
+const PLACES = 1000;  // points of a traced path
 const ARROW = 0.2;  // part of the canvas that the longest velocity and acceleration take
 
 class Stage {
@@ -194,10 +195,11 @@ function hasMotion() {
   return player.data.status.some(status => status === 0);
 }
 
-/* Where a point is at all solved times; null where it is not known. */
+/* Where a point is at solved times, at most PLACES of them; null where it is not known. */
 function pathOf(point) {
-  return Array.from({ length: player.count }, (_, k) => {
-    const state = player.solved(k);
+  const count = Math.min(player.count, PLACES);
+  return Array.from({ length: count }, (_, k) => {
+    const state = player.solved(Math.round(k * (player.count - 1) / Math.max(count - 1, 1)));
     return state.isFound ? inWorld(state.q, point.frame, point.point) : null;
   });
 }

@@ -22,12 +22,15 @@ function showMessages() {
   }
   for (const event of data.events) {
     const item = document.createElement('li'), button = document.createElement('button');
-    Object.assign(button, { type: 'button', textContent: event.message });
+    const short = `${event.kind} at t = ${+event.t.toPrecision(6)}: ${event.bodies.join(', ')}`;
+    Object.assign(button, { type: 'button', textContent: short });
     button.addEventListener('click', () => {
       player.pause();
       player.setTime(event.t);
     });
     item.append(button);
+    // A motion that ends at an event has its message above.
+    if (data.success) item.append(` ${event.message}`);
     byId('events').append(item);
   }
 }

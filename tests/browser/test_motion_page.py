@@ -324,7 +324,7 @@ def test_that_a_lock_up_is_marked_and_what_follows_is_explained(open_page: Any) 
     assert float(mark.evaluate("element => parseFloat(element.style.left)")) == pytest.approx(
         100 * lock / 2, abs=1e-3
     )
-    assert "Lock-up" in page.inner_text("#events")
+    assert page.inner_text("#events") == f"lock-up at t = {lock:.6g}: rod, rocker"
     assert "locks failed at t = 1.325" in page.inner_text("#message")
     assert page.locator("#note").is_hidden()
     page.keyboard.press("End")
