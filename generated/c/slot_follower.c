@@ -785,6 +785,7 @@ static void store_rows(slot_follower_output to, double (*rows)[LANES], const int
         }
 }
 
+// The same, for what is not much or is read again soon.
 static void write_rows(slot_follower_output to, double (*rows)[LANES], const int *listed, int size,
     size_t start, size_t count)
 {
@@ -842,9 +843,9 @@ int slot_follower_evaluate(const slot_follower_batch *batch)
         return 0;
     const int is_far = batch->count > FAR;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
-    if (wants_Phi_q)
-        place_constants(&b, matrix, widest);
     const int only = batch->varying_only, wants_rates = wanted & 8 && batch->q_dot.first;
+    if (wants_Phi_q && !only)
+        place_constants(&b, matrix, widest);
     if (!wants_rates)
         memset(b.q_dot, 0, sizeof b.q_dot);
     for (size_t start = 0; start < batch->count; start += LANES) {
@@ -867,7 +868,8 @@ int slot_follower_evaluate(const slot_follower_batch *batch)
             count, is_far);
     }
 #ifdef __x86_64__
-    _mm_sfence();
+    if (is_far)
+        _mm_sfence();
 #endif
     double total = 0;
     for (size_t k = 0; k < widest; k++)

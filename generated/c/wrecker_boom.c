@@ -1623,6 +1623,7 @@ static void store_rows(wrecker_boom_output to, double (*rows)[LANES], const int 
         }
 }
 
+// The same, for what is not much or is read again soon.
 static void write_rows(wrecker_boom_output to, double (*rows)[LANES], const int *listed, int size,
     size_t start, size_t count)
 {
@@ -1680,9 +1681,9 @@ int wrecker_boom_evaluate(const wrecker_boom_batch *batch)
         return 0;
     const int is_far = batch->count > FAR;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
-    if (wants_Phi_q)
-        place_constants(&b, matrix, widest);
     const int only = batch->varying_only, wants_rates = wanted & 8 && batch->q_dot.first;
+    if (wants_Phi_q && !only)
+        place_constants(&b, matrix, widest);
     if (!wants_rates)
         memset(b.q_dot, 0, sizeof b.q_dot);
     for (size_t start = 0; start < batch->count; start += LANES) {
@@ -1705,7 +1706,8 @@ int wrecker_boom_evaluate(const wrecker_boom_batch *batch)
             count, is_far);
     }
 #ifdef __x86_64__
-    _mm_sfence();
+    if (is_far)
+        _mm_sfence();
 #endif
     double total = 0;
     for (size_t k = 0; k < widest; k++)

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-import threading
-from ctypes import Structure, byref, c_double, c_int, c_size_t, c_ssize_t, c_void_p
+from ctypes import byref, c_size_t
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +17,23 @@ import numpy as np
 from kincompile.errors import InputError
 from kincompile.runtime.c_library import library
 from kincompile.runtime.memory import LINE, empty
+from kincompile.runtime.native_points import (
+    Places,
+    function_of_positions,
+    function_of_states,
+)
+from kincompile.runtime.native_structures import (
+    NUMBER,
+    REAL,
+    STATES,
+    Batch,
+    Motion,
+    Numbers,
+    System,
+    Variants,
+    numbers_of_batch,
+    numbers_of_times,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -30,10 +46,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Function = Callable[..., Any]
 
-REAL = np.dtype(np.float64)
-NUMBER = REAL.itemsize
-
-STATES = ("q", "q_dot")
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "Phi": ("Phi",),
     "Phi_q": ("Phi_q",),
@@ -49,59 +61,6 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 
 BATCH_LAST = ("Phi", "nonzeros", "nu", "gamma")
 """What `kinematics_batch_last` returns."""
-
-
-class _Numbers(Structure):
-    """Numbers of many points: entry i of point k is ``first[i * entry + k * point]``."""
-
-    _fields_ = (("first", c_void_p), ("entry", c_ssize_t), ("point", c_ssize_t))
-
-
-class _Batch(Structure):
-    """What is to be evaluated, as the emitted header has it."""
-
-    _fields_ = (
-        ("count", c_size_t),
-        *((name, _Numbers) for name in (*STATES, "t", "p")),
-        *((name, _Numbers) for name in ("Phi", "Phi_q", "nonzeros", "nu", "gamma")),
-        ("varying_only", c_int),
-    )
-
-
-class _System(Structure):
-    """Linear systems, as the emitted header has them."""
-
-    _fields_ = (("count", c_size_t), *((name, _Numbers) for name in ("nonzeros", "b", "x")))
-
-
-class _Motion(Structure):
-    """A motion, as the emitted header has it."""
-
-    _fields_ = (
-        ("count", c_size_t),
-        *((name, c_void_p) for name in ("t", "p", "guess")),
-        ("tolerance", c_double),
-        ("max_iterations", c_int),
-        *((name, _Numbers) for name in ("q", "q_dot", "q_ddot")),
-        *((name, c_void_p) for name in ("residual", "status", "iterations")),
-    )
-
-
-class _Variants(Structure):
-    """Motions of many variants, as the emitted header has them."""
-
-    _fields_ = (
-        ("count", c_size_t),
-        ("variants", c_size_t),
-        ("t", c_void_p),
-        ("p", _Numbers),
-        ("guess", c_void_p),
-        ("tolerance", c_double),
-        ("max_iterations", c_int),
-        *((name, _Numbers) for name in ("q", "q_dot", "q_ddot")),
-        ("time", c_ssize_t),
-        *((name, c_void_p) for name in ("residual", "status", "iterations")),
-    )
 
 
 def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
@@ -141,71 +100,6 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     return module
 
 
-class _Point:
-    """Evaluates one point; the numbers go through memory of fixed place, under a lock.
-
-    Attributes
-    ----------
-    lock
-        To be held from writing the states until the results are copied.
-    states
-        Where coordinates and rates are to be written.
-    evaluate
-        Function of t and p that gives the results, or None where they are not a point's or a
-        number is not finite.
-    """
-
-    def __init__(
-        self,
-        module: ModuleType,
-        loaded: ctypes.CDLL,
-        quantities: Sequence[str],
-        shapes: Mapping[str, tuple[int, ...]],
-    ) -> None:
-        self.lock = threading.Lock()
-        self.states = tuple(np.zeros((2, module.N_COORDINATES)))
-        time, parameters = np.zeros(1), module.DEFAULTS.copy()
-        results = [np.zeros(shapes[quantity]) for quantity in quantities]
-        batch = _Batch(count=1, t=_vector(time), p=_vector(parameters))
-        batch.q, batch.q_dot = (_vector(state) for state in self.states)
-        for quantity, result in zip(quantities, results, strict=True):
-            setattr(batch, quantity, _vector(result))
-        # To give up the interpreter's lock for a point would take longer than the point.
-        prototype = ctypes.PYFUNCTYPE(c_int, c_void_p)
-        run = prototype((f"{module.NAME}_evaluate", loaded))
-        self.evaluate = _point_evaluator(module.DEFAULTS, time, parameters, results, run, batch)
-
-
-def _point_evaluator(
-    defaults: Array,
-    time: Array,
-    parameters: Array,
-    results: Sequence[Array],
-    run: Function,
-    batch: _Batch,
-) -> Function:
-    """Return the function that sets time and parameters, runs a point and copies its results."""
-    ndarray, shape, real, copy = np.ndarray, defaults.shape, REAL, np.ndarray.copy
-    pointer, result, is_one, last = byref(batch), results[0], len(results) == 1, defaults
-
-    def evaluate(t: Any, p: Any) -> Any:
-        nonlocal last
-        if not isinstance(t, float):
-            return None
-        # Parameters are copied unless they are the defaults, which cannot have changed.
-        if p is not last or p is not defaults:
-            if type(p) is not ndarray or p.shape != shape or p.dtype is not real:
-                return None
-            parameters[...] = p
-            last = p
-        time[0] = t
-        if run(pointer):
-            return None
-        return result.copy() if is_one else tuple(map(copy, results))
-
-    return evaluate
-
-
 class _Functions:
     """Makes the functions of a module from those of its library."""
 
@@ -222,42 +116,11 @@ class _Functions:
         self._run = getattr(loaded, f"{self._name}_evaluate")
 
     def evaluator(self, name: str) -> Function:
-        """Return a function of points (..., n).
-
-        A single point is looked at first, and nothing is called that need not be: what is around
-        the compiled code takes ten times as long as the code itself.
-        """
+        """Return a function of points (..., n)."""
         quantities = QUANTITIES[name]
-        point, evaluate = _Point(self._module, self._library, quantities, self._shapes), self._batch
-        defaults, original = self._module.DEFAULTS, getattr(self._module, name)
-        ndarray, shape, real = np.ndarray, (self._n,), REAL
-        lock, q_place, q_dot_place, at_point = point.lock, *point.states, point.evaluate
-
-        def of_states(q: Any, q_dot: Any, t: Any, p: Any = defaults) -> Any:
-            if (
-                type(q) is ndarray and q.shape == shape and q.dtype is real
-                and type(q_dot) is ndarray and q_dot.shape == shape and q_dot.dtype is real
-            ):  # fmt: skip
-                with lock:
-                    q_place[...] = q
-                    q_dot_place[...] = q_dot
-                    results = at_point(t, p)
-                if results is not None:
-                    return results
-            results = evaluate(quantities, (q, q_dot), t, p)
-            return original(q, q_dot, t, p) if results is None else results
-
-        def of_positions(q: Any, t: Any, p: Any = defaults) -> Any:
-            if type(q) is ndarray and q.shape == shape and q.dtype is real:
-                with lock:
-                    q_place[...] = q
-                    results = at_point(t, p)
-                if results is not None:
-                    return results
-            results = evaluate(quantities, (q,), t, p)
-            return original(q, t, p) if results is None else results
-
-        return of_states if "gamma" in quantities else of_positions
+        places = Places(self._module, self._library, quantities, self._shapes)
+        make = function_of_states if "gamma" in quantities else function_of_positions
+        return make(places, self._batch, getattr(self._module, name))
 
     def _batch(self, quantities: Sequence[str], states: tuple[Any, ...], t: Any, p: Any) -> Any:
         """Evaluate a batch whose axes are the first ones; None where numbers are complex."""
@@ -270,12 +133,12 @@ class _Functions:
         rows, t, p, shape = vars(self._module)["_batch"](t, p, states)
         if rows[0].dtype != REAL:
             return None
-        batch = _Batch(count=math.prod(shape), t=_times(t), p=_numbers(p))
+        batch = Batch(count=math.prod(shape), t=numbers_of_times(t), p=numbers_of_batch(p))
         for name, state in zip(STATES, rows, strict=False):
-            setattr(batch, name, _numbers(state))
+            setattr(batch, name, numbers_of_batch(state))
         return self._fill(batch, quantities, shape)
 
-    def _plain(self, states: tuple[Any, ...], t: Any, p: Any) -> _Batch | None:
+    def _plain(self, states: tuple[Any, ...], t: Any, p: Any) -> Batch | None:
         """Return a batch of arrays that need no conversion; that they are finite C will see."""
         shape = getattr(states[0], "shape", ())
         if not (
@@ -285,19 +148,19 @@ class _Functions:
         ):
             return None
         time = np.asarray(t)
-        batch = _Batch(count=math.prod(shape[:-1]), t=_times(time), p=_numbers(p))
+        batch = Batch(count=math.prod(shape[:-1]), t=numbers_of_times(time), p=numbers_of_batch(p))
         batch.kept = time  # C reads through an address: the array must live as long as the batch
         for name, state in zip(STATES, states, strict=False):
-            setattr(batch, name, _Numbers(state.ctypes.data, 1, self._n))
+            setattr(batch, name, Numbers(state.ctypes.data, 1, self._n))
         return batch if batch.count else None
 
-    def _fill(self, batch: _Batch, quantities: Sequence[str], shape: tuple[int, ...]) -> Any:
+    def _fill(self, batch: Batch, quantities: Sequence[str], shape: tuple[int, ...]) -> Any:
         """Run a batch into new arrays; None where a number is not finite."""
         results = []
         for quantity in quantities:
             result = empty((*shape, *self._shapes[quantity]))
             size = math.prod(self._shapes[quantity])
-            setattr(batch, quantity, _Numbers(result.ctypes.data, 1, size))
+            setattr(batch, quantity, Numbers(result.ctypes.data, 1, size))
             results.append(result)
         if self._run(byref(batch)):
             return None
@@ -323,10 +186,16 @@ class _Functions:
             if results is None:
                 results = tuple([_in_lines(size, shape[1]) for size in sizes])
             time = np.asarray(t)
-            batch = _Batch(shape[1], _numbers(q), _numbers(q_dot), _times(time), _numbers(p))
+            batch = Batch(
+                shape[1],
+                numbers_of_batch(q),
+                numbers_of_batch(q_dot),
+                numbers_of_times(time),
+                numbers_of_batch(p),
+            )
             batch.varying_only = out is not None
             for quantity, result in zip(BATCH_LAST, results, strict=True):
-                setattr(batch, quantity, _numbers(result))
+                setattr(batch, quantity, numbers_of_batch(result))
             return original(q, q_dot, t, p) if self._run(byref(batch)) else results
 
         kinematics_batch_last.__doc__ = f"""{original.__doc__}
@@ -361,9 +230,11 @@ class _Functions:
                 return original(nonzeros, b)
             shape = np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
             x = empty((*shape, self._n))
-            system = _System(math.prod(shape), x=_Numbers(x.ctypes.data, 1, self._n))
-            system.nonzeros = _numbers(matrix := _rows(nonzeros, shape, self._shapes["nonzeros"]))
-            system.b = _numbers(right := _rows(b, shape, (self._m,)))
+            system = System(math.prod(shape), x=Numbers(x.ctypes.data, 1, self._n))
+            system.nonzeros = numbers_of_batch(
+                matrix := _rows(nonzeros, shape, self._shapes["nonzeros"])
+            )
+            system.b = numbers_of_batch(right := _rows(b, shape, (self._m,)))
             run(byref(system))
             del matrix, right  # until here their memory is read
             return x
@@ -389,9 +260,9 @@ class _Functions:
             many points converged, from the first one on.
             """
             t, p, guess = inputs.t, inputs.p, inputs.guess
-            motion = _Motion(t.size, t.ctypes.data, p.ctypes.data, guess.ctypes.data)
+            motion = Motion(t.size, t.ctypes.data, p.ctypes.data, guess.ctypes.data)
             motion.tolerance, motion.max_iterations = inputs.tolerance, inputs.max_iterations
-            motion.q, motion.q_dot, motion.q_ddot = (_numbers(state) for state in states)
+            motion.q, motion.q_dot, motion.q_ddot = (numbers_of_batch(state) for state in states)
             motion.residual, motion.status = residual.ctypes.data, status.ctypes.data
             motion.iterations = iterations.ctypes.data
             return int(run(byref(motion)))
@@ -418,34 +289,18 @@ class _Functions:
             how many variants converged at all times.
             """
             t, guess = inputs.t, inputs.guess
-            motions = _Variants(t.size, len(sets), t.ctypes.data, _numbers(sets.T))
+            motions = Variants(t.size, len(sets), t.ctypes.data, numbers_of_batch(sets.T))
             motions.guess, motions.tolerance = guess.ctypes.data, inputs.tolerance
             motions.max_iterations = inputs.max_iterations
-            motions.q, motions.q_dot, motions.q_ddot = (_numbers(state[0]) for state in states)
+            motions.q, motions.q_dot, motions.q_ddot = (
+                numbers_of_batch(state[0]) for state in states
+            )
             motions.time = states.strides[1] // NUMBER
             motions.residual, motions.status = residual.ctypes.data, status.ctypes.data
             motions.iterations = iterations.ctypes.data
             return int(run(byref(motions)))
 
         return march_variants
-
-
-def _vector(array: Array) -> _Numbers:
-    """Return the numbers of one point."""
-    return _Numbers(array.ctypes.data, 1, 0)
-
-
-def _numbers(array: Array) -> _Numbers:
-    """Return an array whose last axis is the batch; one without it is shared by all points."""
-    if array.ndim == 2:
-        entry, point = array.strides
-        return _Numbers(array.ctypes.data, entry // NUMBER, point // NUMBER)
-    return _Numbers(array.ctypes.data, 1, 0)
-
-
-def _times(array: Array) -> _Numbers:
-    """Return one time a point, or one for all."""
-    return _Numbers(array.ctypes.data, 0, array.strides[-1] // NUMBER if array.ndim else 0)
 
 
 def _is_real(value: Any, shape: tuple[int, ...]) -> bool:
