@@ -16,6 +16,8 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 WIDTHS = (1280, 390)
 EXAMPLES = ("wrecker_boom", "four_bar", "cam_flat_follower", "problem_3_5_6")
 
+SLANT = np.arctan2(0.6, 0.8)
+
 # Whatever can be scrolled by itself may be wider than the page.
 TOO_WIDE = """() => [...document.querySelectorAll('body *')]
   .filter(element => element.closest('.wide, #stage') === null)
@@ -58,14 +60,14 @@ def open_page(
 
 
 def four_bar(name: str, crank: float, *, driven: bool = True) -> kc.Mechanism:
-    """Return a four-bar of crank, coupler 2, rocker 2 and ground 3."""
+    """Return a four-bar of crank, coupler 2 (aslant in its frame), rocker 2 and ground 3."""
     m = kc.Mechanism(name, end=2.0, points=81)
     i = m.body("crank", guess=(crank / 2, 0, 0.3))
-    j = m.body("rod", guess=(2, 1, 0.2))
+    j = m.body("rod", guess=(2, 1, 0.2 - SLANT))
     k = m.body("rocker", guess=(3, 1, 1.2))
     m.add(kc.Revolute("O", m.ground, (0, 0), i, (-crank / 2, 0)))
-    m.add(kc.Revolute("P", i, (crank / 2, 0), j, (-1, 0)))
-    m.add(kc.Revolute("Q", j, (1, 0), k, (1, 0)))
+    m.add(kc.Revolute("P", i, (crank / 2, 0), j, (-0.8, -0.6)))
+    m.add(kc.Revolute("Q", j, (0.8, 0.6), k, (1, 0)))
     m.add(kc.Revolute("R", k, (-1, 0), m.ground, (3, 0)))
     if driven:
         m.add(kc.AbsoluteAngle("motor", i, 0.5 + kc.t))
@@ -161,7 +163,7 @@ def test_that_pins_are_on_the_screen_where_the_solution_has_them(
     page.evaluate("stage.traced.clear()")
     for index in (0, 33, 80):
         page.evaluate("k => player.setIndex(k)", index)
-        angle, phi = 0.5 + solution.t[index], solution["phi_rod"][index]
+        angle, phi = 0.5 + solution.t[index], solution["phi_rod"][index] + SLANT
         crank_pin = np.array((np.cos(angle), np.sin(angle)))
         rod_pin = crank_pin + 2 * np.array((np.cos(phi), np.sin(phi)))
         for pin in ((0, 0), crank_pin, rod_pin, (3, 0)):
