@@ -138,6 +138,8 @@ class Findings:
         The well determined part of the pattern in the order of solution.
     is_assembled
         Whether joints and drivers could be assembled at the start.
+    rank_at_start
+        Rank of Phi_q at the start; less than `rank` at a singular position.
     nearest
         The coordinates at the start, or at the position nearest to it that was found.
     residuals
@@ -164,6 +166,7 @@ class Findings:
     too_few: NamedBlock
     blocks: tuple[NamedBlock, ...]
     is_assembled: bool
+    rank_at_start: int
     nearest: tuple[float, ...]
     residuals: tuple[float, ...]
 

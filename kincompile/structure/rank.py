@@ -69,6 +69,9 @@ class RankReport:
         As many of them as there are degrees of freedom: with these driven, nothing is free.
     assembled
         Whether joints and drivers, as far as they are independent, could be assembled at the start.
+    rank_at_start
+        Rank at the start; where it is less than `rank` and the system is assembled, that position
+        is singular.
     nearest : ndarray, shape (n,)
         The position at the start, or the nearest to one.
     residuals : ndarray, shape (m,)
@@ -82,6 +85,7 @@ class RankReport:
     free: tuple[int, ...]
     drive: tuple[int, ...]
     assembled: bool
+    rank_at_start: int
     nearest: Array
     residuals: Array
 
@@ -185,6 +189,7 @@ class _Analysis:
             free=free,
             drive=drive,
             assembled=bool(together[0]),
+            rank_at_start=_rank(self._scaled(nearest, self._t[:1])[0]),
             nearest=nearest[0],
             residuals=self._evaluate(nearest, self._t[:1])[0][0],
         )
@@ -255,8 +260,13 @@ def _damped(matrix: Array, Phi: Array, damping: float) -> Array:
 def _best(matrices: Array, order: Sequence[int]) -> tuple[list[int], list[int], Array]:
     """Return independent and dependent rows at the state of largest rank, and Phi_q there."""
     finite = [matrix for matrix in matrices if np.isfinite(matrix).all()]
-    best = max(finite, key=lambda matrix: int(np.linalg.matrix_rank(matrix, tol=DEPENDENT)))
+    best = max(finite, key=_rank)
     return (*_split(best, order), best)
+
+
+def _rank(matrix: Array) -> int:
+    """Return the rank of a matrix with rows of length one, 0 where it is not finite."""
+    return int(np.linalg.matrix_rank(matrix, tol=DEPENDENT)) if np.isfinite(matrix).all() else 0
 
 
 def _split(matrix: Array, order: Sequence[int]) -> tuple[list[int], list[int]]:

@@ -79,6 +79,7 @@ def inspect_system(system: ConstraintSystem, pattern: Pattern, ranks: RankReport
             named(block.rows, block.columns) for block in parts_of(independent, shape).blocks
         ),
         is_assembled=ranks.assembled,
+        rank_at_start=ranks.rank_at_start,
         nearest=tuple(ranks.nearest.tolist()),
         residuals=tuple(ranks.residuals.tolist()),
     )

@@ -136,6 +136,11 @@ def _structure(found: Findings) -> Iterator[str]:
     yield from _parts(found)
     states = "generic assembled states" if found.is_assembled else "generic states"
     yield f"rank {found.rank} at {states}: {_left(found)}"
+    if found.is_assembled and found.rank_at_start < found.rank:
+        yield (
+            f"rank {found.rank_at_start} at t = 0: no equation is redundant for that, but this "
+            "position is singular"
+        )
 
 
 def _parts(found: Findings) -> Iterator[str]:
@@ -180,6 +185,11 @@ def _advice(found: Findings) -> Iterator[str]:
         yield f"{what} missing: add, for instance, {drivers}, as a function of kc.t."
     if not found.is_assembled:
         yield _unassembled(found)
+    elif found.rank_at_start < found.rank:
+        yield (
+            "singular at t = 0, a dead point or a change point: velocities are not determined "
+            "there. Let the drivers start from another position, or drive another body."
+        )
     if found.problem:
         yield found.problem
 

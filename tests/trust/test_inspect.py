@@ -105,7 +105,7 @@ def test_a_five_bar_with_so_many_drivers(build, drivers):
 def test_an_example(example):
     found = kc.inspect(example.model)
     assert found.degrees_of_freedom == 0
-    assert found.rank == len(found.coordinates) == found.structural_rank
+    assert found.rank == len(found.coordinates) == found.structural_rank == found.rank_at_start
     assert found.is_assembled
     assert (found.redundant, found.conflicting, found.free, found.problem) == ((), (), (), "")
     assert "What to do" not in found.to_text()
@@ -252,6 +252,19 @@ def test_that_a_singular_pose_is_not_a_redundancy(build, start):
     assert np.linalg.matrix_rank(here, tol=1e-9) == 8
     found = kc.inspect(model)
     assert (found.rank, found.redundant, found.problem) == (9, (), "")
+    assert found.rank_at_start == 8
+    assert "rank 8 at t = 0: no equation is redundant" in found.to_text()
+    assert "singular at t = 0, a dead point or a change point" in found.to_text()
+
+
+def test_a_slider_crank_driven_by_its_slider_from_the_dead_point():
+    """The crank and the rod in one line: the slider cannot start to move them."""
+    t = kc.t
+    push = [kc.AbsoluteX("push", "slider", (0, 0), 3 - start - t / 9) for start in (0, 0.2)]
+    at_dead_point, later = (kc.inspect(slider_crank(driver)) for driver in push)
+    assert (at_dead_point.rank, at_dead_point.rank_at_start) == (9, 8)
+    assert (later.rank, later.rank_at_start) == (9, 9)
+    assert "singular" not in later.to_text()
 
 
 def three_bars(angle, size=1.0):
