@@ -514,18 +514,18 @@ class _Quantity:
         self.count = len(self.places)
         self.fixed = np.array(fixed, dtype=int)
         self.constants = np.reshape(constants, (-1, 1))
-        self.start = np.zeros(self.size)
-        self.start[self.fixed] = constants
+        self.start = np.zeros(shape)
+        self.start.put(self.fixed, constants)
         self.is_full = shape == (self.count,)
 
     def at_point(self, values):
         """Return the array of one point; of an iterator, as many values are taken as are needed."""
-        computed = np.fromiter(values, float, self.count)
+        computed = _fromiter(values, _REAL, self.count)
         if self.is_full:
             return computed
         result = self.start.copy()
-        result[self.index] = computed
-        return result.reshape(self.shape)
+        result.put(self.index, computed)
+        return result
 
     def for_batch(self, count, dtype):
         """Return an array (size, N) with the constant entries in place.
@@ -534,7 +534,7 @@ class _Quantity:
         """
         result = _empty((count, self.size), dtype)
         if not self.is_full:
-            result[:] = self.start
+            result[:] = self.start.reshape(-1)
         return result.T
 
 
@@ -545,7 +545,7 @@ _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), _FLAT[_VARYING], _FLAT[_FIXED],
 _NONZEROS = _Quantity((len(PATTERN),), _VARYING, _FIXED, _CONSTANTS)
 _STATES = ("q", "q_dot")
 _SHAPE = (N_COORDINATES,)
-_REAL = np.dtype(float)
+_REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
 _BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
 _PARAMETER_LIST = DEFAULTS.tolist()
 _empty = np.empty  # the loader's function in its place uses the memory of earlier results again
@@ -638,14 +638,14 @@ def _point(t, p, states):
         t = float(t)
     if p is DEFAULTS:
         parameters, total = _PARAMETER_LIST, t
-    elif type(p) is np.ndarray and p.shape == DEFAULTS.shape and p.dtype is _REAL:
+    elif type(p) is _ndarray and p.shape == DEFAULTS.shape and p.dtype is _REAL:
         parameters = p.tolist()
         total = t + sum(parameters)
     else:
         return None
     arguments = [_Floats]
     for state in states:
-        if type(state) is not np.ndarray or state.shape != _SHAPE or state.dtype is not _REAL:
+        if type(state) is not _ndarray or state.shape != _SHAPE or state.dtype is not _REAL:
             return None
         values = state.tolist()
         total += sum(values)
