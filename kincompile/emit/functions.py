@@ -29,6 +29,11 @@ EVALUATORS: Mapping[str, tuple[str, ...]] = {
 """The functions of a module and the quantities each returns; the last four share work."""
 
 
+DEEPEST = 60
+"""Operations within each other, a long sum's for instance, after which a value gets a name: neither
+the printers nor the languages take any number of them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Assignment:
     """A value with a name."""
@@ -119,8 +124,12 @@ def schedule(
     for position, section in enumerate(inline.sections):
         own: list[Assignment] = []
         starts = [entry.node for _, rows in results for entry in rows[position][1]]
+        depths: dict[int, int] = {}
         for node in _in_order(inline, starts, names):
-            if uses[node] > 1 and node not in names and _deserves_name(inline, node):
+            inner = (depths.get(k, 0) for k in operands_of(inline.nodes[node]) if k not in names)
+            depths[node] = 1 + max(inner, default=0)
+            is_wanted = uses[node] > 1 or depths[node] % DEEPEST == 0
+            if is_wanted and node not in names and _deserves_name(inline, node):
                 wanted = inline.hints.get(node) or content_name(inline.nodes[node], names, numbers)
                 names[node] = table.take(wanted or f"{section.instance.name}_{len(own) + 1}")
                 own.append(Assignment(node, names[node]))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import sympy
 
+from kincompile.errors import ModelError
 from kincompile.ir.equation_shapes import EquationShapes
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
@@ -36,23 +37,15 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
     """
     columns = {item.name: column for column, item in enumerate(system.coordinates)}
     graph = Graph()
-    binder, shapes = _Binder(graph), EquationShapes(columns)
+    binder = _Binder(graph, EquationShapes(columns) if share_equations else None)
     instances = []
     tables: dict[str, SplineTable] = {}
     for first_row, constraint in zip(system.row_offsets, system.constraints, strict=True):
-        names: tuple[str | None, ...] = constraint.columns
-        if isinstance(constraint, FreeEquation):
-            shared = shapes.shared(constraint) if share_equations else None
-            if shared is None:
-                kernel = equation_kernel(constraint)
-                bindings = tuple(graph.input(name) for name in kernel.inputs)
-            else:
-                kernel, names = shared.kernel, shared.columns
-                bindings = binder.bind_equation(shared)
-        else:
-            kernel = constraint_kernel(constraint.template)
-            bindings = binder.bind(constraint, kernel)
-            tables.update(_tables(constraint))
+        try:
+            kernel, names, bindings = binder.bound(constraint)
+        except RecursionError:
+            raise ModelError(_too_deep(constraint)) from None
+        tables.update(_tables(constraint))
         own = tuple(None if name is None else columns[name] for name in names)
         instances.append(Instance(kernel, constraint, first_row, own, bindings))
     frames = tuple((body.name, columns[body_coordinates(body.name)[2]]) for body in system.bodies)
@@ -107,9 +100,20 @@ def _kernel_mark(instance: Instance, first: str) -> Kernel | str:
     return instance.kernel if first == instance.name else first
 
 
-def _tables(joint: Joint) -> dict[str, SplineTable]:
+def _too_deep(constraint: Joint | FreeEquation) -> str:
+    """Return what to do about an expression that SymPy cannot differentiate."""
+    return (
+        f"{constraint.name!r}: its expressions are nested too deeply, functions of functions of "
+        "functions; give an inner part u a coordinate of its own, with the equation u - (inner "
+        "part) = 0, and write u in its place"
+    )
+
+
+def _tables(constraint: Joint | FreeEquation) -> dict[str, SplineTable]:
+    if isinstance(constraint, FreeEquation):
+        return {}
     splines = (
-        item for profile in joint.profiles.values() for item in profile.atoms(PeriodicSpline)
+        item for profile in constraint.profiles.values() for item in profile.atoms(PeriodicSpline)
     )
     return {item.table_name: item.table for item in splines}
 
@@ -117,12 +121,25 @@ def _tables(joint: Joint) -> dict[str, SplineTable]:
 class _Binder:
     """Gives the nodes of kernels' inputs; those of a body are made once for all its joints."""
 
-    def __init__(self, graph: Graph) -> None:
-        self._graph = graph
+    def __init__(self, graph: Graph, shapes: EquationShapes | None) -> None:
+        self._graph, self._shapes = graph, shapes
         self._convert = Converter(graph, graph.input).convert
         self._bodies: dict[str, tuple[int, ...]] = {}
         self._numbers: dict[float, int] = {}
         self._orders: dict[int, tuple[Kernel, tuple[int | str, ...]]] = {}
+
+    def bound(
+        self, constraint: Joint | FreeEquation
+    ) -> tuple[Kernel, tuple[str | None, ...], tuple[int, ...]]:
+        """Return a constraint's kernel, the names of its columns, and the nodes of its inputs."""
+        if isinstance(constraint, Joint):
+            kernel = constraint_kernel(constraint.template)
+            return kernel, constraint.columns, self.bind(constraint, kernel)
+        shared = self._shapes and self._shapes.shared(constraint)
+        if shared:
+            return shared.kernel, shared.columns, self.bind_equation(shared)
+        kernel = equation_kernel(constraint)
+        return kernel, constraint.columns, tuple(self._graph.input(name) for name in kernel.inputs)
 
     def bind(self, joint: Joint, kernel: Kernel) -> tuple[int, ...]:
         """Return the node of each of the kernel's inputs."""
