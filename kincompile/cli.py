@@ -140,21 +140,31 @@ def _destination(output: str, emitted: Emitted) -> tuple[Path, str]:
     return path.parent, path.name
 
 
+def _motion_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a motion: its times, and the values of parameters."""
+    options = (
+        click.option("--end", type=float, help="Last time.  [default: the model's own]"),
+        click.option(
+            "--points",
+            type=click.IntRange(min=1),
+            help="Number of equally spaced times from 0 to the end.  [default: the model's own]",
+        ),
+        click.option(
+            "--set",
+            "assignments",
+            multiple=True,
+            metavar="NAME=VALUE",
+            help="Value of a parameter; may be given several times.",
+        ),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
 @cli.command()
 @click.argument("model")
-@click.option("--end", type=float, help="Last time.  [default: the model's own]")
-@click.option(
-    "--points",
-    type=click.IntRange(min=1),
-    help="Number of equally spaced times from 0 to the end.  [default: the model's own]",
-)
-@click.option(
-    "--set",
-    "assignments",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Value of a parameter; may be given several times.",
-)
+@_motion_options
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
 @click.option("-o", "--output", metavar="FILE", help="Write the motion: .csv, .npz or .json.")
 @click.pass_context
@@ -310,19 +320,7 @@ def derive(model: str, output: str, at: float, assignments: tuple[str, ...]) -> 
     metavar="FILE",
     help="Page to write, .html; a folder gets a page of each model, and index.html.",
 )
-@click.option("--end", type=float, help="Last time.  [default: the model's own]")
-@click.option(
-    "--points",
-    type=click.IntRange(min=1),
-    help="Number of equally spaced times from 0 to the end.  [default: the model's own]",
-)
-@click.option(
-    "--set",
-    "assignments",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Value of a parameter; may be given several times.",
-)
+@_motion_options
 @click.pass_context
 def view(
     context: click.Context,

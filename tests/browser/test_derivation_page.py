@@ -1,25 +1,18 @@
 """Derivation pages in headless Chromium: no overflow, no missing glyph, no network, no message."""
 
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 import kincompile as kc
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-ARGUMENTS = [
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-]  # fmt: skip
 WIDTHS = (1280, 390)
 EXAMPLES = ("wrecker_boom", "cam_flat_follower", "problem_3_5_6")
 
 pytestmark = [
     pytest.mark.browser,
     pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed"),
 ]
 
 # Whatever can be scrolled by itself may be wider than the page.
@@ -75,35 +68,18 @@ MISSING_GLYPHS = """extra => {
 
 @pytest.fixture(scope="module")
 def open_page(
-    tmp_path_factory: pytest.TempPathFactory, example_named: Any
-) -> Iterator[Callable[..., Any]]:
-    """Return a function that opens the page of an example, with what it says and asks for."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    open_file: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory, example_named: Any
+) -> Callable[..., Any]:
+    """Return a function that opens the page of an example."""
     folder = tmp_path_factory.mktemp("pages")
-    with api.sync_playwright() as playwright:
-        context = playwright.chromium.launch_persistent_context(
-            tmp_path_factory.mktemp("profile"),
-            executable_path=CHROMIUM,
-            headless=True,
-            args=ARGUMENTS,
-        )
 
-        def opened(name: str, width: int = 1280, scheme: str = "light") -> Any:
-            path = folder / f"{name}.html"
-            if not path.exists():
-                kc.derivation(example_named(name).model, 0.5).write(path)
-            page = context.new_page()
-            page.set_viewport_size({"width": width, "height": 900})
-            page.emulate_media(color_scheme=scheme)
-            page.said, page.asked = [], []
-            page.on("console", lambda message: page.said.append(message.text))
-            page.on("pageerror", lambda error: page.said.append(str(error)))
-            page.on("request", lambda request: page.asked.append(request.url))
-            page.goto(path.as_uri())
-            return page
+    def opened(name: str, width: int = 1280, scheme: str = "light") -> Any:
+        path = folder / f"{name}.html"
+        if not path.exists():
+            kc.derivation(example_named(name).model, 0.5).write(path)
+        return open_file(path, width, scheme)
 
-        yield opened
-        context.close()
+    return opened
 
 
 @pytest.fixture(params=EXAMPLES)
