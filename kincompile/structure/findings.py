@@ -135,7 +135,8 @@ class Findings:
         The parts of the pattern, by Dulmage and Mendelsohn, with more equations than coordinates
         in them, and with more coordinates than equations for them.
     blocks
-        The well determined part of the pattern in the order of solution.
+        The well determined part of the pattern in the order of solution, without the equations
+        that are redundant or conflicting.
     is_assembled
         Whether joints and drivers could be assembled at the start.
     rank_at_start

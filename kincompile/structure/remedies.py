@@ -62,17 +62,19 @@ class Surplus:
     @property
     def text(self) -> str:
         """What is wrong, in words."""
-        ending = "s" if len(self.equations) == 1 else ""
         what, partners = listed(self.equations), listed(self.repeats)
+        s = "s" if len(self.equations) == 1 else ""
+        verdict = "conflicting" if self.conflicting else "redundant"
         if not self.repeats:
             return (
-                f"{'conflicting' if self.conflicting else 'redundant'}: {what} determine{ending} "
-                "nothing, for at assembled positions all its derivatives are zero"
+                f"{verdict}: {what} determine{s} nothing, for at assembled positions all its "
+                "derivatives are zero"
             )
         if self.conflicting:
-            return f"conflicting: {what} contradict{ending} {partners}"
+            return f"{verdict}: {what} contradict{s} {partners}"
+        demands = "demands" if len(self.repeats) == 1 else "demand"
         return (
-            f"redundant: {what} repeat{ending} what {partners} demand, harmless as long as the "
+            f"{verdict}: {what} repeat{s} what {partners} {demands}, harmless as long as the "
             "lengths are exact"
         )
 

@@ -51,7 +51,7 @@ def inspect_system(system: ConstraintSystem, pattern: Pattern, ranks: RankReport
     entries = sorted((int(row), int(column)) for row, column in pattern)
     shape = len(names), len(columns)
     whole = parts_of(entries, shape)
-    independent = [(row, column) for row, column in entries if row not in ranks.redundant]
+    independent = [(row, column) for row, column in entries if row not in ranks.partners]
 
     def named(rows: Sequence[int], at: Sequence[int]) -> NamedBlock:
         return NamedBlock(tuple(names[row] for row in rows), tuple(columns[k] for k in at))

@@ -89,7 +89,7 @@ def test_that_a_wrong_module_is_an_exit_code_of_one(inspected, monkeypatch):
         (
             "m.add(kc.AbsoluteAngle",
             'm.add(kc.Revolute("E", m.ground, (0, 0), crank, (-0.1, 0)))\nm.add(kc.AbsoluteAngle',
-            ["redundant: E.x, E.y repeat what A demand", "remove the Revolute E"],
+            ["redundant: E.x, E.y repeat what A demands", "remove the Revolute E"],
         ),
         (
             "1 + kc.t",
