@@ -43,6 +43,12 @@ away a coordinate has no digits left for a difference."""
 ALL_SHOWN = 60
 """Equations up to which each has lines of its own; beyond, the largest errors stand for all."""
 
+LEGEND = (
+    "complex step: Phi_q = Im Phi(q + i h) / h, nu = -Im Phi(q, t + i h) / h",
+    "line oracle: gamma = -d2/ds2 Phi(q + s q_dot, t + s) at s = 0",
+)
+"""What is compared with, for who reads the table."""
+
 LARGEST = 10
 """How many of the largest errors of each quantity stand for all."""
 
@@ -143,6 +149,7 @@ class Verification:
             f"Verification of {self.name}",
             *indented(table(header, rows, right=("error",))),
             *more,
+            *indented(LEGEND),
             f"  {self._verdict()}",
         ])  # fmt: skip
 
