@@ -115,19 +115,16 @@ def page(
     ModelError
         If the model cannot be used as written; every problem is listed.
     InputError
-        If times or parameters cannot be used, or the solution has several variants.
+        If times or parameters cannot be used, or the solution is of another model, or holds
+        several variants.
     """
     system = model.system()
     if solution is None:
         times = np.linspace(0, system.end, system.points) if t is None else t
         solution, message = _solved(system, times, p)
     else:
+        _require_motion_of(system, solution)
         message = solution.message
-    if solution is not None and solution.q.ndim != 2:
-        raise InputError(
-            f"this Solution of {solution.name} holds {len(solution.q)} variants, and a page shows "
-            "one motion: solve with the parameters of one of them"
-        )
     shown = page_data(system, solution, message)
     slots = {
         "title": escape(system.name),
@@ -137,6 +134,20 @@ def page(
         "data": as_json(shown),
     }
     return Page(system.name, fill("view/page.html.jinja", slots), shown)
+
+
+def _require_motion_of(system: ConstraintSystem, solution: Solution) -> None:
+    """Refuse what is not one motion of this system."""
+    if solution.coordinates != tuple(item.name for item in system.coordinates):
+        raise InputError(
+            f"this Solution is one of {solution.name}, whose coordinates are not those of "
+            f"{system.name}: give the model that was solved"
+        )
+    if solution.q.ndim != 2:
+        raise InputError(
+            f"this Solution of {solution.name} holds {len(solution.q)} variants, and a page shows "
+            "one motion: solve with the parameters of one of them"
+        )
 
 
 def _solved(

@@ -3,6 +3,7 @@
 import base64
 import dataclasses
 import json
+import pickle
 import re
 
 import numpy as np
@@ -131,6 +132,19 @@ def test_that_variants_are_refused(example_named):
     many = kc.solve(module, [0, 1], np.tile(module.DEFAULTS, (2, 1, 1)))
     with pytest.raises(kc.InputError, match="holds 2 variants, and a page shows one motion"):
         kc.page(example_named("four_bar").model, many)
+
+
+def test_that_a_motion_of_another_model_is_refused(example_named):
+    solution = example_named("four_bar").solution
+    with pytest.raises(kc.InputError, match="is one of four_bar, whose coordinates are not those"):
+        kc.page(pendulum(), solution)
+
+
+def test_that_a_motion_from_another_process_has_a_page_without_residuals(example_named):
+    example = example_named("slider_crank")
+    copy = pickle.loads(pickle.dumps(example.solution))
+    _, arrays = data_of(kc.page(example.model, copy).html)
+    assert set(arrays) == {"t", "q", "q_dot", "q_ddot"}
 
 
 def test_that_a_thousand_frames_of_the_wrecker_boom_are_small(example_named):
