@@ -213,13 +213,12 @@ class _Builder:
         for number in dict.fromkeys(which.tolist()):
             members = np.flatnonzero(which == number)
             part = bindings[members], columns[members], rows[members]
-            found.append(self._group(instances[members[0]], shapes[members[0]], *part))
+            found.append(self._group(instances[members[0]], *part))
         return found
 
     def _group(
         self,
         sample: Instance,
-        shape: NDArray[np.float64],
         bindings: Index,
         columns: Index,
         rows: Index,
@@ -228,9 +227,10 @@ class _Builder:
         graph = Graph()
         inputs: dict[str, int] = {}
         sources: dict[str, Source] = {}
-        for name, folded, nodes in zip(kernel.inputs, shape.tolist(), bindings.T, strict=True):
-            if folded >= 0:
-                inputs[name] = graph.const(int(folded))
+        for name, nodes in zip(kernel.inputs, bindings.T, strict=True):
+            numbers = self._nodes.number[nodes]
+            if (numbers == numbers[0]).all():  # of all constraints; not so where it is no number
+                inputs[name] = graph.const(float(numbers[0]))
             else:
                 inputs[name] = graph.input(name)
                 sources[name] = self._source(nodes)

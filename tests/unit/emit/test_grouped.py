@@ -206,6 +206,16 @@ def test_too_many_equations_of_a_very_large_mechanism_are_refused(monkeypatch):
         kc.compile(parallel_cranks(1), form="grouped")
 
 
+def test_numbers_that_all_constraints_share_stay_in_the_code():
+    program = group(lower(loops(5, "angle").system()))
+    angles = [item for item in program.groups if item.sample.name.startswith("G")]
+    assert len(angles) == 1
+    assert {source.kind for source in angles[0].inputs.values()} <= {"q", "value"}
+    bearings = next(item for item in program.groups if item.sample.name == "B0")
+    assert bearings.inputs["s_i.x"].kind == "number"
+    assert "s_i.y" not in bearings.inputs
+
+
 def test_an_unknown_form_is_refused():
     with pytest.raises(kc.InputError, match="forms are: inline, grouped"):
         kc.emit(loops(1, "angle"), form="tree")
@@ -293,7 +303,7 @@ def test_the_signs_of_blocks_make_up_the_sign_of_the_determinant(is_split, monke
     solver, found = staged.StagedSolver(module), set()
     for q in module.GUESS + np.random.default_rng(5).normal(size=(8, module.N_COORDINATES)):
         factors = solver.factor(module.Phi_q_nonzeros(q, 0.1))
-        ours = np.prod(np.where(solver.signs(factors), 1, -1))
+        ours = np.prod(np.sign(solver.determinants(factors)))
         found.add((int(ours), int(np.linalg.slogdet(module.Phi_q(q, 0.1))[0])))
     # The order of rows and columns gives both the same or the opposite sign everywhere.
     assert found in ({(1, 1), (-1, -1)}, {(1, -1), (-1, 1)})
