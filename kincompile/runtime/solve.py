@@ -22,7 +22,7 @@ from kincompile.errors import BranchSwitchWarning, InputError, SolveError
 from kincompile.runtime.events import branch_switch, locate, singular_start
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
-from kincompile.runtime.lanes import has_planned_solve
+from kincompile.runtime.lanes import has_planned_solve, missing_lanes
 from kincompile.runtime.large import LargeMarch, LargeState
 from kincompile.runtime.march import (
     SMALL_ERROR,
@@ -212,7 +212,7 @@ def _takes_grid(module: ModuleType, points: int, method: str | None) -> bool:
     if method not in (None, "grid", "march"):
         raise InputError(f"method is {method!r}: give 'grid', 'march', or nothing.")
     if method == "grid" and not has_planned_solve(module):
-        raise InputError(f"{module.NAME} has no planned solve for method='grid': use 'march'.")
+        raise InputError(missing_lanes(module, "method='grid'", "use 'march'"))
     return method == "grid" or (
         method is None and points >= SMALLEST_GRID and has_planned_solve(module)
     )

@@ -15,7 +15,7 @@ import numpy as np
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.runtime.coarse import KINK, SMOOTH
-from kincompile.runtime.lanes import LaneCode, has_planned_solve
+from kincompile.runtime.lanes import LaneCode, has_planned_solve, missing_lanes
 from kincompile.runtime.march import SMALL_ERROR, State, advance, complete, start
 from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import problem
@@ -58,9 +58,7 @@ def read_variants(module: ModuleType, p: object) -> Array | None:
             f"(B, 1, {len(module.PARAMETERS)}) for B variants of {listed(module.PARAMETERS)}."
         )
     if not has_planned_solve(module):
-        raise InputError(
-            f"{module.NAME} has no planned solve for variants: call solve once for each of them."
-        )
+        raise InputError(missing_lanes(module, "variants", "call solve once for each of them"))
     sets = np.ascontiguousarray(p[:, 0], dtype=np.float64)
     bad = np.argwhere(~np.isfinite(sets))
     if bad.size:

@@ -216,6 +216,14 @@ def test_numbers_that_all_constraints_share_stay_in_the_code():
     assert "s_i.y" not in bearings.inputs
 
 
+def test_what_needs_all_points_at_once_is_refused_with_what_to_do():
+    module = kc.compile(loops(2, "equation"), form="grouped")
+    with pytest.raises(kc.InputError, match=r"grouped form.* no method='grid': use 'march', or"):
+        kc.solve(module, [0.0, 0.1], method="grid")
+    with pytest.raises(kc.InputError, match=r"no variants: call solve once .* form='inline'"):
+        kc.solve(module, [0.0, 0.1], p=np.ones((2, 1, 1)))
+
+
 def test_an_unknown_form_is_refused():
     with pytest.raises(kc.InputError, match="forms are: inline, grouped"):
         kc.emit(loops(1, "angle"), form="tree")
