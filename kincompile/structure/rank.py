@@ -200,9 +200,8 @@ class _Analysis:
         if not held.any():  # the drivers lead where the joints cannot follow
             return set(dependent) & set(self._drivers)
         Phi, _ = self._evaluate(found[held], self._t[held])
-        moving = self._t[held] > 0  # at the start drivers may agree that do not agree later
-        sizes = np.abs(Phi[moving] if moving.any() else Phi) / self._terms
-        missed = np.median(sizes, axis=0)
+        # The median, for drivers may agree at one time; and a state may be on another branch.
+        missed = np.median(np.abs(Phi) / self._terms, axis=0)
         return {row for row in dependent if not missed[row] <= ASSEMBLED * 10}
 
     def _scaled(self, q: Array, t: Array) -> Array:
