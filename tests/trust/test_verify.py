@@ -154,6 +154,27 @@ def test_that_a_fault_is_found_where_complex_numbers_are_no_help(model, quantity
     assert (wrong.quantity, wrong.equation) == (quantity, module.EQUATIONS[row])
 
 
+@pytest.mark.parametrize("dimensions", [1, 2], ids=["single state", "batch"])
+def test_that_a_fault_of_one_shape_alone_is_found(example_named, dimensions):
+    """A batch may run on other code than a single state does."""
+    module = example_named("four_bar").module
+    wrong = spoiled(module, "gamma", None, (3,), 1e-6)
+    everywhere = wrong.gamma
+    wrong.gamma = lambda q, *given: (everywhere if q.ndim == dimensions else module.gamma)(
+        q, *given
+    )
+    found = kc.verify(wrong)
+    assert [check.entry for check in found.table if not check.passed] == ["gamma of B.y"]
+
+
+@pytest.mark.parametrize("place", range(4), ids=["Phi", "nonzeros", "nu", "gamma"])
+def test_that_a_fault_of_the_batch_of_lanes_is_found(example_named, place):
+    module = example_named("four_bar").module
+    found = kc.verify(spoiled(module, "kinematics_batch_last", place, (0, slice(None)), 1e-6))
+    (wrong,) = [check for check in found.table if not check.passed]
+    assert wrong.entry.startswith(("Phi of ", "Phi_q of ", "nu of ", "gamma of ")[place])
+
+
 def test_that_a_fault_of_compiled_c_is_found(example_named, quick_compiler):
     module = example_named("four_bar").native
     found = kc.verify(spoiled(module, "gamma", None, (3,), 1e-6))
