@@ -149,7 +149,7 @@ def emit_c_large(
         f"{program.name}.c": fill("c/large.c.jinja", source),
         f"{program.name}.h": fill("c/large.h.jinja", header),
     }
-    return Emitted(program.name, files, _arrays(grouped, runs), companion)
+    return Emitted(program.name, files, _arrays(runs), companion)
 
 
 def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
@@ -178,6 +178,9 @@ def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
         "number": number,
         "blocks": sum(run.columns.shape[1] for run in runs if run.type == number),
         "equations": ", ".join(program.equations),
+        "is_angle": ", ".join(
+            str(int(item.unit == "rad")) for item in program.coordinates[: kind.own]
+        ),
         "determined": ", ".join(coordinates[: kind.own]),
         "read": ", ".join(coordinates[kind.own :]) or "nothing",
         "functions": "\n".join(lines),
@@ -240,6 +243,7 @@ def _row(number: int, kind: BlockType, written: _Written) -> str:
     numbers = ", ".join(map(str, (*sizes, written.sizes["determinants"])))
     functions = [f"type_{number}_{name}_of_block" for name in (*FUNCTIONS, "factor")]
     functions += [f"type_{number}_solve", f"type_{number}_follow" if written.is_chain else "NULL"]
+    numbers += f", type_{number}_is_angle"
     return f"    {{{numbers},\n" + "\n".join(f"        {name}," for name in functions) + "\n    },"
 
 
@@ -270,7 +274,7 @@ def _values(grouped: GroupedProgram) -> tuple[list[str], set[str]]:
     return lines, set(listing.functions)
 
 
-def _arrays(grouped: GroupedProgram, runs: Sequence[Run]) -> dict[str, NDArray[Any]]:
+def _arrays(runs: Sequence[Run]) -> dict[str, NDArray[Any]]:
     """Return the data of the blocks, tile by tile."""
     tiles: list[tuple[int, int, bool, bool]] = []
     columns, numbers, values = [], [], []
@@ -284,9 +288,7 @@ def _arrays(grouped: GroupedProgram, runs: Sequence[Run]) -> dict[str, NDArray[A
             columns.append(first.reshape(-1))
             numbers.append(run.numbers[:, lanes].reshape(-1))
             values.append(run.values[:, lanes].reshape(-1))
-    angular = [item.unit == "rad" for item in grouped.program.coordinates]
     return {
-        "angular": np.array(angular, dtype=np.uint8),
         "columns": np.concatenate(columns).astype(np.int32),
         "numbers": np.concatenate(numbers),
         "tiles": np.array(tiles, dtype=np.int32),

@@ -187,8 +187,9 @@ class _Finder:
     def __init__(self, grouped: GroupedProgram) -> None:
         self.grouped = grouped
         self.types: list[BlockType] = []
-        self._known: dict[tuple[bytes, bytes], int] = {}
+        self._known: dict[tuple[bytes, ...], int] = {}
         self._angles = np.array(grouped.angles, dtype=np.intp)
+        self._is_angle = np.array([item.unit == "rad" for item in grouped.program.coordinates])
         self._writer = _Writer(grouped)
         size, first = len(grouped.program.equations), 0
         # Of each equation: its group, the number of its constraint, and which row of that it is.
@@ -213,9 +214,10 @@ class _Finder:
             parts = self._parts(rows, first[:, lanes[0]].tolist())
             reads = np.array([index for part in parts for index in part.reads(self._angles)])
             slots = _slots(reads, own)
-            for same in _equal(slots):
+            for same in _equal(np.concatenate((slots, self._is_angle[own]))):
                 columns = _columns(reads[:, same], slots[:, same[0]], own[:, same])
-                key = joined[:, lanes[0]].tobytes(), slots[:, same[0]].tobytes()
+                marks = joined[:, lanes[0]], slots[:, same[0]], self._is_angle[own[:, same[0]]]
+                key = tuple(mark.tobytes() for mark in marks)
                 here = [part.of(same) for part in parts]
                 if key not in self._known:
                     self._known[key] = len(self.types)

@@ -29,7 +29,6 @@ ARRAYS: Mapping[str, type[np.generic]] = {
     "columns": np.int32,
     "numbers": np.float64,
     "values": np.int32,
-    "angular": np.uint8,
 }
 """The arrays that the library reads, as the emitted header has them."""
 
