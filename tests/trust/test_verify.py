@@ -8,6 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile.runtime.native import make_native
 
 x, y = sympy.symbols("x y")
 
@@ -179,6 +180,27 @@ def test_that_a_fault_of_compiled_c_is_found(example_named, quick_compiler):
     module = example_named("four_bar").native
     found = kc.verify(spoiled(module, "gamma", None, (3,), 1e-6))
     assert [check.entry for check in found.table if not check.passed] == ["gamma of B.y"]
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "entry"),
+    [
+        ("at->Phi_q[7][lane] = -C", "at->Phi_q[7][lane] = C", "Phi_q of B.x by phi_coupler"),
+        ("at->nu[0][lane] = 0.0;", "at->nu[0][lane] = 1e-6;", "nu of A.x"),
+        ("at->gamma[4][lane] = C", "at->gamma[4][lane] = 2 * C", "gamma of C.x"),
+        ("at->Phi[2][lane] = ", "at->Phi[2][lane] = 1e-3 + ", "Phi of B.x"),
+    ],
+    ids=["Phi_q", "nu", "gamma", "Phi"],
+)
+def test_that_a_slip_in_the_c_file_is_found(example_named, quick_compiler, right, wrong, entry):
+    """Of all places where the C file writes it, the first one is wrong."""
+    example = example_named("four_bar")
+    files = dict(example.files("c"))
+    name = next(name for name in files if name.endswith(".c"))
+    assert files[name].count(right) > 1
+    files[name] = files[name].replace(right, wrong, 1)
+    found = kc.verify(make_native(kc.compile(example.model), files))
+    assert entry in [check.entry for check in found.table if not check.passed]
 
 
 @pytest.mark.parametrize(
