@@ -124,7 +124,7 @@ class KincompileWarning(UserWarning):
 
 
 class SingularConfigurationWarning(KincompileWarning):
-    """The mechanism is at, or very near, a configuration where Phi_q is singular."""
+    """A motion that converged has points very near to a configuration where Phi_q is singular."""
 
 
 class BranchSwitchWarning(KincompileWarning):

@@ -646,14 +646,13 @@ static const double PROBE[] = {
 
 // Error of a prediction, in radians or sizes of the mechanism, up to which it stays on its branch.
 static const double LARGEST_ERROR = 0.05;
-// Movement, in scales, for an error of one scale in the equations: beyond this Phi_q is singular.
-static const double SINGULAR_SENSITIVITY = 1e7;
+// Sensitivity is the movement, in scales, for an error of one scale in the equations: beyond this
+// Phi_q is singular, or so nearly that rates are too uncertain to go on from.
+static const double TOO_NEAR = 1e5;
 // Sensitivity from which on two branches may be so near each other that Newton confuses them. On one
 // branch the error of the predicted velocity, times the step, is a few times that of the position;
 // on another it is not. Below SMOOTH rounding errors decide.
 static const double NEARLY_SINGULAR = 30, KINK = 8, SMOOTH = 1e-9;
-// Sensitivity of a sub-step beyond which its rates are too uncertain to go on from.
-static const double TOO_NEAR = 1e5;
 // How much larger than the tolerance, relative to its terms, a residual may be at the end, and
 // the residual that rounding leaves.
 static const double RESIDUAL_FACTOR = 10, ROUNDING = 16 * 2.220446049250313e-16;
@@ -755,7 +754,7 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
         }
     for (size_t k = 0; k < count; k++) {
         const int holds = excess[k] == 0, finite = total[k] - total[k] == 0;
-        const int regular = o->sensitivity[k] <= SINGULAR_SENSITIVITY;
+        const int regular = o->sensitivity[k] <= TOO_NEAR;
         if (o->status[k] != EXAMPLE_3_7_5_CONVERGED)
             continue;
         o->status[k] = !(o->residual[k] - o->residual[k] == 0) ? EXAMPLE_3_7_5_NOT_FINITE
@@ -768,13 +767,12 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
 
 // A good point of the motion.
 typedef struct {
-    double t, q[N], q_dot[N], q_ddot[N], determinants[BLOCKS > 0 ? BLOCKS : 1], sensitivity;
+    double t, q[N], q_dot[N], q_ddot[N], determinants[BLOCKS > 0 ? BLOCKS : 1];
 } state;
 
-static void take_up(state *at, const block *b, const outcome *o, size_t k)
+static void take_up(state *at, const block *b, size_t k)
 {
     at->t = b->t[k];
-    at->sensitivity = o->sensitivity[k];
     for (int i = 0; i < BLOCKS; i++)
         at->determinants[i] = b->determinants[i][k];
     for (int i = 0; i < N; i++) {
@@ -858,15 +856,10 @@ static int advance(block *b, const scales *s, state *at, double t, outcome *o)
     for (int k = 0; k < MAX_SUBSTEPS; k++) {
         const int whole = fabs(h) >= fabs(t - at->t);
         b->t[0] = whole ? t : at->t + h;
-        size_t good = step(b, s, at, 1, o);
+        const size_t good = step(b, s, at, 1, o);
         iterations += o->iterations[0];
-        // A state that is too near already may be gone away from, not towards the singularity.
-        if (good && !whole && o->sensitivity[0] > fmax(TOO_NEAR, at->sensitivity)) {
-            o->status[0] = EXAMPLE_3_7_5_SINGULAR;
-            good = 0;
-        }
         if (good) {
-            take_up(at, b, o, 0);
+            take_up(at, b, 0);
             h *= 2;
         } else if (fabs(h) <= smallest) {
             break;
@@ -925,7 +918,7 @@ size_t example_3_7_5_march(const example_3_7_5_motion *motion)
             b.p[i][k] = motion->p[i];
     assemble(&b, &s, motion->t[0], motion->guess, motion->max_iterations, LANES, &o);
     record(motion, &b, &o, 0, 1);
-    take_up(&at, &b, &o, 0);
+    take_up(&at, &b, 0);
     int status = o.status[0];
     size_t done = status == EXAMPLE_3_7_5_CONVERGED ? 1 : 0, width = 1;
     while (status == EXAMPLE_3_7_5_CONVERGED && done < motion->count) {
@@ -934,7 +927,7 @@ size_t example_3_7_5_march(const example_3_7_5_motion *motion)
         const size_t good = step(&b, &s, &at, count, &o);
         if (good > 0) {
             record(motion, &b, &o, done, good);
-            take_up(&at, &b, &o, good - 1);
+            take_up(&at, &b, good - 1);
             done += good;
             // The fewer iterations, the more points the next prediction can serve.
             if (good < count || o.iterations[good - 1] > 3)
@@ -1011,7 +1004,6 @@ static void advance_alone(block *b, const scales *s, state *at, size_t k, outcom
     o->status[k] = advance(&alone, &own, at, b->t[k], &found);
     o->iterations[k] = found.iterations[0];
     o->residual[k] = found.residual[0];
-    o->sensitivity[k] = found.sensitivity[0];
     for (int i = 0; i < BLOCKS; i++)
         b->determinants[i][k] = alone.determinants[i][0];
     for (int i = 0; i < N; i++) {
@@ -1027,7 +1019,7 @@ static void step_variants(block *b, const scales *s, double t, size_t count, out
     state from[LANES];
     double h[LANES];
     for (size_t k = 0; k < count; k++) {
-        take_up(&from[k], b, o, k);
+        take_up(&from[k], b, k);
         h[k] = t - b->t[k];
         b->t[k] = t;
     }

@@ -37,7 +37,7 @@ BLOCK = 3000
 LARGEST_DISPLACEMENT = 1e-3
 """Distance from the interpolation, in radians or sizes of the mechanism, that is still trusted."""
 
-SMALLEST_DETERMINANT = 1e-6
+SMALLEST_DETERMINANT = 1e-5
 """Determinant, relative to the largest of the coarse march, that is still trusted."""
 
 CORRECTIONS_ON_GRID = 2

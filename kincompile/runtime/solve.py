@@ -18,7 +18,12 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.errors import BranchSwitchWarning, InputError, SolveError
+from kincompile.errors import (
+    BranchSwitchWarning,
+    InputError,
+    SingularConfigurationWarning,
+    SolveError,
+)
 from kincompile.runtime.events import branch_switch, locate, singular_start
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
@@ -26,6 +31,7 @@ from kincompile.runtime.lanes import has_planned_solve, missing_lanes
 from kincompile.runtime.large import LargeMarch, LargeState
 from kincompile.runtime.march import (
     SMALL_ERROR,
+    TOO_NEAR,
     Outcome,
     State,
     advance,
@@ -120,6 +126,14 @@ def solve(
         When the module has not as many equations as coordinates.
     SolveError
         With `throw`, when a point failed; `.solution` holds what was found.
+
+    Warns
+    -----
+    BranchSwitchWarning
+        When the motion went through a bifurcation, with the time.
+    SingularConfigurationWarning
+        When it converged at points so near to a singular configuration that their rates have lost
+        digits, with the time. A motion that ends at one has a status and an event instead.
     """
     sets = read_variants(module, p)
     inputs = read_inputs(module, t, p if sets is None else None, guess, tolerance, max_iterations)
@@ -150,7 +164,19 @@ def _solve_one(
     for event in motion.passed:
         text = f"{inputs.module.NAME} goes through a bifurcation at t = {event.t:.10g}, and on"
         warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=3)
+    if motion.near and outcome.status is Status.CONVERGED:
+        warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=3)
     return _solution(inputs, motion, outcome)
+
+
+def _nearly(inputs: Inputs, near: list[int]) -> str:
+    """Say that points of a motion, given by their numbers, are nearly singular."""
+    more = f" and {len(near) - 1} more times" if len(near) > 1 else ""
+    return (
+        f"{inputs.module.NAME} is nearly singular at t = {inputs.t[near[0]]:.10g}{more}: its rates "
+        "have few good digits there (see .condition). Drive another coordinate near this time, or "
+        "change a length slightly."
+    )
 
 
 @dataclass(slots=True, eq=False)
@@ -166,6 +192,8 @@ class _Motion:
     statistics: dict[str, int]
     events: list[Event] = field(default_factory=list)
     passed: list[Event] = field(default_factory=list)
+    near: list[int] = field(default_factory=list)
+    """Points so near to a singular configuration that their rates are uncertain."""
 
     @classmethod
     def over(cls, inputs: Inputs) -> _Motion:
@@ -205,6 +233,8 @@ class _Motion:
         if outcome.status is Status.CONVERGED and outcome.state is not None:
             self.q_dot[index] = outcome.state.q_dot
             self.q_ddot[index] = outcome.state.q_ddot
+            if outcome.state.sensitivity > TOO_NEAR:
+                self.near.append(index)
 
 
 def _takes_grid(module: ModuleType, points: int, method: str | None) -> bool:

@@ -75,7 +75,6 @@ def test_the_march_judges_by_the_numbers_of_the_runtime(example_named):
     source = next(iter(example_named("four_bar").files("c").values()))
     wanted = {
         "LARGEST_ERROR": march.SMALL_ERROR,
-        "SINGULAR_SENSITIVITY": march.SINGULAR_SENSITIVITY,
         "SMALLEST_PART": march.SMALLEST_PART,
         "NEARLY_SINGULAR": march.NEARLY_SINGULAR,
         "KINK": march.KINK,
