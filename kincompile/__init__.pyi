@@ -1,0 +1,64 @@
+"""The public names as a type checker sees them: `__init__.py` loads them when they are used."""
+
+from kincompile.compiler import compile as compile  # noqa: A004
+from kincompile.compiler import emit as emit
+from kincompile.compiler import inspect as inspect
+from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
+from kincompile.errors import ContractError as ContractError
+from kincompile.errors import InputError as InputError
+from kincompile.errors import InternalError as InternalError
+from kincompile.errors import KincompileError as KincompileError
+from kincompile.errors import ModelError as ModelError
+from kincompile.errors import RedundantConstraintWarning as RedundantConstraintWarning
+from kincompile.errors import SingularConfigurationWarning as SingularConfigurationWarning
+from kincompile.errors import SolveError as SolveError
+from kincompile.errors import StructuralError as StructuralError
+from kincompile.errors import TemplateError as TemplateError
+from kincompile.errors import UnsupportedError as UnsupportedError
+from kincompile.model.absolute import AbsoluteAngle as AbsoluteAngle
+from kincompile.model.absolute import AbsoluteDistance as AbsoluteDistance
+from kincompile.model.absolute import AbsoluteX as AbsoluteX
+from kincompile.model.absolute import AbsoluteY as AbsoluteY
+from kincompile.model.cams import CamFlatFollower as CamFlatFollower
+from kincompile.model.cams import CamFollower as CamFollower
+from kincompile.model.cams import PointFollower as PointFollower
+from kincompile.model.equation import Equation as Equation
+from kincompile.model.expressions import alpha as alpha
+from kincompile.model.expressions import pi as pi
+from kincompile.model.expressions import t as t
+from kincompile.model.file_format import model_schema as model_schema
+from kincompile.model.files import read as read
+from kincompile.model.files import read_analysis as read_analysis
+from kincompile.model.files import read_model as read_model
+from kincompile.model.gears import Gear as Gear
+from kincompile.model.gears import RackAndPinion as RackAndPinion
+from kincompile.model.joints import Revolute as Revolute
+from kincompile.model.joints import RevoluteTranslational as RevoluteTranslational
+from kincompile.model.joints import Translational as Translational
+from kincompile.model.joints import TranslationalDistance as TranslationalDistance
+from kincompile.model.mechanism import Mechanism as Mechanism
+from kincompile.model.relative import Distance as Distance
+from kincompile.model.relative import RelativeAngle as RelativeAngle
+from kincompile.model.relative import RelativeX as RelativeX
+from kincompile.model.relative import RelativeY as RelativeY
+from kincompile.model.system import ConstraintSystem as ConstraintSystem
+from kincompile.runtime.assemblies import assemblies as assemblies
+from kincompile.runtime.events import Event as Event
+from kincompile.runtime.load import load as load
+from kincompile.runtime.newton import newton as newton
+from kincompile.runtime.results import write as write
+from kincompile.runtime.solution import Solution as Solution
+from kincompile.runtime.solve import solve as solve
+from kincompile.runtime.status import Status as Status
+from kincompile.teach.compare import compare as compare
+from kincompile.teach.compare import compare_file as compare_file
+from kincompile.teach.derivation import derivation as derivation
+from kincompile.teach.verify import verify as verify
+from kincompile.view.animation import animate as animate
+from kincompile.view.gallery import gallery as gallery
+from kincompile.view.mechanism_plot import plot_mechanism as plot_mechanism
+from kincompile.view.page import page as page
+from kincompile.view.sparsity_plot import plot_sparsity as plot_sparsity
+
+__all__: list[str]
+__version__: str
