@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.runtime.grid import LAST_CORRECTION
+from kincompile.runtime.grid import LAST_CORRECTION, SMALLEST_DETERMINANT
 from kincompile.runtime.march import (
     ALLOWED_PART,
     KINK,
@@ -54,8 +54,8 @@ class LargeState:
         The motion.
     Phi : ndarray, shape (n,)
         What is left of the equations.
-    signs : ndarray of bool
-        Which determinants of blocks of Phi_q are positive.
+    determinants : ndarray
+        Those of the blocks of Phi_q.
     iterations : int
         Newton iterations spent.
     """
@@ -65,7 +65,7 @@ class LargeState:
     q_dot: Vector
     q_ddot: Vector
     Phi: Vector
-    signs: NDArray[np.bool_]
+    determinants: Vector
     iterations: int
 
 
@@ -79,10 +79,14 @@ class LargeMarch:
         angular = np.array([unit == "rad" for unit in inputs.module.UNITS.values()])
         self._angular = angular[: inputs.guess.size]
         self._reach = max(float(np.max(np.abs(inputs.guess[~self._angular]), initial=0.0)), 1e-12)
+        self._smallest: Vector = np.zeros(0)
 
     def start(self, t: float) -> LargeState | Status:
         """Assemble the mechanism at the first time, from the guess."""
-        return self._correct(self._inputs.guess, t, damped=True)
+        found = self._correct(self._inputs.guess, t, damped=True)
+        if isinstance(found, LargeState):
+            self._smallest = SMALLEST_DETERMINANT * np.abs(found.determinants)
+        return found
 
     def run_compiled(
         self,
@@ -138,8 +142,11 @@ class LargeMarch:
         )
         if error > min(LARGE_ERROR, max(SMALL_ERROR, ALLOWED_PART * float(movement))):
             return Status.NOT_CONVERGED
-        if not np.array_equal(found.signs, state.signs):
+        if not np.array_equal(found.determinants > 0, state.determinants > 0):
             return Status.SINGULAR  # a singular configuration lies between the two
+        is_small = np.any(np.abs(found.determinants) <= self._smallest)
+        if is_small and self._sensitivity(found) > TOO_NEAR:
+            return Status.SINGULAR  # its rates are too uncertain to go on from
         if kink > KINK * error + SMOOTH and self._sensitivity(found) > NEARLY_SINGULAR:
             return Status.SINGULAR
         return found
@@ -208,4 +215,4 @@ class LargeMarch:
         q_ddot = solver.solve(factors, module.gamma(q, q_dot, t, p))
         if not np.isfinite(q_ddot).all():
             return Status.SINGULAR
-        return LargeState(t, q, q_dot, q_ddot, Phi, solver.determinants(factors) > 0, iterations)
+        return LargeState(t, q, q_dot, q_ddot, Phi, solver.determinants(factors), iterations)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -337,6 +337,9 @@ def _run(
             motion.put(index, outcome)
             motion.statistics["marched"] += 1
             index += 1
+            # Rates near a singularity are too uncertain to predict from: the point before serves.
+            if outcome.state and outcome.state.sensitivity > max(TOO_NEAR, state.sensitivity):
+                outcome = replace(outcome, state=state)
         if progress:
             progress(index, len(times))
     return index, outcome

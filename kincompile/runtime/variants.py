@@ -15,8 +15,9 @@ import numpy as np
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.runtime.coarse import KINK, SMOOTH
+from kincompile.runtime.grid import SMALLEST_DETERMINANT
 from kincompile.runtime.lanes import LaneCode, has_planned_solve, missing_lanes
-from kincompile.runtime.march import SMALL_ERROR, State, advance, complete, start
+from kincompile.runtime.march import SMALL_ERROR, TOO_NEAR, State, advance, complete, start
 from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import problem
 from kincompile.runtime.solution import Solution
@@ -155,6 +156,7 @@ class _Chunk:
         self._alive = np.ones(count, dtype=bool)
         self._q, self._q_dot, self._q_ddot = np.empty((3, inputs.guess.size, count))
         self._signs: Any = np.zeros((0, count))
+        self._smallest: Any = 0.0
         nominal = problem(inputs.module, sets[0], inputs.guess, float(inputs.t[0]))
         self._allowed = RESIDUAL_FACTOR * inputs.tolerance * nominal.magnitude
         self._spread = nominal.spread(inputs.guess)[:, np.newaxis]
@@ -165,6 +167,7 @@ class _Chunk:
         guess = np.repeat(self._inputs.guess[:, np.newaxis], len(self._sets), axis=1)
         good, iterations = self._correct(guess, times[0], self._inputs.max_iterations)
         self._record(0, good, iterations)
+        self._smallest = SMALLEST_DETERMINANT * self._sizes
         for variant in np.flatnonzero(~good).tolist():
             equations = problem(
                 self._inputs.module, self._sets[variant], self._inputs.guess, times[0]
@@ -233,9 +236,10 @@ class _Chunk:
             for row, value in zip(rows, values, strict=True):
                 row[:] = value
         good &= np.isfinite(self._q_dot.sum(axis=0) + self._q_ddot.sum(axis=0))
-        self._signs = _signs(at.determinants, q.shape[1])
+        determinants = _blocks(at.determinants, q.shape[1])
+        self._signs, self._sizes = np.sign(determinants), np.abs(determinants)
         self._residual = residual
-        good &= (self._signs != 0).all(axis=0)
+        good &= (self._sizes > self._smallest).all(axis=0)
         return good
 
     def _record(self, index: int, good: Mask, iterations: NDArray[np.int64]) -> None:
@@ -254,6 +258,9 @@ class _Chunk:
         if outcome.status is not Status.CONVERGED or outcome.state is None:
             self._fail(index, variant, outcome.status)
             return
+        if outcome.state.sensitivity > TOO_NEAR:  # its rates are too uncertain to go on from
+            self._fail(index, variant, Status.SINGULAR)
+            return
         arrays, place, state = self._arrays, self._first + variant, outcome.state
         self._q[:, variant] = state.point.q
         self._q_dot[:, variant] = state.q_dot
@@ -266,7 +273,7 @@ class _Chunk:
             self._inputs.module, self._inputs.module.FLOATS, self._sets[variant].tolist()
         )
         determinants = lane.position(state.point.q.tolist(), state.t).determinants
-        self._signs[:, variant] = _signs(determinants, 1)[:, 0]
+        self._signs[:, variant] = np.sign(_blocks(determinants, 1)[:, 0])
 
     def _fail(self, index: int, variant: int, status: Status) -> None:
         """Write down why a variant ends; its place in the arrays is kept busy with its guess."""
@@ -279,12 +286,12 @@ class _Chunk:
         return replace(self._inputs, p=self._sets[variant])
 
 
-def _signs(determinants: Any, count: int) -> Array:
-    """Return the signs of the determinants of the blocks, shape (blocks, count)."""
-    signs = np.empty((len(determinants), count))
+def _blocks(determinants: Any, count: int) -> Array:
+    """Return the determinants of the blocks as an array, shape (blocks, count)."""
+    result = np.empty((len(determinants), count))
     for block, values in enumerate(determinants):
-        signs[block] = np.sign(values)
-    return signs
+        result[block] = values
+    return result
 
 
 def _state(equations: Any, t: float, parts: list[Array]) -> State | Status:

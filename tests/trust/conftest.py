@@ -85,7 +85,7 @@ def compiled():
     return compiled
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def build():
     """Return the mechanisms of this folder by name."""
     makers = (double_parallelogram, scott_russell_pair, four_bar, five_bar)
