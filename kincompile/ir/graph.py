@@ -240,6 +240,11 @@ class Graph:
         content = self.nodes[a]
         return content[1] if content[0] == "neg" else None
 
+    def apply(self, operation: Sequence[str], operands: Sequence[int]) -> int:
+        """Return ``("add",)``, ``("call", "sin")`` or the like on nodes of this graph."""
+        kind, *name = operation
+        return int(getattr(self, kind)(*name, *operands))
+
     def instantiate(self, nodes: Sequence[Node], inputs: dict[str, int]) -> list[int]:
         """Copy code into this graph with its inputs bound; return the new number of each node.
 

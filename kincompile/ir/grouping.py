@@ -8,16 +8,16 @@ constraints.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.ir.graph import Graph, Node, number_of
+from kincompile.ir.graph import Graph, Node, number_of, operands_of
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -134,11 +134,14 @@ class _Nodes:
         Index into the vector of that kind; for computed values the node itself.
     number : ndarray, shape (nodes,)
         NaN where a node is not a plain number.
+    structure : ndarray of int, shape (nodes,)
+        Equal where nodes are computed by the same operations, whatever the names and numbers.
     """
 
     kind: Index
     index: Index
     number: NDArray[np.float64]
+    structure: Index
 
 
 def _classify(program: Program) -> _Nodes:
@@ -162,7 +165,21 @@ def _classify(program: Program) -> _Nodes:
             if inner[0] == "input" and inner[1] in angle_number:
                 kind[node], index[node] = KINDS.index(operands[0]), angle_number[inner[1]]
     kind[~np.isnan(number)] = KINDS.index("number")
-    return _Nodes(kind, index, number)
+    return _Nodes(kind, index, number, _structures(nodes, kind))
+
+
+def _structures(nodes: Sequence[Node], kind: Index) -> Index:
+    """Return a number for the structure of each node: its kind, or operation and operands."""
+    structure = kind.tolist()
+    known: dict[tuple[Any, ...], int] = {}
+    for node in np.flatnonzero(kind == KINDS.index("value")).tolist():
+        content = nodes[node]
+        operands = operands_of(content)
+        if operands:
+            literals = content[1 : len(content) - len(operands)]
+            key = (content[0], literals, *(structure[k] for k in operands))
+            structure[node] = known.setdefault(key, len(KINDS) + len(known))
+    return np.array(structure)
 
 
 def group(program: Program) -> GroupedProgram:
@@ -171,7 +188,7 @@ def group(program: Program) -> GroupedProgram:
     for instance in program.instances:
         by_kernel.setdefault(id(instance.kernel), []).append(instance)
     nodes = _classify(program)
-    builder = _Builder(nodes)
+    builder = _Builder(nodes, program.values)
     groups: list[Group] = []
     for instances in by_kernel.values():
         groups += builder.groups(instances)
@@ -185,11 +202,34 @@ def group(program: Program) -> GroupedProgram:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class _Sources:
+    """The inputs of a group while its code is made.
+
+    Attributes
+    ----------
+    by_name
+        Where each comes from.
+    known
+        Node in the group's code by the values that it stands for, as bytes.
+    """
+
+    by_name: dict[str, Source] = field(default_factory=dict)
+    known: dict[bytes, int] = field(default_factory=dict)
+
+
+ARITHMETIC = frozenset({"add", "sub", "mul", "div", "neg", "square"})
+"""Operations whose operands are nodes and nothing else."""
+
+FEW = 8
+"""Different values up to which each is computed by itself, before all groups."""
+
+
 class _Builder:
     """Makes groups, and collects the numbers and computed values that they read."""
 
-    def __init__(self, nodes: _Nodes) -> None:
-        self._nodes = nodes
+    def __init__(self, nodes: _Nodes, code: Sequence[Node]) -> None:
+        self._nodes, self._code = nodes, code
         self._counts: dict[str, int] = {}
         self._values: dict[int, int] = {}
         self.numbers: list[float] = []
@@ -206,15 +246,28 @@ class _Builder:
         # What shapes the code: attributes that are zero, and the ground, whose cosine is one.
         cosine = np.array([name.startswith("cos ") for name in instances[0].kernel.inputs])
         shapes = np.where((numbers == 0) | ((numbers == 1) & cosine), numbers, -1)
+        expressions = np.stack([self._expressions(nodes) for nodes in bindings.T], axis=1)
+        expressions = expressions[:, expressions.any(axis=0)]
         # One byte string a constraint compares faster than a row of numbers.
-        key = np.concatenate((shapes, columns < 0), axis=1).astype(np.int8)
-        _, which = np.unique(key.view(f"V{key.shape[1]}").reshape(-1), return_inverse=True)
+        key = np.concatenate((shapes, columns < 0, expressions), axis=1).astype(np.int32)
+        whole = key.view(f"V{key.itemsize * key.shape[1]}").reshape(-1)
+        _, which = np.unique(whole, return_inverse=True)
         found = []
         for number in dict.fromkeys(which.tolist()):
             members = np.flatnonzero(which == number)
             part = bindings[members], columns[members], rows[members]
             found.append(self._group(instances[members[0]], *part))
         return found
+
+    def _expressions(self, nodes: Index) -> Index:
+        """Return the structure of each constraint's expression, where many of them share few."""
+        structures = np.zeros_like(nodes)
+        is_value = self._nodes.kind[nodes] == KINDS.index("value")
+        if is_value.any():
+            structures[is_value] = self._nodes.structure[nodes[is_value]]
+            if FEW * np.unique(structures).size > np.unique(nodes).size:
+                structures[:] = 0
+        return structures
 
     def _group(
         self,
@@ -224,23 +277,18 @@ class _Builder:
         rows: Index,
     ) -> Group:
         kernel = sample.kernel
-        graph = Graph()
-        inputs: dict[str, int] = {}
-        sources: dict[str, Source] = {}
-        for name, nodes in zip(kernel.inputs, bindings.T, strict=True):
-            numbers = self._nodes.number[nodes]
-            if (numbers == numbers[0]).all():  # of all constraints; not so where it is no number
-                inputs[name] = graph.const(float(numbers[0]))
-            else:
-                inputs[name] = graph.input(name)
-                sources[name] = self._source(nodes)
+        graph, sources = Graph(), _Sources()
+        inputs = {
+            name: self._input(name, nodes, graph, sources)
+            for name, nodes in zip(kernel.inputs, bindings.T, strict=True)
+        }
         new = graph.instantiate(kernel.nodes, inputs)
         self._counts[kernel.name] = self._counts.get(kernel.name, 0) + 1
         return Group(
             f"{kernel.name}_{self._counts[kernel.name]}",
             sample,
             tuple(graph.nodes),
-            sources,
+            sources.by_name,
             tuple(new[node] for node in kernel.Phi),
             tuple(
                 (row, column, new[node])
@@ -257,6 +305,47 @@ class _Builder:
                 if graph.nodes[new[node]][0] not in ("neg", "const", "input")
             },
         )
+
+    def _input(self, name: str, nodes: Index, graph: Graph, sources: _Sources) -> int:
+        """Return the node of an input in a group's code.
+
+        It is a number where all constraints have the same. Where many constraints have expressions
+        of their own that begin with the same operation, drivers for instance, the operation is one
+        of the group, and its operands are the inputs.
+        """
+        key = nodes.tobytes()
+        if key not in sources.known:
+            numbers = self._nodes.number[nodes]
+            if (numbers == numbers[0]).all():  # not so where it is no number
+                sources.known[key] = graph.const(float(numbers[0]))
+            elif (operation := self._shared_operation(nodes)) is not None:
+                operands = [
+                    self._input(f"{name}.{k}", column, graph, sources)
+                    for k, column in enumerate(self._operands(nodes))
+                ]
+                sources.known[key] = graph.apply(operation, operands)
+            else:
+                sources.known[key] = graph.input(name)
+                sources.by_name[name] = self._source(nodes)
+        return sources.known[key]
+
+    def _shared_operation(self, nodes: Index) -> tuple[str, ...] | None:
+        """Return the operation, with the function's name, that computes each of many values."""
+        is_value = self._nodes.kind[nodes] == KINDS.index("value")
+        if not is_value.all() or np.unique(nodes).size <= FEW:
+            return None
+        found = {self._operation(node) for node in nodes.tolist()}
+        return found.pop() if len(found) == 1 else None
+
+    def _operation(self, node: int) -> tuple[str, ...] | None:
+        operation, *operands = self._code[node]
+        if operation == "call":
+            return operation, operands[0]
+        return (operation,) if operation in ARITHMETIC else None
+
+    def _operands(self, nodes: Index) -> Index:
+        """Return the operands of nodes of one operation, a row an operand."""
+        return np.array([operands_of(self._code[node]) for node in nodes.tolist()]).T.copy()
 
     def _source(self, nodes: Index) -> Source:
         """Return where an input comes from; numbers here and expressions there are all computed."""

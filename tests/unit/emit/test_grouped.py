@@ -216,6 +216,37 @@ def test_numbers_that_all_constraints_share_stay_in_the_code():
     assert "s_i.y" not in bearings.inputs
 
 
+def motors(count):
+    """Return wheels, each with a driver of its own and a cam's contact."""
+    m = kc.Mechanism("motors")
+    a = m.parameter("a", 0.3)
+    for k in range(count):
+        wheel, pin = m.body(f"wheel{k}", (5.0 * k, 0, 0)), m.body(f"pin{k}", (5.0 * k + 1, 0, 0))
+        m.add(kc.Revolute(f"axle{k}", m.ground, (5.0 * k, 0), wheel, (0, 0)))
+        angle = (1.5 + 0.1 * k) * kc.t + a * sympy.sin(kc.t * (2 + k)) / (3 + k)
+        m.add(kc.AbsoluteAngle(f"motor{k}", wheel, angle))
+        rho = 1 + a / (2 + k) * sympy.cos(2 * kc.alpha + 0.1 * k)
+        m.add(kc.PointFollower(f"slot{k}", pin, (0.1, 0.2), wheel, (0, 0), rho, guess=0.3))
+        m.add(kc.AbsoluteAngle(f"turn{k}", pin, 0.1 * k))
+        m.add(kc.AbsoluteX(f"guide{k}", pin, (0, 0), 5.0 * k + 0.9 + 0.01 * kc.t**2))
+    return m
+
+
+def test_drivers_and_profiles_of_one_structure_are_one_piece_of_code():
+    small, large = (len(kc.emit(motors(n), form="grouped").source) for n in (40, 120))
+    assert large < 1.02 * small
+    ours, theirs = both(motors(12))
+    rng = np.random.default_rng(2)
+    q, q_dot = rng.normal(size=(2, 5, ours.N_COORDINATES))
+    for batch in (slice(0, 5), 0):
+        for found, known in zip(
+            ours.kinematics(q[batch], q_dot[batch], 0.4),
+            theirs.kinematics(q[batch], q_dot[batch], 0.4),
+            strict=True,
+        ):
+            np.testing.assert_allclose(found, known, rtol=1e-12, atol=1e-12)
+
+
 def test_what_needs_all_points_at_once_is_refused_with_what_to_do():
     module = kc.compile(loops(2, "equation"), form="grouped")
     with pytest.raises(kc.InputError, match=r"grouped form.* no method='grid': use 'march', or"):
