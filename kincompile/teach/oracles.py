@@ -28,6 +28,9 @@ and hardly ever reaches over a knot of a spline or from one piece to the next.""
 DIFFERENCE = 1e-3
 """Step of the differences that judge where Phi cannot be continued to complex numbers."""
 
+ROUGH = 1e-3
+"""Change with half the step up to which differences mean anything."""
+
 SAME = 1e-9
 """Part of an equation's terms by which Phi of complex numbers may be away from Phi of real ones."""
 
@@ -75,24 +78,40 @@ def stepped(module: ModuleType, q: Array, t: float, along: Array, time: float) -
 
 
 def differences(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the derivative of Phi along directions, of real numbers alone."""
-    return _slope(lambda h: np.asarray(module.Phi(q + h * along, t + h * time)), DIFFERENCE)
+    """Return the derivative of Phi along directions, of real numbers alone; NaN beside a pole."""
+    return _smooth(
+        module.Phi(q, t),
+        lambda h: _slope(lambda s: np.asarray(module.Phi(q + s * along, t + s * time)), h),
+    )
+
+
+def second_differences(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
+    """Return the second derivative of Phi along lines, likewise."""
+    here = module.Phi(q, t)
+
+    def curvature(h: float) -> Array:
+        near, far = (
+            module.Phi(q + s * along, t + s * time)
+            + module.Phi(q - s * along, t - s * time)
+            - 2 * here
+            for s in (h, 2 * h)
+        )
+        return np.asarray((16 * near - far) / (12 * h**2))
+
+    return _smooth(here, curvature)
+
+
+def _smooth(here: Array, difference: Callable[[float], Array]) -> Array:
+    """Return differences of fourth order; NaN where half the step gives something else."""
+    found, closer = difference(DIFFERENCE), difference(DIFFERENCE / 2)
+    size = 1 + np.abs(here) + np.abs(closer)
+    return np.where(np.abs(found - closer) <= ROUGH * size, found, np.nan)
 
 
 def _slope(function: Callable[[float], Array], h: float) -> Array:
     """Return the derivative of a function at 0 by central differences of fourth order."""
     near, far = function(h) - function(-h), function(2 * h) - function(-2 * h)
     return np.asarray((8 * near - far) / (12 * h))
-
-
-def second_differences(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the second derivative of Phi along lines by differences of fourth order."""
-    here = module.Phi(q, t)
-    near, far = (
-        module.Phi(q + h * along, t + h * time) + module.Phi(q - h * along, t - h * time) - 2 * here
-        for h in (DIFFERENCE, 2 * DIFFERENCE)
-    )
-    return np.asarray((16 * near - far) / (12 * DIFFERENCE**2))
 
 
 Oracle = tuple[str, "Callable[[ModuleType, Array, float, Array, float], Array]", float]

@@ -334,6 +334,10 @@ def _judged(
         doubted = np.max(_away(found, other, size), axis=2) > plain[2]
         error[doubted] = _error(module, states, quantity, other, size)[doubted]
         limit[doubted], judge[doubted] = plain[2], 1
+        # Beside a pole, and where a root begins, no oracle tells: the other states do.
+        silent = doubted & ~np.isfinite(other).all(axis=2)
+        silent &= ~silent.all(axis=0)
+        error[silent] = 0.0
     return error, limit, judge
 
 
