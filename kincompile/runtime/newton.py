@@ -269,9 +269,11 @@ def _direction(equations: Problem, point: Point, weights: Vector) -> Vector | No
     bend = math.sqrt(BEND * min(1.0, norm(residual)))
     matrix = np.vstack((weights[:, np.newaxis] * point.Phi_q * scale, bend * np.eye(scale.size)))
     sides = np.concatenate((-residual, np.zeros_like(scale)))
+    if not np.isfinite(matrix).all():  # LAPACK would say so on the terminal
+        return None
     try:
         correction = scale * np.linalg.lstsq(matrix, sides, rcond=None)[0]
-    except np.linalg.LinAlgError:  # Phi_q is not finite
+    except np.linalg.LinAlgError:
         return None
     return np.asarray(correction, dtype=np.float64)
 
