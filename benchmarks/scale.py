@@ -11,9 +11,7 @@ import importlib.util
 import math
 from typing import TYPE_CHECKING
 
-import kincompile as kc
 from benchmarks import machine
-from benchmarks.loops import Loops
 from benchmarks.tables import Target, print_table, print_targets
 from benchmarks.timing import Timing, printed_by_processes
 
@@ -30,6 +28,7 @@ UNITS = (1.0, 1e6, 1e-3, 1e-3)
 HEADS = ("N", "contender", "model + compile, s", "peak MB", "all four, ms", "one step, ms")
 NAMES = {
     "kincompile": "kincompile, NumPy",
+    "kincompile-c": "kincompile, C by block types; all four are NumPy's",
     "casadi": "CasADi VM, fast_newton, sparse QR; gears as a ratio of angles",
     "casadi-rolling": "CasADi VM, fast_newton, sparse QR; gears by kc.Gear's equation",
     "superlu": "kincompile's values, SciPy's SuperLU",
@@ -51,7 +50,6 @@ def main(sizes: Sequence[int], plot: str | None) -> None:
         heads = ("contender", "from N to N", *HEADS[2:])
         print_table("Exponents of growth", heads, growth(found, min(sizes), max(sizes)))
     print_targets("Scale: what was to be reached", reached(found, sizes))
-    print(f"kincompile, C: {c_target(min(sizes))}\n")
     print(f"{machine.description()}. Load before {before}, after {machine.load()}.")
     if plot:
         draw(found, sizes, plot)
@@ -108,6 +106,10 @@ def reached(found: Measured, sizes: Sequence[int]) -> Iterator[Target]:
         for what, limit, unit in limits:
             measured = ours[what].median / UNITS[what]
             yield Target(f"N = 10,000: {HEADS[what + 2]}", measured, "at most", limit, unit)
+    compiled = found.get(("kincompile-c", "gears", SIZES[-1]))
+    if compiled:
+        measured = compiled[STEP].median / UNITS[STEP]
+        yield Target(f"C, N = 10,000: {HEADS[STEP + 2]}", measured, "at most", 2, "ms")
     if len(sizes) > 1:
         for what in (BUILD, FOUR, STEP):
             measured = exponent(found, "kincompile", min(sizes), max(sizes), what)
@@ -127,15 +129,6 @@ def beside_casadi(found: Measured, n: int) -> Iterator[Target]:
             ratio = found["kincompile", "gears", n][what].median / theirs[what].median
             title = f"N = {n:,}: {HEADS[what + 2].partition(',')[0]}, x {NAMES[name]}"
             yield Target(title, ratio, "at most", 1)
-
-
-def c_target(n: int) -> str:
-    """Say whether there is a C form for loops, and if not, why."""
-    try:
-        kc.compile(Loops.of(n, is_chain=False).mechanism(), target="c")
-    except kc.UnsupportedError as error:
-        return f"skipped: {error}"
-    return "compiled"
 
 
 def draw(

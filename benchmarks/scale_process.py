@@ -50,10 +50,10 @@ class Contender:
 
 
 class Kincompile(Contender):
-    """The NumPy module."""
+    """The module of a target; what a C compiler takes is not in the time of this process."""
 
-    def __init__(self, loops: Loops) -> None:
-        self.module = kc.compile(loops.mechanism(), form="grouped")
+    def __init__(self, loops: Loops, *, target: str = "numpy") -> None:
+        self.module = kc.compile(loops.mechanism(), target=target, form="grouped")
         self._q = np.array(self.module.GUESS)
 
     def all_four(self) -> object:
@@ -145,6 +145,7 @@ class HandLoop(Contender):
 
 CONTENDERS: dict[str, Callable[[Loops], Contender]] = {
     "kincompile": Kincompile,
+    "kincompile-c": partial(Kincompile, target="c"),
     "casadi": Casadi,
     "casadi-rolling": partial(Casadi, is_rolling=True),
     "superlu": SuperLU,

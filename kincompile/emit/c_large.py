@@ -23,7 +23,7 @@ from kincompile.emit.solving import schedule_solve
 from kincompile.emit.target import Emitted
 from kincompile.emit.templates import fill
 from kincompile.errors import UnsupportedError
-from kincompile.ir.block_types import block_types
+from kincompile.ir.block_types import block_types, tiles
 from kincompile.ir.elimination import jacobian_entries
 from kincompile.ir.inline import Entry, InlineProgram, Section
 from kincompile.names import rate
@@ -149,7 +149,7 @@ def emit_c_large(
         f"{program.name}.c": fill("c/large.c.jinja", source),
         f"{program.name}.h": fill("c/large.h.jinja", header),
     }
-    return Emitted(program.name, files, _arrays(runs), companion)
+    return Emitted(program.name, files, _arrays(types, runs), companion)
 
 
 def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
@@ -274,23 +274,21 @@ def _values(grouped: GroupedProgram) -> tuple[list[str], set[str]]:
     return lines, set(listing.functions)
 
 
-def _arrays(runs: Sequence[Run]) -> dict[str, NDArray[Any]]:
+def _arrays(types: Sequence[BlockType], runs: Sequence[Run]) -> dict[str, NDArray[Any]]:
     """Return the data of the blocks, tile by tile."""
-    tiles: list[tuple[int, int, bool, bool]] = []
+    header: list[tuple[int, int, bool, bool]] = []
     columns, numbers, values = [], [], []
-    for run in runs:
-        for start in range(0, run.columns.shape[1], LANES):
-            lanes = slice(start, start + LANES)
-            own = run.columns[:, lanes]
-            is_regular = own.shape[1] > 2 and not np.diff(own, 2).any()
-            tiles.append((run.type, own.shape[1], run.is_chain, is_regular))
-            first = np.stack((own[:, 0], own[:, 1] - own[:, 0]), axis=1) if is_regular else own
-            columns.append(first.reshape(-1))
-            numbers.append(run.numbers[:, lanes].reshape(-1))
-            values.append(run.values[:, lanes].reshape(-1))
+    for tile in tiles(types, runs, LANES):
+        count = tile.columns.shape[1]
+        is_regular = count > 2 and not np.diff(tile.columns, 2).any()
+        header.append((tile.type, count, tile.is_chain, is_regular))
+        first = tile.columns[:, :2] if is_regular else tile.columns
+        columns.append((np.diff(first, prepend=0) if is_regular else first).reshape(-1))
+        numbers.append(tile.numbers.reshape(-1))
+        values.append(tile.values.reshape(-1))
     return {
         "columns": np.concatenate(columns).astype(np.int32),
         "numbers": np.concatenate(numbers),
-        "tiles": np.array(tiles, dtype=np.int32),
+        "tiles": np.array(header, dtype=np.int32),
         "values": np.concatenate(values).astype(np.int32),
     }

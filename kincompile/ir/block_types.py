@@ -9,6 +9,7 @@ are the attributes and the values of t and p that differ from block to block.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from heapq import heapify, heappop, heappush
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -90,7 +91,7 @@ class Run:
     numbers: NDArray[np.float64]
     values: Index
 
-    def of(self, lanes: Index, *, is_chain: bool) -> Run:
+    def of(self, lanes: Index | slice, *, is_chain: bool) -> Run:
         """Return some of the blocks."""
         columns, numbers, values = self.columns, self.numbers, self.values
         return Run(self.type, is_chain, columns[:, lanes], numbers[:, lanes], values[:, lanes])
@@ -128,6 +129,40 @@ def block_types(
     if any(item.plan is None for item in finder.types):
         return None
     return tuple(finder.types), tuple(runs)
+
+
+def tiles(types: Sequence[BlockType], runs: Sequence[Run], size: int) -> list[Run]:
+    """Cut runs into tiles of so many blocks, in an order in which none needs a later one.
+
+    Of the tiles that could come next it is the one with the first coordinates: tiles that read what
+    others have just found follow them soon, while it is near.
+    """
+    found = [
+        run.of(slice(start, start + size), is_chain=run.is_chain)
+        for run in runs
+        for start in range(0, run.columns.shape[1], size)
+    ]
+    owner = np.empty(sum(types[run.type].own * run.columns.shape[1] for run in runs), dtype=np.intp)
+    for number, tile in enumerate(found):
+        owner[tile.columns[: types[tile.type].own]] = number
+    followers: list[list[int]] = [[] for _ in found]
+    missing = [0] * len(found)
+    for number, tile in enumerate(found):
+        for before in set(owner[tile.columns[types[tile.type].coupled()]].ravel().tolist()):
+            if before != number:
+                followers[before].append(number)
+                missing[number] += 1
+    ready = [(int(tile.columns[0, 0]), k) for k, tile in enumerate(found) if missing[k] == 0]
+    heapify(ready)
+    order = []
+    while ready:
+        _, number = heappop(ready)
+        order.append(found[number])
+        for follower in followers[number]:
+            missing[follower] -= 1
+            if missing[follower] == 0:
+                heappush(ready, (int(found[follower].columns[0, 0]), follower))
+    return order
 
 
 def _in_order(runs: Sequence[Run], finder: _Finder) -> list[Run]:
