@@ -1,6 +1,6 @@
-"""Free equations of equal structure share one kernel.
+"""Expressions of equal structure are differentiated once; free equations share one kernel.
 
-The structure of an equation is what is left when its symbols are numbered in order of occurrence
+The structure of an expression is what is left when its symbols are numbered in order of occurrence
 and its numbers are taken for attributes: ``phi_a - 1.5*phi_b`` and ``phi_c - 2.5*phi_d`` both are
 ``q_1 + c_1*q_2``. Exponents and signs stay what they are, because they decide about the code.
 """
@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from kincompile.ir.from_sympy import FUNCTIONS, RECIPROCALS
+from kincompile.ir.from_sympy import FUNCTIONS, RECIPROCALS, Converter
+from kincompile.ir.graph import Graph
 from kincompile.ir.kernels import equation_kernel
 from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
+    from kincompile.ir.graph import Node
     from kincompile.ir.program import Kernel
     from kincompile.model.resolve import FreeEquation
 
@@ -48,8 +50,24 @@ class SharedEquation:
     values: Mapping[str, str | sympy.Number]
 
 
+@dataclass(frozen=True, slots=True)
+class SharedValue:
+    """A derivative of an expression as an instance of the code of its structure.
+
+    Attributes
+    ----------
+    nodes
+        The code; the last node is the value.
+    values
+        What each of its inputs stands for: the name of a symbol, or a number.
+    """
+
+    nodes: tuple[Node, ...]
+    values: Mapping[str, str | sympy.Number]
+
+
 class EquationShapes:
-    """The kernels of free equations, one a structure.
+    """The kernels of free equations and the derivatives of functions, one a structure.
 
     Parameters
     ----------
@@ -60,6 +78,7 @@ class EquationShapes:
     def __init__(self, coordinates: Collection[str]) -> None:
         self._coordinates = coordinates
         self._kernels: dict[Any, Kernel] = {}
+        self._derivatives: dict[Any, tuple[Node, ...]] = {}
 
     def shared(self, equation: FreeEquation) -> SharedEquation | None:
         """Return an equation as an instance of a kernel; None where it needs one of its own."""
@@ -76,10 +95,25 @@ class EquationShapes:
                 columns=tuple(columns),
             )
             self._kernels[trees] = equation_kernel(alike)
-        values: dict[str, str | sympy.Number] = {new: old for old, new in shape.symbols.items()}
-        values |= {rate(new): rate(old) for new, old in columns.items()}
-        values |= {f"c_{k}": number for k, number in enumerate(shape.numbers, 1)}
-        return SharedEquation(self._kernels[trees], tuple(columns.values()), values)
+        rates = {rate(new): rate(old) for new, old in columns.items()}
+        return SharedEquation(self._kernels[trees], tuple(columns.values()), shape.values() | rates)
+
+    def derivative(self, value: sympy.Expr, variable: str, order: int) -> SharedValue | None:
+        """Return a derivative of a driver or of a profile; None where it has code of its own."""
+        shape = _Shape(self._coordinates)
+        try:
+            tree = shape.tree(value)
+        except _Unknown:
+            return None
+        own = shape.symbols.get(variable, variable)
+        key = tree, own, order
+        if key not in self._derivatives:
+            graph = Graph()
+            found = Converter(graph, graph.input).convert(
+                _expression(tree).diff(sympy.Symbol(own), order)
+            )
+            self._derivatives[key] = tuple(graph.nodes[: found + 1])
+        return SharedValue(self._derivatives[key], shape.values())
 
 
 @dataclass(slots=True)
@@ -97,6 +131,11 @@ class _Shape:
     coordinates: Collection[str]
     symbols: dict[str, str] = field(default_factory=dict)
     numbers: list[sympy.Number] = field(default_factory=list)
+
+    def values(self) -> dict[str, str | sympy.Number]:
+        """Return what each name in the kernel stands for."""
+        names: dict[str, str | sympy.Number] = {new: old for old, new in self.symbols.items()}
+        return names | {f"c_{k}": number for k, number in enumerate(self.numbers, 1)}
 
     def tree(self, value: sympy.Basic) -> Any:
         """Return the structure: a name, a literal number, or an operation and its operands."""

@@ -14,14 +14,12 @@ from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
 from kincompile.ir.kernels import constraint_kernel, derivative_name, equation_kernel
 from kincompile.ir.program import Instance, Kernel, Program
-from kincompile.model.expressions import alpha, as_sympy, t
+from kincompile.model.expressions import alpha, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.spline import PeriodicSpline, SplineTable
 from kincompile.names import body_coordinates, rate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from kincompile.calculus.template import Template
     from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
@@ -144,11 +142,40 @@ class _Binder:
     def bind(self, joint: Joint, kernel: Kernel) -> tuple[int, ...]:
         """Return the node of each of the kernel's inputs."""
         known = self._known(joint)
-        functions = _function_nodes(joint, self._convert)
         return tuple(
-            functions(place) if isinstance(place, str) else known[place]
+            self._function(joint, place) if isinstance(place, str) else known[place]
             for place in self._order(joint, kernel)
         )
+
+    def _function(self, joint: Joint, name: str) -> int:
+        """Return the node of C, C', C'', or of rho and its derivatives at the contact."""
+        symbol, order = name.rstrip("'"), name.count("'")
+        assert derivative_name(symbol, order) == name
+        if symbol in joint.profiles:
+            contact = _contact_symbols(joint.template, joint.columns)[symbol]
+            return self._derivative(joint.profiles[symbol], alpha, order, contact)
+        value = joint.scalars[symbol]
+        if not isinstance(value, sympy.Expr):
+            return self._value(0.0 if order else value)
+        return self._derivative(value, t, order, t)
+
+    def _derivative(
+        self, value: sympy.Expr, variable: sympy.Symbol, order: int, at: sympy.Symbol
+    ) -> int:
+        """Return the node of a derivative by a variable that stands for another symbol."""
+        shared = self._shapes and self._shapes.derivative(value, variable.name, order)
+        if not shared:
+            found = value.diff(variable, order) if order else value
+            return self._convert(found if at == variable else found.subs(variable, at))
+        inputs = {
+            name: self._named(at.name if named == variable.name else named)
+            for name, named in shared.values.items()
+        }
+        return self._graph.instantiate(shared.nodes, inputs)[-1]
+
+    def _named(self, value: str | sympy.Number) -> int:
+        """Return the node of a symbol by name, or of a number."""
+        return self._graph.input(value) if isinstance(value, str) else self._convert(value)
 
     def _known(self, joint: Joint) -> list[int]:
         """Return the nodes of coordinates, rates and frames, then of scalars and points."""
@@ -183,11 +210,7 @@ class _Binder:
 
     def bind_equation(self, equation: SharedEquation) -> tuple[int, ...]:
         """Return the node of each of the inputs of a shared kernel."""
-        values = (equation.values[name] for name in equation.kernel.inputs)
-        return tuple(
-            self._graph.input(value) if isinstance(value, str) else self._convert(value)
-            for value in values
-        )
+        return tuple(self._named(equation.values[name]) for name in equation.kernel.inputs)
 
     def _body(self, body: Body) -> tuple[int, ...]:
         """Return a body's coordinates, rates, cosine and sine; of the ground they are numbers."""
@@ -209,22 +232,6 @@ def _frame_inputs(index: str) -> tuple[str, ...]:
     coordinates = f"r_{index}.x", f"r_{index}.y", f"phi_{index}"
     rates = f"r_{index}_dot.x", f"r_{index}_dot.y", f"phi_{index}_dot"
     return *coordinates, *rates, f"cos phi_{index}", f"sin phi_{index}"
-
-
-def _function_nodes(joint: Joint, convert: Callable[..., int]) -> Callable[[str], int]:
-    """Return what gives the node of C, C', C'', or of rho and its derivatives at the contact."""
-
-    def node(name: str) -> int:
-        symbol, order = name.rstrip("'"), name.count("'")
-        assert derivative_name(symbol, order) == name
-        if symbol in joint.profiles:
-            rho = joint.profiles[symbol].diff(alpha, order)
-            contact = _contact_symbols(joint.template, joint.columns)[symbol]
-            return convert(rho.subs(alpha, contact))
-        value = joint.scalars[symbol]
-        return convert(value if order == 0 else as_sympy(value).diff(t, order))
-
-    return node
 
 
 def _contact_symbols(

@@ -7,6 +7,7 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile.ir import equation_shapes
 from kincompile.ir.grouping import group
 from kincompile.ir.lower import lower
 
@@ -101,3 +102,24 @@ def test_that_sharing_changes_nothing_where_equations_are_written_out() -> None:
     apart = lower(model)
     assert len({id(item.kernel) for item in apart.instances}) == COUNT
     assert len({id(item.kernel) for item in lower(model, share_equations=True).instances}) == 2
+
+
+def test_that_drivers_of_one_structure_are_differentiated_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    m = kc.Mechanism("wheels")
+    for k in range(20):
+        wheel = m.body(f"wheel{k}")
+        m.add(kc.Revolute(f"axle{k}", m.ground, (k, 0), wheel, (0, 0)))
+        m.add(kc.AbsoluteAngle(f"motor{k}", wheel, (1 + k) * t + sympy.sin(t * (2 + k)) / (3 + k)))
+    built = []
+    build = equation_shapes._expression  # noqa: SLF001 - each call is a derivation
+
+    def counted(tree: Any) -> Any:
+        if isinstance(tree, tuple) and tree[0] is sympy.Add:
+            built.append(tree)
+        return build(tree)
+
+    monkeypatch.setattr(equation_shapes, "_expression", counted)
+    lower(m.system(), share_equations=True)
+    assert len(built) <= 2 * 3  # C, C', C''; the first wheel's t has no factor
