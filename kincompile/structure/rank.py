@@ -161,10 +161,13 @@ class _Analysis:
         self._joints = [row for row in range(m) if row not in set(drivers)]
 
     def undefined(self) -> list[int]:
-        """Return the rows that are finite at none of the states."""
+        """Return the rows that are most seldom finite, where no state has all of them finite."""
         Phi, Phi_q = self._evaluate(self._q, self._t)
         finite = np.isfinite(Phi) & np.isfinite(Phi_q).all(axis=2)
-        return [int(row) for row in np.flatnonzero(~finite.any(axis=0))]
+        if finite.all(axis=1).any():
+            return []
+        often = np.sum(finite, axis=0)
+        return [int(row) for row in np.flatnonzero(often == often.min())]
 
     def report(self) -> RankReport:
         """Analyse the joints, then the drivers, then whether all can hold together."""
@@ -205,8 +208,12 @@ class _Analysis:
         return {row for row in dependent if not missed[row] <= ASSEMBLED * 10}
 
     def _scaled(self, q: Array, t: Array) -> Array:
-        """Return Phi_q at states with each row of length one and columns in scales."""
+        """Return Phi_q at states with each row of length one and columns in scales.
+
+        A row that is not finite is one of zeros: it tells nothing there.
+        """
         matrices = self._evaluate(q, t)[1] * self._scale
+        matrices[~np.isfinite(matrices).all(axis=2)] = 0.0
         lengths = np.linalg.norm(matrices, axis=2, keepdims=True)
         return np.asarray(matrices / np.where(lengths > 0, lengths, 1.0))
 
@@ -258,14 +265,13 @@ def _damped(matrix: Array, Phi: Array, damping: float) -> Array:
 
 def _best(matrices: Array, order: Sequence[int]) -> tuple[list[int], list[int], Array]:
     """Return independent and dependent rows at the state of largest rank, and Phi_q there."""
-    finite = [matrix for matrix in matrices if np.isfinite(matrix).all()]
-    best = max(finite, key=_rank)
+    best = max(matrices, key=_rank)
     return (*_split(best, order), best)
 
 
 def _rank(matrix: Array) -> int:
-    """Return the rank of a matrix with rows of length one, 0 where it is not finite."""
-    return int(np.linalg.matrix_rank(matrix, tol=DEPENDENT)) if np.isfinite(matrix).all() else 0
+    """Return the rank of a matrix with rows of length one."""
+    return int(np.linalg.matrix_rank(matrix, tol=DEPENDENT))
 
 
 def _split(matrix: Array, order: Sequence[int]) -> tuple[list[int], list[int]]:

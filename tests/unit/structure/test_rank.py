@@ -108,3 +108,16 @@ def test_that_scales_of_equations_do_not_matter(scale):
     )
     assert report([CIRCLE, large], (0.6, 0.7)).redundant == (1,)
     assert report([large, PUSH], (0.6, 0.7), drivers=[1]).rank == 2
+
+
+def test_that_equations_that_never_have_values_together_are_named():
+    """One needs x above the guess, the other one below."""
+
+    def root(sign):
+        return (
+            lambda x, t: np.sqrt(sign * (x[0] - 0.6)),
+            lambda x: (sign / 2 / np.sqrt(sign * (x[0] - 0.6)), 0),
+        )
+
+    with pytest.raises(InputError, match=r"no finite value near the guess: e\d"):
+        report([root(1), root(-1)], (0.6, 0.7))
