@@ -159,15 +159,18 @@ class LargeMarch:
     def _sensitivity(self, state: LargeState) -> float:
         """Return the movement, in scales, for an error of one scale in the equations."""
         spread = np.where(self._angular, 1.0, self._reach)
-        nonzeros = self._module.evaluate(state.q, state.t, self._p)[1]
+        probe = probe_of(state.q.size)
+        # At a dead point a whole row may vanish: what it contributes elsewhere measures it.
+        _, generic = self._module.evaluate(state.q + spread * probe, state.t, self._p)
+        _, nonzeros = self._module.evaluate(state.q, state.t, self._p)
         rows, columns = self._module.PATTERN.T
-        terms = np.bincount(rows, np.abs(nonzeros) * spread[columns], state.Phi.size)
+        sizes = np.maximum(np.abs(nonzeros), np.abs(generic)) * spread[columns]
         try:
             factors = self._solver.factor(nonzeros)
         except RuntimeError:
             return np.inf
-        probe = self._solver.solve(factors, terms * probe_of(terms.size))
-        return float(np.max(np.abs(probe) / spread))
+        movement = self._solver.solve(factors, np.bincount(rows, sizes) * probe)
+        return float(np.max(np.abs(movement) / spread))
 
     def _correct(self, q: Vector, t: float, *, damped: bool = False) -> LargeState | Status:
         """Run Newton's method, and solve for velocity and acceleration where it converges."""
