@@ -102,15 +102,18 @@ class _LaneStage:
     def __init__(self, stage: Any, pattern: Index, functions: Any) -> None:
         self._stage, self._functions = stage, functions
         self.rows, self.columns = stage.rows, stage.columns
+        self._varying = stage.varying.astype(np.intp)
+        self._right = [_evenly(rows) for rows in stage.rows]
+        self._x = [_evenly(columns) for columns in stage.columns]
         # One pass over all blocks for each row that has entries outside of its block.
         self._outer = [
-            (row, places, pattern[places, 1])
+            (row, _evenly(places), _evenly(pattern[places, 1]))
             for row, places in zip(stage.outer_rows, stage.outer, strict=True)
         ]
 
     def factor(self, nonzeros: Array) -> tuple[Any, Any]:
         """Return factors and determinants."""
-        varying = nonzeros.take(self._stage.varying)
+        varying = nonzeros.take(self._varying)
         factored: tuple[Any, Any] = self._stage.factor(self._functions, varying)
         return factored
 
@@ -120,16 +123,21 @@ class _LaneStage:
 
     def solution(self, part: tuple[Any, Any], nonzeros: Array, b: Array, x: Array) -> Sequence[Any]:
         """Return the solution, a number or an array (L,) for each of a block's coordinates."""
-        right = b.take(self.rows)
+        right = [b[rows] for rows in self._right]
         for row, places, columns in self._outer:
-            right[row] -= nonzeros.take(places) * x.take(columns)
+            right[row] = right[row] - nonzeros[places] * x[columns]
         found: Sequence[Any] = self._stage.solve(self._functions, part[0], right)
         return found
 
     def put(self, values: Sequence[Any], x: Array) -> None:
         """Put a solution into x."""
-        for columns, value in zip(self.columns, values, strict=True):
+        for columns, value in zip(self._x, values, strict=True):
             x[columns] = value
+
+    def subtract(self, values: Array, x: Array) -> None:
+        """Subtract a correction of a solution from x."""
+        for columns, value in zip(self._x, values, strict=True):
+            x[columns] -= value
 
     def unit_solution(self, part: tuple[Any, Any], row: int) -> Array:
         """Return the solution for a right side of one in a row of every block, shape (size, L)."""
@@ -175,7 +183,8 @@ class _ChainStage:
         own = np.zeros(size, dtype=bool)
         for part in self._parts:
             own[part.columns] = True
-        entries = np.concatenate([part.outer.reshape(-1) for part in stage.parts])
+        outer = np.concatenate([part.outer.reshape(-1) for part in stage.parts])
+        entries = outer.astype(np.intp)
         entries = entries[own[pattern[entries, 1]]]
         rows, columns = pattern[entries].T
         self._entries, self._columns, self._rows = entries, columns, place[rows]
@@ -233,8 +242,7 @@ class _ChainStage:
         for (number, _, places), unit in zip(self._units, units, strict=True):
             # Blocks without a link have the place -1: their number is the zero at the end.
             share = unit * np.append(s, 0.0).take(places)
-            for columns, values in zip(self._parts[number].columns, share, strict=True):
-                x[columns] -= values
+            self._parts[number].subtract(share, x)
 
     def determinants(self, part: tuple[list[Any], list[Array], Any]) -> list[Array]:
         """Return the determinants of the blocks."""
@@ -366,6 +374,15 @@ def _is_odd(permutation: Index) -> int:
     return int(permutation.size - circles) % 2
 
 
+def _evenly(numbers: Index) -> Index | slice:
+    """Return indices as a slice where they are evenly spaced: NumPy then needs no copy."""
+    first, last = int(numbers[0]), int(numbers[-1])
+    step = (last - first) // max(numbers.size - 1, 1) or 1
+    if step > 0 and np.array_equal(numbers, np.arange(first, last + 1, step)):
+        return slice(first, last + 1, step)
+    return numbers.astype(np.intp)
+
+
 def _summed(places: Index, values: Array, size: int) -> Array:
     """Return an array with each value added at its place."""
     return np.asarray(np.bincount(places, values, size), dtype=np.float64)
@@ -373,6 +390,6 @@ def _summed(places: Index, values: Array, size: int) -> Array:
 
 def _numbering(members: Index, size: int) -> Index:
     """Return the position of each member among the members."""
-    numbers = np.full(size, -1, dtype=np.int32)
+    numbers = np.full(size, -1, dtype=np.intp)
     numbers[members] = np.arange(members.size)
     return numbers
