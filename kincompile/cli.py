@@ -18,6 +18,7 @@ import signal
 import sys
 import time
 import traceback
+import warnings
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -49,6 +50,9 @@ DERIVATIONS = (".html", ".tex", ".md", ".ipynb")
 TRACEBACK = "KINCOMPILE_TRACEBACK"
 """The environment variable that shows where an error comes from."""
 
+ENDINGS = {".py": "numpy", ".c": "c", ".h": "c", ".m": "octave", ".js": "javascript"}
+"""The target whose files have an ending."""
+
 PATIENCE = 0.5
 """Seconds after which a progress bar appears."""
 
@@ -59,7 +63,9 @@ class _Shell(click.Group):
     def invoke(self, context: click.Context) -> Any:
         """Run a command."""
         try:
-            return super().invoke(context)
+            with warnings.catch_warnings():
+                warnings.showwarning = _show_warning
+                return super().invoke(context)
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except KeyboardInterrupt:
@@ -81,6 +87,11 @@ def _end(message: str, code: int) -> NoReturn:
         traceback.print_exc()
     click.echo(message, err=True)
     raise click.exceptions.Exit(code)
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Write a warning to stderr as a message, without the line of code that gave it."""
+    click.echo(f"Warning: {message}", err=True)
 
 
 @click.group(
@@ -107,7 +118,12 @@ def cli() -> None:
     metavar="FILE",
     help="File to write, or a folder, or - for stdout.",
 )
-@click.option("--target", default="numpy", metavar="NAME", help="What to emit.")
+@click.option(
+    "--target",
+    default="numpy",
+    metavar="NAME",
+    help="What to emit: numpy, c, octave or javascript.",
+)
 def compile_command(model: str, output: str, target: str) -> None:
     """Write Phi, Phi_q, nu and gamma of MODEL as a module.
 
@@ -118,22 +134,33 @@ def compile_command(model: str, output: str, target: str) -> None:
     if output == "-":
         _print("\n".join(emitted.files.values()))
         return
-    folder, main = _destination(output, emitted)
+    folder, main = _destination(output, emitted, target)
     for path in (folder / name for name in (main, *emitted.companions)):
-        if path.exists() and path.samefile(model):
-            raise InputError(f"{path} is the model itself; give -o another name")
         if path.parent.exists():
-            require_writable(path)
+            _require_output(path, model, "the model itself")
     for path in emitted.write(folder, main):
         click.echo(f"Wrote {path}", err=True)
 
 
-def _destination(output: str, emitted: Emitted) -> tuple[Path, str]:
+def _require_output(path: str | Path, read: str, what: str) -> None:
+    """Refuse an output that cannot be written, or that is a file which is read."""
+    require_writable(path)
+    if Path(path).exists() and Path(read).exists() and Path(path).samefile(read):
+        raise InputError(f"{path} is {what}; give -o another name")
+
+
+def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]:
     """Return the folder to write to, and the name there of the main file."""
     path = Path(output)
     usual = next(iter(emitted.files))
     if path.is_dir() or (emitted.companions and not path.suffix):
         return path, usual
+    other = ENDINGS.get(path.suffix, target)
+    if other != target:
+        raise InputError(
+            f"{path} is the name of a file for {other}, and the target is {target}; "
+            f"give --target {other}, or end the name as {usual}"
+        )
     if path.name in emitted.companions:
         raise InputError(f"{path} is the name of another file that is written; end it as {usual}")
     require_writable(path)
@@ -185,7 +212,7 @@ def run(
     """
     if output is not None:
         require_known_suffix(output)
-        require_writable(output)
+        _require_output(output, model, "the model itself")
     values = _values(assignments)
     mechanism = _read(model)
     if analysis is not None:
@@ -263,7 +290,8 @@ def compare(
     if output is not None and Path(output).suffix not in writers:
         raise InputError(f"{output}: a report is written as .html, .json or .txt")
     for path in filter(None, (output, gradescope)):
-        require_writable(path)
+        _require_output(path, model, "the model itself")
+        _require_output(path, hand, "the file to compare")
     report = kc.compare_file(_read(model), hand, constraint=constraint)
     if output is not None:
         write_atomically(output, getattr(report, writers[Path(output).suffix])(reveal))

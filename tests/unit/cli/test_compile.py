@@ -2,8 +2,11 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 import kincompile as kc
+from kincompile.cli import ENDINGS
+from kincompile.compiler import TARGETS
 
 
 def test_that_the_module_written_is_the_one_that_emit_gives(kincompile, pendulum, tmp_path):
@@ -40,6 +43,26 @@ def test_that_the_model_is_never_overwritten(kincompile, pendulum, tmp_path):
         assert done.exit_code == 2
         assert "is the model itself; give -o another name" in done.stderr
         assert pendulum.read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("target", "ending", "other"),
+    [("numpy", ".c", "c"), ("c", ".py", "numpy"), ("octave", ".js", "javascript")],
+)
+def test_that_the_ending_of_another_target_is_refused(
+    kincompile, pendulum, tmp_path, target, ending, other
+):
+    done = kincompile("compile", pendulum, "--target", target, "-o", tmp_path / f"out{ending}")
+    assert done.exit_code == 2
+    assert f"give --target {other}, or end the name as pendulum." in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == [pendulum.name]
+
+
+def test_that_every_target_has_an_ending_and_a_place_in_the_help(kincompile):
+    text = " ".join(kincompile("compile", "--help").stdout.split())
+    for name in TARGETS:
+        assert name in set(ENDINGS.values())
+        assert name in text
 
 
 def test_that_a_failure_leaves_an_existing_file_alone(kincompile, tmp_path):

@@ -4,6 +4,8 @@ import json
 import numpy as np
 import pytest
 
+import kincompile as kc
+
 
 def rows_of(path):
     """Return the rows by the names of their columns, without the units."""
@@ -124,3 +126,24 @@ def test_that_an_output_which_cannot_be_written_is_refused_before_the_work(
     done = kincompile("run", tmp_path / "model.py", "-o", tmp_path / output)
     assert done.exit_code == 2
     assert done.stderr.startswith("Error: cannot write ")
+
+
+def test_that_the_motion_is_never_written_over_the_model(kincompile, pendulum, tmp_path):
+    model = tmp_path / "model.json"
+    model.write_text(kc.read_model(pendulum).to_json())
+    text = model.read_text()
+    done = kincompile("run", model, "-o", model)
+    assert (done.exit_code, model.read_text()) == (2, text)
+    assert done.stderr == f"Error: {model} is the model itself; give -o another name\n"
+
+
+def test_that_a_warning_is_a_message_without_a_line_of_code(process, pendulum):
+    with pendulum.open("a") as file:
+        file.write(
+            'mechanism.add(kc.Revolute("pin2", bob, (-length, 0), mechanism.ground, (0, 0)))'
+        )
+    done = process("run", pendulum)
+    assert done.returncode == 0
+    assert done.stderr.startswith("Warning: 'pendulum' is redundant: ")
+    assert "pin2" in done.stderr
+    assert ".py" not in done.stderr
