@@ -113,8 +113,11 @@ def block_types(
     -------
     types, runs
         The types, and the runs in the order of solution; None where some equations do not split
-        into blocks, or are dependent, or the blocks have too little in common.
+        into blocks, or are dependent, the blocks have too little in common, or what a profile gives
+        at a contact is computed outside of them.
     """
+    if _follows_contacts(grouped):
+        return None
     finder = _Finder(grouped)
     runs: list[Run] = []
     for stage in stages:
@@ -129,6 +132,19 @@ def block_types(
     if any(item.plan is None for item in finder.types):
         return None
     return tuple(finder.types), tuple(runs)
+
+
+def _follows_contacts(grouped: GroupedProgram) -> bool:
+    """Say whether a computed value depends on coordinates."""
+    nodes, stack = grouped.program.values, list(grouped.values)
+    coordinates = {item.name for item in grouped.program.coordinates}
+    found: set[int] = set()
+    while stack:
+        node = stack.pop()
+        if node not in found:
+            found.add(node)
+            stack += operands_of(nodes[node])
+    return any(nodes[k][0] == "input" and nodes[k][1] in coordinates for k in found)
 
 
 def tiles(types: Sequence[BlockType], runs: Sequence[Run], size: int) -> list[Run]:
