@@ -146,7 +146,7 @@ def _require_output(path: str | Path, read: str, what: str) -> None:
     """Refuse an output that cannot be written, or that is a file which is read."""
     require_writable(path)
     if Path(path).exists() and Path(read).exists() and Path(path).samefile(read):
-        raise InputError(f"{path} is {what}; give -o another name")
+        raise InputError(f"{path} is {what}; give another name to write to")
 
 
 def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]:

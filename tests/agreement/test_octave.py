@@ -148,6 +148,25 @@ def test_that_outside_a_domain_there_is_no_complex_number(tmp_path):
     assert json.dumps(found["Phi"][0]) == "[NaN, 0.0, 0.0]"
 
 
+@octave
+def test_that_a_guess_at_which_phi_q_is_singular_gives_no_motion(tmp_path):
+    """Newton goes 1e14 rad away, where corrections are small beside q and Phi is not zero."""
+    m = kc.Mechanism("stuck")
+    cam, follower = m.body("cam"), m.body("follower", guess=(0, 0.06, 0))
+    angles = [2 * np.pi * k / 36 for k in range(36)]
+    table = (angles, [0.05 + 0.01 * np.cos(angle) for angle in angles])
+    m.add(kc.Revolute("axle", m.ground, (0, 0), cam, (0, 0)))
+    m.add(kc.Translational("guide", m.ground, (0, 0), (0, 1), follower, (0, 0), (0, 1)))
+    m.add(kc.PointFollower("contact", follower, (0, 0), cam, (0, 0), table))
+    m.add(kc.AbsoluteAngle("motor", cam, 2 * kc.pi * kc.t))
+    kc.emit(m, "octave").write(tmp_path)
+    refused = "show('refused', strfind(problem.message, 'no position found at t = 0;'));"
+    found = run_octave(
+        tmp_path, ["try", "stuck", "show('found', 1);", "catch problem", refused, "end"]
+    )
+    assert found == {"refused": [[8.0]]}
+
+
 def test_that_a_name_beyond_matlab_is_refused():
     m = kc.Mechanism("long")
     m.add(kc.AbsoluteAngle("motor", m.body("b" * 70), kc.t))

@@ -41,7 +41,7 @@ def test_that_the_model_is_never_overwritten(kincompile, pendulum, tmp_path):
     for output in (pendulum, tmp_path, link):
         done = kincompile("compile", pendulum, "-o", output)
         assert done.exit_code == 2
-        assert "is the model itself; give -o another name" in done.stderr
+        assert "is the model itself; give another name to write to" in done.stderr
         assert pendulum.read_text() == text
 
 

@@ -134,7 +134,7 @@ def test_that_the_motion_is_never_written_over_the_model(kincompile, pendulum, t
     text = model.read_text()
     done = kincompile("run", model, "-o", model)
     assert (done.exit_code, model.read_text()) == (2, text)
-    assert done.stderr == f"Error: {model} is the model itself; give -o another name\n"
+    assert done.stderr == f"Error: {model} is the model itself; give another name to write to\n"
 
 
 def test_that_a_warning_is_a_message_without_a_line_of_code(process, pendulum):

@@ -138,6 +138,16 @@ def test_the_command_where_all_is_equal() -> None:
     assert "Verdict: equal." in result.stdout
 
 
+@pytest.mark.parametrize("option", ["--output", "--gradescope"])
+def test_the_command_never_writes_over_what_it_compares(tmp_path: Path, option: str) -> None:
+    hand = tmp_path / "hand.txt"
+    hand.write_text("nu = [0, 0, 0]", encoding="utf-8")
+    result = run(str(hand), option, str(hand))
+    assert result.exit_code == 2
+    assert result.stderr == f"Error: {hand} is the file to compare; give another name to write to\n"
+    assert hand.read_text(encoding="utf-8") == "nu = [0, 0, 0]"
+
+
 def test_the_command_where_something_differs(tmp_path: Path) -> None:
     hand = str(DATA / "problem_3_5_6.txt")
     result = run(hand)
