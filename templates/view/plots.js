@@ -36,6 +36,10 @@ function plottable(data) {
   return groups.filter(group => group.items.length);
 }
 
+function timesFall() {
+  return player.t[0] > player.t[player.count - 1];
+}
+
 function finite(value) {
   return Number.isFinite(value) ? value : null;
 }
@@ -70,8 +74,7 @@ class Plot {
   redraw() {
     if (this.chart) this.chart.destroy();
     const item = this.items.find(({ label }) => label === this.choice.value);
-    // uPlot wants rising times.
-    const order = player.t[0] <= player.t[player.count - 1] ? x => x : x => x.reverse();
+    const order = timesFall() ? x => x.reverse() : x => x;  // uPlot wants rising times
     const series = [order(Array.from(player.t)), order(item.values())];
     this.chart = new uPlot(this.options(item), series, this.holder);
     this.chart.over.append(this.cursor);
@@ -92,12 +95,14 @@ class Plot {
       series: [
         { label: 't', value: (_, value) => written(value) },
         { label: item.unit ? `${item.label} [${item.unit}]` : item.label, stroke: stage.palette.plot || ink,
-          width: 1.75, points: { show: player.count < 2 }, value: (_, value) => written(value) },
+          width: 1.75, pxAlign: 0,  // on whole pixels a curve is a staircase
+          points: { show: player.count < 2 }, value: (_, value) => written(value) },
       ],
       cursor: { drag: { x: true, y: false }, points: { size: 6 } },
       hooks: {
         drawClear: [chart => this.shadeFailures(chart)],
         draw: [chart => this.drawEvents(chart)],
+        setCursor: [() => this.showNumbers(player.state)],
         ready: [chart => {
           this.listen(chart);
           this.move(player.state);
@@ -145,11 +150,19 @@ class Plot {
     ctx.restore();
   }
 
+  /* The numbers under the plot are those of the pointer; where there is none, of the time shown. */
+  showNumbers(state) {
+    if (this.chart.cursor.left >= 0) return;
+    const idx = timesFall() ? player.count - 1 - state.index : state.index;
+    this.chart.setLegend({ idx }, false);
+  }
+
   move(state) {
     if (this.chart.status !== 1) return;  // uPlot lays out a little later, and then calls `ready`
     const x = this.chart.valToPos(state.time, 'x');
     this.cursor.style.transform = `translateX(${x}px)`;
     this.cursor.hidden = !(x >= 0 && x <= this.chart.over.clientWidth);
+    this.showNumbers(state);
   }
 }
 
@@ -247,16 +260,20 @@ const plots = {
 };
 
 /* The coordinate that is plotted first: of bodies an angle, that of the largest acceleration, so that
-   it is not one that a motor turns steadily; where all are steady, the one that goes farthest. */
+   it is not one that a motor turns steadily; where all angles are steady, as of a cam and its follower,
+   any coordinate of the largest acceleration; where nothing accelerates, the one that goes farthest. */
 function liveliest() {
   const { data, n } = player, bodies = data.drawing.bodies.length;
-  const candidates = data.coordinates.map((_, k) => k)
-    .filter(k => bodies === 0 || (k < 3 * bodies && k % 3 === 2));
-  const sizes = name => candidates.map(k => {
+  const all = data.coordinates.map((_, k) => k);
+  const sizes = (name, candidates) => candidates.map(k => {
     const values = data.arrays[name].filter((value, place) => place % n === k && Number.isFinite(value));
     return values.reduce((most, value) => Math.max(most, Math.abs(value - values[0])), 0);
   });
-  const accelerations = sizes('q_ddot');
-  const chosen = Math.max(...accelerations) > 1e-9 ? accelerations : sizes('q');
-  return data.coordinates[candidates[chosen.indexOf(Math.max(...chosen))]].name;
+  const ofBodies = all.filter(k => bodies === 0 || k < 3 * bodies);
+  const angles = ofBodies.filter(k => bodies > 0 && k % 3 === 2);
+  for (const [name, candidates] of [['q_ddot', angles], ['q_ddot', ofBodies], ['q', all]]) {
+    const found = sizes(name, candidates), largest = Math.max(0, ...found);
+    if (largest > 1e-9) return data.coordinates[candidates[found.indexOf(largest)]].name;
+  }
+  return data.coordinates[0].name;
 }

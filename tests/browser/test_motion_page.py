@@ -288,6 +288,41 @@ def test_that_the_time_line_of_a_plot_moves_and_a_click_sets_the_time(open_page:
     page.close()
 
 
+def test_that_the_numbers_under_a_plot_are_those_of_the_time_or_of_the_pointer(
+    open_page: Any,
+) -> None:
+    page = open_page(four_bar("under_plots", 1.0))
+    shown = page.locator(".u-legend").first.locator(".u-value")
+
+    def values() -> list[str]:
+        return shown.all_inner_texts()
+
+    def at(index: int) -> list[str]:
+        times, y = page.evaluate("plots.list[0].chart.data.map(column => Array.from(column))")
+        return [f"{times[index]:#.7g}", f"{y[index]:#.7g}"]
+
+    page.evaluate("player.setIndex(30)")
+    assert values() == at(30)
+    page.locator(".u-over").first.hover(position={"x": 1, "y": 20})
+    assert values() == ["0.000000", at(0)[1]]
+    page.mouse.move(3, 3)
+    assert values() == at(30)
+    page.close()
+
+
+def test_that_what_moves_unevenly_is_plotted_first(open_page: Any) -> None:
+    m = kc.Mechanism("yoke", points=21)
+    crank, yoke = m.body("crank"), m.body("yoke", guess=(1, 0, 0))
+    m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
+    m.add(kc.Translational("guide", m.ground, (0, 0), (1, 0), yoke, (0, 0), (1, 0)))
+    m.add(kc.RevoluteTranslational("slot", yoke, (0, 0), (0, 1), crank, (1, 0), 0))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    page = open_page(m)
+    labels = page.get_by_label("What is plotted").evaluate_all("all => all.map(one => one.value)")
+    assert labels == ["x_yoke", "x_yoke_dot", "x_yoke_ddot"]
+    page.close()
+
+
 def test_that_the_numbers_can_be_copied(open_page: Any, example_named: Any) -> None:
     page = open_page("four_bar")
     page.evaluate("player.setIndex(100)")
