@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -39,13 +39,14 @@ from kincompile.runtime.march import (
     leaves_branch,
     start,
 )
+from kincompile.runtime.motion import Motion
 from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.solution import Solution
 from kincompile.runtime.staged import is_staged
 from kincompile.runtime.status import Status
 from kincompile.runtime.variants import read_variants, solve_variants
-from kincompile.runtime.verdict import unassembled, verdict
+from kincompile.runtime.verdict import verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -53,9 +54,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from kincompile.runtime.events import Event, Passage
+    from kincompile.runtime.events import Passage
     from kincompile.runtime.inputs import Values
-    from kincompile.runtime.problem import Problem, Vector
+    from kincompile.runtime.problem import Problem
 
     Progress: TypeAlias = Callable[[int, int], object]
 
@@ -153,7 +154,7 @@ def _solve_one(
     inputs: Inputs, on_grid: bool, may_be_compiled: bool, smooth: bool, progress: Progress | None
 ) -> Solution:
     """Solve with one set of parameters."""
-    motion = _Motion.over(inputs)
+    motion = Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if is_staged(inputs.module):
             outcome = _follow_large(inputs, motion, may_be_compiled, smooth, progress)
@@ -179,64 +180,6 @@ def _nearly(inputs: Inputs, near: list[int]) -> str:
     )
 
 
-@dataclass(slots=True, eq=False)
-class _Motion:
-    """The arrays of a solution while they are being filled."""
-
-    q: Vector
-    q_dot: Vector
-    q_ddot: Vector
-    status: NDArray[np.int64]
-    residual: Vector
-    iterations: NDArray[np.int64]
-    statistics: dict[str, int]
-    events: list[Event] = field(default_factory=list)
-    passed: list[Event] = field(default_factory=list)
-    near: list[int] = field(default_factory=list)
-    """Points so near to a singular configuration that their rates are uncertain."""
-
-    @classmethod
-    def over(cls, inputs: Inputs) -> _Motion:
-        """Make the arrays for a time grid, with nothing reached."""
-        points = inputs.t.size
-        if is_staged(inputs.module):
-            q, q_dot, q_ddot = np.full((3, points, inputs.guess.size), np.nan)
-        else:  # each coordinate contiguous in memory, as the code of a grid wants it
-            q, q_dot, q_ddot = np.full((3, inputs.guess.size, points), np.nan).transpose(0, 2, 1)
-        return cls(
-            q,
-            q_dot,
-            q_ddot,
-            np.full(points, int(Status.NOT_REACHED)),
-            np.full(points, np.nan),
-            np.zeros(points, dtype=np.int64),
-            {"coarse": 0, "marched": 0},
-        )
-
-    def forget(self, index: int) -> None:
-        """Clear what a grid left behind the last point reached."""
-        for values in (self.q, self.q_dot, self.q_ddot, self.residual):
-            values[index:] = np.nan
-        self.iterations[index:] = 0
-
-    def put(self, index: int, outcome: Outcome) -> None:
-        """Write down what became of a point."""
-        self.status[index] = outcome.status
-        self.iterations[index] = outcome.iterations
-        self.q[index] = self.q_dot[index] = self.q_ddot[index] = np.nan
-        self.residual[index] = np.nan
-        if outcome.position is not None:
-            self.q[index] = outcome.position.q
-            self.residual[index] = np.max(np.abs(outcome.position.Phi))
-        elif (point := unassembled(outcome)) is not None:
-            self.residual[index] = np.max(np.abs(point.Phi))
-        if outcome.status is Status.CONVERGED and outcome.state is not None:
-            self.q_dot[index] = outcome.state.q_dot
-            self.q_ddot[index] = outcome.state.q_ddot
-            if outcome.state.sensitivity > TOO_NEAR:
-                self.near.append(index)
-
-
 def _takes_grid(module: ModuleType, points: int, method: str | None) -> bool:
     """Say whether the points of a grid are solved together."""
     if method not in (None, "grid", "march"):
@@ -248,7 +191,7 @@ def _takes_grid(module: ModuleType, points: int, method: str | None) -> bool:
     )
 
 
-def _march_compiled(inputs: Inputs, motion: _Motion) -> bool:
+def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
     """Let a compiled module follow the motion; say whether all went well.
 
     Where anything did not, the careful march finds out what it is, from the first time on.
@@ -272,24 +215,39 @@ def _march_compiled(inputs: Inputs, motion: _Motion) -> bool:
 
 
 def _follow(
-    inputs: Inputs, motion: _Motion, on_grid: bool, smooth: bool, progress: Progress | None
+    inputs: Inputs, motion: Motion, on_grid: bool, smooth: bool, progress: Progress | None
 ) -> Outcome:
     """Go through the grid up to its end, or to the first point that fails."""
     t = float(inputs.t[0])
-    outcome = start(problem(inputs.module, inputs.p, inputs.guess, t), t, inputs)
+    at_guess = problem(inputs.module, inputs.p, inputs.guess, t)
+    outcome = start(at_guess, t, inputs)
     motion.put(0, outcome)
     if progress:
         progress(1, inputs.t.size)
+    motion.note = _other_branch(at_guess, t, inputs, outcome)
     # The guess may be rough: from here on the assembled mechanism gives the size.
     assembled = inputs.guess if outcome.position is None else outcome.position.q
     equations = problem(inputs.module, inputs.p, assembled, t)
     return _go_on(equations, inputs, motion, 1, outcome, on_grid, smooth, progress)
 
 
+def _other_branch(equations: Problem, time: float, inputs: Inputs, outcome: Outcome) -> str:
+    """Say so where the first position lies on another branch than the guess."""
+    guess = equations.at(inputs.guess, time)
+    if guess is None or outcome.position is None:
+        return ""
+    if not leaves_branch(equations, time, guess, outcome.position):
+        return ""
+    return (
+        f" The position at t = {time:.10g} is on another branch than the guess: kc.assemblies "
+        "gives all of them, and each serves as a guess."
+    )
+
+
 def _go_on(
     equations: Problem,
     inputs: Inputs,
-    motion: _Motion,
+    motion: Motion,
     index: int,
     outcome: Outcome,
     on_grid: bool,
@@ -312,7 +270,7 @@ def _go_on(
 def _run(
     equations: Problem,
     inputs: Inputs,
-    motion: _Motion,
+    motion: Motion,
     index: int,
     outcome: Outcome,
     on_grid: bool,
@@ -346,7 +304,7 @@ def _run(
 
 
 def _explain(
-    equations: Problem, inputs: Inputs, motion: _Motion, index: int, outcome: Outcome
+    equations: Problem, inputs: Inputs, motion: Motion, index: int, outcome: Outcome
 ) -> Passage | None:
     """Find the event that ends the motion at a point; return the way through it if there is one."""
     t, state = float(inputs.t[index]), outcome.state
@@ -366,7 +324,7 @@ def _explain(
 
 
 def _pass(
-    equations: Problem, inputs: Inputs, motion: _Motion, index: int, passage: Passage
+    equations: Problem, inputs: Inputs, motion: Motion, index: int, passage: Passage
 ) -> tuple[int, Outcome]:
     """Fill the points within the passage through a bifurcation, and take the next one."""
     times, after = inputs.t.tolist(), passage.after
@@ -391,7 +349,7 @@ def _pass(
 
 def _follow_large(
     inputs: Inputs,
-    motion: _Motion,
+    motion: Motion,
     may_be_compiled: bool,
     smooth: bool,
     progress: Progress | None,
@@ -426,7 +384,7 @@ def _follow_large(
     return _go_on(equations, inputs, motion, index, outcome, False, smooth, progress)
 
 
-def _run_compiled(march: LargeMarch, motion: _Motion, index: int) -> int:
+def _run_compiled(march: LargeMarch, motion: Motion, index: int) -> int:
     """Let compiled code fill the points from an index on; return how many it could."""
     states = motion.q, motion.q_dot, motion.q_ddot
     done = march.run_compiled(index, states, motion.residual, motion.iterations)
@@ -437,7 +395,7 @@ def _run_compiled(march: LargeMarch, motion: _Motion, index: int) -> int:
 
 
 def _next_large(
-    march: LargeMarch, motion: _Motion, times: Sequence[float], index: int, good: LargeState | None
+    march: LargeMarch, motion: Motion, times: Sequence[float], index: int, good: LargeState | None
 ) -> tuple[LargeState | None, LargeState | Status]:
     """Return the state before a point, which is found again if it is not given, and the point."""
     if index == 0:
@@ -461,7 +419,7 @@ def _large_outcome(found: LargeState | Status, good: LargeState | None) -> Outco
 
 
 def _grid(
-    equations: Problem, inputs: Inputs, motion: _Motion, first: State, index: int
+    equations: Problem, inputs: Inputs, motion: Motion, first: State, index: int
 ) -> NDArray[np.bool_]:
     """Solve all points from an index on together, and tell which of them can be trusted."""
     times = inputs.t[index:]
@@ -479,7 +437,7 @@ def _end_of_run(trusted: NDArray[np.bool_], index: int) -> int:
     return index + (rest.size if rest.all() else int(np.argmin(rest)))
 
 
-def _continues(equations: Problem, motion: _Motion, state: State, index: int) -> bool:
+def _continues(equations: Problem, motion: Motion, state: State, index: int) -> bool:
     """Say whether a point of the grid lies on the branch that the march came by.
 
     After trusted points it does. Where the march went on by itself, the grid's next point must be
@@ -491,7 +449,7 @@ def _continues(equations: Problem, motion: _Motion, state: State, index: int) ->
     return bool(np.max(distance) <= SMALL_ERROR)
 
 
-def _taken_up(equations: Problem, motion: _Motion, t: float, index: int) -> Outcome:
+def _taken_up(equations: Problem, motion: Motion, t: float, index: int) -> Outcome:
     """Return a point of the grid as one from which the march can go on."""
     if index == motion.status.size - 1:
         point = Point(motion.q[index], np.empty(0), np.empty((0, 0)), 0.0)
@@ -505,9 +463,10 @@ def _taken_up(equations: Problem, motion: _Motion, t: float, index: int) -> Outc
     return Outcome(Status.CONVERGED, 0, following, at)
 
 
-def _solution(inputs: Inputs, motion: _Motion, outcome: Outcome) -> Solution:
+def _solution(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
     """Put names, parameters and the verdict to the numbers."""
     module = inputs.module
+    message = verdict(inputs, motion.status, motion.residual, outcome, motion.events)
     return Solution(
         t=inputs.t,
         q=motion.q,
@@ -517,7 +476,7 @@ def _solution(inputs: Inputs, motion: _Motion, outcome: Outcome) -> Solution:
         residual=motion.residual,
         iterations=motion.iterations,
         success=outcome.status is Status.CONVERGED,
-        message=verdict(inputs, motion.status, motion.residual, outcome, motion.events),
+        message=message + motion.note,
         name=module.NAME,
         coordinates=module.COORDINATES,
         equations=module.EQUATIONS,
