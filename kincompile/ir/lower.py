@@ -124,7 +124,7 @@ class _Binder:
         self._convert = Converter(graph, graph.input).convert
         self._bodies: dict[str, tuple[int, ...]] = {}
         self._numbers: dict[float, int] = {}
-        self._orders: dict[int, tuple[Kernel, tuple[int | str, ...]]] = {}
+        self._orders: dict[int, tuple[Kernel, tuple[tuple[int, ...], list[str]]]] = {}
 
     def bound(
         self, constraint: Joint | FreeEquation
@@ -142,10 +142,9 @@ class _Binder:
     def bind(self, joint: Joint, kernel: Kernel) -> tuple[int, ...]:
         """Return the node of each of the kernel's inputs."""
         known = self._known(joint)
-        return tuple(
-            self._function(joint, place) if isinstance(place, str) else known[place]
-            for place in self._order(joint, kernel)
-        )
+        places, functions = self._order(joint, kernel)
+        known += [self._function(joint, name) for name in functions]
+        return tuple(map(known.__getitem__, places))
 
     def _function(self, joint: Joint, name: str) -> int:
         """Return the node of C, C', C'', or of rho and its derivatives at the contact."""
@@ -187,26 +186,28 @@ class _Binder:
         known += [self._value(value) for point in joint.points.values() for value in point]
         return known
 
-    def _order(self, joint: Joint, kernel: Kernel) -> tuple[int | str, ...]:
-        """Return where each of the kernel's inputs stands in `_known`; the name of a function."""
+    def _order(self, joint: Joint, kernel: Kernel) -> tuple[tuple[int, ...], list[str]]:
+        """Return where each of the kernel's inputs stands in `_known`, and what comes after it."""
         if id(kernel) not in self._orders:
             names = [name for item in joint.template.frames for name in _frame_inputs(item.index)]
             for contact in joint.template.contacts:
                 names += contact.alpha.name, contact.alpha_dot.name
             names += [symbol for symbol in joint.scalars if symbol != "C"]
             names += [f"{symbol}.{axis}" for symbol in joint.points for axis in "xy"]
-            places = {name: place for place, name in enumerate(names)}
-            order = tuple(places.get(name, name) for name in kernel.inputs)
+            functions = [name for name in kernel.inputs if name not in names]
+            places = {name: place for place, name in enumerate((*names, *functions))}
+            order = tuple(places[name] for name in kernel.inputs), functions
             self._orders[id(kernel)] = kernel, order
         return self._orders[id(kernel)][1]
 
     def _value(self, value: Scalar) -> int:
         """Return the node of an attribute; a number that was there before costs little."""
-        if not isinstance(value, float):
+        if isinstance(value, sympy.Expr):
             return self._convert(value)
-        if value not in self._numbers:
-            self._numbers[value] = self._convert(value)
-        return self._numbers[value]
+        node = self._numbers.get(value)
+        if node is None:
+            node = self._numbers[value] = self._graph.const(value)
+        return node
 
     def bind_equation(self, equation: SharedEquation) -> tuple[int, ...]:
         """Return the node of each of the inputs of a shared kernel."""

@@ -178,8 +178,9 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     scalars: dict[str, Scalar] = {}
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
+    title = _title(constraint)
     for name, item in constraint.arguments().items():
-        given, where = getattr(constraint, name), f"{_title(constraint)}, {name}"
+        given, where = getattr(constraint, name), f"{title}, {name}"
         if item.kind is Kind.BODY:
             bodies.append(_body(given, where, scope))
         elif item.kind in (Kind.POINT, Kind.AXIS):
