@@ -346,3 +346,36 @@ def test_the_signs_of_blocks_make_up_the_sign_of_the_determinant(is_split, monke
         found.add((int(ours), int(np.linalg.slogdet(module.Phi_q(q, 0.1))[0])))
     # The order of rows and columns gives both the same or the opposite sign everywhere.
     assert found in ({(1, 1), (-1, -1)}, {(1, -1), (-1, 1)})
+
+
+def forest(count, seed):
+    """Return loops, each driven by a motor of its own or by a body of any loop before it."""
+    rng = np.random.default_rng(seed)
+    m = loops(count, None)
+    for k in range(1, count):
+        body, crank = m.bodies[int(rng.integers(3 * k))], m.bodies[3 * k]
+        match int(rng.integers(5)):
+            case 0:
+                m.add(kc.AbsoluteAngle(f"G{k}", crank, rng.uniform(1, 2) * kc.t))
+            case 1:
+                m.add(kc.RelativeAngle(f"G{k}", body, crank, rng.uniform(0, 0.1)))
+            case 2:
+                m.add(kc.Equation(f"G{k}", crank.phi - rng.uniform(0.5, 2) * body.phi))
+            case 3:
+                m.add(kc.Gear(f"G{k}", body, (0.1, 0.2), 2, 0, crank, (-0.5, 0), 3, np.pi))
+            case 4:
+                m.add(kc.Equation(f"G{k}", crank.phi - sympy.sin(body.phi) * body.x / (k + 1)))
+    return m
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_loops_linked_at_random_are_solved_as_by_the_dense_matrix(seed):
+    module = kc.compile(forest(30, seed), form="grouped")
+    rng = np.random.default_rng(seed)
+    q = module.GUESS + rng.normal(scale=0.02, size=module.N_COORDINATES)
+    solver, Phi_q = staged.StagedSolver(module), module.Phi_q(q, 0.1)
+    b = rng.normal(size=module.N_EQUATIONS)
+    x = solver.solve(solver.factor(module.Phi_q_nonzeros(q, 0.1)), b)
+    np.testing.assert_allclose(Phi_q @ x, b, rtol=1e-8, atol=1e-8 * np.abs(x).max())
+    kinds = {type(stage).__name__ for stage in module.STAGES}
+    assert kinds <= {"Stage", "Chain"}
