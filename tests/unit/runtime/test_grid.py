@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
 from kincompile.runtime import grid as grid_module
@@ -104,3 +105,19 @@ def test_that_a_wrong_factorization_is_noticed(example_named):
 def test_that_an_unknown_method_is_refused(example_named):
     with pytest.raises(kc.InputError, match="give 'grid', 'march', or nothing"):
         kc.solve(example_named("four_bar").module, 0.0, method="leap")
+
+
+@pytest.mark.parametrize("centre", [0.3, 0.47, 0.81])
+def test_what_the_coarse_march_steps_over_is_found_and_followed(centre):
+    # A twitch of half a radian within eight points: the interpolation knows nothing of it.
+    m = kc.Mechanism("twitch")
+    rod = m.body("rod", guess=(1, 0, 0))
+    m.add(kc.Revolute("A", m.ground, (0, 0), rod, (-1, 0)))
+    m.add(kc.AbsoluteAngle("motor", rod, kc.t + sympy.exp(-(((kc.t - centre) / 0.004) ** 2)) / 2))
+    module, times = kc.compile(m), np.linspace(0, 1, 2001)
+    found = kc.solve(module, times, method="grid")
+    assert found.success
+    assert found.statistics["marched"] > 0
+    phi = times + np.exp(-(((times - centre) / 0.004) ** 2)) / 2
+    expected = np.stack((np.cos(phi), np.sin(phi), phi), axis=-1)
+    np.testing.assert_allclose(found.q, expected, rtol=0, atol=1e-12)

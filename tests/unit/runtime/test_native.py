@@ -355,3 +355,18 @@ def test_two_blocks_that_turn_singular_together_are_noticed():
         assert not found.success
         np.testing.assert_array_equal(found.status, expected.status)
         assert found.message == expected.message
+
+
+# ---------------------------------------------------------------- large batches
+
+
+@pytest.mark.parametrize("points", [12_000, 12_001, 20_013])
+def test_batches_that_are_written_past_the_caches_agree(four_bar, points):
+    native, module = four_bar
+    q, q_dot, t = states(module, points)
+    assert_functions_agree(native, module, q, q_dot, t)
+    last = np.ascontiguousarray(q.T), np.ascontiguousarray(q_dot.T), t
+    expected = module.kinematics_batch_last(*last)
+    found = native.kinematics_batch_last(*last)
+    assert_same(found, expected)
+    assert_same(native.kinematics_batch_last(*last, out=found), expected)
