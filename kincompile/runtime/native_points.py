@@ -99,9 +99,11 @@ def function_of_states(places: Places, evaluate: Function, original: Function) -
             q_place[...] = q
             q_dot_place[...] = q_dot
             time.value = t
-            if p is not defaults:
+            if p is defaults:
+                failed = run(own)
+            else:
                 parameters[...] = p
-            failed = run(own if p is defaults else given)
+                failed = run(given)
             found = copied(*results)
             put_back(place)
             if not failed:
@@ -132,9 +134,11 @@ def function_of_positions(places: Places, evaluate: Function, original: Function
             q_place, _, time, parameters, results, own, given = place
             q_place[...] = q
             time.value = t
-            if p is not defaults:
+            if p is defaults:
+                failed = run(own)
+            else:
                 parameters[...] = p
-            failed = run(own if p is defaults else given)
+                failed = run(given)
             found = copied(*results)
             put_back(place)
             if not failed:
