@@ -27,6 +27,9 @@ NAMED_EQUATIONS = 3
 NAMED_BODIES = 6
 """Of how many bodies a message gives the position."""
 
+LOCATED = 1e-6
+"""How exactly an event is located in time."""
+
 MET = 1e-9
 """Residual, relative to the largest, up to which an equation counts as met."""
 
@@ -61,9 +64,8 @@ def verdict(
         f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
         f" ({outcome.status.name}).",
         _before(outcome, index),
+        _why(outcome, events, times[index]),
         _there(inputs.module, outcome),
-        outcome.status.sentence,
-        *(event.message for event in events[-1:]),
     ]
     return " ".join(part for part in parts if part)
 
@@ -83,6 +85,19 @@ def _before(outcome: Outcome, index: int) -> str:
     good = f"The {index} points before it are good" if index > 1 else "The point before it is good"
     reached = f"; the motion was followed to t = {outcome.state.t:.10g}"
     return f"{good}{'' if outcome.position else reached}."
+
+
+def _why(outcome: Outcome, events: Sequence[Event], t: float) -> str:
+    """Say why the motion ended, and what to do: by the event between its end and the failed time.
+
+    Without one, what the status may mean is said in general, and the last event on the way.
+    """
+    general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
+    if not events or outcome.state is None:
+        return general
+    event, end = events[-1], outcome.state.t
+    is_between = abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LOCATED
+    return event.message if is_between else general
 
 
 def _there(module: ModuleType, outcome: Outcome) -> str:
