@@ -38,6 +38,7 @@ for k = 1:points
     end
 
     % position: Phi(q, t) = 0 by Newton's method
+    extent = 1 + norm(q);
     for iteration = 1:most_iterations
         correction = example_3_7_5_Phi_q(q, t, p) \ example_3_7_5_Phi(q, t, p);
         q = q - correction;
@@ -46,12 +47,14 @@ for k = 1:points
             break
         end
     end
-    if ~has_converged
+    % Where a singular Phi_q sends q far away, the corrections are small beside it: Phi tells.
+    Phi_q = example_3_7_5_Phi_q(q, t, p);
+    is_met = abs(example_3_7_5_Phi(q, t, p)) <= 10 * tolerance * extent * sum(abs(Phi_q), 2);
+    if ~has_converged || ~all(is_met)
         error('example_3_7_5: no position found at t = %g; take more points, or another guess', t);
     end
 
     % velocity: Phi_q q_dot = nu; acceleration: Phi_q q_ddot = gamma
-    Phi_q = example_3_7_5_Phi_q(q, t, p);
     q_dot = Phi_q \ example_3_7_5_nu(q, t, p);
     q_ddot = Phi_q \ example_3_7_5_gamma(q, q_dot, t, p);
 
