@@ -175,6 +175,19 @@ def test_a_lock_up_has_the_status_of_the_numpy_module(quick_compiler):
     np.testing.assert_array_equal(np.isnan(ours.q), np.isnan(theirs.q))
 
 
+def test_a_singular_configuration_within_a_step_is_not_passed(quick_compiler):
+    x = sympy.symbols("x0:8")
+    equations = [item**2 - (k + 1) * kc.t**2 for k, item in enumerate(x)]
+    guess = {str(item): 0.5 * (k + 1) ** 0.5 for k, item in enumerate(x)}
+    native, module = both(kc.ConstraintSystem("crossing", [*map(str, x)], equations, guess=guess))
+    t = [-0.5, -0.4, 0.4]
+    ours, theirs = kc.solve(native, t), kc.solve(module, t)
+    np.testing.assert_array_equal(ours.status, theirs.status)
+    assert ours.status.tolist()[:2] == [0, 0]
+    assert ours.status[2] != kc.Status.CONVERGED
+    assert ours.statistics["compiled"] == 1
+
+
 def test_equations_that_do_not_split_stay_with_numpy(quick_compiler, caplog):
     with caplog.at_level("INFO", logger="kincompile"):
         module = kc.compile(ring(45), target="c", form="grouped")
@@ -245,3 +258,13 @@ def test_the_march_judges_by_the_numbers_of_the_runtime():
     for name, value in wanted.items():
         (text,) = re.findall(rf"\b{name} = ([^,;]+)[,;]", source)
         assert eval(text) == value, name
+
+
+def test_angles_and_lengths_are_judged_by_scales_of_their_own():
+    m = kc.Mechanism("kinds")
+    for k in range(4):
+        body = m.body(f"b{k}")
+        for name, item in zip(("x", "y", "phi"), (body.x, body.y, body.phi), strict=True):
+            m.add(kc.Equation(f"{name}{k}", item - (k + 2) * kc.t))
+    source = kc.emit(m, target="c", form="grouped").source
+    assert sorted(re.findall(r"_is_angle\[\] = \{ (\d) \}", source)) == ["0", "1"]
