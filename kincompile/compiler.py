@@ -29,7 +29,6 @@ from kincompile.emit.octave_target import emit_octave
 from kincompile.errors import (
     InputError,
     KincompileError,
-    ModelError,
     RedundantConstraintWarning,
     UnsupportedError,
 )
@@ -37,9 +36,8 @@ from kincompile.ir.grouping import GroupedProgram, group
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
 from kincompile.ir.redundancy import rank_report, redundancy_warning, redundant_equations
-from kincompile.model.mechanism import Mechanism
+from kincompile.model.mechanism import Mechanism, system_of
 from kincompile.model.origins import remember_model
-from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native import make_native
@@ -56,6 +54,7 @@ if TYPE_CHECKING:
 
     from kincompile.emit.target import Emitted, Target
     from kincompile.ir.inline import InlineProgram
+    from kincompile.model.system import ConstraintSystem
     from kincompile.structure.report import Inspection
 
 LOG = logging.getLogger(__name__)
@@ -118,7 +117,7 @@ def emit(
     """
     _check_target(target, form)
     with _without_collector():
-        return _emitted(_lowered(_checked(model), target, form), target)
+        return _emitted(_lowered(system_of(model), target, form), target)
 
 
 @contextmanager
@@ -177,16 +176,6 @@ def _emitted(code: InlineProgram | GroupedProgram, target: str) -> Emitted:
     return TARGETS[target](code)
 
 
-def _checked(model: Mechanism | ConstraintSystem) -> ConstraintSystem:
-    """Return the checked system of a model."""
-    if not isinstance(model, Mechanism | ConstraintSystem):
-        raise ModelError(
-            f"{type(model).__name__} is not a model: give a kc.Mechanism or a kc.ConstraintSystem "
-            "(a file is read by kc.read_model)"
-        )
-    return model.system()
-
-
 def compile(  # noqa: A001 - the public name kc.compile
     model: Mechanism | ConstraintSystem, target: str = "numpy", form: str | None = None
 ) -> ModuleType:
@@ -223,7 +212,7 @@ def compile(  # noqa: A001 - the public name kc.compile
         )
     _check_target(target, form)
     with _without_collector():
-        system = _checked(model)
+        system = system_of(model)
         code = _lowered(system, target, form)
         # The NumPy module has the constants, the checks and the careful march of the compiled one.
         emitted = _emitted(code, "numpy")
@@ -262,7 +251,7 @@ def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
     ModelError
         If the model cannot be used as written; every problem is listed.
     """
-    system = _checked(model)
+    system = system_of(model)
     program = lower(system)
     ranks = rank_report(system, program)
     if not ranks.assembled:

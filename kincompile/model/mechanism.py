@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 
 import sympy
 
+from kincompile.errors import ModelError
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
@@ -113,3 +114,19 @@ class Mechanism(MatrixViews, TextViews):
         """Return name and sizes."""
         sizes = f"{len(self.bodies)} bodies, {len(self.constraints)} constraints"
         return f"<Mechanism {self.name!r}: {sizes}>"
+
+
+def system_of(model: Mechanism | ConstraintSystem) -> ConstraintSystem:
+    """Return the checked system of what a user gives as a model.
+
+    Raises
+    ------
+    ModelError
+        If it is no model, or one that cannot be used as written.
+    """
+    if not isinstance(model, Mechanism | ConstraintSystem):
+        raise ModelError(
+            f"{type(model).__name__} is not a model: give a kc.Mechanism or a kc.ConstraintSystem "
+            "(a file is read by kc.read_model)"
+        )
+    return model.system()

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.errors import InputError
 from kincompile.files import write_atomically
+from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
 from kincompile.names import listed
 from kincompile.teach.assembled import assembled_section, unknowns_section
@@ -141,7 +142,7 @@ def derivation(
     InputError
         If the state has unknown names, or the formulas have no finite values there.
     """
-    system = model.system()
+    system = system_of(model)
     chosen = situation(system, state)
     page = Page(chosen)
     sections = tuple(

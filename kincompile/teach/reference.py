@@ -15,6 +15,7 @@ from kincompile.ir.graph import Graph
 from kincompile.ir.interpret import interpret, run
 from kincompile.ir.lower import lower
 from kincompile.model.matrices import Row, assemble
+from kincompile.model.mechanism import system_of
 from kincompile.names import listed, rate, suggestion
 from kincompile.teach.states import (
     Array,
@@ -75,7 +76,7 @@ class Reference:
     """
 
     def __init__(self, model: Mechanism | ConstraintSystem) -> None:
-        self.system = model.system()
+        self.system = system_of(model)
         self.program = lower(self.system)
         self.coordinates = tuple(item.name for item in self.system.coordinates)
         self.equations = self.system.equations

@@ -11,6 +11,7 @@ import numpy as np
 
 from kincompile.errors import InputError, UnsupportedError, missing_package
 from kincompile.files import require_writable, write_atomically
+from kincompile.model.mechanism import system_of
 from kincompile.model.origins import model_of
 from kincompile.names import listed, suggestion
 from kincompile.runtime.labelled import TIME_UNIT
@@ -148,7 +149,7 @@ def _moving(solution: Solution, model: Mechanism | ConstraintSystem | None) -> C
         )
     if not (solution.status == 0).any():
         raise InputError(f"{name} has no position that could be shown. {solution.message}")
-    found = model_of(solution.module) if model is None else model.system()
+    found = model_of(solution.module) if model is None else system_of(model)
     if found is None:
         raise InputError(
             f"the shapes of {name} are not known, because its module was loaded from a file; give "

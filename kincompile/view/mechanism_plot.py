@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError, missing_package
+from kincompile.model.mechanism import system_of
 from kincompile.names import listed, suggestion
 from kincompile.view.placed import world
 from kincompile.view.shapes import drawing
@@ -124,7 +125,7 @@ def position_of(model: Mechanism | ConstraintSystem, q: ArrayLike | None) -> NDA
     InputError
         If there is nothing to draw, or `q` is no finite position.
     """
-    system = require_bodies(model.system())
+    system = require_bodies(system_of(model))
     names = [item.name for item in system.coordinates]
     if q is None:
         return np.array([item.guess for item in system.coordinates], dtype=np.float64)

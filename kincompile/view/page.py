@@ -12,6 +12,7 @@ from kincompile.compiler import compile as compile_model
 from kincompile.emit.templates import fill, read
 from kincompile.errors import InputError, StructuralError
 from kincompile.files import write_atomically
+from kincompile.model.mechanism import system_of
 from kincompile.runtime.solve import solve
 from kincompile.view.newton import newton_script
 from kincompile.view.page_data import as_json, page_data
@@ -118,7 +119,7 @@ def page(
         If times or parameters cannot be used, or the solution is of another model, or holds
         several variants.
     """
-    system = model.system()
+    system = system_of(model)
     if solution is None:
         times = np.linspace(0, system.end, system.points) if t is None else t
         solution, message = _solved(system, times, p)

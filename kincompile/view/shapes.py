@@ -10,6 +10,7 @@ import numpy as np
 
 from kincompile.model.constraint import Kind
 from kincompile.model.joints import Revolute
+from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
 from kincompile.view.body_shapes import links, outlines
 from kincompile.view.joint_shapes import marks_of
@@ -143,7 +144,7 @@ def drawing(
     ModelError
         If the model cannot be used as written; every problem is listed.
     """
-    system = model.system()
+    system = system_of(model)
     guess = [item.guess for item in system.coordinates]
     positions = _finite(guess if q is None else q)
     if not len(positions):

@@ -95,7 +95,11 @@ def test_that_a_system_is_frozen() -> None:
 
 
 @pytest.mark.parametrize("what", [None, 5, "four_bar.py", [], {}, kc.Mechanism, object(), x - 1])
-@pytest.mark.parametrize("use", [kc.compile, kc.emit, kc.inspect], ids=lambda use: use.__name__)
+@pytest.mark.parametrize(
+    "use",
+    [kc.compile, kc.emit, kc.inspect, kc.page, kc.derivation, kc.plot_sparsity, kc.compare],
+    ids=lambda use: use.__name__,
+)
 def test_that_what_is_no_model_is_refused(use: Any, what: Any) -> None:
     with pytest.raises(kc.ModelError, match=r"is not a model: give a kc.Mechanism or a"):
         use(what)
