@@ -127,7 +127,7 @@ def emit_c_large(
         **about,
         **sizes,
         "values": len(grouped.values),
-        # a vector, signs of two points in an eighth of the memory each, and the values
+        # a vector, at most as many determinants, and the values
         "work": 2 * len(program.coordinates) + len(grouped.values),
         "lanes": LANES,
         "fingerprint": program.fingerprint,

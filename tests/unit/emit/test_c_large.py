@@ -9,7 +9,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.runtime import march, newton, problem
+from kincompile.runtime import grid, march, newton, problem
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1")
 LINKS = ("angle", "equation", "gear", "rocker")
@@ -252,6 +252,7 @@ def test_the_march_judges_by_the_numbers_of_the_runtime():
         "LARGE_ERROR": march.LARGE_ERROR,
         "KINK": march.KINK,
         "SMOOTH": march.SMOOTH,
+        "SMALLEST_DETERMINANT": grid.SMALLEST_DETERMINANT,
         "RESIDUAL_FACTOR": newton.RESIDUAL_FACTOR,
         "ROUNDING": problem.ROUNDING,
     }
