@@ -13,6 +13,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+from kincompile.names import suggestion
+
 _PUBLIC = {
     "kincompile.compiler": ("compile", "emit", "inspect"),
     "kincompile.model.files": ("read", "read_analysis", "read_model"),
@@ -59,7 +61,9 @@ __version__ = "0.1.0"
 
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
-        raise AttributeError(f"module 'kincompile' has no attribute {name!r}")
+        raise AttributeError(
+            f"module 'kincompile' has no attribute {name!r}{suggestion(name, _HOME)}"
+        )
     module = _HOME[name]
     if not module.startswith(_WITHOUT_SYMPY):
         # The compiling side is loaded as a whole at its first use, so that no later call pays for

@@ -96,7 +96,7 @@ def _is_device(target: Path) -> bool:
 
 def _explanation(target: Path, error: OSError) -> str:
     """Say which file could not be written, why, and what to do."""
-    folder = target.parent
+    folder = target.parent if target.parent.name else target.parent.resolve()
     if isinstance(error, IsADirectoryError):
         remedy = "it is a folder. Give the name of a file in it."
     elif isinstance(error, FileNotFoundError):

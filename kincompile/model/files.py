@@ -116,4 +116,6 @@ def _content(file: Path) -> bytes:
         raise InputError(f"cannot read {file}: it is a folder; give a file in it") from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot read {file}: {reason}; check the path") from error
+        raise InputError(
+            f"cannot read {file}: {reason}; check the path and its permissions"
+        ) from error

@@ -27,6 +27,9 @@ PREFERRED = ("mechanism", "system", "m")
 MODULE_NAME = "kincompile_model"
 """The `__name__` of a file while it runs: not "__main__", so that its script part does not run."""
 
+_NUMBERS_ONLY = ("Cannot convert expression to float", "loop of ufunc does not support argument")
+"""What Python and NumPy say to a function of `kc.t` or a parameter that takes numbers only."""
+
 _COMPILED = ("FORMAT", "FINGERPRINT", "N_COORDINATES")
 
 
@@ -100,6 +103,10 @@ def _explained(path: Path, error: BaseException) -> KincompileError:
         what = f"the file ends the program, sys.exit({error.code!r}); a model file must run through"
     else:
         what = f"{type(error).__name__}: {error}".rstrip(": ")
+        if any(part in what for part in _NUMBERS_ONLY):
+            what += "; of kc.t and parameters take SymPy's functions: sympy.sin, not math.sin"
+        elif "truth value of Relational" in what:
+            what += "; a choice that depends on kc.t is a sympy.Piecewise"
     return ModelError(f"{path}, line {line}: {what}")
 
 

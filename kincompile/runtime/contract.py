@@ -74,8 +74,9 @@ def check(module: ModuleType) -> None:
 
 def _format(module: ModuleType) -> Iterator[str]:
     """Report a format that this version does not read; its names may well be others."""
-    given = getattr(module, "FORMAT", FORMAT)
-    if given != FORMAT:
+    if not hasattr(module, "FORMAT"):
+        yield "FORMAT is missing; a model is read by kc.read_model and compiled by kc.compile"
+    elif (given := module.FORMAT) != FORMAT:
         yield f"its FORMAT is {given!r} and this version reads {FORMAT}"
 
 

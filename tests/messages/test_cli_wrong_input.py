@@ -51,6 +51,18 @@ CASES = {
     "no mechanism": ("size = 1\n", "run M", ["has no Mechanism", "Its names are: size"]),
     "two mechanisms": (TWO_MODELS, "run M", ["first (Mechanism), second (Mechanism)"]),
     "exception": (RAISED_BELOW, "run M", ["line 2: ZeroDivisionError: division by zero"]),
+    "misspelt type": (f"{IMPORT}kc.Revolut\n", "run M", ["line 2: ", "did you mean 'Revolute'?"]),
+    "math.sin": (
+        f"{IMPORT}import math\nmath.sin(kc.t)\n",
+        "run M",
+        ["line 3: TypeError", "sympy.sin, not math.sin"],
+    ),
+    "numpy.sin": (
+        f"{IMPORT}import numpy\nnumpy.sin(kc.t)\n",
+        "run M",
+        ["line 3: TypeError", "sympy.sin, not math.sin"],
+    ),
+    "if of t": (f"{IMPORT}1 if kc.t < 1 else 0\n", "run M", ["line 2: ", "a sympy.Piecewise"]),
     "import error": ("import no_such_module\n", "run M", ["line 1: ModuleNotFoundError: No mod"]),
     "bare exception": ("raise KeyError\n", "run M", ["model.py, line 1: KeyError\n"]),
     "exit": ("import sys\nsys.exit(7)\n", "run M", ["line 2: the file ends the program, sys.e"]),

@@ -88,5 +88,7 @@ def test_a_folder_without_permission_is_named(tmp_path, monkeypatch):
         raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(Path, "replace", refused)
-    with pytest.raises(InputError, match=r"no permission to write in .* Choose a folder"):
-        write_atomically(tmp_path / "a.txt", "")
+    monkeypatch.chdir(tmp_path)
+    for path in (tmp_path / "a.txt", "a.txt"):
+        with pytest.raises(InputError, match=rf"no permission to write in {tmp_path}\. Choose a"):
+            write_atomically(path, "")

@@ -121,6 +121,14 @@ def test_all_that_is_missing_is_said_at_once():
     assert len(caught.value.problems) == 11 + len(FUNCTIONS)
 
 
+def test_a_file_that_is_a_model_is_told_how_to_read_it(tmp_path):
+    (tmp_path / "m.py").write_text("import math\n")
+    with pytest.raises(
+        ContractError, match=r"FORMAT is missing; a model is read by kc\.read_model"
+    ):
+        load(tmp_path / "m.py")
+
+
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(InputError, match=r"cannot load .*m\.py: there is no such file\. Check"):
         load(tmp_path / "m.py")
