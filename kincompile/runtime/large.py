@@ -42,6 +42,10 @@ SHORTEST = 2.0**-10
 """Part of a Newton correction below which it is given up."""
 
 
+USUAL = 4
+"""Newton corrections of a good prediction; where it takes more, the solves of all are checked."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LargeState:
     """A point of the motion, complete.
@@ -81,6 +85,11 @@ class LargeMarch:
         self._reach = max(float(np.max(np.abs(inputs.guess[~self._angular]), initial=0.0)), 1e-12)
         self._smallest: Vector = np.zeros(0)
 
+    @property
+    def pivoted(self) -> int:
+        """How often the planned solve was not good enough."""
+        return self._solver.pivoted
+
     def start(self, t: float) -> LargeState | Status:
         """Assemble the mechanism at the first time, from the guess."""
         found = self._correct(self._inputs.guess, t, damped=True)
@@ -103,6 +112,15 @@ class LargeMarch:
         if march is None:
             return 0
         return int(march(self._inputs, first, self._reach, states, residual, iterations))
+
+    def leaves_branch(self, found: LargeState) -> bool:
+        """Say whether the guess shows a branch, and a position found from it lies on another."""
+        nonzeros = self._module.evaluate(self._inputs.guess, found.t, self._p)[1]
+        try:
+            shown = self._solver.determinants(self._solver.factor(nonzeros))
+        except RuntimeError:
+            return False
+        return bool(np.all(shown != 0) and np.any((shown > 0) != (found.determinants > 0)))
 
     def take_up(self, q: Vector, t: float) -> LargeState | Status:
         """Return the state at a position that is known to be good."""
@@ -181,7 +199,7 @@ class LargeMarch:
                 factors = solver.factor(nonzeros)
             except RuntimeError:
                 return Status.SINGULAR
-            correction = solver.solve(factors, Phi)
+            correction = solver.solve(factors, Phi, checked=iteration > USUAL)
             if not np.isfinite(correction).all():
                 return Status.SINGULAR if np.isfinite(Phi).all() else Status.NOT_FINITE
             q, Phi, nonzeros = self._apply(q, Phi, correction, t, damped=damped)

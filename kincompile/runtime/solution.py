@@ -60,7 +60,8 @@ class Solution(LabelledViews):
         Value of each parameter that was used; of variants one each, shape (B,).
     statistics : dict
         How it was found: ``coarse``, points of the coarse march of a grid; ``marched``, points that
-        were followed one by one with a pivoted solve.
+        were followed one by one with a pivoted solve; of large mechanisms ``pivoted``, solves for
+        which the planned one was not good enough.
     events : list of Event
         Lock-ups, bifurcations and jumps, in order, each with `.kind`, `.t`, `.bodies`, `.message`.
         Those of variants are found by solving a variant alone.

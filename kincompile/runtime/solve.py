@@ -373,6 +373,8 @@ def _follow_large(
                 good, index = found, index + 1
         if progress and index < len(times):
             progress(index, len(times))
+    if march.pivoted:
+        motion.statistics["pivoted"] = march.pivoted
     if outcome.status is Status.CONVERGED or inputs.guess.size > LARGEST_CAREFUL:
         if progress:
             progress(len(times), len(times))

@@ -304,11 +304,26 @@ class _Triangular:
         return solution
 
 
+LOST, ROUNDED = 1e-8, 1e-12
+"""A solution is good when each equation holds to the first part of its own terms, or to the second
+of the largest: rounding errors go from large equations to small ones."""
+
+
 class StagedSolver:
-    """Factors and solves Phi_q of a grouped module, again and again with one pattern."""
+    """Factors and solves Phi_q of a grouped module, again and again with one pattern.
+
+    Attributes
+    ----------
+    pivoted : int
+        How often the stages lost too many digits, and a factorization of the whole matrix with
+        pivoting took their place.
+    """
 
     def __init__(self, module: ModuleType) -> None:
         pattern, size = module.PATTERN, module.N_EQUATIONS
+        self.pivoted = 0
+        self._rows, self._columns = np.ascontiguousarray(pattern.T)
+        self._first = np.searchsorted(self._rows, np.arange(size))  # entries go row by row
         self._stages = [_stage(stage, pattern, module.ARRAYS, size) for stage in module.STAGES]
         self._size = size
 
@@ -331,12 +346,38 @@ class StagedSolver:
         ]
         return np.concatenate(found) if found else np.empty(0)
 
-    def solve(self, factors: StagedFactors, b: Array) -> Array:
-        """Return x of Phi_q x = b, shape (n,)."""
+    def solve(self, factors: StagedFactors, b: Array, *, checked: bool = True) -> Array:
+        """Return x of Phi_q x = b, shape (n,); not finite where Phi_q is singular.
+
+        Without `checked` it is enough that x is finite: for a correction of Newton's method, whose
+        convergence tells the rest, in half the time.
+        """
         x = np.zeros(self._size)
         for stage, part in zip(self._stages, factors.parts, strict=True):
             stage.solve(part, factors.nonzeros, b, x)
-        return x
+        is_good = self._is_good(factors.nonzeros, b, x) if checked else np.isfinite(x).all()
+        return x if is_good else self._solve_whole(factors, b)
+
+    def _is_good(self, nonzeros: Array, b: Array, x: Array) -> bool:
+        """Say whether a solution satisfies every equation."""
+        products = nonzeros * x.take(self._columns)
+        missing = np.abs(np.add.reduceat(products, self._first) - b)
+        terms = np.add.reduceat(np.abs(products), self._first) + np.abs(b)
+        return bool(np.all(missing <= LOST * terms + ROUNDED * terms.max(initial=0.0)))
+
+    def _solve_whole(self, factors: StagedFactors, b: Array) -> Array:
+        """Return the solution by a factorization with pivoting; NaN where that is singular."""
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        self.pivoted += 1
+        places, shape = (self._rows, self._columns), (self._size, self._size)
+        try:
+            factored: Any = splu(csc_array((factors.nonzeros, places), shape=shape))
+        except (RuntimeError, ValueError):  # singular; entries that are not finite
+            return np.full(self._size, np.nan)
+        solution: Array = factored.solve(b)
+        return solution
 
 
 def _stage(

@@ -379,3 +379,28 @@ def test_loops_linked_at_random_are_solved_as_by_the_dense_matrix(seed):
     np.testing.assert_allclose(Phi_q @ x, b, rtol=1e-8, atol=1e-8 * np.abs(x).max())
     kinds = {type(stage).__name__ for stage in module.STAGES}
     assert kinds <= {"Stage", "Chain"}
+
+
+def test_a_planned_solve_that_loses_digits_gives_way_to_pivoting(monkeypatch):
+    module = kc.compile(loops(12, "rocker"), form="grouped")
+    t = np.linspace(0, 0.1, 3)
+    expected = kc.solve(module, t)
+    assert "pivoted" not in expected.statistics
+    put = staged._LaneStage.put  # noqa: SLF001 - elimination that fails cannot be had to order
+
+    def put_wrongly(self, values, x):
+        put(self, [value * (1 + 1e-4 * k) for k, value in enumerate(values, 1)], x)
+
+    monkeypatch.setattr(staged._LaneStage, "put", put_wrongly)  # noqa: SLF001
+    solution = kc.solve(module, t)
+    assert solution.success, solution.message
+    assert solution.statistics["pivoted"] >= 2 * 3  # velocity and acceleration, at least
+    np.testing.assert_allclose(solution.q_ddot, expected.q_ddot, rtol=1e-9, atol=1e-9)
+
+
+def test_the_solve_of_a_singular_matrix_is_not_finite():
+    module = kc.compile(loops(2, "angle"), form="grouped")
+    solver = staged.StagedSolver(module)
+    with np.errstate(all="ignore"):  # as the callers do
+        factors = solver.factor(np.zeros(len(module.PATTERN)))
+        assert np.isnan(solver.solve(factors, np.ones(module.N_EQUATIONS))).all()
