@@ -36,7 +36,7 @@ def in_node(folder, source, variable, expression):
     (folder / "model.js").write_text(source, encoding="utf-8")
     text = f"const {variable} = require('./model.js'); console.log(JSON.stringify({expression}))"
     done = subprocess.run(
-        [NODE, "-e", text], cwd=folder, capture_output=True, text=True, check=False
+        [str(NODE), "-e", text], cwd=folder, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

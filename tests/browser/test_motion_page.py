@@ -295,7 +295,7 @@ def test_that_the_numbers_under_a_plot_are_those_of_the_time_or_of_the_pointer(
     shown = page.locator(".u-legend").first.locator(".u-value")
 
     def values() -> list[str]:
-        return shown.all_inner_texts()
+        return list(shown.all_inner_texts())
 
     def at(index: int) -> list[str]:
         times, y = page.evaluate("plots.list[0].chart.data.map(column => Array.from(column))")

@@ -7,12 +7,14 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile.ir import redundancy
+from kincompile.ir.interpret import interpret
 
 
 def chain(count):
     """Return an open chain of links, each pinned to the one before."""
     m = kc.Mechanism("chain")
-    before, end = m.ground, (0, 0)
+    before, end = m.ground, (0.0, 0.0)
     for k in range(count):
         link = m.body(f"link{k}", guess=(k + 0.5, 0, 0))
         m.add(kc.Revolute(f"P{k}", before, end, link, (-0.5, 0)))
@@ -323,13 +325,13 @@ def test_free_equations_without_a_solution():
 
 def test_that_a_hundred_bodies_are_readable_and_analysed_in_few_steps(monkeypatch):
     """Neither a wide pattern nor long lists; and the work does not grow with the redundancy."""
-    import kincompile.ir.redundancy as redundancy
-
     calls = []
-    interpret = redundancy.interpret
-    monkeypatch.setattr(
-        redundancy, "interpret", lambda *given: calls.append(1) or interpret(*given)
-    )
+
+    def counted(*given):
+        calls.append(1)
+        return interpret(*given)
+
+    monkeypatch.setattr(redundancy, "interpret", counted)
     found = kc.inspect(parallel_cranks(33))
     assert len(found.redundant) == 31
     few, calls[:] = len(calls), []

@@ -1,6 +1,7 @@
 """Inspection of random linkages, most of them wrong in some way, against NumPy's rank."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def random_linkage(seed):
         first, second = (bodies[k] for k in random.choice(count + 1, 2, replace=False))
         one, value = bodies[int(random.integers(1, count + 1))], float(random.uniform(0.3, 1.5))
         places = (first, point(), second, point())
-        makers = [
+        makers: list[Any] = [
             lambda name, places=places: kc.Revolute(name, *places),
             lambda name, places=places: kc.Revolute(name, *places),
             lambda name, a=places, v=value: kc.Translational(name, *a[:2], (1, v), *a[2:], (1, 0)),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.teach import verify
+from kincompile import compiler
 
 FOUR_BAR = """
 import kincompile as kc
@@ -44,16 +44,16 @@ def test_that_a_good_model_is_verified(inspected):
 
 def test_that_a_wrong_module_is_an_exit_code_of_one(inspected, monkeypatch):
     """The compiler is right, so its result is spoiled on the way."""
-    compiled = verify.compiler.compile
+    compiled = compiler.compile
 
     def spoiled(model):
         right = compiled(model)
         wrong = types.ModuleType(right.__name__)
         vars(wrong).update(vars(right))
-        wrong.nu = lambda q, t, p=right.DEFAULTS: right.nu(q, t, p) * (1 + 1e-6)
+        vars(wrong)["nu"] = lambda q, t, p=right.DEFAULTS: right.nu(q, t, p) * (1 + 1e-6)
         return wrong
 
-    monkeypatch.setattr(verify.compiler, "compile", spoiled)
+    monkeypatch.setattr(compiler, "compile", spoiled)
     done = inspected(FOUR_BAR, "--verify")
     assert (done.exit_code, done.stderr) == (1, "")
     assert done.stdout.startswith("four_bar: 9 coordinates, 9 equations")

@@ -28,7 +28,7 @@ def run(tmp_path, script, expression):
     text = f"{script}\n{read('view/newton.js')}\nconsole.log(JSON.stringify({expression}))"
     (tmp_path / "all.js").write_text(text, encoding="utf-8")
     done = subprocess.run(
-        [NODE, "all.js"], cwd=tmp_path, capture_output=True, text=True, check=False
+        [str(NODE), "all.js"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
