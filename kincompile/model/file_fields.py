@@ -134,7 +134,8 @@ class FieldReader:
     def number(self, value: Any, address: Address) -> float:
         """Return a finite number; a text is not one. Where it is none, 1."""
         if isinstance(value, bool) or not isinstance(value, int | float):
-            self.problem(address, f"expected a number, not {shown(value)}")
+            hint = "; write the number itself, without quotes" if isinstance(value, str) else ""
+            self.problem(address, f"expected a number, not {shown(value)}{hint}")
             return 1.0
         try:
             if math.isfinite(float(value)):
@@ -178,7 +179,9 @@ def shown(value: Any) -> str:
     """Return a value as a message shows it: kind and beginning of what is long."""
     if isinstance(value, str):
         return repr(value if len(value) <= 60 else value[:57] + "...")
-    if isinstance(value, list | dict | bool | None):
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict | bool | None):
         return _KINDS[type(value)]
     text = repr(value) if not isinstance(value, int) or abs(value) < 10**40 else "a huge number"
     return text if len(text) <= 60 else text[:57] + "..."
