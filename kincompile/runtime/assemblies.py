@@ -66,7 +66,10 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
 
     Notes
     -----
-    The search is by chance, with a fixed seed: what is rarely met may be missed. Singular
+    The search is by chance, with a fixed seed: what is rarely met may be missed. What the equations
+    allow counts, also where the parts would have to be taken apart to get there: a translational
+    joint holds as well with a body turned by half a turn, so that a slider-crank whose slider is
+    held by one has 4 assemblies, and 2 where the slider's angle is given. Singular
     positions, of which there may be infinitely many together, count where Newton's method
     ends.
     """

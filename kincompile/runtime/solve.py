@@ -224,19 +224,18 @@ def _follow(
     motion.put(0, outcome)
     if progress:
         progress(1, inputs.t.size)
-    motion.note = _other_branch(at_guess, t, inputs, outcome)
+    motion.note = _other_branch(at_guess, inputs, outcome.position)
     # The guess may be rough: from here on the assembled mechanism gives the size.
     assembled = inputs.guess if outcome.position is None else outcome.position.q
     equations = problem(inputs.module, inputs.p, assembled, t)
     return _go_on(equations, inputs, motion, 1, outcome, on_grid, smooth, progress)
 
 
-def _other_branch(equations: Problem, time: float, inputs: Inputs, outcome: Outcome) -> str:
+def _other_branch(equations: Problem, inputs: Inputs, position: Point | None) -> str:
     """Say so where the first position lies on another branch than the guess."""
+    time = float(inputs.t[0])
     guess = equations.at(inputs.guess, time)
-    if guess is None or outcome.position is None:
-        return ""
-    if not leaves_branch(equations, time, guess, outcome.position):
+    if guess is None or position is None or not leaves_branch(equations, time, guess, position):
         return ""
     return (
         f" The position at t = {time:.10g} is on another branch than the guess: kc.assemblies "
@@ -358,7 +357,7 @@ def _follow_large(
 
     Where it has a march of its own, that goes as far as it can, here one point is added, and so on.
     """
-    march, times = LargeMarch(inputs), inputs.t.tolist()
+    march, times = _large_march(inputs, motion), inputs.t.tolist()
     good, outcome, index = None, Outcome(Status.CONVERGED, 0, None), 0
     while outcome.status is Status.CONVERGED and index < len(times):
         done = _run_compiled(march, motion, index) if may_be_compiled and index else 0
@@ -384,6 +383,20 @@ def _follow_large(
     equations = problem(inputs.module, inputs.p, good.q, times[0])
     outcome = _taken_up(equations, motion, good.t, index - 1)
     return _go_on(equations, inputs, motion, index, outcome, False, smooth, progress)
+
+
+def _large_march(inputs: Inputs, motion: Motion) -> LargeMarch:
+    """Return the march of a large mechanism, whose start is on the guess's branch if it can be."""
+    march, t = LargeMarch(inputs), float(inputs.t[0])
+    if inputs.guess.size > LARGEST_CAREFUL:
+        return march
+    found = march.start(t)
+    if isinstance(found, Status) or not march.leaves_branch(found):
+        return march
+    at_guess = problem(inputs.module, inputs.p, inputs.guess, t)
+    careful = start(at_guess, t, inputs).position
+    motion.note = _other_branch(at_guess, inputs, careful or at_guess.at(found.q, t))
+    return march if careful is None else LargeMarch(replace(inputs, guess=careful.q))
 
 
 def _run_compiled(march: LargeMarch, motion: Motion, index: int) -> int:

@@ -148,3 +148,44 @@ def test_that_a_guess_36_degrees_away_keeps_its_branch(example_named, compiled_f
     solution = kc.solve(compiled_for(example.model), t, guess=guess)
     assert solution.success
     np.testing.assert_allclose(solution.q[0], there, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "t", "count"),
+    [("four_bar", 1.0, 2), ("slider_crank", 1.0, 2), ("problem_3_5_6", 1, 2)],
+)
+def test_the_assemblies_of_the_examples(example_named, compiled_for, name, t, count):
+    module = compiled_for(example_named(name).model)
+    found = kc.assemblies(module, t)
+    assert found.shape == (count, module.N_COORDINATES)
+    np.testing.assert_allclose(found[0], kc.solve(module, np.linspace(0, t, 40)).q[-1], atol=1e-8)
+
+
+def test_that_assemblies_take_parameters(example_named):
+    module = example_named("example_3_7_5").module
+    two = kc.assemblies(module, 3.0, {"l": 1.5})
+    assert two.shape == (2, 3)
+    angle = np.arccos(np.sin(np.pi / 4) / 1.5)  # sin(phi1) = l cos(phi2)
+    np.testing.assert_allclose(sorted(two[:, 2]), [-angle, angle], atol=1e-9)
+    assert kc.assemblies(module, 3.0, [0.5]).shape == (0, 3)
+    with pytest.raises(kc.InputError, match="assemblies are those of one time"):
+        kc.assemblies(module, [0.0, 1.0])
+
+
+def test_that_another_branch_than_the_guess_is_told(example_named, compiled_for):
+    """Where det Phi_q of the guess and of the position differ in sign, and no small steps help."""
+    example = example_named("four_bar")
+    module = compiled_for(example.model)
+    random = np.random.default_rng(0)
+    told = 0
+    for _ in range(40):
+        guess = random.uniform(-20, 20, 9)
+        solution = kc.solve(module, 0.0, guess=guess)
+        if solution.success:
+            of_guess, found = (
+                np.sign(np.linalg.det(module.Phi_q(q, 0.0))) for q in (guess, solution.q[0])
+            )
+            says = "is on another branch than the guess: kc.assemblies" in solution.message
+            assert says == (of_guess != found)
+            told += says
+    assert told > 0

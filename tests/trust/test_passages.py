@@ -7,7 +7,17 @@ import pytest
 
 import kincompile as kc
 
-PATHS = ("march", "grid", "variants", "compiled", "compiled variants", "grouped")
+PATHS = (
+    "march",
+    "grid",
+    "variants",
+    "compiled",
+    "compiled variants",
+    "grouped",
+    "compiled grouped",
+)
+MODULES = {"compiled": "c", "compiled variants": "c", "grouped": "grouped",
+           "compiled grouped": "compiled grouped"}  # fmt: skip
 START = 1.0
 FLAT = np.pi - START
 """When the parallelogram, whose crank starts at START and turns with 1 rad/s, is flat."""
@@ -21,14 +31,13 @@ def parallelograms(build, quick_compiler):
         "numpy": kc.compile(model),
         "c": kc.compile(model, target="c"),
         "grouped": kc.compile(model, form="grouped"),
+        "compiled grouped": kc.compile(model, target="c", form="grouped"),
     }
 
 
 def status_and_angle(modules, path, t):
     """Return the status of every point, the coupler's angle, and the events."""
-    module = modules[{"compiled": "c", "compiled variants": "c", "grouped": "grouped"}.get(
-        path, "numpy"
-    )]  # fmt: skip
+    module = modules[MODULES.get(path, "numpy")]
     if "variants" in path:
         solution = kc.solve(module, t, p=np.zeros((2, 1, 0)))
         return solution.status[0], solution["phi_coupler"][0], None
@@ -70,10 +79,10 @@ def test_that_points_close_to_the_bifurcation_do_not_lead_past_it(parallelograms
             check(parallelograms, path, t)
 
 
-@pytest.mark.parametrize("path", ["march", "grid", "compiled", "grouped"])
+@pytest.mark.parametrize("path", ["march", "grid", "compiled", "grouped", "compiled grouped"])
 @pytest.mark.parametrize("points", [20, 1000])
 def test_that_every_path_goes_on_along_the_smooth_branch(parallelograms, path, points):
-    module = parallelograms[{"compiled": "c", "grouped": "grouped"}.get(path, "numpy")]
+    module = parallelograms[MODULES.get(path, "numpy")]
     t = np.linspace(0, 9, points)
     method = path if path in ("march", "grid") else None
     with pytest.warns(kc.BranchSwitchWarning, match="bifurcation at t = .*, and on") as found:
