@@ -1,6 +1,7 @@
 """Mechanisms that cannot be analysed, or not assembled, or look as if they could not."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -189,3 +190,16 @@ def test_that_another_branch_than_the_guess_is_told(example_named, compiled_for)
             assert says == (of_guess != found)
             told += says
     assert told > 0
+
+
+def test_that_the_page_on_singular_configurations_tells_the_truth():
+    text = (Path(__file__).resolve().parents[2] / "docs" / "singular.md").read_text("utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    calls = re.findall(r"^(kc\.solve\(.*\)\.\w+)  # (.*)$", code, re.MULTILINE)
+    assert len(calls) == 3
+    names: dict[str, object] = {}
+    exec(code.split("kc.solve", maxsplit=1)[0], names)
+    for call, comment in calls[:2]:
+        assert repr(eval(call, names)) == comment
+    with pytest.warns(kc.BranchSwitchWarning):
+        assert eval(calls[2][0], names) is True
