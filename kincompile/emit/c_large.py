@@ -174,6 +174,7 @@ def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
     assert plan is not None  # or there were no types
     solving = schedule_solve(own, plan, NameTable(RESERVED))
     lines += ["", *solve_functions(own, solving, prefix)]
+    links = _links(kind, [run for run in runs if run.type == number and run.is_chain])
     data: dict[str, Any] = {
         "number": number,
         "blocks": sum(run.columns.shape[1] for run in runs if run.type == number),
@@ -187,7 +188,14 @@ def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
         "coupling": "\n".join(f"    {line}" for line in _coupling(kind, entries)),
         "is_chain": any(run.is_chain for run in runs if run.type == number),
         "taking": "\n".join(f"        {line}" for line in _taking(kind, entries)),
-        "coupled": ", ".join(map(str, kind.coupled())),
+        "is_linked": bool(links),
+        "start": "\n".join(
+            f"    before[{k}] = all[at->columns[{slot}][first]];"
+            for k, slot in enumerate(kind.coupled())
+        ),
+        "handing_on": "\n".join(
+            f"        before[{k}] = x[{slot}][lane];" for k, slot in enumerate(links)
+        ),
         "n_coupled": len(kind.coupled()),
         "own": kind.own,
     }
@@ -230,6 +238,19 @@ def _taking(kind: BlockType, entries: Sequence[tuple[int, int, Any]]) -> list[st
         for number, (row, column, value) in enumerate(entries)
         if column in place
     ]
+
+
+def _links(kind: BlockType, chains: Sequence[Run]) -> list[int]:
+    """Return what each coordinate taken over is in the block before, empty if it is not there."""
+    links = []
+    for slot in kind.coupled():
+        same = [
+            own
+            for own in range(kind.own)
+            if all((run.columns[slot, 1:] == run.columns[own, :-1]).all() for run in chains)
+        ]
+        links += same[:1]
+    return links if len(links) == len(kind.coupled()) else []
 
 
 def _entry(number: int, value: Any) -> str:
