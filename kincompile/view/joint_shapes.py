@@ -45,13 +45,18 @@ def _revolute(placed: Placed) -> list[Mark]:
 
 
 def _translational(placed: Placed) -> list[Mark]:
-    """Draw a block on a rail of the ground; between moving bodies a sleeve and its slide."""
+    """Draw a block on a rail of the ground; between moving bodies a sleeve and its slide.
+
+    The sleeve is on body i, unless body j is the block of a crank that works in a slotted lever.
+    """
     i, j = placed.place("s_i"), placed.place("s_j")
     v_i, v_j = placed.unit("v_i"), placed.unit("v_j")
     if i.frame == GROUND_FRAME:
         return [placed.rail(i, v_i, j), Block(placed.name, j, v_j)]
     if j.frame == GROUND_FRAME:
         return [placed.rail(j, v_j, i), Block(placed.name, i, v_i)]
+    if j.frame in placed.scene.blocks:
+        i, j, v_i = j, i, v_j
     return [Span(placed.name, i, j, "slide"), Block(placed.name, i, v_i)]
 
 

@@ -53,12 +53,15 @@ class Scene:
         Positions that rails must fit; all finite.
     bearings
         The point of each frame at which it first hangs on the ground or on another body.
+    blocks
+        The frames of bodies that are one point to all their joints, and pinned to a moving body.
     """
 
     values: Mapping[str, float]
     frames: Mapping[str, int]
     q: Array
     bearings: Mapping[int, Place]
+    blocks: frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)

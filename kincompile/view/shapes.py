@@ -21,6 +21,7 @@ from kincompile.view.marks import (
     Mark,
     Pin,
     Place,
+    Point,
     Rail,
     Span,
     moves_with,
@@ -153,7 +154,8 @@ def drawing(
     values = {item.name: item.default or 0.0 for item in system.parameters} | dict(p or {})
     joints = [item for item in system.constraints if isinstance(item, Joint)]
     attached = _attached(joints, frames, values)
-    scene = Scene(values, frames, positions, _bearings(joints, frames, values))
+    bearings = _bearings(joints, frames, values)
+    scene = Scene(values, frames, positions, bearings, _blocks(joints, frames, values))
     marks = {joint.name: marks_of(joint.written, Placed(joint, scene)) for joint in joints}
     bodies: list[Mark] = [*outlines(system.bodies, values)]
     drawn = _uncovered(itertools.chain(*marks.values()), set().union(*map(moves_with, bodies)))
@@ -210,6 +212,22 @@ def _bearings(
     for place in _attached(revolutes, frames, values):
         found.setdefault(place.frame, place)
     return found
+
+
+def _blocks(
+    joints: Iterable[Joint], frames: Mapping[str, int], values: Mapping[str, float]
+) -> frozenset[int]:
+    """Return the frames with one point for all joints, in a revolute joint of moving bodies."""
+    points: dict[int, set[Point]] = {}
+    for place in _attached(joints, frames, values):
+        points.setdefault(place.frame, set()).add(place.point)
+    pins = [
+        joint
+        for joint in joints
+        if isinstance(joint.written, Revolute) and not any(body.is_ground for body in joint.bodies)
+    ]
+    held = {place.frame for place in _attached(pins, frames, values)}
+    return frozenset(frame for frame in held if len(points[frame]) == 1)
 
 
 def _pointed_at(marks: Iterable[Mark], attached: Iterable[Place]) -> Place | None:

@@ -89,6 +89,22 @@ def test_that_between_moving_bodies_there_are_a_sleeve_and_a_slide():
     assert block.place == slide.first
 
 
+@pytest.mark.parametrize("is_lever_first", [True, False])
+def test_that_the_block_of_a_slotted_lever_is_the_body_at_the_crank_pin(is_lever_first):
+    m = kc.Mechanism("whitworth")
+    crank, lever, block = m.body("crank"), m.body("lever"), m.body("block")
+    m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
+    m.add(kc.Revolute("C", m.ground, (0, -1), lever, (0, 0)))
+    m.add(kc.Revolute("pin", crank, (2, 0), block, (0, 0)))
+    sides = [(lever, (0, 0), (1, 0)), (block, (0, 0), (0, 1))]
+    i, j = sides if is_lever_first else sides[::-1]
+    m.add(kc.Translational("slot", *i, *j))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    (slide,), (sleeve,) = marks(m, Span), marks(m, Block)
+    assert (sleeve.place, sleeve.axis) == (Place(2, (0, 0)), (0, 1))
+    assert slide == Span("slot", Place(2, (0, 0)), Place(1, (0, 0)), "slide")
+
+
 def test_that_a_cylinder_takes_the_place_of_its_slide():
     m = two_bodies(
         lambda m, i, j, a: kc.Translational("C", i, (1, 0), (1, 0), j, (2, 0), (1, 0)),
