@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 ROUNDING = 16 * float(np.finfo(np.float64).eps)
 """A residual this small, relative to its terms, is all that floating point has to give."""
 
+STEEP = 1e6
+"""An equation this much steeper than at a generic position is beside a pole, where it is measured
+by what it is at the generic one: tan(x) at pi/2 is no root, however near one a step says it is."""
+
 WILD = 1e3
 """A coordinate beyond this many references is an iterate gone wild, not a larger scale."""
 
@@ -113,7 +117,8 @@ class Problem:
         At a dead point a whole row of Phi_q may vanish. What it contributes elsewhere keeps the
         equation from being measured by nothing.
         """
-        return np.maximum(self.magnitude, np.abs(point.Phi_q) @ scale)
+        limit = np.where(self.magnitude > 0, STEEP * self.magnitude, np.inf)
+        return np.maximum(self.magnitude, np.minimum(np.abs(point.Phi_q) @ scale, limit))
 
     def holds(self, point: Point, tolerance: float) -> bool:
         """Say whether every equation holds, relative to what its terms contribute.

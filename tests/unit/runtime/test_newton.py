@@ -2,7 +2,9 @@ import math
 
 import numpy as np
 import pytest
+import sympy
 
+import kincompile as kc
 from kincompile.errors import InputError
 from kincompile.runtime.newton import newton
 from kincompile.runtime.status import Status
@@ -131,6 +133,15 @@ def test_the_cap_is_reported(problem_3_5_6):
 def test_a_double_root_is_singular(problem_3_5_6):
     result = newton(problem_3_5_6, 4.5, START)
     assert result.status is Status.SINGULAR
+
+
+@pytest.mark.parametrize("method", ["march", "grid"])
+def test_a_pole_is_no_root(method):
+    # There a residual of 1.6e16 is small beside the slope of 2.7e32.
+    x = sympy.Symbol("x")
+    tangent = kc.ConstraintSystem("tangent", "x", [sympy.tan(x) - kc.t], guess=[math.pi / 2])
+    solution = kc.solve(kc.compile(tangent), [0.5, 1.0], method=method)
+    np.testing.assert_allclose(np.tan(solution.q[:, 0]), [0.5, 1.0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("equation", ["math.sqrt(t - 1)", "math.nan * t", "1 / (t - t)"])
