@@ -16,7 +16,7 @@ from kincompile.emit.c_functions import evaluator, solve_functions
 from kincompile.emit.c_target import LANES, RESERVED, array_lines, elementary
 from kincompile.emit.functions import inputs_read, schedule
 from kincompile.emit.grouped import pattern_of
-from kincompile.emit.layout import assigned
+from kincompile.emit.layout import assigned, indented, labelled
 from kincompile.emit.naming import NameTable
 from kincompile.emit.printers import CPrinter
 from kincompile.emit.solving import schedule_solve
@@ -137,7 +137,7 @@ def emit_c_large(
         "table": "\n".join(
             _row(k, *pair) for k, pair in enumerate(zip(types, written, strict=True))
         ),
-        "values_code": "\n".join(f"    {line}" for line in values),
+        "values_code": indented(values),
     }
     header = {
         **about,
@@ -154,8 +154,43 @@ def emit_c_large(
 
 def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
     """Write the functions of a type."""
-    code, prefix = kind.code, f"type_{number}_"
-    program, pattern = code.program, code.pattern()
+    code, prefix, own = kind.code, f"type_{number}_", kind.own
+    plan, program = kind.plan, code.program
+    assert plan is not None  # or there were no types
+    lines, called = _evaluators(kind, prefix)
+    determined = program.coordinates[:own]
+    square = dataclasses.replace(code, program=dataclasses.replace(program, coordinates=determined))
+    solving = schedule_solve(square, plan, NameTable(RESERVED))
+    lines += ["", *solve_functions(square, solving, prefix)]
+    of_type = [run for run in runs if run.type == number]
+    chains = [run for run in of_type if run.is_chain]
+    data = {
+        "number": number,
+        "blocks": sum(run.columns.shape[1] for run in of_type),
+        "about": "\n".join(f"// {line}" for line in _about(kind)),
+        "is_angle": ", ".join(str(int(item.unit == "rad")) for item in determined),
+        "functions": "\n".join(lines),
+        "coupling": indented(_coupling(kind)),
+        "own": own,
+        "is_chain": bool(chains),
+        **_chain(kind, chains),
+    }
+    sizes = {
+        "slots": len(program.coordinates),
+        "rows": own,
+        "entries": len(code.pattern()),
+        "parameters": len(program.parameters),
+        "factors": len(solving.factors),
+        "determinants": len(plan.determinants),
+    }
+    largest = max((len(block.rows) for block in plan.blocks), default=0)
+    text = fill("c/block_type.c.jinja", data)
+    return _Written(text, called, sizes, bool(chains), largest)
+
+
+def _evaluators(kind: BlockType, prefix: str) -> tuple[list[str], frozenset[str]]:
+    """Return the functions that evaluate Phi, Phi_q, nu and gamma, and what they call."""
+    program = kind.code.program
     table = NameTable((*RESERVED, *program.tables))
     coordinates = [item.name for item in program.coordinates]
     wanted = [*coordinates, *(rate(name) for name in coordinates)]
@@ -164,53 +199,32 @@ def _type(number: int, kind: BlockType, runs: Sequence[Run]) -> _Written:
     lines: list[str] = []
     called: set[str] = set()
     for name, quantities in FUNCTIONS.items():
-        listing = schedule(code, quantities, names, table)
+        listing = schedule(kind.code, quantities, names, table)
         called |= set(listing.functions)
-        lines += ["", *evaluator(name, code, listing, names, prefix)]
-    own = dataclasses.replace(
-        code, program=dataclasses.replace(program, coordinates=program.coordinates[: kind.own])
-    )
-    plan, entries = kind.plan, jacobian_entries(code)
-    assert plan is not None  # or there were no types
-    solving = schedule_solve(own, plan, NameTable(RESERVED))
-    lines += ["", *solve_functions(own, solving, prefix)]
-    links = _links(kind, [run for run in runs if run.type == number and run.is_chain])
-    data: dict[str, Any] = {
-        "number": number,
-        "blocks": sum(run.columns.shape[1] for run in runs if run.type == number),
-        "equations": ", ".join(program.equations),
-        "is_angle": ", ".join(
-            str(int(item.unit == "rad")) for item in program.coordinates[: kind.own]
-        ),
-        "determined": ", ".join(coordinates[: kind.own]),
-        "read": ", ".join(coordinates[kind.own :]) or "nothing",
-        "functions": "\n".join(lines),
-        "coupling": "\n".join(f"    {line}" for line in _coupling(kind, entries)),
-        "is_chain": any(run.is_chain for run in runs if run.type == number),
-        "taking": "\n".join(f"        {line}" for line in _taking(kind, entries)),
+        lines += ["", *evaluator(name, kind.code, listing, names, prefix)]
+    return lines, frozenset(called)
+
+
+def _chain(kind: BlockType, chains: Sequence[Run]) -> dict[str, Any]:
+    """Return what the function of blocks that need each other consists of."""
+    coupled, links = kind.coupled(), _links(kind, chains)
+    start = [f"before[{k}] = all[at->columns[{slot}][first]];" for k, slot in enumerate(coupled)]
+    handing_on = [f"before[{k}] = x[{slot}][lane];" for k, slot in enumerate(links)]
+    return {
+        "n_coupled": len(coupled),
+        "taking": indented(_taking(kind), 2),
         "is_linked": bool(links),
-        "start": "\n".join(
-            f"    before[{k}] = all[at->columns[{slot}][first]];"
-            for k, slot in enumerate(kind.coupled())
-        ),
-        "handing_on": "\n".join(
-            f"        before[{k}] = x[{slot}][lane];" for k, slot in enumerate(links)
-        ),
-        "n_coupled": len(kind.coupled()),
-        "own": kind.own,
+        "start": indented(start, 1 if links else 2),
+        "handing_on": indented(handing_on, 2),
     }
-    sizes = {
-        "slots": len(coordinates),
-        "rows": kind.own,
-        "entries": len(pattern),
-        "parameters": len(program.parameters),
-        "factors": len(solving.factors),
-        "determinants": len(plan.determinants),
-    }
-    largest = max((len(block.rows) for block in plan.blocks), default=0)
-    return _Written(
-        fill("c/block_type.c.jinja", data), frozenset(called), sizes, data["is_chain"], largest
-    )
+
+
+def _about(kind: BlockType) -> list[str]:
+    """Return the lines that say what a block is made of."""
+    program = kind.code.program
+    names = [item.name for item in program.coordinates]
+    lines = labelled("by", program.equations) + labelled("for", names[: kind.own])
+    return lines + labelled("given", names[kind.own :]) if names[kind.own :] else lines
 
 
 def _identifier(name: str) -> str:
@@ -218,11 +232,11 @@ def _identifier(name: str) -> str:
     return name.replace(" ", "_").replace(".", "_").replace("'", "_prime")
 
 
-def _coupling(kind: BlockType, entries: Sequence[tuple[int, int, Any]]) -> list[str]:
+def _coupling(kind: BlockType) -> list[str]:
     """Return the lines that take the columns of earlier blocks off the right side."""
     lines = [
         f"right[{row}][lane] -= {_entry(number, value)} * x[{column}][lane];"
-        for number, (row, column, value) in enumerate(entries)
+        for number, (row, column, value) in enumerate(jacobian_entries(kind.code))
         if column >= kind.own
     ]
     if not lines:
@@ -230,12 +244,12 @@ def _coupling(kind: BlockType, entries: Sequence[tuple[int, int, Any]]) -> list[
     return lines if any("at->" in line for line in lines) else ["(void)at;", *lines]
 
 
-def _taking(kind: BlockType, entries: Sequence[tuple[int, int, Any]]) -> list[str]:
+def _taking(kind: BlockType) -> list[str]:
     """Return the lines that write down the columns of earlier blocks."""
     place = {column: k for k, column in enumerate(kind.coupled())}
     return [
         f"taken[{place[column]}][{row}][lane] = {_entry(number, value)};"
-        for number, (row, column, value) in enumerate(entries)
+        for number, (row, column, value) in enumerate(jacobian_entries(kind.code))
         if column in place
     ]
 
