@@ -111,7 +111,9 @@ async function copied(text) {
 
 const points = {
   build(panel) {
-    const table = tableOf(['point', 'what', 'path', 'x', 'y', 'speed', 'acceleration']);
+    const unit = player.data.lengthUnit;
+    const titles = [`x [${unit}]`, `y [${unit}]`, `|v| [${unit}/s]`, `|a| [${unit}/s²]`];
+    const table = tableOf(['point', 'path', ...titles, 'what']);
     this.table = table;
     this.rows = [];
     for (const point of stage.points) this.addRow(point);
@@ -125,7 +127,7 @@ const points = {
     box.addEventListener('change', () => stage.toggleTrace(point));
     const holder = cell('');
     holder.append(box);
-    row.append(cell(point.name, 'th'), cell(point.kind), holder, cell(''), cell(''), cell(''), cell(''));
+    row.append(cell(point.name, 'th'), holder, cell(''), cell(''), cell(''), cell(''), cell(point.kind));
     row.addEventListener('pointerenter', () => stage.hover(point));
     row.addEventListener('pointerleave', () => stage.hover(null));
     box.addEventListener('focus', () => stage.hover(point));
@@ -166,7 +168,7 @@ const points = {
       const { velocity, acceleration } = ratesInWorld(state, point.frame, point.point);
       const values = [x, y, Math.hypot(...velocity), Math.hypot(...acceleration)];
       values.forEach((value, k) => {
-        row.cells[3 + k].textContent = k > 1 && !state.isFound ? '–' : numberText(value);
+        row.cells[2 + k].textContent = k > 1 && !state.isFound ? '–' : numberText(value);
       });
     }
   },

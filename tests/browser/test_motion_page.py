@@ -256,6 +256,21 @@ def test_that_a_point_of_ones_own_is_traced(open_page: Any) -> None:
     page.close()
 
 
+def test_that_the_numbers_of_points_have_units_and_are_in_sight(open_page: Any) -> None:
+    page = open_page(four_bar("points", 1.0))
+    page.get_by_role("tab", name="Points").click()
+    panel = page.locator("#panel-points")
+    titles = panel.locator("thead th")
+    units = ["x [m]", "y [m]", "|v| [m/s]", "|a| [m/s²]"]
+    assert titles.all_inner_texts() == ["point", "path", *units, "what"]
+    edge, last = panel.bounding_box(), titles.nth(5).bounding_box()
+    assert last["x"] + last["width"] <= edge["x"] + edge["width"]
+    # The crank has length 1 and turns at 1 rad/s.
+    pin = panel.locator("tbody tr", has=page.get_by_role("rowheader", name="P", exact=True))
+    assert pin.locator("td").all_inner_texts()[3:] == ["1.000000", "1.000000", "Revolute"]
+    page.close()
+
+
 def test_that_plots_hold_the_numbers_of_the_solution(open_page: Any, example_named: Any) -> None:
     page = open_page("wrecker_boom")
     example = example_named("wrecker_boom")
