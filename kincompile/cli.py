@@ -183,6 +183,11 @@ def _motion_options(command: Callable[..., None]) -> Callable[..., None]:
             metavar="NAME=VALUE",
             help="Value of a parameter; may be given several times.",
         ),
+        click.option(
+            "--through",
+            type=click.Choice(["smooth"]),
+            help="Go on past a bifurcation, along the smooth branch.",
+        ),
     )
     for option in reversed(options):
         command = option(command)
@@ -201,6 +206,7 @@ def run(
     end: float | None,
     points: int | None,
     assignments: tuple[str, ...],
+    through: str | None,
     analysis: str | None,
     output: str | None,
 ) -> None:
@@ -222,7 +228,7 @@ def run(
     times = _times(mechanism, end, points)
     module = kc.compile(mechanism)
     with progress_bar() as progress:
-        solution = kc.solve(module, times, values, progress=progress)
+        solution = kc.solve(module, times, values, through=through, progress=progress)
     if output is None:
         _print(summary(solution) + "\n")
     else:
@@ -357,6 +363,7 @@ def view(
     end: float | None,
     points: int | None,
     assignments: tuple[str, ...],
+    through: str | None,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
 
@@ -369,9 +376,9 @@ def view(
         require_writable(output)
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
-    values = _values(assignments)
     read = [_read(model) for model in models]
-    pages = [kc.page(model, t=_times(model, end, points), p=values) for model in read]
+    options: dict[str, Any] = {"p": _values(assignments), "through": through}
+    pages = [kc.page(model, t=_times(model, end, points), **options) for model in read]
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:
         click.echo(f"Wrote {path}", err=True)

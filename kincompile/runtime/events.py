@@ -230,9 +230,9 @@ def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
         )
     return (
         f"Bifurcation at t = {t:.10g}: Phi_q is singular, but velocities stay finite: {moving} may "
-        "go on in two ways. kc.solve(..., through='smooth') goes on along the smooth branch; "
-        "otherwise end the motion before this time, change a length slightly, or drive one of "
-        "these bodies near this time."
+        "go on in two ways. kc.solve(..., through='smooth'), or --through smooth, goes on along "
+        "the smooth branch; otherwise end the motion before this time, change a length slightly, "
+        "or drive one of these bodies near this time."
     )
 
 

@@ -96,6 +96,7 @@ def page(
     *,
     t: ArrayLike | None = None,
     p: Mapping[str, float] | None = None,
+    through: str | None = None,
 ) -> Page:
     """Return a page that shows a mechanism, its motion and its numbers.
 
@@ -110,6 +111,8 @@ def page(
         Times to solve for; without, those of the model.
     p
         Parameters to solve with, by name; others have their defaults.
+    through : {"smooth"}, optional
+        Go on past a bifurcation, as `kc.solve` does.
 
     Raises
     ------
@@ -122,7 +125,7 @@ def page(
     system = system_of(model)
     if solution is None:
         times = np.linspace(0, system.end, system.points) if t is None else t
-        solution, message = _solved(system, times, p)
+        solution, message = _solved(system, times, p, through)
     else:
         _require_motion_of(system, solution)
         message = solution.message
@@ -152,12 +155,15 @@ def _require_motion_of(system: ConstraintSystem, solution: Solution) -> None:
 
 
 def _solved(
-    system: ConstraintSystem, t: ArrayLike, p: Mapping[str, float] | None
+    system: ConstraintSystem,
+    t: ArrayLike,
+    p: Mapping[str, float] | None,
+    through: str | None,
 ) -> tuple[Solution | None, str]:
     """Compile and solve a system, as far as that goes, and say how far."""
     try:
         module = compile_model(system)
     except StructuralError as error:
         return None, str(error)
-    solution = solve(module, t, p)
+    solution = solve(module, t, p, through=through)
     return solution, solution.message

@@ -147,3 +147,32 @@ def test_that_a_warning_is_a_message_without_a_line_of_code(process, pendulum):
     assert done.stderr.startswith("Warning: 'pendulum' is redundant: ")
     assert "pin2" in done.stderr
     assert ".py" not in done.stderr
+
+
+PARALLELOGRAM = """
+import kincompile as kc
+
+m = kc.Mechanism("parallelogram", end=6.0, points=61)
+i, j = m.body("i", guess=(0, 0, 1)), m.body("j", guess=(0.5, 0.8, 0))
+k = m.body("k", guess=(2, 0, 1))
+m.add(kc.Revolute("A", m.ground, (0, 0), i, (0, 0)))
+m.add(kc.Revolute("B", i, (1, 0), j, (0, 0)))
+m.add(kc.Revolute("C", j, (2, 0), k, (1, 0)))
+m.add(kc.Revolute("D", m.ground, (2, 0), k, (0, 0)))
+m.add(kc.AbsoluteAngle("motor", i, 1 + kc.t))
+"""
+
+
+def test_that_a_motion_goes_through_a_bifurcation_where_it_is_told_to(process, tmp_path):
+    model, table, page = (tmp_path / name for name in ("model.py", "motion.csv", "page.html"))
+    model.write_text(PARALLELOGRAM)
+    stopped = process("run", model)
+    assert stopped.returncode == 3
+    assert "--through smooth, goes on along the smooth branch" in stopped.stderr
+    for command, output in (("run", table), ("view", page)):
+        done = process(command, model, "--through", "smooth", "-o", output)
+        assert (done.returncode, output.exists()) == (0, True)
+        assert "Warning: parallelogram goes through a bifurcation at t = 2.14159265" in done.stderr
+    # Opposite sides stay parallel.
+    for row in rows_of(table):
+        assert float(row["phi_k"]) == pytest.approx(1 + float(row["t"]), abs=1e-9)
