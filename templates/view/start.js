@@ -237,6 +237,7 @@ function showState(state) {
 function start() {
   byId('stage').hidden = !hasBodies;
   byId('plain').hidden = hasBodies;
+  byId('pointing').hidden = !hasBodies;
   byId('tab-points').hidden = !hasBodies;
   byId('names').parentElement.hidden = !hasBodies;
   showMessages();

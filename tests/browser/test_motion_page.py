@@ -117,6 +117,17 @@ def test_that_the_page_says_nothing_and_asks_for_nothing(open_page: Any, name: s
     page.close()
 
 
+@pytest.mark.parametrize(("name", "has_bodies"), [("four_bar", True), ("problem_3_5_6", False)])
+def test_that_what_is_for_bodies_is_shown_where_there_are_some(
+    open_page: Any, name: str, has_bodies: bool
+) -> None:
+    page = open_page(name)
+    for place in ("#canvas", "#pointing", "#names", "#tab-points"):
+        assert page.locator(place).is_visible() is has_bodies
+    assert page.locator("#plain").is_visible() is not has_bodies
+    page.close()
+
+
 def test_that_play_moves_the_bodies_and_a_pause_stops_at_a_solved_time(
     open_page: Any, example_named: Any
 ) -> None:
