@@ -76,21 +76,3 @@ class LaneCode:
 def has_planned_solve(module: ModuleType) -> bool:
     """Return whether a module can be run on its lanes."""
     return "solve" in getattr(module, "LANES", {})
-
-
-def missing_lanes(module: ModuleType, wanted: str, instead: str) -> str:
-    """Say that a module cannot do what needs the lanes, and what to do.
-
-    Parameters
-    ----------
-    module
-        A module without a planned solve on lanes.
-    wanted, instead
-        What the caller asked for, and what does the same with any module.
-    """
-    if getattr(module, "FORM", "") == "grouped":
-        return (
-            f"{module.NAME} is in the grouped form, which goes from point to point and has no "
-            f"{wanted}: {instead}, or compile it with form='inline'."
-        )
-    return f"{module.NAME} has no planned solve for {wanted}: {instead}."

@@ -27,7 +27,7 @@ from kincompile.errors import (
 from kincompile.runtime.events import branch_switch, locate, singular_start
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.inputs import Inputs, read_inputs
-from kincompile.runtime.lanes import has_planned_solve, missing_lanes
+from kincompile.runtime.lanes import has_planned_solve
 from kincompile.runtime.large import LargeMarch, LargeState
 from kincompile.runtime.march import (
     SMALL_ERROR,
@@ -45,7 +45,7 @@ from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.solution import Solution
 from kincompile.runtime.staged import is_staged
 from kincompile.runtime.status import Status
-from kincompile.runtime.variants import read_variants, solve_variants
+from kincompile.runtime.variants import read_variants, solve_in_turn, solve_variants
 from kincompile.runtime.verdict import verdict
 
 if TYPE_CHECKING:
@@ -141,10 +141,16 @@ def solve(
     on_grid = _takes_grid(module, inputs.t.size, method)
     if through not in (None, "smooth"):
         raise InputError(f"through is {through!r}: give 'smooth', or nothing.")
+
+    def solve_one(inputs: Inputs, progress: Progress | None = None) -> Solution:
+        return _solve_one(inputs, on_grid, method is None, through == "smooth", progress)
+
     if sets is None:
-        solution = _solve_one(inputs, on_grid, method is None, through == "smooth", progress)
-    else:
+        solution = solve_one(inputs, progress)
+    elif has_planned_solve(module):
         solution = solve_variants(inputs, sets, progress)
+    else:
+        solution = solve_in_turn(inputs, sets, solve_one, progress)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution
@@ -185,7 +191,10 @@ def _takes_grid(module: ModuleType, points: int, method: str | None) -> bool:
     if method not in (None, "grid", "march"):
         raise InputError(f"method is {method!r}: give 'grid', 'march', or nothing.")
     if method == "grid" and not has_planned_solve(module):
-        raise InputError(missing_lanes(module, "method='grid'", "use 'march'"))
+        raise InputError(
+            f"{module.NAME} goes from point to point, as all redundant mechanisms and those in the "
+            "grouped form do: use method='march', or compile it with form='inline'."
+        )
     return method == "grid" or (
         method is None and points >= SMALLEST_GRID and has_planned_solve(module)
     )

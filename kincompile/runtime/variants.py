@@ -16,7 +16,7 @@ from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.runtime.coarse import KINK, SMOOTH
 from kincompile.runtime.grid import SMALLEST_DETERMINANT
-from kincompile.runtime.lanes import LaneCode, has_planned_solve, missing_lanes
+from kincompile.runtime.lanes import LaneCode
 from kincompile.runtime.march import SMALL_ERROR, TOO_NEAR, State, advance, complete, start
 from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import problem
@@ -58,8 +58,6 @@ def read_variants(module: ModuleType, p: object) -> Array | None:
             f"p has shape {p.shape} and type {p.dtype}: give real numbers of shape "
             f"(B, 1, {len(module.PARAMETERS)}) for B variants of {listed(module.PARAMETERS)}."
         )
-    if not has_planned_solve(module):
-        raise InputError(missing_lanes(module, "variants", "call solve once for each of them"))
     sets = np.ascontiguousarray(p[:, 0], dtype=np.float64)
     bad = np.argwhere(~np.isfinite(sets))
     if bad.size:
@@ -122,6 +120,25 @@ def solve_variants(
             _solve_chunk(inputs, sets[chunk], arrays, chunk)
             if progress:
                 progress(chunk.stop, count)
+    return _solution(inputs, sets, arrays)
+
+
+def solve_in_turn(
+    inputs: Inputs,
+    sets: Array,
+    alone: Callable[[Inputs], Solution],
+    progress: Callable[[int, int], object] | None,
+) -> Solution:
+    """Solve variants of a module that has no lanes, one after the other, as `alone` does."""
+    arrays = _Arrays.over(inputs, len(sets))
+    for variant, p in enumerate(sets):
+        solution = alone(replace(inputs, p=p))
+        arrays.motion[..., variant] = solution.q, solution.q_dot, solution.q_ddot
+        arrays.status[:, variant] = solution.status
+        arrays.residual[:, variant] = solution.residual
+        arrays.iterations[:, variant] = solution.iterations
+        if progress:
+            progress(variant + 1, len(sets))
     return _solution(inputs, sets, arrays)
 
 

@@ -30,6 +30,13 @@ NAMED_BODIES = 6
 LOCATED = 1e-6
 """How exactly an event is located in time."""
 
+NOT_ASSEMBLED = (
+    "No position was found: the mechanism cannot be assembled at this time (change lengths, or "
+    "what the drivers demand), or the guess is too far away (give one nearer to the assembled "
+    "mechanism; kc.assemblies(module) looks for positions)."
+)
+"""What a first point that does not converge means, and what to do: there is no motion yet."""
+
 MET = 1e-9
 """Residual, relative to the largest, up to which an equation counts as met."""
 
@@ -92,6 +99,8 @@ def _why(outcome: Outcome, events: Sequence[Event], t: float) -> str:
 
     Without one, what the status may mean is said in general, and the last event on the way.
     """
+    if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
+        return NOT_ASSEMBLED
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
     if not events or outcome.state is None:
         return general

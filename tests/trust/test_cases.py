@@ -59,8 +59,6 @@ def test_the_cases_of_the_textbook(
 
 def test_that_a_variant_ends_where_it_does_alone(example_named, compiled_for):
     module = compiled_for(example_named("example_3_7_5").model)
-    if not hasattr(module, "LANES"):
-        pytest.skip("the grouped form has no variants")
     rods = np.array([0.5, 0.8, 1.0, 1.5])
     t = np.linspace(0, 7, 100)
     together = kc.solve(module, t, p=rods.reshape(-1, 1, 1))

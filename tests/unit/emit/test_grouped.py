@@ -247,12 +247,21 @@ def test_drivers_and_profiles_of_one_structure_are_one_piece_of_code():
             np.testing.assert_allclose(found, known, rtol=1e-12, atol=1e-12)
 
 
-def test_what_needs_all_points_at_once_is_refused_with_what_to_do():
+def test_that_a_grid_is_refused_with_what_to_do():
     module = kc.compile(loops(2, "equation"), form="grouped")
-    with pytest.raises(kc.InputError, match=r"grouped form.* no method='grid': use 'march', or"):
+    with pytest.raises(kc.InputError, match=r"grouped form do: use method='march', or compile it"):
         kc.solve(module, [0.0, 0.1], method="grid")
-    with pytest.raises(kc.InputError, match=r"no variants: call solve once .* form='inline'"):
-        kc.solve(module, [0.0, 0.1], p=np.ones((2, 1, 1)))
+
+
+def test_that_variants_are_solved_one_after_the_other(example_named):
+    t, sets = np.linspace(0, 1, 5), np.array([[10, 26, 18, 20, 1.5]] * 3)[:, np.newaxis]
+    sets[1, 0, 1], sets[2, 0, 1] = 100.0, 25.0  # a coupler too long to be assembled, and a good one
+    found, known = (kc.solve(module, t, p=sets) for module in both(example_named("four_bar").model))
+    np.testing.assert_array_equal(found.status, known.status)
+    np.testing.assert_allclose(found.q[[0, 2]], known.q[[0, 2]], atol=1e-12)
+    np.testing.assert_allclose(found.q_ddot[[0, 2]], known.q_ddot[[0, 2]], atol=1e-10)
+    assert not found.success
+    assert found.message == known.message
 
 
 def test_an_unknown_form_is_refused():
