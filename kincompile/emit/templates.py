@@ -47,7 +47,6 @@ def _environment() -> Environment:
     )
 
 
-@cache
 def read(name: str) -> str:
     """Return the text of a file below the folder of templates, as it is: a script, a style sheet.
 
