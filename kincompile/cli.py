@@ -371,7 +371,7 @@ def view(
     a page in a folder, whose index.html links them. Where the motion does not converge, the page
     shows what was found, or the start guess, and the exit code is 3.
     """
-    is_page = Path(output).suffix == ".html"
+    is_page = Path(output).suffix in (".html", ".htm")
     if is_page:
         require_writable(output)
     if is_page and len(models) > 1:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from kincompile.view.page_data import as_json, page_data
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
-    from pathlib import Path
 
     from numpy.typing import ArrayLike
 
@@ -75,8 +75,10 @@ class Page:
         Raises
         ------
         InputError
-            When the file cannot be written; says why.
+            When the name does not end in .html or .htm, or the file cannot be written; says why.
         """
+        if Path(path).suffix not in (".html", ".htm"):
+            raise InputError(f"cannot write {path}: end its name in .html")
         return write_atomically(path, self.html)
 
     def _repr_html_(self) -> str:

@@ -1,11 +1,14 @@
 import pytest
 
+import kincompile as kc
 
-def test_that_a_page_is_written(kincompile, pendulum, tmp_path):
-    done = kincompile("view", pendulum, "-o", tmp_path / "page.html")
+
+@pytest.mark.parametrize("name", ["page.html", "page.htm"])
+def test_that_a_page_is_written(kincompile, pendulum, tmp_path, name):
+    done = kincompile("view", pendulum, "-o", tmp_path / name)
     assert (done.exit_code, done.stdout) == (0, "")
-    assert done.stderr == f"Wrote {tmp_path / 'page.html'}\n"
-    html = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert done.stderr == f"Wrote {tmp_path / name}\n"
+    html = (tmp_path / name).read_text(encoding="utf-8")
     assert html.startswith("<!DOCTYPE html>")
     assert "<title>pendulum</title>" in html
 
@@ -69,3 +72,10 @@ def test_that_wrong_usage_is_told(kincompile, pendulum, tmp_path, arguments, mes
     assert done.exit_code == 2
     assert message in done.stderr
     assert not (tmp_path / "folder").exists()
+
+
+def test_that_a_page_is_not_written_under_the_name_of_something_else(pendulum, tmp_path):
+    page = kc.page(kc.read_model(pendulum))
+    with pytest.raises(kc.InputError, match=r"cannot write .*page\.png: end its name in \.html"):
+        page.write(tmp_path / "page.png")
+    assert not (tmp_path / "page.png").exists()
