@@ -44,7 +44,7 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        When the suffix is another, or the file cannot be written.
+        When the suffix is another, the file cannot be written, or a table is asked for of variants.
     """
     require_known_suffix(path)
     return write_atomically(path, _WRITERS[Path(path).suffix.lower()](solution))
@@ -64,6 +64,11 @@ def require_known_suffix(path: str | os.PathLike[str]) -> None:
 
 def _csv(solution: Solution) -> str:
     """Give the table; every number with as many digits as it takes to read it back exactly."""
+    if solution.q.ndim > 2:
+        raise InputError(
+            f"{solution.name}: a .csv holds one motion, and these are {len(solution.q)} variants; "
+            "write .npz or .json"
+        )
     titles = [f"t [{TIME_UNIT}]"]
     for name, (unit, _) in solution.labelled_columns().items():
         titles.append(f"{name} [{unit}]" if unit else name)
@@ -108,7 +113,7 @@ def _json(solution: Solution) -> str:
         "coordinates": solution.coordinates,
         "equations": solution.equations,
         "units": solution.units,
-        "parameters": solution.parameters,
+        "parameters": {k: np.asarray(v).tolist() for k, v in solution.parameters.items()},
         "statuses": {str(int(status)): status.sentence for status in Status},
         "t": solution.t.tolist(),
         "q": _nullable(solution.q),

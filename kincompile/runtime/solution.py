@@ -181,6 +181,8 @@ class Solution(LabelledViews):
         """Give the name, the grid and the outcome in one line."""
         ends = f"t = {self.t[0]:g}" + (f" to {self.t[-1]:g}" if self.t.size > 1 else "")
         points = f"{self.t.size} point" + ("s" if self.t.size > 1 else "")
+        if self.q.ndim > 2:
+            points = f"{len(self.q)} variants of {points}"
         return f"<Solution of {self.name}: {points}, {ends}; {self._outcome()}>"
 
     def _outcome(self) -> str:
@@ -188,7 +190,7 @@ class Solution(LabelledViews):
         if self.success:
             return f"converged, largest residual {np.max(self.residual):.1e}"
         good = np.count_nonzero(self.status == 0)
-        return f"failed, {good} of {self.t.size} points converged; see .message"
+        return f"failed, {good} of {self.status.size} points converged; see .message"
 
 
 def _range(values: NDArray[np.float64]) -> tuple[float, ...]:

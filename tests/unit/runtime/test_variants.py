@@ -1,5 +1,7 @@
 """Many parameter sets at once: each as if it were alone, and none disturbed by another."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -77,3 +79,23 @@ def test_that_a_value_that_is_not_finite_is_named(four_bar, sets):
     name = four_bar.PARAMETERS[1]
     with pytest.raises(kc.InputError, match=f"parameter {name!r} of variant 5 is nan"):
         kc.solve(four_bar, 0.0, p=p)
+
+
+def test_that_the_description_counts_the_points_of_all(four_bar, sets):
+    solution = kc.solve(four_bar, [0.0, 0.1], p=sets)
+    assert repr(solution) == (
+        "<Solution of four_bar: 12 variants of 2 points, t = 0 to 0.1; failed, 22 of 24 points "
+        "converged; see .message>"
+    )
+
+
+def test_that_files_hold_all_variants_and_a_table_is_refused(four_bar, sets, tmp_path):
+    solution = kc.solve(four_bar, [0.0, 0.1], p=sets[:2])
+    with np.load(kc.write(solution, tmp_path / "motion.npz")) as arrays:
+        np.testing.assert_array_equal(arrays["q"], solution.q)
+    document = json.loads(kc.write(solution, tmp_path / "motion.json").read_text(encoding="utf-8"))
+    np.testing.assert_array_equal(document["q"], solution.q)
+    assert document["parameters"]["b"] == sets[:2, 0, four_bar.PARAMETERS.index("b")].tolist()
+    with pytest.raises(kc.InputError, match=r"holds one motion, and these are 2 variants; write"):
+        kc.write(solution, tmp_path / "motion.csv")
+    assert not (tmp_path / "motion.csv").exists()
