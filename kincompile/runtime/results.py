@@ -12,6 +12,7 @@ import numpy as np
 from kincompile.errors import InputError
 from kincompile.files import write_atomically
 from kincompile.runtime.labelled import TIME_UNIT
+from kincompile.runtime.solution import Solution, require_solution
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
-
-    from kincompile.runtime.solution import Solution
 
 
 def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
@@ -46,6 +45,7 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
     InputError
         When the suffix is another, the file cannot be written, or a table is asked for of variants.
     """
+    require_solution(solution)
     require_known_suffix(path)
     return write_atomically(path, _WRITERS[Path(path).suffix.lower()](solution))
 

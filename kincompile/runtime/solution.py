@@ -197,3 +197,18 @@ def _range(values: NDArray[np.float64]) -> tuple[float, ...]:
     """Give the smallest and the largest of the values that were found."""
     found = values[np.isfinite(values)]
     return (float(found.min()), float(found.max())) if found.size else (np.nan, np.nan)
+
+
+def require_solution(value: object) -> None:
+    """Refuse what is no solution.
+
+    Raises
+    ------
+    InputError
+        Says what was given, and where solutions come from.
+    """
+    if not isinstance(value, Solution):
+        raise InputError(
+            f"expected a Solution, got {type(value).__name__}: solve first, "
+            "solution = kc.solve(kc.compile(model), t)."
+        )

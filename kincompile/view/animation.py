@@ -15,6 +15,7 @@ from kincompile.model.mechanism import system_of
 from kincompile.model.origins import model_of
 from kincompile.names import listed, suggestion
 from kincompile.runtime.labelled import TIME_UNIT
+from kincompile.runtime.solution import Solution, require_solution
 from kincompile.view.marks import Place
 from kincompile.view.mechanism_plot import draw, move, require_bodies
 from kincompile.view.placed import world
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
-    from kincompile.runtime.solution import Solution
     from kincompile.view.shapes import Drawing
 
 WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
@@ -141,6 +141,7 @@ def frame_rows(solution: Solution, seconds: float | None) -> tuple[NDArray[np.in
 
 def _moving(solution: Solution, model: Mechanism | ConstraintSystem | None) -> ConstraintSystem:
     """Return the system whose motion it is, if that can be shown."""
+    require_solution(solution)
     name = solution.name
     if solution.q.ndim != 2:
         raise InputError(

@@ -14,6 +14,7 @@ from kincompile.emit.templates import fill, read
 from kincompile.errors import InputError, StructuralError
 from kincompile.files import write_atomically
 from kincompile.model.mechanism import system_of
+from kincompile.runtime.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.view.newton import newton_script
 from kincompile.view.page_data import as_json, page_data
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
-    from kincompile.runtime.solution import Solution
 
 STYLES = ("vendor/uplot.css", "style.css", "newton.css")
 """Style sheets, in order."""
@@ -144,6 +144,7 @@ def page(
 
 def _require_motion_of(system: ConstraintSystem, solution: Solution) -> None:
     """Refuse what is not one motion of this system."""
+    require_solution(solution)
     if solution.coordinates != tuple(item.name for item in system.coordinates):
         raise InputError(
             f"this Solution is one of {solution.name}, whose coordinates are not those of "

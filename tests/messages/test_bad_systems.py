@@ -1,5 +1,6 @@
 """What is wrong with a system of free equations, and with what is given instead of a model."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,18 @@ def test_that_a_system_is_frozen() -> None:
 def test_that_what_is_no_model_is_refused(use: Any, what: Any) -> None:
     with pytest.raises(kc.ModelError, match=r"is not a model: give a kc.Mechanism or a"):
         use(what)
+
+
+@pytest.mark.parametrize("what", [None, 5, [], system(), kc.Mechanism("m")], ids=repr)
+def test_that_what_is_no_solution_is_refused(tmp_path: Path, what: Any) -> None:
+    uses: Any = [
+        lambda: kc.write(what, tmp_path / "motion.csv"),
+        lambda: kc.animate(what),
+        lambda: kc.page(system(), what or 0),
+    ]
+    for use in uses:
+        with pytest.raises(kc.InputError, match=r"expected a Solution, got \w+: solve first"):
+            use()
 
 
 def test_that_an_unknown_target_is_refused() -> None:
