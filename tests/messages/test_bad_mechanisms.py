@@ -447,7 +447,11 @@ def test_that_all_problems_are_told_at_once_and_each_once() -> None:
     assert len(text.splitlines()) == 13
 
 
-@pytest.mark.parametrize("use", [kc.compile, kc.emit, lambda m: m.Phi, lambda m: m.q], ids=["compile", "emit", "Phi", "q"])
+@pytest.mark.parametrize(
+    "use",
+    [kc.compile, kc.emit, lambda m: m.Phi, lambda m: m.q],
+    ids=["compile", "emit", "Phi", "q"],
+)
 def test_that_every_use_of_a_bad_mechanism_says_so(use: Callable[..., Any]) -> None:
     with pytest.raises(kc.ModelError, match="'empty' has no constraints"):
         use(kc.Mechanism("empty"))
