@@ -137,7 +137,7 @@ def draw(
     """Draw cost against N."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 3.5), layout="constrained")
+    figure = Figure(figsize=(10, 4.4), layout="constrained")
     axes = figure.subplots(1, 3)
     for axis, what in zip(axes, (BUILD, FOUR, STEP), strict=True):
         for name, label in NAMES.items():
@@ -146,7 +146,8 @@ def draw(
             axis.loglog([n for n, _ in points], heights, "o-", label=label)
         axis.set(xlabel="four-bar loops N", title=HEADS[what + 2])
         axis.grid(alpha=0.3)
-    axes[0].legend(fontsize="x-small")
+    lines = axes[0].get_legend_handles_labels()
+    figure.legend(*lines, loc="outside lower center", ncols=2, fontsize="small")
     figure.savefig(file)
 
 
