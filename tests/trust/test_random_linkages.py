@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,9 +33,9 @@ class Linkage:
     """
 
     module: ModuleType
-    sample: Callable
-    gaps: Callable
-    assemblies: Callable
+    sample: Callable[..., Any]
+    gaps: Callable[..., Any]
+    assemblies: Callable[..., Any]
 
 
 def _bodies(q):

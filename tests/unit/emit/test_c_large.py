@@ -3,6 +3,7 @@
 import itertools
 import re
 import subprocess
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from kincompile.runtime import grid, march, newton, problem
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1")
 LINKS = ("angle", "equation", "gear", "rocker")
 TIMES = np.linspace(0.0, 0.3, 16)
-CLOSE = {"rtol": 1e-12, "atol": 1e-12}
+CLOSE: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-12}
 
 
 def add_loop(m, name, x, size):
@@ -110,7 +111,7 @@ def test_a_tile_that_is_not_full_and_mixed_types_do_no_harm(count, link, quick_c
 @pytest.mark.parametrize("chains", [3, 6])
 def test_parallel_chains_run_side_by_side_where_that_is_worth_it(chains, quick_compiler):
     m = kc.Mechanism("parallel")
-    cranks = {}
+    cranks: dict[int, Any] = {}
     for chain, k in itertools.product(range(chains), range(4)):
         crank, _ = add_loop(m, f"{chain}_{k}", 5.0 * k, 1 + 0.03 * chain + 0.01 * k)
         if k == 0:
@@ -156,7 +157,8 @@ def test_the_method_can_be_forced(quick_compiler):
 
 
 def test_steps_that_are_too_long_are_divided_by_the_careful_march(quick_compiler):
-    solution = assert_same_motion(*both(loops(6, "angle")), np.linspace(0, 4, 5))
+    native, module = both(loops(6, "angle"))
+    solution = assert_same_motion(native, module, np.linspace(0, 4, 5))
     assert solution.success, solution.message
     assert solution.statistics["marched"] > 0
 
