@@ -1,5 +1,6 @@
 """No path passes a bifurcation unnoticed: march, grid, variants, compiled march, grouped form."""
 
+import itertools
 import warnings
 
 import numpy as np
@@ -60,8 +61,14 @@ def check(modules, path, t, flat=FLAT):
 
 
 @pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize("points", [7, 100, 1000, pytest.param(10_000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("end", [FLAT + 0.5, 2 * FLAT, 3.034, 6.0])
+@pytest.mark.parametrize(
+    ("points", "end"),
+    [
+        *itertools.product([7, 100, 1000], [FLAT + 0.5, 2 * FLAT, 3.034, 6.0]),
+        pytest.param(10_000, FLAT + 0.5, marks=pytest.mark.slow),
+        pytest.param(10_000, 3.034, marks=pytest.mark.slow),
+    ],
+)
 def test_that_the_flat_parallelogram_is_noticed(parallelograms, path, points, end):
     check(parallelograms, path, np.linspace(0, end, points))
 

@@ -275,7 +275,7 @@ def same_modulo_turns(q, other):
     return np.max(np.abs(difference), axis=-1) < 1e-6
 
 
-@pytest.mark.parametrize("count", [6, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [6, pytest.param(12, marks=pytest.mark.slow)])
 def test_the_number_of_assemblies_by_intersecting_circles(linkage, count):
     random = np.random.default_rng(count)
     for _ in range(count):

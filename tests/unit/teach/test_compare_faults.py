@@ -191,7 +191,7 @@ def tally(quantity: str, step: int) -> dict[str, int]:
 
 # The slow run judges about a thousand: all four thousand take a quarter of an hour.
 @pytest.mark.parametrize(
-    "step", [25, pytest.param(4, marks=pytest.mark.slow)], ids=["some", "a thousand"]
+    "step", [35, pytest.param(4, marks=pytest.mark.slow)], ids=["some", "a thousand"]
 )
 @pytest.mark.parametrize("quantity", ["Phi_q", "gamma"])
 def test_that_single_faults_are_called_different_and_named(quantity: str, step: int) -> None:
