@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from kincompile.structure.stages import Stage
 
     Index = NDArray[np.intp]
-    Key = tuple[bytes, ...]
 
 LARGEST_TYPES = 400
 """Equations of all types together up to which their code is worth a compiler's time."""

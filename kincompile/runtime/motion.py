@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -13,12 +13,16 @@ from kincompile.runtime.status import Status
 from kincompile.runtime.verdict import unassembled
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from kincompile.runtime.events import Event
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.march import Outcome
     from kincompile.runtime.problem import Vector
+
+    Progress: TypeAlias = Callable[[int, int], object]
 
 
 @dataclass(slots=True, eq=False)
