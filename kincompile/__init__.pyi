@@ -1,8 +1,11 @@
 """The public names as a type checker sees them: `__init__.py` loads them when they are used."""
 
+from kincompile.compare.compare import compare as compare
+from kincompile.compare.compare import compare_file as compare_file
 from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
+from kincompile.derivation.derivation import derivation as derivation
 from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
 from kincompile.errors import ContractError as ContractError
 from kincompile.errors import InputError as InputError
@@ -15,6 +18,9 @@ from kincompile.errors import SolveError as SolveError
 from kincompile.errors import StructuralError as StructuralError
 from kincompile.errors import TemplateError as TemplateError
 from kincompile.errors import UnsupportedError as UnsupportedError
+from kincompile.files.files import read as read
+from kincompile.files.files import read_analysis as read_analysis
+from kincompile.files.files import read_model as read_model
 from kincompile.model.absolute import AbsoluteAngle as AbsoluteAngle
 from kincompile.model.absolute import AbsoluteDistance as AbsoluteDistance
 from kincompile.model.absolute import AbsoluteX as AbsoluteX
@@ -27,9 +33,6 @@ from kincompile.model.expressions import alpha as alpha
 from kincompile.model.expressions import pi as pi
 from kincompile.model.expressions import t as t
 from kincompile.model.file_format import model_schema as model_schema
-from kincompile.model.files import read as read
-from kincompile.model.files import read_analysis as read_analysis
-from kincompile.model.files import read_model as read_model
 from kincompile.model.gears import Gear as Gear
 from kincompile.model.gears import RackAndPinion as RackAndPinion
 from kincompile.model.joints import Revolute as Revolute
@@ -42,18 +45,15 @@ from kincompile.model.relative import RelativeAngle as RelativeAngle
 from kincompile.model.relative import RelativeX as RelativeX
 from kincompile.model.relative import RelativeY as RelativeY
 from kincompile.model.system import ConstraintSystem as ConstraintSystem
-from kincompile.runtime.assemblies import assemblies as assemblies
-from kincompile.runtime.events import Event as Event
 from kincompile.runtime.load import load as load
 from kincompile.runtime.newton import newton as newton
-from kincompile.runtime.results import write as write
-from kincompile.runtime.solution import Solution as Solution
+from kincompile.runtime.results.solution import Solution as Solution
+from kincompile.runtime.results.write import write as write
+from kincompile.runtime.singular.assemblies import assemblies as assemblies
+from kincompile.runtime.singular.events import Event as Event
 from kincompile.runtime.solve import solve as solve
 from kincompile.runtime.status import Status as Status
-from kincompile.teach.compare import compare as compare
-from kincompile.teach.compare import compare_file as compare_file
-from kincompile.teach.derivation import derivation as derivation
-from kincompile.teach.verify import verify as verify
+from kincompile.verify.verify import verify as verify
 from kincompile.view.animation import animate as animate
 from kincompile.view.gallery import gallery as gallery
 from kincompile.view.mechanism_plot import plot_mechanism as plot_mechanism

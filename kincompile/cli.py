@@ -28,18 +28,18 @@ import numpy as np
 
 import kincompile as kc
 from kincompile.errors import InputError, InternalError, KincompileError
-from kincompile.files import require_writable, write_atomically
-from kincompile.runtime.results import require_known_suffix
-from kincompile.runtime.summary import summary
+from kincompile.runtime.results.summary import summary
+from kincompile.runtime.results.write import require_known_suffix
+from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
-    from kincompile.emit.target import Emitted
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
+    from kincompile.targets.target import Emitted
 
 DIFFERENT, USAGE_OR_MODEL, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes."""

@@ -20,12 +20,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.emit.c_large import emit_c_grouped, emit_c_large, split_into_types
-from kincompile.emit.c_target import emit_c
-from kincompile.emit.grouped import emit_grouped
-from kincompile.emit.javascript_target import emit_javascript
-from kincompile.emit.numpy_target import emit_numpy
-from kincompile.emit.octave_target import emit_octave
 from kincompile.errors import (
     InputError,
     KincompileError,
@@ -40,11 +34,17 @@ from kincompile.model.mechanism import Mechanism, system_of
 from kincompile.model.origins import remember_model
 from kincompile.names import listed
 from kincompile.runtime.load import from_source
-from kincompile.runtime.native import make_native
-from kincompile.runtime.native_large import make_native_large
+from kincompile.runtime.native.large import make_native_large
+from kincompile.runtime.native.module import make_native
 from kincompile.runtime.solve import solve
 from kincompile.structure.counting import require_square
 from kincompile.structure.report import inspect_system
+from kincompile.targets.c.large import emit_c_grouped, emit_c_large, split_into_types
+from kincompile.targets.c.library import emit_c
+from kincompile.targets.javascript.script import emit_javascript
+from kincompile.targets.numpy.grouped import emit_grouped
+from kincompile.targets.numpy.module import emit_numpy
+from kincompile.targets.octave.script import emit_octave
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -52,10 +52,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.emit.target import Emitted, Target
     from kincompile.ir.inline import InlineProgram
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.report import Inspection
+    from kincompile.targets.target import Emitted, Target
 
 LOG = logging.getLogger(__name__)
 

@@ -83,13 +83,13 @@ class SolveError(KincompileError, ArithmeticError):
     ----------
     message : str
         The time, the status and the remedy, as in ``Solution.message``.
-    solution : kincompile.runtime.solution.Solution
+    solution : kincompile.runtime.results.solution.Solution
         What was solved before the failure, with a status per point. Typed `Any` because this file
         lies on the lowest floor and knows no other module.
 
     Attributes
     ----------
-    solution : kincompile.runtime.solution.Solution
+    solution : kincompile.runtime.results.solution.Solution
         The partial solution.
     """
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.runtime.events import branch_switch, locate, singular_start
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.march import (
     SMALL_ERROR,
@@ -22,15 +21,16 @@ from kincompile.runtime.march import (
 )
 from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import Point, problem
+from kincompile.runtime.singular.events import branch_switch, locate, singular_start
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from kincompile.runtime.events import Passage
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.motion import Motion, Progress
     from kincompile.runtime.problem import Problem
+    from kincompile.runtime.singular.events import Passage
 
 
 def follow(

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.runtime.branches import signs, turned
 from kincompile.runtime.linear import solve_linear
 from kincompile.runtime.newton import Attempt, assemble, iterate, safeguarded_step
 from kincompile.runtime.problem import Point, Problem, norm
+from kincompile.runtime.singular.branches import signs, turned
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.events import Event
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.march import Outcome
     from kincompile.runtime.problem import Vector
+    from kincompile.runtime.singular.events import Event
 
     Progress: TypeAlias = Callable[[int, int], object]
 

@@ -30,7 +30,7 @@ from kincompile.runtime.lanes import has_planned_solve
 from kincompile.runtime.march import Outcome, leaves_branch
 from kincompile.runtime.motion import Motion
 from kincompile.runtime.problem import problem
-from kincompile.runtime.solution import Solution
+from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.staged import is_staged
 from kincompile.runtime.status import Status
 from kincompile.runtime.variants import read_variants, solve_in_turn, solve_variants

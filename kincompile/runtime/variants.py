@@ -20,7 +20,7 @@ from kincompile.runtime.lanes import LaneCode
 from kincompile.runtime.march import SMALL_ERROR, TOO_NEAR, State, advance, complete, start
 from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import problem
-from kincompile.runtime.solution import Solution
+from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:

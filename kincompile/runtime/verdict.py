@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.names import body_coordinates, listed
-from kincompile.runtime.events import owner_of_coordinates
+from kincompile.runtime.singular.events import owner_of_coordinates
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.events import Event
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.march import Outcome
     from kincompile.runtime.problem import Point, Vector
+    from kincompile.runtime.singular.events import Event
 
 NAMED_EQUATIONS = 3
 """How many equations a message names."""

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError, UnsupportedError, missing_package
-from kincompile.files import require_writable, write_atomically
 from kincompile.model.mechanism import system_of
 from kincompile.model.origins import model_of
 from kincompile.names import listed, suggestion
-from kincompile.runtime.labelled import TIME_UNIT
-from kincompile.runtime.solution import Solution, require_solution
+from kincompile.runtime.results.labelled import TIME_UNIT
+from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.view.marks import Place
 from kincompile.view.mechanism_plot import draw, move, require_bodies
 from kincompile.view.placed import world
 from kincompile.view.shapes import drawing
+from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
     import os

@@ -7,11 +7,11 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kincompile.emit.templates import fill, read
 from kincompile.errors import InputError
-from kincompile.files import write_atomically
 from kincompile.names import listed
+from kincompile.targets.templates import fill, read
 from kincompile.view.page_data import as_json
+from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
     import os

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from kincompile.model.origins import model_of
 from kincompile.model.system import ConstraintSystem
 from kincompile.pictures import picture_html
-from kincompile.runtime.figures import figure_html
-from kincompile.runtime.solution import Solution
+from kincompile.runtime.results.figures import figure_html
+from kincompile.runtime.results.solution import Solution
 from kincompile.view.mechanism_plot import draw, position_of
 from kincompile.view.page import page
 from kincompile.view.shapes import drawing

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
-from kincompile.emit.templates import fill, read
 from kincompile.errors import InputError, StructuralError
-from kincompile.files import write_atomically
 from kincompile.model.mechanism import system_of
-from kincompile.runtime.solution import Solution, require_solution
+from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
+from kincompile.targets.templates import fill, read
 from kincompile.view.newton import newton_script
 from kincompile.view.page_data import as_json, page_data
+from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
     import os

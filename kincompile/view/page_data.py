@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.model.system import ConstraintSystem
-    from kincompile.runtime.solution import Solution
+    from kincompile.runtime.results.solution import Solution
     from kincompile.view.shapes import Drawing
 
     Array: TypeAlias = NDArray[np.float64]

@@ -9,8 +9,8 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.emit.printers import JAVASCRIPT_FUNCTIONS, JavaScriptPrinter
 from kincompile.ir import from_sympy
+from kincompile.targets.printers import JAVASCRIPT_FUNCTIONS, JavaScriptPrinter
 
 STATES = 3
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 import kincompile as kc
 from kincompile.cli import cli
-from kincompile.model.adm_file import read_adm
+from kincompile.files.adm_file import read_adm
 
 FOLDER = Path(__file__).parent / "simengine2d"
 

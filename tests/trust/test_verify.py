@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.runtime.native import make_native
+from kincompile.runtime.native.module import make_native
 
 x, y = sympy.symbols("x y")
 

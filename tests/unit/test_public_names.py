@@ -11,7 +11,7 @@ import kincompile as kc
 
 
 @pytest.mark.parametrize(
-    "first", ["kc.Mechanism", "kc.compile", "__import__('kincompile.emit.target')"]
+    "first", ["kc.Mechanism", "kc.compile", "__import__('kincompile.targets.target')"]
 )
 def test_that_emit_is_the_function_and_not_the_subpackage(first: str) -> None:
     code = f"import kincompile as kc; {first}; print(kc.emit.__module__)"

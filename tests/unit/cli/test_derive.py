@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from kincompile.cli import DERIVATIONS
-from kincompile.teach.derivation import FORMATS
+from kincompile.derivation.derivation import FORMATS
 
 
 @pytest.mark.parametrize("ending", DERIVATIONS)

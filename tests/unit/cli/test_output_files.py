@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from kincompile.errors import InputError
-from kincompile.files import require_writable, write_atomically
+from kincompile.writing import require_writable, write_atomically
 
 
 def test_that_a_new_or_existing_file_may_be_written(tmp_path):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.runtime import c_library
+from kincompile.runtime.native import library as c_library
 
 COMPILE = """
 import sys, kincompile as kc

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from kincompile.errors import InputError
-from kincompile.files import write_atomically
+from kincompile.writing import write_atomically
 
 
 def test_text_and_bytes_arrive_as_given(tmp_path):

@@ -6,7 +6,9 @@ from pathlib import Path
 
 PROGRAM = """
 import sys
-from kincompile.runtime import load, results, solve
+from kincompile.runtime import load
+from kincompile.runtime.results import write as results
+from kincompile.runtime import solve
 module = load.load(sys.argv[1])
 solution = solve.solve(module, [0, 1])
 assert solution.success

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kincompile.errors import InputError
-from kincompile.runtime.results import write
+from kincompile.runtime.results.write import write
 from kincompile.runtime.solve import solve
 from kincompile.runtime.status import Status
 

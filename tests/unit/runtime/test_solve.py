@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kincompile.errors import SolveError
-from kincompile.runtime.solution import Solution
+from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.solve import solve
 from kincompile.runtime.status import Status
 

@@ -9,9 +9,9 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.emit.templates import read
 from kincompile.runtime.newton import iterate
 from kincompile.runtime.problem import problem
+from kincompile.targets.templates import read
 from kincompile.view.newton import MOST_COORDINATES, newton_script
 
 NODE = shutil.which("node") or shutil.which("nodejs")

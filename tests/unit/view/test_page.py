@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.emit.templates import read, template_root
+from kincompile.targets.templates import read, template_root
 from kincompile.view.page import SCRIPTS, STYLES
 
 

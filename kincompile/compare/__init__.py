@@ -1,0 +1,1 @@
+"""Comparison of hand-derived formulas with the compiler's."""

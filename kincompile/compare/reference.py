@@ -1,0 +1,225 @@
+"""The generated side of a comparison: the program of a system, evaluated at states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+from kincompile.compare.states import (
+    Array,
+    States,
+    consistent_states,
+    default_parameters,
+    is_angular,
+    random_states,
+)
+from kincompile.errors import InputError
+from kincompile.ir.from_sympy import Converter
+from kincompile.ir.graph import Graph
+from kincompile.ir.interpret import interpret, run
+from kincompile.ir.lower import lower
+from kincompile.model.matrices import Row, assemble
+from kincompile.model.mechanism import system_of
+from kincompile.names import listed, rate, suggestion
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.ir.graph import Node
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.resolve import FreeEquation, Joint
+    from kincompile.model.system import ConstraintSystem
+
+QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
+
+
+@dataclass(frozen=True, slots=True)
+class Values:
+    """Phi, nu and gamma (N, m) and Phi_q (N, m, n) at N states."""
+
+    Phi: Array
+    Phi_q: Array
+    nu: Array
+    gamma: Array
+
+    def of(self, quantity: str) -> Array:
+        """Return a quantity as matrices, shape (N, m, 1) or (N, m, n)."""
+        array: Array = getattr(self, quantity)
+        return array if quantity == "Phi_q" else array[..., None]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """The rows and columns of one constraint; a column is None where it belongs to the ground."""
+
+    constraint: Joint | FreeEquation
+    rows: tuple[int, ...]
+    columns: tuple[int | None, ...]
+
+
+class Reference:
+    """What the compiler derives from a model, ready to be evaluated anywhere.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system of free equations.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written.
+    """
+
+    def __init__(self, model: Mechanism | ConstraintSystem) -> None:
+        self.system = system_of(model)
+        self.program = lower(self.system)
+        self.coordinates = tuple(item.name for item in self.system.coordinates)
+        self.equations = self.system.equations
+        self.angular = is_angular(self.system)
+        self.defaults = default_parameters(self.system)
+        self._consistent: dict[tuple[int, ...], States | None] = {}
+        self._texts: dict[tuple[str, int, int], str] = {}
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The blocks of the constraints, in order."""
+        number = {name: k for k, name in enumerate(self.coordinates)}
+        return tuple(
+            Block(
+                item,
+                tuple(range(first, first + len(item.equation_names))),
+                tuple(None if name is None else number[name] for name in item.columns),
+            )
+            for first, item in zip(self.system.row_offsets, self.system.constraints, strict=True)
+        )
+
+    def block(self, name: str) -> Block:
+        """Return the block of a constraint by its name."""
+        for block in self.blocks:
+            if block.constraint.name == name:
+                return block
+        names = [block.constraint.name for block in self.blocks]
+        raise InputError(
+            f"there is no constraint {name!r} in {self.system.name!r}{suggestion(name, names)}; "
+            f"constraints are: {listed(names, 40)}."
+        )
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """The rows as SymPy expressions, for what people read."""
+        return assemble(self.system)
+
+    def expression(self, quantity: str, row: int, column: int) -> sympy.Expr:
+        """Return an entry as a SymPy expression."""
+        if quantity == "Phi_q":
+            entry = self.rows[row].Phi_q.get(self.coordinates[column], sympy.Integer(0))
+        else:
+            entry = getattr(self.rows[row], quantity)
+        expression: sympy.Expr = sympy.sympify(entry)
+        return expression
+
+    def text(self, quantity: str, row: int, column: int) -> str:
+        """Return an entry as people type it."""
+        key = (quantity, row, column)
+        if key not in self._texts:
+            self._texts[key] = str(self.expression(quantity, row, column))
+        return self._texts[key]
+
+    def values(self, states: States) -> Values:
+        """Evaluate the generated quantities."""
+        with np.errstate(all="ignore"):
+            return Values(*interpret(self.program, states.q, states.q_dot, states.t, states.p.T))
+
+    @cached_property
+    def random(self) -> States:
+        """Generic states, off the manifold."""
+
+        def is_usable(states: States) -> Array:
+            found = self.values(states)
+            parts = [np.isfinite(found.of(name)).all(axis=(-2, -1)) for name in QUANTITIES]
+            return np.asarray(np.logical_and.reduce(parts))
+
+        return random_states(self.system, is_usable)
+
+    def consistent(self, start: States, rows: Sequence[int]) -> States | None:
+        """Return states near `start` at which the given equations hold, with rates that fit.
+
+        Those near the random states are kept: many comparisons with one model need them.
+        """
+        if start is not self.random:
+            return self._moved_to_manifold(start, rows)
+        key = tuple(rows)
+        if key not in self._consistent:
+            self._consistent[key] = self._moved_to_manifold(start, rows)
+        return self._consistent[key]
+
+    def _moved_to_manifold(self, start: States, rows: Sequence[int]) -> States | None:
+        chosen = list(rows)
+
+        def constraints(states: States) -> tuple[Array, Array, Array]:
+            found = self.values(states)
+            return found.Phi[:, chosen], found.Phi_q[:, chosen], found.nu[:, chosen]
+
+        return consistent_states(start, constraints)
+
+    def compiled(self, expressions: Sequence[sympy.Expr]) -> Compiled:
+        """Prepare SymPy expressions of coordinates, rates, parameters and time for evaluation."""
+        graph = Graph()
+        convert = Converter(graph, graph.input).convert
+        terms = [
+            [convert(term) for term in sympy.Add.make_args(expression)]
+            for expression in expressions
+        ]
+        return Compiled(self, tuple(graph.nodes), terms)
+
+    def evaluate(self, expressions: Sequence[sympy.Expr], states: States) -> tuple[Array, Array]:
+        """Evaluate SymPy expressions once; see `Compiled.evaluate`."""
+        return self.compiled(expressions).evaluate(states)
+
+    def named(self, states: States, k: int) -> dict[str, float]:
+        """Return one of the states as numbers by name."""
+        return {name: float(np.broadcast_to(value, len(states))[k])
+                for name, value in self.inputs(states).items()}  # fmt: skip
+
+    def inputs(self, states: States) -> dict[str, Any]:
+        """Return the values of coordinates, rates, parameters and t by name, (N,) each."""
+        inputs: dict[str, Any] = {"t": states.t}
+        for k, item in enumerate(self.system.parameters):
+            inputs[item.name] = states.p[:, k]
+        for k, name in enumerate(self.coordinates):
+            inputs[name] = states.q[:, k]
+            inputs[rate(name)] = states.q_dot[:, k]
+        return inputs
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """SymPy expressions as straight-line code; `terms` are the nodes that each expression adds."""
+
+    reference: Reference
+    nodes: tuple[Node, ...]
+    terms: list[list[int]]
+
+    def evaluate(self, states: States) -> tuple[Array, Array]:
+        """Evaluate the expressions.
+
+        Returns
+        -------
+        tuple of arrays
+            Values, and the sizes of their terms: the sum of the absolute values of what is added
+            on the topmost level. Both of shape (N, number of expressions).
+        """
+        shape = (len(self.terms), len(states))
+        values, sizes = np.zeros(shape), np.zeros(shape)
+        with np.errstate(all="ignore"):
+            results = run(self.nodes, self.reference.inputs(states), self.reference.program.tables)
+            for k, nodes in enumerate(self.terms):
+                for node in nodes:
+                    values[k] += results[node]
+                    sizes[k] += np.abs(results[node])
+        return values.T, sizes.T

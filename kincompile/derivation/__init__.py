@@ -1,0 +1,1 @@
+"""The derivation of a mechanism's equations, shown."""

@@ -1,0 +1,303 @@
+"""The assembled system: unknowns, offsets, pattern, mobility, the four arrays, the three solves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from kincompile.derivation.derivation_page import anchor, counted, is_number, row_range, table
+from kincompile.derivation.document import (
+    Code,
+    Display,
+    Link,
+    Math,
+    Pattern,
+    Section,
+    Verbatim,
+    text,
+)
+from kincompile.derivation.formulas import (
+    DELTA_Q,
+    GAMMA,
+    NU,
+    PHI,
+    PHI_Q,
+    Q_DDOT,
+    Q_DOT,
+    Decimal,
+    Equated,
+    Glyph,
+    Q,
+    Row,
+    decimals,
+)
+from kincompile.structure.report import gruebler
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from kincompile.derivation.derivation_page import Page
+    from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.ir.inline import Entry
+    from kincompile.runtime.newton import NewtonResult
+
+    Rows: TypeAlias = list[tuple[Run | Runs, ...]]
+
+LARGEST_MATRIX = 9
+"""Columns up to which a matrix of numbers is written out."""
+
+WIDEST_TABLE = 30
+"""Columns of Phi_q up to which it is a square table; the entries of a larger one are listed."""
+
+MOST_COORDINATES = 12
+"""Coordinates up to which every iterate of Newton's method is written out."""
+
+ITERATE_DIGITS = 10
+
+
+def assembled_section(page: Page) -> Section:
+    """Return the part of the page on the whole system."""
+    parts = (
+        _offsets(page),
+        _pattern(page),
+        _mobility(page),
+        _vectors(page),
+        _jacobian(page),
+        _newton(page),
+        _rates(page),
+    )
+    return Section("assembled", ("The assembled system",), (), parts)
+
+
+def unknowns_section(page: Page) -> Section:
+    """Return the coordinates and parameters, with the chosen state."""
+    values, q = page.situation.values, page.shown["q"]
+    rows: Rows = [
+        (str(k), Verbatim(item.name), item.unit, _math(item.guess), _math(q[k]))
+        for k, item in enumerate(page.system.coordinates)
+    ]
+    blocks: list[Block] = [table(("column", "coordinate", "unit", "guess", "chosen state"), rows)]
+    if page.system.parameters:
+        known: Rows = [
+            (Verbatim(item.name), item.unit, _math(values[item.name]))
+            for item in page.system.parameters
+        ]
+        blocks.append(table(("parameter", "unit", "value"), known))
+    return Section("unknowns", ("Coordinates and parameters",), tuple(blocks))
+
+
+def _math(value: float, digits: int = 6) -> Math:
+    return Math(Decimal(value, digits))
+
+
+def _offsets(page: Page) -> Section:
+    rows: Rows = []
+    for item, first in zip(page.system.constraints, page.system.row_offsets, strict=True):
+        count = len(item.equation_names)
+        name = Link(f"constraint-{item.name}", Verbatim(item.name))
+        rows.append((name, str(count), str(first), row_range(first, count), str(first + 1)))
+    note = text(
+        "The row offset of a constraint is the number of equations before it: the exclusive prefix "
+        "scan of the numbers of equations. The column offset of a body is three times the number "
+        "of bodies before it."
+    )
+    header = ("constraint", "equations", "row offset", "rows from 0", "first row from 1")
+    columns: Rows = [
+        (Verbatim(body.name), str(3 * k), row_range(3 * k, 3))
+        for k, body in enumerate(page.system.bodies)
+    ]
+    blocks: list[Block] = [note, table(header, rows)]
+    if columns:
+        blocks.append(table(("body", "column offset", "columns from 0"), columns))
+    return Section("offsets", ("Row and column offsets",), tuple(blocks), (), "expanded")
+
+
+def _pattern(page: Page) -> Section:
+    entries = {
+        (entry.row, entry.column): anchor("Phi_q", entry)
+        for section in page.situation.code.sections
+        for entry in section.entries["Phi_q"]
+    }
+    counts = (len(item.equation_names) for item in page.system.constraints)
+    bands = tuple(zip(page.system.row_offsets, counts, strict=True))
+    m, n = len(page.equations), len(page.coordinates)
+    note = text(
+        f"{len(entries)} of the {m} \N{MULTIPLICATION SIGN} {n} entries of ", Math(PHI_Q),
+        " can differ from zero.",
+    )  # fmt: skip
+    picture = Pattern(page.equations, tuple(page.coordinates), entries, bands)
+    title = ("The pattern of the Jacobian",)
+    return Section("pattern", title, (note, picture), (), "expanded")
+
+
+def _mobility(page: Page) -> Section:
+    mobility = gruebler(page.system)
+    rows: Rows = [
+        ("coordinates", f"3 \N{MULTIPLICATION SIGN} {mobility.bodies} + {mobility.others}",
+         str(mobility.coordinates)),
+        ("equations of joints", "", f"\N{MINUS SIGN}{mobility.joint_equations}"),
+        ("degrees of freedom", "", str(mobility.degrees_of_freedom)),
+        ("equations of drivers", "", f"\N{MINUS SIGN}{mobility.driver_equations}"),
+        ("left undriven", "", str(mobility.undriven)),
+    ]  # fmt: skip
+    blocks: list[Block] = [table(("what", "count", "number"), rows)]
+    if page.situation.problem:
+        blocks.append(text(page.situation.problem))
+    return Section("mobility", ("Mobility",), tuple(blocks))
+
+
+def _vectors(page: Page) -> Section:
+    rows: Rows = []
+    for section in page.situation.code.sections:
+        quantities = (section.entries[name] for name in ("Phi", "nu", "gamma"))
+        for Phi, nu, gamma in zip(*quantities, strict=True):
+            row: list[Run | Runs] = [str(Phi.row), Verbatim(page.equations[Phi.row])]
+            for quantity, entry in (("Phi", Phi), ("nu", nu), ("gamma", gamma)):
+                shown = page.brief(quantity, entry)
+                row += [Link(anchor(quantity, entry), shown), _math(page.value(quantity, entry))]
+            rows.append(tuple(row))
+    header: tuple[Run, ...] = (
+        "row", "equation", Math(PHI), "number", Math(NU), "number", Math(GAMMA), "number",
+    )  # fmt: skip
+    title = ("The arrays ", Math(PHI), ", ", Math(NU), " and ", Math(GAMMA))
+    note = text(f"Numbers at {page.situation.origin}. Each formula leads to its derivation.")
+    return Section("arrays", title, (note, table(header, rows)), (), "expanded")
+
+
+def _jacobian(page: Page) -> Section:
+    found = {
+        (entry.row, entry.column): entry
+        for section in page.situation.code.sections
+        for entry in section.entries["Phi_q"]
+    }
+    is_wide = len(page.coordinates) > WIDEST_TABLE
+    entries = _listed_entries(page, found) if is_wide else _square_entries(page, found)
+    note = text(
+        "Each entry leads to its derivation, where its line in the emitted module stands. ",
+        f"Numbers at {page.situation.origin}.",
+    )
+    check = Code("print(np.round(Phi_q(q, t, p), 6))")
+    title = ("The Jacobian ", Math(PHI_Q))
+    return Section("jacobian", title, (note, entries, check), (), "expanded")
+
+
+def _square_entries(page: Page, found: Mapping[tuple[int, int], Entry]) -> Block:
+    """Return the entries as a matrix with named rows and columns."""
+    rows: Rows = []
+    for row, name in enumerate(page.equations):
+        line: list[Run | Runs] = [Verbatim(name)]
+        for column in range(len(page.coordinates)):
+            entry = found.get((row, column))
+            line.append("" if entry is None else _cell(page, entry))
+        rows.append(tuple(line))
+    return table(("", *(Verbatim(name) for name in page.coordinates)), rows)
+
+
+def _listed_entries(page: Page, found: Mapping[tuple[int, int], Entry]) -> Block:
+    """Return the entries one below the other."""
+    rows: Rows = [
+        (Verbatim(page.equations[row]), Verbatim(page.coordinates[column]), _cell(page, entry))
+        for (row, column), entry in found.items()
+    ]
+    return table(("row", "column", "entry"), rows)
+
+
+def _cell(page: Page, entry: Entry) -> Runs:
+    shown, number = page.brief("Phi_q", entry), _math(page.value("Phi_q", entry))
+    if is_number(page.expanded(entry)):
+        return (Link(anchor("Phi_q", entry), shown),)
+    return (Link(anchor("Phi_q", entry), shown), " = ", number)
+
+
+def _newton(page: Page) -> Section:
+    blocks: list[Block] = [
+        text(
+            "From the guess, each step solves ",
+            Math(Equated((Row((PHI_Q, DELTA_Q)), Row(("-", PHI))))),
+            " and adds the correction. It stops when the correction is small; that correction has "
+            "been applied.",
+        )
+    ]
+    result = page.situation.assembly
+    if result is None:
+        blocks.append(text(page.situation.problem))
+    else:
+        blocks += _iterations(page, result)
+        blocks += _first_step(page, result)
+    return Section("newton", ("Position: Newton's method",), tuple(blocks), (), "numeric")
+
+
+def _iterations(page: Page, result: NewtonResult) -> Iterator[Block]:
+    names = page.coordinates if len(page.coordinates) <= MOST_COORDINATES else []
+    rows: Rows = []
+    for k, (q, residual) in enumerate(zip(result.iterates, result.residuals, strict=True)):
+        correction = _math(result.corrections[k], 7) if k < len(result.corrections) else ""
+        numbers = (_math(value, ITERATE_DIGITS) for value in q[: len(names)])
+        rows.append((str(k), *numbers, _math(residual, 7), correction))
+    norms = (Math(Row(("|", PHI, "|"))), Math(Row(("|", DELTA_Q, "|"))))
+    yield table(("step", *(Verbatim(name) for name in names), *norms), rows)
+    outcome = result.status.name.lower().replace("_", " ")
+    yield text(f"{counted(result.iterations, 'correction')}; the outcome: {outcome}.")
+
+
+def _first_step(page: Page, result: NewtonResult) -> Iterator[Block]:
+    """Yield the first correction with all its numbers."""
+    if result.iterations == 0:
+        return
+    situation, guess = page.situation, result.iterates[0]
+    Phi, Phi_q = situation.module.position(guess, situation.t, situation.p)
+    correction = result.iterates[1] - guess
+    yield text("The first step in numbers:")
+    if guess.size <= LARGEST_MATRIX:
+        product = Row((decimals(Phi_q, 4), decimals(correction)))
+        yield Display(Equated((Row((PHI_Q, DELTA_Q)), product, decimals(-Phi))))
+    columns = zip(page.coordinates, guess, correction, result.iterates[1], strict=True)
+    rows: Rows = [
+        (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
+        for name, *values in columns
+    ]
+    yield table(("coordinate", "guess", Math(DELTA_Q), "after the step"), rows)
+    yield Code(
+        "correction = np.linalg.solve(Phi_q(GUESS, t, p), -Phi(GUESS, t, p))\n"
+        "print(np.round(correction, 6))"
+    )
+
+
+def _rates(page: Page) -> Section:
+    situation, shown = page.situation, page.shown
+    title = ("Velocity and acceleration",)
+    if not situation.is_assembled:
+        note = text(f"Not solved: the numbers on this page are those of {situation.origin}.")
+        return Section("rates", title, (note,), (), "numeric")
+    velocity = Equated((Row((PHI_Q, Q_DOT)), NU))
+    acceleration = Equated((Row((PHI_Q, Q_DDOT)), GAMMA))
+    determinant = float(np.linalg.det(situation.Phi_q))
+    rows: Rows = [
+        (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
+        for name, *values in zip(
+            page.coordinates, shown["q"], shown["q_dot"], shown["q_ddot"], strict=True
+        )
+    ]
+    blocks: list[Block] = [
+        text("With ", Math(PHI_Q), f" at {situation.origin}, two linear solves give the rates:"),
+        Display(velocity),
+        Display(acceleration),
+    ]
+    if situation.q.size <= LARGEST_MATRIX:
+        blocks += [
+            Display(Equated((Row((decimals(shown["Phi_q"], 4), Q_DOT)), decimals(shown["nu"])))),
+            Display(Equated((Q_DOT, decimals(shown["q_dot"])))),
+            Display(Equated((Row((PHI_Q, Q_DDOT)), decimals(shown["gamma"])))),
+            Display(Equated((Q_DDOT, decimals(shown["q_ddot"])))),
+        ]
+    det = Row((Glyph("det", bold=False), PHI_Q))
+    blocks.append(Display(Equated((det, Decimal(determinant, ITERATE_DIGITS)))))
+    blocks.append(table(("coordinate", Math(Q), Math(Q_DOT), Math(Q_DDOT)), rows))
+    blocks.append(
+        Code(
+            "print(np.linalg.solve(Phi_q(q, t, p), nu(q, t, p)))\n"
+            "print(np.linalg.solve(Phi_q(q, t, p), gamma(q, q_dot, t, p)))"
+        )
+    )
+    return Section("rates", title, tuple(blocks), (), "numeric")

@@ -1,0 +1,190 @@
+"""`kc.derivation`: how Phi_q, nu and gamma of a mechanism follow from Phi, step by step.
+
+model     -> system()     ConstraintSystem  checked
+system    -> situation    Situation         the emitted module and a state, for the numbers
+each type -> derive       RowBlock          the very blocks that are expanded into emitted code,
+                                            with the rules that fired while they were derived
+blocks    -> sections     Derivation        the page as data
+page      -> to_...       text              HTML, LaTeX, Markdown, a notebook
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+from kincompile.derivation.assembled import assembled_section, unknowns_section
+from kincompile.derivation.derivation_html import as_html
+from kincompile.derivation.derivation_markdown import as_markdown
+from kincompile.derivation.derivation_notebook import as_notebook
+from kincompile.derivation.derivation_page import Page, counted
+from kincompile.derivation.derivation_tex import as_tex
+from kincompile.derivation.document import Document, Section
+from kincompile.derivation.equation_section import equation_section
+from kincompile.derivation.joint_section import joint_section
+from kincompile.derivation.joint_terms import abbreviations
+from kincompile.derivation.situation import Situation, situation
+from kincompile.errors import InputError
+from kincompile.model.mechanism import system_of
+from kincompile.model.resolve import Joint
+from kincompile.names import listed
+from kincompile.writing import write_atomically
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from kincompile.calculus.expressions import Expression
+    from kincompile.derivation.formulas import Glyph
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Derivation(Document):
+    """The derivation of a mechanism's equations, to be printed.
+
+    The attributes are those of `Document`: the name, and what the page says as data.
+    """
+
+    def to_html(self) -> str:
+        """Return one self-contained page: MathML, no script, no network."""
+        return as_html(self)
+
+    def to_latex(self) -> str:
+        """Return a LaTeX document, for pdflatex."""
+        return as_tex(self)
+
+    def to_markdown(self) -> str:
+        """Return Markdown with formulas as GitHub renders them."""
+        return as_markdown(self)
+
+    def to_notebook(self) -> str:
+        """Return a Jupyter notebook, the text of an .ipynb file; it computes the numbers again."""
+        return as_notebook(self)
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the derivation in the format that the file's ending names.
+
+        Parameters
+        ----------
+        path : path-like
+            Ends with .html, .tex, .md or .ipynb.
+
+        Raises
+        ------
+        InputError
+            If the ending is another, or the file cannot be written.
+        """
+        return write_atomically(path, format_of(path)(self))
+
+    def __repr__(self) -> str:
+        """Return name and sizes."""
+        return f"<Derivation of {self.name!r}: {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        # In a frame, so that the page's style sheet leaves the notebook alone.
+        page = escape(self.to_html(), quote=True)
+        return f'<iframe srcdoc="{page}" style="width: 100%; height: 40em; border: 0"></iframe>'
+
+
+FORMATS: Mapping[str, Callable[[Derivation], str]] = {
+    ".html": Derivation.to_html,
+    ".tex": Derivation.to_latex,
+    ".md": Derivation.to_markdown,
+    ".ipynb": Derivation.to_notebook,
+}
+"""What prints a derivation, by the ending of the file it goes to."""
+
+
+def format_of(path: str | os.PathLike[str]) -> Callable[[Derivation], str]:
+    """Return what prints a derivation in the format of a file.
+
+    Raises
+    ------
+    InputError
+        If the file's ending names none.
+    """
+    for ending, printed in FORMATS.items():
+        if str(path).endswith(ending):
+            return printed
+    raise InputError(f"{path}: a derivation is written to a file that ends with {listed(FORMATS)}")
+
+
+def derivation(
+    model: Mechanism | ConstraintSystem, state: Mapping[str, float] | float | None = None
+) -> Derivation:
+    """Show how Phi_q, nu and gamma of a mechanism follow from Phi, step by step.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system of free equations; it may lack equations.
+    state
+        Where the numbers are taken: a time, at which the mechanism is assembled, or values by name
+        (coordinates, rates, parameters and ``t``), taken as they are. The time 0 by default; the
+        guess where the mechanism does not assemble.
+
+    Returns
+    -------
+    Derivation
+        ``.to_html()``, ``.to_latex()``, ``.to_markdown()``, ``.to_notebook()``, ``.write(path)``.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written; every problem is listed.
+    InputError
+        If the state has unknown names, or the formulas have no finite values there.
+    """
+    system = system_of(model)
+    chosen = situation(system, state)
+    page = Page(chosen)
+    sections = tuple(
+        joint_section(page, item, rows)
+        if isinstance(item, Joint)
+        else equation_section(page, item, rows)
+        for item, rows in zip(system.constraints, chosen.code.sections, strict=True)
+    )
+    names: dict[Expression, Glyph] = {}
+    for item in system.constraints:
+        if isinstance(item, Joint):
+            names |= abbreviations(item.template)
+    constraints = Section("constraints", ("The constraints, one by one",), (), sections)
+    return Derivation(
+        system.name,
+        _summary(chosen),
+        (unknowns_section(page), constraints, assembled_section(page)),
+        names,
+        chosen.source,
+        _state_code(chosen),
+    )
+
+
+def _summary(chosen: Situation) -> str:
+    system = chosen.system
+    sizes = ", ".join(
+        (
+            counted(len(system.coordinates), "coordinate"),
+            counted(len(system.equations), "equation"),
+            counted(len(system.parameters), "parameter"),
+        )
+    )
+    return f"{sizes}; numbers at {chosen.origin}"
+
+
+def _state_code(chosen: Situation) -> str:
+    """Return the state as Python code, exact to the last digit."""
+    lines = [f"t = {chosen.t!r}"]
+    for name, values in (("q", chosen.q), ("q_dot", chosen.q_dot), ("p", chosen.p)):
+        lines.append(f"{name} = np.array({_listed(values)})")
+    return "\n".join(lines)
+
+
+def _listed(values: NDArray[np.float64]) -> str:
+    return repr([value + 0.0 for value in values.tolist()])

@@ -1,0 +1,198 @@
+"""A derivation page as data: sections of blocks, whatever it is printed in.
+
+A renderer prints each kind of block; what a page says is decided before, in the modules that fill
+these classes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from kincompile.calculus.expressions import Expression
+    from kincompile.derivation.formulas import Formula, Glyph
+
+
+@dataclass(frozen=True, slots=True)
+class Verbatim:
+    """A name or a piece of code in a text, printed as it is."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Math:
+    """A formula in a text or a cell."""
+
+    formula: Formula
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A reference to an anchor of the page."""
+
+    anchor: str
+    content: Run
+
+
+Run: TypeAlias = str | Verbatim | Math | Link
+"""A piece of a text; a plain string is prose."""
+
+Runs: TypeAlias = tuple[Run, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SourceLine:
+    """Lines of the emitted module.
+
+    Attributes
+    ----------
+    number
+        Number of the first line, from 1.
+    text
+        The lines, stripped.
+    """
+
+    number: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A paragraph."""
+
+    runs: Runs
+
+
+@dataclass(frozen=True, slots=True)
+class Display:
+    """A formula on a line of its own.
+
+    Attributes
+    ----------
+    formula
+        What is displayed.
+    anchor
+        Where links to it lead; "" for none.
+    source
+        The emitted code of it.
+    """
+
+    formula: Formula
+    anchor: str = ""
+    source: SourceLine | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table.
+
+    Attributes
+    ----------
+    header
+        Titles of the columns.
+    rows
+        Cells, each a text.
+    folded
+        Title under which it is folded away where the medium can fold, "" for an open table.
+    """
+
+    header: tuple[Runs, ...]
+    rows: tuple[tuple[Runs, ...], ...]
+    folded: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """The picture of a sparse matrix.
+
+    Attributes
+    ----------
+    rows, columns
+        Names.
+    entries
+        Anchor of the derivation of each entry, by row and column.
+    bands
+        First row and number of rows of each constraint.
+    """
+
+    rows: tuple[str, ...]
+    columns: tuple[str, ...]
+    entries: dict[tuple[int, int], str]
+    bands: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """Code that a notebook runs; other media leave it out."""
+
+    text: str
+
+
+Block: TypeAlias = Text | Display | Table | Pattern | Code
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A titled part of the page.
+
+    Attributes
+    ----------
+    anchor
+        Where links to it lead.
+    title
+        A text.
+    blocks
+        What it says.
+    sections
+        Its parts, after the blocks.
+    level
+        "vector", "expanded" or "numeric"; "" where that says nothing.
+    """
+
+    anchor: str
+    title: Runs
+    blocks: tuple[Block, ...] = ()
+    sections: tuple[Section, ...] = ()
+    level: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Document:
+    """A whole page.
+
+    Attributes
+    ----------
+    name
+        Name of the mechanism.
+    summary
+        Sizes, and the state of the numbers, in a few words.
+    sections
+        What the page says: coordinates, constraints (nine steps each), the assembled system.
+    abbreviations
+        Symbols that stand for vectors and angles which occur again and again.
+    source
+        Text of the emitted module.
+    state
+        Python code that sets t, q, q_dot and p to the state of the numbers.
+    """
+
+    name: str
+    summary: str
+    sections: tuple[Section, ...]
+    abbreviations: Mapping[Expression, Glyph]
+    source: str
+    state: str
+
+
+def text(*runs: Run) -> Text:
+    """Return a paragraph."""
+    return Text(runs)
+
+
+def cells(*items: Run | Runs) -> tuple[Runs, ...]:
+    """Return a row of cells, each a run or several."""
+    return tuple(item if isinstance(item, tuple) else (item,) for item in items)

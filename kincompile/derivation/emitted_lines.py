@@ -1,0 +1,100 @@
+"""Where the emitted module computes each number: read off its syntax tree, in order of emission."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from kincompile.derivation.document import SourceLine
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from kincompile.ir.inline import Entry, InlineProgram
+
+Place = tuple[str, int, int]
+"""A quantity, a row and a column; the column of a vector is 0."""
+
+
+def emitted_lines(code: InlineProgram, source: str) -> dict[Place, SourceLine]:
+    """Return the lines of the emitted module that compute each entry of Phi, Phi_q, nu and gamma.
+
+    Entries whose line cannot be told, in code that treats many constraints at once, are absent.
+    """
+    tree = ast.parse(source)
+    lines = source.splitlines()
+    functions = {item.name: item for item in tree.body if isinstance(item, ast.FunctionDef)}
+    found: dict[Place, SourceLine] = {}
+    for quantity in ("Phi", "Phi_q", "nu", "gamma"):
+        entries = [entry for section in code.sections for entry in section.entries[quantity]]
+        if quantity == "Phi_q":
+            constants = [entry for entry in entries if code.number(entry.node) is not None]
+            entries = [entry for entry in entries if code.number(entry.node) is None]
+            found |= _constant_lines(tree, constants)
+        function = functions.get(f"_{quantity}")
+        if function is not None:
+            found |= _lines(quantity, function, entries, lines)
+    return found
+
+
+def _lines(
+    quantity: str, function: ast.FunctionDef, entries: Sequence[Entry], lines: Sequence[str]
+) -> dict[Place, SourceLine]:
+    returned = function.body[-1]
+    if not (isinstance(returned, ast.Return) and isinstance(returned.value, ast.Tuple)):
+        return {}
+    elements = returned.value.elts
+    if len(elements) != len(entries):
+        return {}
+    definitions = _definitions(function)
+    return {
+        (quantity, entry.row, entry.column): _source_line(element, definitions, lines)
+        for entry, element in zip(entries, elements, strict=True)
+    }
+
+
+def _definitions(function: ast.FunctionDef) -> dict[str, ast.Assign]:
+    """Return the statements that compute a value with a name of its own."""
+    return {
+        target.id: statement
+        for statement in function.body
+        if isinstance(statement, ast.Assign)
+        and isinstance(target := statement.targets[0], ast.Name)
+        and not isinstance(statement.value, ast.Attribute | ast.Subscript)
+    }
+
+
+def _source_line(
+    element: ast.expr, definitions: dict[str, ast.Assign], lines: Sequence[str]
+) -> SourceLine:
+    needed = {statement.lineno: statement for statement in _needed(element, definitions)}
+    statements = [needed[number] for number in sorted(needed)]
+    text = [*(_text(item, lines) for item in statements), _text(element, lines)]
+    return SourceLine(element.lineno, "\n".join(text))
+
+
+def _needed(element: ast.AST, definitions: dict[str, ast.Assign]) -> Iterator[ast.Assign]:
+    for node in ast.walk(element):
+        if isinstance(node, ast.Name) and node.id in definitions:
+            statement = definitions[node.id]
+            yield statement
+            yield from _needed(statement.value, definitions)
+
+
+def _text(node: ast.stmt | ast.expr, lines: Sequence[str]) -> str:
+    last = node.end_lineno or node.lineno
+    return " ".join(line.strip() for line in lines[node.lineno - 1 : last])
+
+
+def _constant_lines(tree: ast.Module, entries: Sequence[Entry]) -> dict[Place, SourceLine]:
+    """Return where the constant entries of Phi_q stand: the numbers of `_CONSTANTS`."""
+    for node in tree.body:
+        match node:
+            case ast.Assign([ast.Name("_CONSTANTS")], ast.Call(args=[ast.Tuple(numbers)])):
+                return {
+                    ("Phi_q", entry.row, entry.column): SourceLine(
+                        number.lineno, f"_CONSTANTS[{k}] = {ast.unparse(number)}"
+                    )
+                    for k, (entry, number) in enumerate(zip(entries, numbers, strict=True))
+                }
+    return {}

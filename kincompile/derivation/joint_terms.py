@@ -1,0 +1,186 @@
+"""A joint's derivation in vectors: abbreviations, blocks of Phi_q, the rules that fired."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from kincompile.calculus.expressions import (
+    ONE,
+    ZERO,
+    ZERO_VECTOR,
+    Basis,
+    Dot,
+    Expression,
+    Number,
+    Power,
+    Product,
+    Scalar,
+    Scaled,
+    Sum,
+    Symbol,
+    Turned,
+    Vector,
+    VectorSum,
+    VectorSymbol,
+)
+from kincompile.derivation.document import Math
+from kincompile.derivation.formulas import (
+    IDENTITY,
+    ZERO_BLOCK,
+    Equated,
+    Glyph,
+    Partial,
+    Row,
+    Transposed,
+)
+from kincompile.derive.rules import Rule, vector_derivative
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from kincompile.calculus.template import Template
+    from kincompile.derivation.document import Runs
+    from kincompile.derivation.formulas import Formula
+    from kincompile.derive.derivation import RowBlock
+    from kincompile.derive.rules import Step
+
+_PHI = Symbol("phi")
+_A, _B = Glyph("A"), Glyph("B")
+
+RULES: Mapping[Rule, Runs] = {
+    Rule.SUM: ("sum rule",),
+    Rule.PRODUCT: ("product rule",),
+    Rule.CHAIN: ("chain rule",),
+    Rule.A_TO_B: (Math(Equated((Partial(_A, _PHI, "d"), _B))),),
+    Rule.B_TO_A: (Math(Equated((Partial(_B, _PHI, "d"), Row(("-", _A))))),),
+    Rule.DRIVER: ("driver, a function of ", Math(Symbol("t"))),
+    Rule.PROFILE: ("profile, chain rule",),
+}
+"""The rules worth a line; that a constant has no derivative is not."""
+
+
+def parts(expression: Any) -> Iterator[Expression]:
+    """Yield an expression and everything it is made of, outside in."""
+    yield expression
+    match expression:
+        case Sum(items) | VectorSum(items) | Product(items):
+            inner: tuple[Expression, ...] = items
+        case Dot(left, right) | Scaled(left, right):
+            inner = (left, right)
+        case Power(base, _):
+            inner = (base,)
+        case Turned(angle, vector, _):
+            inner = (angle, vector)
+        case other:
+            inner = (other.vector,) if hasattr(other, "vector") else ()
+    for item in inner:
+        yield from parts(item)
+
+
+def abbreviations(template: Template) -> dict[Expression, Glyph]:
+    """Name what occurs again and again: the distance vector d, its rate, the angle of a gear."""
+    found = [item for Phi in template.Phi for item in parts(Phi)]
+    separations = list(dict.fromkeys(v for item in found for v in _separations(item)))
+    along: dict[Expression, Expression] = dict(
+        zip(template.coordinates, template.rates, strict=True)
+    )
+    names: dict[Expression, Glyph] = {}
+    for k, vector in enumerate(separations, 1):
+        index = str(k) if len(separations) > 1 else ""
+        names[vector] = Glyph("d", index)
+        names[vector_derivative(vector, along)] = Glyph("d", index, dots=1)
+    for item in found:
+        match item:
+            case Turned(angle, Basis(), _) if not isinstance(angle, Symbol):
+                names[angle] = Glyph("vartheta", bold=False)
+    return names
+
+
+def _separations(expression: Expression) -> Iterator[VectorSum]:
+    """Yield the sums with a position in them that a scalar product has as a factor."""
+    if isinstance(expression, Dot):
+        for side in (expression.left, expression.right):
+            if isinstance(side, VectorSum) and _has_position(side):
+                yield side
+
+
+def _has_position(vector: VectorSum) -> bool:
+    return any(isinstance(term, VectorSymbol) for term in vector.terms)
+
+
+def is_zero(entry: Expression) -> bool:
+    """Return whether an expression is zero as it stands."""
+    return entry in (ZERO, ZERO_VECTOR)
+
+
+def block_entry(entry: Expression, coordinate: Expression, Phi: Expression) -> Formula:
+    """Return an entry of Phi_q as the textbook writes it: k I, a row u^T, or the entry itself."""
+    if is_zero(entry):
+        return ZERO_BLOCK if isinstance(coordinate, Vector) else entry
+    if isinstance(coordinate, Symbol):
+        return entry
+    if isinstance(Phi, Vector):
+        assert isinstance(entry, Scalar)
+        return _times_identity(entry)
+    assert isinstance(entry, Vector)
+    return Transposed(entry)
+
+
+def _times_identity(factor: Scalar) -> Formula:
+    if factor == ONE:
+        return IDENTITY
+    return Row(("-", IDENTITY)) if factor == -ONE else Row((factor, IDENTITY))
+
+
+def block_columns(template: Template) -> list[tuple[str, slice]]:
+    """Return the index of each block of columns, i, j or that of a contact, and its coordinates."""
+    blocks = [(frame.index, slice(2 * k, 2 * k + 2)) for k, frame in enumerate(template.frames)]
+    first = 2 * len(template.frames)
+    return blocks + [
+        (f"alpha_{contact.index}", slice(first + k, first + k + 1))
+        for k, contact in enumerate(template.contacts)
+    ]
+
+
+def block_rows(
+    template: Template, blocks: Sequence[RowBlock], columns: slice
+) -> tuple[tuple[Formula, ...], ...]:
+    """Return the block of Phi_q in some columns, a row for each row block."""
+    coordinates = template.coordinates[columns]
+    return tuple(
+        tuple(
+            block_entry(entry, coordinate, block.Phi)
+            for entry, coordinate in zip(block.Phi_q[columns], coordinates, strict=True)
+        )
+        for block in blocks
+    )
+
+
+def telling(steps: Sequence[Step]) -> list[Step]:
+    """Return the steps worth showing, each once: those of a rule that gave something."""
+    kept = [
+        step
+        for step in steps
+        if step.rule in RULES and not is_zero(step.derivative) and not _is_multiple(step.expression)
+    ]
+    return list(dict.fromkeys(kept))
+
+
+def _is_multiple(expression: Expression) -> bool:
+    """Return whether an expression is a number times something: no rule worth a line."""
+    match expression:
+        case Scaled(Number(), _) | Product((Number(), _)):
+            return True
+    return False
+
+
+def known_vectors(blocks: Sequence[RowBlock]) -> list[Vector]:
+    """Return the turned points and directions that occur, A_i s_i before B_i s_i."""
+    found: dict[Vector, None] = {}
+    for block in blocks:
+        for expression in (block.Phi, *block.Phi_q):
+            for item in parts(expression):
+                match item:
+                    case Turned(Symbol(), VectorSymbol(), _):
+                        found[item] = None
+    return sorted(found, key=lambda item: item.quarter if isinstance(item, Turned) else 0)

@@ -1,0 +1,133 @@
+"""Formulas as LaTeX: SymPy's printer, with the textbook's notation mixed in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from sympy.printing.latex import LatexPrinter
+
+from kincompile.derivation.notation import GREEK, Notation
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from kincompile.derivation.formulas import Formula, Glyph
+
+OPERATORS = {
+    "-": "-", "<=": r"\le", ">=": r"\ge", "==": "=", "!=": r"\ne", "|": r"\vert",
+    "\N{LOGICAL AND}": r"\wedge", "\N{LOGICAL OR}": r"\vee",
+    "\N{PARTIAL DIFFERENTIAL}": r"\partial", "\N{MULTIPLICATION SIGN}": r"\times",
+    "\N{DOT OPERATOR}": r"\cdot",
+}  # fmt: skip
+FUNCTIONS = frozenset({"sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log"})
+DOTS = ("", r"\dot", r"\ddot", r"\dddot")
+SPECIAL = {
+    "\\": r"\textbackslash{}", "_": r"\_", "&": r"\&", "%": r"\%", "#": r"\#", "$": r"\$",
+    "{": r"\{", "}": r"\}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
+    "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}",
+    "\N{MINUS SIGN}": "$-$", "\N{MULTIPLICATION SIGN}": r"$\times$", "\N{EN DASH}": "--",
+}  # fmt: skip
+
+
+def escape(text: str) -> str:
+    """Return plain text as LaTeX."""
+    return "".join(SPECIAL.get(character, character) for character in text)
+
+
+class TexPrinter(Notation, LatexPrinter):
+    """Prints formulas as LaTeX in mathematical mode; amsmath is all that it needs.
+
+    Parameters
+    ----------
+    abbreviations
+        What is printed as one symbol.
+    is_breakable
+        Whether a line may be broken between factors.
+    """
+
+    def __init__(
+        self, abbreviations: Mapping[Any, Glyph] | None = None, *, is_breakable: bool = False
+    ) -> None:
+        self._space = r"\,\allowbreak" if is_breakable else r"\,"
+        super().__init__({"mul_symbol": None})  # type: ignore[no-untyped-call]
+        self.abbreviations = abbreviations or {}
+
+    def math(self, formula: Formula) -> str:
+        """Return a formula, without dollar signs."""
+        return str(self._print(formula))
+
+    def row(self, parts: Sequence[str]) -> str:
+        """Return things side by side."""
+        return " ".join(parts)
+
+    def letter(self, name: str, *, bold: bool = False) -> str:
+        """Return a letter, a Greek letter by its name, or a word."""
+        if name in GREEK:
+            return rf"\boldsymbol{{\{name}}}" if bold else rf"\{name}"
+        if bold:
+            return rf"\mathbf{{{name}}}"
+        return name if len(name) == 1 else rf"\mathrm{{{escape(name)}}}"
+
+    def index_text(self, index: str) -> str:
+        """Return the text of an index."""
+        return index if len(index) <= 2 or index.isdigit() else rf"\mathrm{{{escape(index)}}}"
+
+    def operator(self, text: str) -> str:
+        """Return an operator or a bracket."""
+        if text.startswith("\N{PRIME}"):
+            return r"\prime" * len(text)
+        return OPERATORS.get(text, text)
+
+    def leading(self, text: str) -> str:
+        """Return an operator at the beginning of a continued line."""
+        return f"{{}} {self.operator(text)}"
+
+    def numeral(self, text: str) -> str:
+        """Return a number."""
+        return text.replace("\N{MINUS SIGN}", "-")
+
+    def dotted(self, base: str, dots: int) -> str:
+        """Return something with dots over it."""
+        return rf"{DOTS[dots]}{{{base}}}" if dots < len(DOTS) else rf"{base}^{{({dots})}}"
+
+    def scripts(self, base: str, index: str | None, exponent: str | None) -> str:
+        """Return something with an index, an exponent, or both."""
+        below = "" if index is None else f"_{{{index}}}"
+        above = "" if exponent is None else f"^{{{exponent}}}"
+        return f"{{{base}}}{below}{above}" if below or above else base
+
+    def fenced_with(self, value: str, exponent: str) -> str:
+        """Return something in brackets with an exponent, which is put on the bracket.
+
+        What stands within the brackets can then be broken into lines.
+        """
+        return f"( {value} )^{{{exponent}}}"
+
+    def fraction(self, numerator: str, denominator: str) -> str:
+        """Return a fraction."""
+        return rf"\frac{{{numerator}}}{{{denominator}}}"
+
+    def function(self, name: str) -> str:
+        """Return the name of a function."""
+        return rf"\{name}" if name in FUNCTIONS else rf"\operatorname{{{escape(name)}}}"
+
+    def root(self, value: str) -> str:
+        """Return a square root."""
+        return rf"\sqrt{{{value}}}"
+
+    def thin_space(self) -> str:
+        """Return what stands between factors."""
+        return self._space
+
+    def array(self, rows: Sequence[Sequence[str]]) -> str:
+        """Return a matrix in brackets."""
+        lines = r" \\ ".join(" & ".join(row) for row in rows)
+        return rf"\begin{{bmatrix}} {lines} \end{{bmatrix}}"
+
+    def _print_Integer(self, expr: Any) -> str:
+        return str(expr)
+
+    def _print_PeriodicSpline(self, expr: Any) -> str:
+        name = self.letter(expr.table_name)
+        primes = self.operator("\N{PRIME}" * expr.order) if expr.order else None
+        return self.row([self.scripts(name, None, primes), self._fenced(self._print(expr.args[0]))])

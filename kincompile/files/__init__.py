@@ -1,0 +1,1 @@
+"""Model files: TOML, JSON, .adm and .acf, and Python."""

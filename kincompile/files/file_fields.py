@@ -1,0 +1,187 @@
+"""Fields of a data file: taken if they are what they should be, else noted with line and field."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from kincompile.model.safe_expressions import ExpressionError, parse_expression
+from kincompile.names import listed, name_problem, suggestion, unit_problem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import sympy
+
+    from kincompile.files.data_lines import Address
+    from kincompile.files.data_text import Document
+    from kincompile.model.file_format import Field
+
+_KINDS: dict[type, str] = {
+    dict: "a table",
+    list: "a list",
+    str: "a text",
+    bool: "a truth value",
+    type(None): "null",
+}
+_SINGULAR = {"bodies": "body"}
+
+
+class FieldReader:
+    """Takes values from a document and collects what is wrong with them.
+
+    Parameters
+    ----------
+    document
+        The file.
+
+    Attributes
+    ----------
+    problems
+        What has been found, each with file, line and field.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.problems: list[str] = []
+        self._places: dict[str, Address] = {}
+        # A large mechanism says "-a/2" thousands of times. Names only come along, but for alpha,
+        # which profiles alone have, and t, which some places do not have.
+        self._parsed: dict[tuple[str, bool, bool], sympy.Expr] = {}
+
+    def problem(self, address: Address, text: str) -> None:
+        """Note a problem with the value at an address."""
+        where = self._field(address)
+        message = f"{where}: {text}" if where else text
+        self.problems.append(self.document.problem(address, message))
+
+    def stands(self, words: str, address: Address) -> None:
+        """Remember where something stands that the checks of the whole system call by words."""
+        self._places[words] = address
+
+    def located(self, problem: str) -> str:
+        """Return a problem that the checks of the whole system found, with file and line."""
+        known = [words for words in self._places if problem.startswith(words)]
+        address = self._places[max(known, key=len)] if known else ()
+        return self.document.problem(address, problem)
+
+    def _field(self, address: Address) -> str:
+        """Say in words what an address is: ``constraint 'A', point_i, entry 2``."""
+        words: list[str] = []
+        data = self.document.data
+        for part in address:
+            if isinstance(part, str):
+                data = data.get(part) if isinstance(data, dict) else None
+                words.append(part)
+                continue
+            data = data[part] if isinstance(data, list) else None
+            name = data.get("name") if isinstance(data, dict) else None
+            if len(words) == 1:
+                singular = _SINGULAR.get(words[0], words[0].removesuffix("s"))
+                words[0] = f"{singular} {shown(name) if isinstance(name, str) else part + 1}"
+            else:
+                words.append(f"entry {part + 1}")
+        return ", ".join(words)
+
+    def has_fields(
+        self, address: Address, row: Mapping[str, Any], fields: Mapping[str, Field]
+    ) -> bool:
+        """Check which fields a table has; return whether none is missing."""
+        for key in row:
+            if key not in fields:
+                hint = suggestion(key[:40], fields)
+                text = f"there is no such field{hint}; fields are: {listed(fields, 20)}"
+                self.problem((*address, key), text)
+        missing = [key for key, item in fields.items() if item.is_required and key not in row]
+        if missing:
+            self.problem(address, f"no {listed(missing, 20)}; fields are: {listed(fields, 20)}")
+        return not missing
+
+    def rows(
+        self, data: Mapping[str, Any], section: str
+    ) -> list[tuple[tuple[str, int], dict[str, Any]]]:
+        """Return the tables in a list, each with its address."""
+        given = data.get(section, [])
+        if not isinstance(given, list):
+            self.problem((section,), f"expected a list of tables, not {shown(given)}")
+            return []
+        found = []
+        for k, row in enumerate(given):
+            if isinstance(row, dict):
+                found.append(((section, k), row))
+            else:
+                self.problem((section, k), f"expected a table of fields, not {shown(row)}")
+        return found
+
+    def name(self, row: Mapping[str, Any], address: Address, what: str) -> str:
+        """Return the name of a table, nothing where it has none that can be used."""
+        if "name" not in row:
+            return ""
+        problem = name_problem(row["name"], what)
+        if problem is None:
+            return str(row["name"])
+        self.problem((*address, "name"), problem)
+        return ""
+
+    def unit(self, value: Any, address: Address, what: str) -> str:
+        """Return a unit."""
+        problem = unit_problem(value, what)
+        if problem is None:
+            return str(value)
+        self.problem(address, problem)
+        return ""
+
+    def number(self, value: Any, address: Address) -> float:
+        """Return a finite number; a text is not one. Where it is none, 1."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            hint = "; write the number itself, without quotes" if isinstance(value, str) else ""
+            self.problem(address, f"expected a number, not {shown(value)}{hint}")
+            return 1.0
+        try:
+            if math.isfinite(float(value)):
+                return value
+        except OverflowError:
+            pass
+        self.problem(address, f"{shown(value)} is not a finite number that a double can hold")
+        return 1.0
+
+    def expression(
+        self, value: Any, address: Address, names: Mapping[str, sympy.Expr]
+    ) -> float | sympy.Expr:
+        """Return a number, or a formula in declared names; 1 where it is neither."""
+        if not isinstance(value, str):
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                self.problem(address, f"expected a number or a formula, not {shown(value)}")
+                return 1.0
+            return self.number(value, address)
+        key = value, "alpha" in names, "t" in names
+        try:
+            if key not in self._parsed:
+                self._parsed[key] = parse_expression(value, names)
+            return self._parsed[key]
+        except ExpressionError as error:
+            line = f"line {error.line}, " if error.line > 1 else ""
+            text = f"{line}column {error.column} of {shown(value)}: {error.problem}"
+            self.problem(address, text)
+            return 1.0
+
+    def expressions(
+        self, value: Any, address: Address, names: Mapping[str, sympy.Expr], what: str, count: int
+    ) -> list[float | sympy.Expr]:
+        """Return a list of a fixed number of expressions; `what` says how it is written."""
+        if not isinstance(value, list) or len(value) != count:
+            self.problem(address, f"expected {what}, not {shown(value)}")
+            return [1.0] * count
+        return [self.expression(item, (*address, k), names) for k, item in enumerate(value)]
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it: kind and beginning of what is long."""
+    if isinstance(value, str):
+        return repr(value if len(value) <= 60 else value[:57] + "...")
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict | bool | None):
+        return _KINDS[type(value)]
+    text = repr(value) if not isinstance(value, int) or abs(value) < 10**40 else "a huge number"
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,121 @@
+"""A model from a file; the suffix says how to read it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kincompile.errors import InputError
+from kincompile.files.adm_file import read_acf, read_adm
+from kincompile.files.data_text import MAX_BYTES
+from kincompile.files.model_file import read_json_model, read_toml_model
+from kincompile.files.python_file import read_python
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Mapping
+
+    from kincompile.files.adm_file import AnalysisSettings
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+_DATA: dict[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]] = {
+    ".toml": read_toml_model,
+    ".json": read_json_model,
+    ".adm": read_adm,
+}
+_READERS: Mapping[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]] = {
+    ".py": read_python,
+    **_DATA,
+}
+
+
+def read_model(path: str | os.PathLike[str]) -> Mechanism | ConstraintSystem:
+    """Read the model in a file.
+
+    Parameters
+    ----------
+    path
+        ``.py``: a Python file, which is run, with one `Mechanism` or `ConstraintSystem` at module
+        level (of several: the one called `mechanism`, `system` or `m`, in this order). ``.toml``,
+        ``.json``, ``.adm``: a data file, as for `read`.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it cannot be read, or its suffix is another.
+    ModelError
+        If it does not hold one model, or running it fails; the message has file and line.
+    """
+    return _read(Path(path), _READERS, "a Python file, ending in .py, or a data file, ending in")
+
+
+def read(path: str | os.PathLike[str]) -> Mechanism | ConstraintSystem:
+    """Read the model in a data file, which cannot run code.
+
+    Parameters
+    ----------
+    path
+        ``.toml`` or ``.json``: a model as `Mechanism.to_toml` and `Mechanism.to_json` write it.
+        ``.adm``: a model of simEngine2D.
+
+    Returns
+    -------
+    Mechanism or ConstraintSystem
+        A mechanism where the file has no coordinates of its own.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it cannot be read, or its suffix is another.
+    ModelError
+        If it is not a model; every problem with line and field.
+    """
+    return _read(Path(path), _DATA, "a data file, ending in")
+
+
+def read_analysis(path: str | os.PathLike[str]) -> AnalysisSettings:
+    """Read the time grid in an ``.acf`` file of simEngine2D.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it cannot be read, or its suffix is another.
+    ModelError
+        If it is not such a file; every problem with line and field.
+    """
+    file = Path(path)
+    if file.suffix.lower() != ".acf":
+        raise InputError(f"cannot read an analysis from {file}: one is a file ending in .acf")
+    return read_acf(file, _content(file))
+
+
+def _read(
+    file: Path,
+    readers: Mapping[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]],
+    what: str,
+) -> Mechanism | ConstraintSystem:
+    """Read a file by one of the readers."""
+    reader = readers.get(file.suffix.lower())
+    content = _content(file)
+    if reader is None:
+        raise InputError(f"cannot read a model from {file}: a model is {what} {' or '.join(_DATA)}")
+    return reader(file, content)
+
+
+def _content(file: Path) -> bytes:
+    """Return the bytes of a file; of too large a data file as many as it takes to see that."""
+    try:
+        with file.open("rb") as stream:
+            return stream.read(-1 if file.suffix.lower() == ".py" else MAX_BYTES + 1)
+    except FileNotFoundError:
+        near = [file.with_name(file.name + suffix) for suffix in _READERS if file.name]
+        hint = next((f"did you mean {path}?" for path in near if path.is_file()), "check the path")
+        raise InputError(f"cannot read {file}: there is no such file; {hint}") from None
+    except IsADirectoryError:
+        raise InputError(f"cannot read {file}: it is a folder; give a file in it") from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"cannot read {file}: {reason}; check the path and its permissions"
+        ) from error

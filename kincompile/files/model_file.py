@@ -1,0 +1,357 @@
+"""A mechanism, or a system of free equations, as data: TOML or JSON.
+
+    kincompile = 1
+    name = "arm"
+    bodies = [{ name = "arm", guess = [1, 0, 0] }]
+
+    [[constraints]]
+    type = "Revolute"
+    name = "pin"
+    i = "arm"
+    point_i = [-1, 0]
+    j = "ground"
+    point_j = [0, 0]
+
+A file can do nothing but describe: its formulas are parsed by a whitelist (`safe_expressions`), and
+nothing in it is run. All problems are reported together, each with line and field.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import sympy
+
+from kincompile.errors import ModelError
+from kincompile.files.data_text import decoded, listed_problems, read_json, read_toml
+from kincompile.files.file_fields import FieldReader, shown
+from kincompile.model.bodies import GROUND, Body, Parameter
+from kincompile.model.constraint import CamConstraint, Kind
+from kincompile.model.equation import Equation
+from kincompile.model.expressions import alpha, t
+from kincompile.model.file_format import (
+    CONSTRAINTS,
+    FIELDS,
+    MOST_POINTS,
+    SMOOTHNESS,
+    VERSION,
+    constraint_fields,
+)
+from kincompile.model.mechanism import Mechanism
+from kincompile.model.system import ConstraintSystem
+from kincompile.names import body_coordinates, listed, suggestion
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from kincompile.files.data_lines import Address
+    from kincompile.files.data_text import Document
+    from kincompile.model.constraint import Argument, Constraint
+
+Row = dict[str, Any]
+
+
+def read_toml_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
+    """Read a model from TOML.
+
+    Parameters
+    ----------
+    path
+        The file, for messages.
+    content
+        What the file holds.
+
+    Raises
+    ------
+    ModelError
+        If it is not a model; every problem with line and field.
+    """
+    return model_of(read_toml(path, decoded(path, content)))
+
+
+def read_json_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
+    """Read a model from JSON; otherwise as `read_toml_model`."""
+    return model_of(read_json(path, decoded(path, content)))
+
+
+def model_of(document: Document) -> Mechanism | ConstraintSystem:
+    """Return the model that a document describes.
+
+    Returns
+    -------
+    Mechanism or ConstraintSystem
+        A mechanism where the file has no coordinates of its own.
+
+    Raises
+    ------
+    ModelError
+        If it does not describe one; every problem with line and field.
+    """
+    reader = _ModelReader(document)
+    model = reader.read()
+    if reader.problems or model is None:
+        raise listed_problems(reader.problems)
+    return model
+
+
+class _ModelReader(FieldReader):
+    """Reads the sections of a model one after the other."""
+
+    def __init__(self, document: Document) -> None:
+        super().__init__(document)
+        self._names: dict[str, sympy.Expr] = {"t": t}
+        self._bodies: dict[str, Address] = {}
+        self._taken: dict[str, Address] = {}
+
+    def read(self) -> Mechanism | ConstraintSystem | None:
+        """Return the model as far as it could be read, None where nothing is left of it."""
+        data = self.document.data
+        if not self._is_model(data):
+            return None
+        self.has_fields((), data, FIELDS["model"])
+        options = {
+            "length_unit": self.unit(data.get("length_unit", "m"), ("length_unit",), "lengths"),
+            **self._analysis(data.get("analysis", {})),
+        }
+        name = self.name(data, (), "the model") or "model"
+        parameters = [self._parameter(*item) for item in self.rows(data, "parameters")]
+        bodies = [self._body(*item) for item in self.rows(data, "bodies")]
+        free = [self._coordinate(*item) for item in self.rows(data, "coordinates")]
+        rows = self.rows(data, "constraints")
+        for _, row in rows:
+            self._declare_contacts(row)
+        constraints = [self._constraint(*item) for item in rows]
+        content = {
+            "parameters": [item for item in parameters if item],
+            "bodies": [item for item in bodies if item],
+            "coordinates": dict(item for item in free if item),
+            "constraints": [item for item in constraints if item],
+        }
+        return self._checked(name, content, options)
+
+    def _is_model(self, data: Any) -> bool:
+        """Check that the file is of this format, and of this version."""
+        if not isinstance(data, dict):
+            self.problem((), f"expected names and values, not {shown(data)}")
+        elif "kincompile" not in data:
+            self.problem((), f"this is not a model for kincompile: one says kincompile = {VERSION}")
+        elif type(data["kincompile"]) is not int or data["kincompile"] != VERSION:
+            given = shown(data["kincompile"])
+            self.problem(
+                ("kincompile",), f"format {VERSION} is read here, not {given}; convert the file"
+            )
+        return not self.problems
+
+    def _checked(
+        self, name: str, content: dict[str, Any], options: dict[str, Any]
+    ) -> Mechanism | ConstraintSystem | None:
+        """Return the model; its checks see what has been good so far."""
+        model = Mechanism(name, **options)
+        model.parameters, model.bodies = content["parameters"], content["bodies"]
+        model.constraints = content["constraints"]
+        free = content["coordinates"]
+        if self.problems and not (model.constraints and (model.bodies or free)):
+            return None
+        try:
+            if not free:
+                model.system()
+                return model
+            return ConstraintSystem(
+                name,
+                coordinates=list(free),
+                equations=model.constraints,
+                parameters=model.parameters,
+                guess=list(free.values()),
+                bodies=model.bodies,
+                **options,
+            )
+        except ModelError as error:
+            self.problems += [self.located(problem) for problem in error.problems]
+        return None
+
+    def _analysis(self, given: Any) -> Row:
+        """Return the last time and the number of points."""
+        if not isinstance(given, dict):
+            self.problem(("analysis",), f"expected a table of end and points, not {shown(given)}")
+            return {}
+        self.has_fields(("analysis",), given, FIELDS["analysis"])
+        found: Row = {}
+        if "end" in given:
+            found["end"] = self.number(given["end"], ("analysis", "end"))
+        points = given.get("points", 101)
+        if type(points) is int and 1 <= points <= MOST_POINTS:
+            return {**found, "points": points}
+        text = f"expected a whole number from 1 to {MOST_POINTS:,}, not {shown(points)}"
+        self.problem(("analysis", "points"), text)
+        return found
+
+    def _is_free(self, name: str, address: Address) -> bool:
+        """Return whether a name is new, and take it."""
+        if not name:
+            return False
+        other = self._taken.setdefault(name, address)
+        if other is not address:
+            line = self.document.line(other)
+            self.problem((*address, "name"), f"{name!r} is the name in line {line} already")
+        return other is address
+
+    def _parameter(self, address: Address, row: Row) -> Parameter | None:
+        complete = self.has_fields(address, row, FIELDS["parameter"])
+        name = self.name(row, address, "a parameter")
+        default = self.number(row.get("default", 1.0), (*address, "default"))
+        unit = self.unit(row.get("unit", ""), (*address, "unit"), f"parameter {name!r}")
+        if name:
+            self._names[name] = sympy.Symbol(name)
+            self.stands(f"parameter {name!r}", address)
+        return Parameter(name, default, unit) if self._is_free(name, address) and complete else None
+
+    def _body(self, address: Address, row: Row) -> Body | None:
+        self.has_fields(address, row, FIELDS["body"])
+        name = self.name(row, address, "a body")
+        guess = row.get("guess", [0, 0, 0])
+        start = self.expressions(guess, (*address, "guess"), self._names, "[x, y, phi]", 3)
+        outline = self._outline(row.get("outline", []), (*address, "outline"))
+        if not name:
+            return None
+        if name == GROUND.name or name in self._bodies:
+            other = self._bodies.get(name)
+            whose = f"of the body in line {self.document.line(other)}" if other else "of the frame"
+            self.problem((*address, "name"), f"{name!r} is the name {whose} already")
+            return None
+        self._bodies[name] = address
+        for coordinate in body_coordinates(name):
+            self._names[coordinate] = sympy.Symbol(coordinate)
+            self.stands(f"guess of {coordinate}", (*address, "guess"))
+        self.stands(f"outline of {name}", (*address, "outline"))
+        return Body(name, (start[0], start[1], start[2]), outline)
+
+    def _outline(
+        self, given: Any, address: Address
+    ) -> tuple[tuple[float | sympy.Expr, float | sympy.Expr], ...]:
+        """Return the corners of a body's outline."""
+        if not isinstance(given, list):
+            self.problem(address, f"expected a list of corners [xi, eta], not {shown(given)}")
+            return ()
+        corners = [
+            self.expressions(corner, (*address, k), self._names, "[xi, eta]", 2)
+            for k, corner in enumerate(given)
+        ]
+        return tuple((xi, eta) for xi, eta in corners)
+
+    def _coordinate(self, address: Address, row: Row) -> tuple[str, float | sympy.Expr] | None:
+        self.has_fields(address, row, FIELDS["coordinate"])
+        name = self.name(row, address, "a coordinate")
+        guess = self.expression(row.get("guess", 0.0), (*address, "guess"), self._names)
+        if name:
+            self._names[name] = sympy.Symbol(name)
+            self.stands(f"guess of {name}", address)
+        return (name, guess) if self._is_free(name, address) else None
+
+    def _declare_contacts(self, row: Row) -> None:
+        """Make the contact parameters of a cam known, which any equation may name."""
+        kind = CONSTRAINTS.get(row["type"]) if isinstance(row.get("type"), str) else None
+        if (
+            kind is not None
+            and issubclass(kind, CamConstraint)
+            and isinstance(row.get("name"), str)
+        ):
+            count = len(kind.arguments())
+            for name in kind(row["name"], *[None] * count).contact_names:
+                self._names[name] = sympy.Symbol(name)
+
+    def _constraint(self, address: Address, row: Row) -> Constraint | Equation | None:
+        """Return a joint, a driver or a free equation, None where something is wrong with it."""
+        before = len(self.problems)
+        kind = row.get("type")
+        known = (*CONSTRAINTS, "Equation")
+        if not isinstance(kind, str) or kind not in known:
+            hint = suggestion(kind[:40], known) if isinstance(kind, str) else ""
+            given = f"no type {shown(kind)}" if "type" in row else "no type"
+            self.problem((*address, "type"), f"there is {given}{hint}; types: {listed(known, 20)}")
+            return None
+        name = self.name(row, address, "a constraint")
+        self._remember_constraint(kind, name, address)
+        found = (
+            self._equation(address, row, name)
+            if kind == "Equation"
+            else self._joint(address, row, CONSTRAINTS[kind], name)
+        )
+        return found if len(self.problems) == before else None
+
+    def _remember_constraint(self, kind: str, name: str, address: Address) -> None:
+        """Note how the checks of the system call a constraint and its arguments."""
+        other = self._taken.setdefault(f"constraint {name}", address)
+        if name and other is not address:
+            line = self.document.line(other)
+            self.problem((*address, "name"), f"{name!r} is the name in line {line} already")
+        for title in (f"{kind} {name!r}", f"equation {name!r}", f"equation '{name}."):
+            self.stands(title, address)
+
+    def _equation(self, address: Address, row: Row, name: str) -> Equation:
+        self.has_fields(address, row, FIELDS["Equation"])
+        given, place = row.get("expressions", [1]), (*address, "expressions")
+        count = max(1, len(given)) if isinstance(given, list) else 1
+        return Equation(
+            name, *self.expressions(given, place, self._names, "a list of formulas", count)
+        )
+
+    def _joint(self, address: Address, row: Row, kind: type[Constraint], name: str) -> Constraint:
+        fields = constraint_fields(kind)
+        self.has_fields(address, row, fields)
+        arguments = {
+            key: self._argument(item, row[key], (*address, key))
+            for key, item in kind.arguments().items()
+            if key in row
+        }
+        for key in arguments:
+            self.stands(f"{kind.__name__} {name!r}, {key}", (*address, key))
+        if len(arguments) < len(kind.arguments()):
+            return kind(name, *[None] * len(kind.arguments()))
+        if "guess" in row and "guess" in fields:
+            arguments["guess"] = self._contact_guess(kind, row["guess"], (*address, "guess"))
+        return kind(name, **arguments)
+
+    def _contact_guess(self, kind: type[Constraint], given: Any, address: Address) -> Any:
+        if not isinstance(given, list):
+            return self.expression(given, address, self._names)
+        count = len(kind.contacts)
+        return self.expressions(given, address, self._names, f"{count} start values", count)
+
+    def _argument(self, item: Argument, given: Any, address: Address) -> Any:
+        """Return the value of a constraint's argument."""
+        if item.kind is Kind.BODY:
+            return self._body_name(given, address)
+        if item.kind in (Kind.POINT, Kind.AXIS):
+            return tuple(self.expressions(given, address, self._names, "[xi, eta]", 2))
+        if item.kind is Kind.PROFILE:
+            return self._profile(given, address)
+        return self.expression(given, address, self._names)
+
+    def _body_name(self, given: Any, address: Address) -> str:
+        if not isinstance(given, str):
+            self.problem(address, f"expected the name of a body, not {shown(given)}")
+        elif given not in self._bodies and given != GROUND.name:
+            near = suggestion(given[:40], list(self._bodies)[:1000])
+            known = listed((GROUND.name, *self._bodies))
+            self.problem(address, f"there is no body {shown(given)}{near}; bodies are: {known}")
+        return str(given)
+
+    def _profile(self, given: Any, address: Address) -> Any:
+        """Return a radius as a formula in alpha, or as a table."""
+        if not isinstance(given, dict):
+            return self.expression(given, address, {**self._names, alpha.name: alpha})
+        if not self.has_fields(address, given, FIELDS["profile"]):
+            return 1.0
+        if given["smoothness"] != SMOOTHNESS or isinstance(given["smoothness"], bool):
+            self.problem(
+                (*address, "smoothness"),
+                f"a table becomes a periodic quintic spline with {SMOOTHNESS} continuous "
+                f"derivatives; write smoothness = {SMOOTHNESS}",
+            )
+        return tuple(self._numbers(given[key], (*address, key)) for key in ("angles", "radii"))
+
+    def _numbers(self, given: Any, address: Address) -> list[float]:
+        if not isinstance(given, list):
+            self.problem(address, f"expected a list of numbers, not {shown(given)}")
+            return []
+        return [self.number(item, (*address, k)) for k, item in enumerate(given)]

@@ -1,0 +1,344 @@
+"""An emitted module whose functions run as compiled C.
+
+The NumPy module of the same mechanism stays below: its constants, its checks and its messages are
+the module's, complex numbers (for complex steps) run on it, and so does the careful march that
+takes over where the compiled one reports anything but success.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from ctypes import byref, c_size_t
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.errors import InputError
+from kincompile.runtime.memory import LINE, empty
+from kincompile.runtime.native.library import library
+from kincompile.runtime.native.points import (
+    Places,
+    function_of_positions,
+    function_of_states,
+)
+from kincompile.runtime.native.structures import (
+    NUMBER,
+    REAL,
+    STATES,
+    Batch,
+    Motion,
+    Numbers,
+    System,
+    Variants,
+    numbers_of_batch,
+    numbers_of_times,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.inputs import Inputs
+
+    Array = NDArray[np.float64]
+    Function = Callable[..., Any]
+
+QUANTITIES: Mapping[str, tuple[str, ...]] = {
+    "Phi": ("Phi",),
+    "Phi_q": ("Phi_q",),
+    "nu": ("nu",),
+    "gamma": ("gamma",),
+    "Phi_q_nonzeros": ("nonzeros",),
+    "position": ("Phi", "Phi_q"),
+    "velocity": ("Phi_q", "nu"),
+    "acceleration": ("Phi_q", "gamma"),
+    "kinematics": ("Phi", "Phi_q", "nu", "gamma"),
+}
+"""What each function of a module returns."""
+
+BATCH_LAST = ("Phi", "nonzeros", "nu", "gamma")
+"""What `kinematics_batch_last` returns."""
+
+
+def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
+    """Replace the functions of an emitted NumPy module by compiled ones.
+
+    Parameters
+    ----------
+    module
+        The NumPy module of a mechanism, loaded; it is changed.
+    files
+        What the C target emitted for the same mechanism.
+
+    Returns
+    -------
+    module
+        The same module. Where the mechanism has a planned solve it has two functions more,
+        ``march`` and ``march_variants``.
+
+    Raises
+    ------
+    UnsupportedError
+        If there is no C compiler, or it does not do its work.
+    """
+    loaded = library(module.NAME, files, module.FINGERPRINT)
+    functions = _Functions(module, loaded)
+    names = vars(module)
+    compiled = {name: functions.evaluator(name) for name in QUANTITIES}
+    compiled["kinematics_batch_last"] = functions.batch_last()
+    if "solve" in names:
+        compiled["solve"] = functions.solve()
+        compiled["march"] = functions.march()
+        compiled["march_variants"] = functions.march_variants()
+    for name, function in compiled.items():
+        function.__name__, function.__module__ = name, module.__name__
+        function.__doc__ = function.__doc__ or names[name].__doc__
+    names.update(compiled)
+    return module
+
+
+class _Functions:
+    """Makes the functions of a module from those of its library."""
+
+    def __init__(self, module: ModuleType, loaded: ctypes.CDLL) -> None:
+        self._module, self._library, self._name = module, loaded, module.NAME
+        self._n, self._m = module.N_COORDINATES, module.N_EQUATIONS
+        self._shapes: dict[str, tuple[int, ...]] = {
+            "Phi": (self._m,),
+            "Phi_q": (self._m, self._n),
+            "nonzeros": (len(module.PATTERN),),
+            "nu": (self._m,),
+            "gamma": (self._m,),
+        }
+        self._run = getattr(loaded, f"{self._name}_evaluate")
+
+    def evaluator(self, name: str) -> Function:
+        """Return a function of points (..., n)."""
+        quantities = QUANTITIES[name]
+        places = Places(self._module, self._library, quantities, self._shapes)
+        make = function_of_states if "gamma" in quantities else function_of_positions
+        return make(places, self._batch, getattr(self._module, name))
+
+    def _batch(self, quantities: Sequence[str], states: tuple[Any, ...], t: Any, p: Any) -> Any:
+        """Evaluate a batch whose axes are the first ones; None where numbers are complex."""
+        batch = self._plain(states, t, p)
+        if batch is not None:
+            results = self._fill(batch, quantities, states[0].shape[:-1])
+            if results is not None:
+                return results
+        # Broadcasting, conversion and what is to be said of bad arguments are the module's.
+        rows, t, p, shape = vars(self._module)["_batch"](t, p, states)
+        if rows[0].dtype != REAL:
+            return None
+        batch = Batch(count=math.prod(shape), t=numbers_of_times(t), p=numbers_of_batch(p))
+        for name, state in zip(STATES, rows, strict=False):
+            setattr(batch, name, numbers_of_batch(state))
+        return self._fill(batch, quantities, shape)
+
+    def _plain(self, states: tuple[Any, ...], t: Any, p: Any) -> Batch | None:
+        """Return a batch of arrays that need no conversion; that they are finite C will see."""
+        shape = getattr(states[0], "shape", ())
+        if not (
+            all(_is_plain(state, (*shape[:-1], self._n)) for state in states)
+            and _is_plain(p, self._module.DEFAULTS.shape)
+            and (isinstance(t, float) or _is_plain(t, shape[:-1]))
+        ):
+            return None
+        time = np.asarray(t)
+        batch = Batch(count=math.prod(shape[:-1]), t=numbers_of_times(time), p=numbers_of_batch(p))
+        batch.kept = time  # C reads through an address: the array must live as long as the batch
+        for name, state in zip(STATES, states, strict=False):
+            setattr(batch, name, Numbers(state.ctypes.data, 1, self._n))
+        return batch if batch.count else None
+
+    def _fill(self, batch: Batch, quantities: Sequence[str], shape: tuple[int, ...]) -> Any:
+        """Run a batch into new arrays; None where a number is not finite."""
+        results = []
+        for quantity in quantities:
+            result = empty((*shape, *self._shapes[quantity]))
+            size = math.prod(self._shapes[quantity])
+            setattr(batch, quantity, Numbers(result.ctypes.data, 1, size))
+            results.append(result)
+        if self._run(byref(batch)):
+            return None
+        return results[0] if len(results) == 1 else tuple(results)
+
+    def batch_last(self) -> Function:
+        """Return `kinematics_batch_last`."""
+        defaults, original = self._module.DEFAULTS, self._module.kinematics_batch_last
+        sizes = [math.prod(self._shapes[quantity]) for quantity in BATCH_LAST]
+
+        def kinematics_batch_last(
+            q: Any, q_dot: Any, t: Any, p: Any = defaults, out: Any = None
+        ) -> Any:
+            shape: tuple[int, ...] = getattr(q, "shape", ())
+            if not (
+                len(shape) == 2
+                and all(_is_real(state, (self._n, shape[1])) for state in (q, q_dot))
+                and (isinstance(t, float) or _is_real(t, shape[1:]))
+                and (_is_real(p, defaults.shape) or _is_real(p, (defaults.size, shape[1])))
+            ):
+                return _copied(original(q, q_dot, t, p), self._checked(out, sizes))
+            results = self._checked(out, sizes, shape[1])
+            if results is None:
+                results = tuple([_in_lines(size, shape[1]) for size in sizes])
+            time = np.asarray(t)
+            batch = Batch(
+                shape[1],
+                numbers_of_batch(q),
+                numbers_of_batch(q_dot),
+                numbers_of_times(time),
+                numbers_of_batch(p),
+            )
+            batch.varying_only = out is not None
+            for quantity, result in zip(BATCH_LAST, results, strict=True):
+                setattr(batch, quantity, numbers_of_batch(result))
+            return original(q, q_dot, t, p) if self._run(byref(batch)) else results
+
+        kinematics_batch_last.__doc__ = f"""{original.__doc__}
+    out, if given, is what an earlier call for as many points returned: the arrays are filled again,
+    which saves the time to fetch memory and to write the entries that never change.
+    """
+        return kinematics_batch_last
+
+    def _checked(self, out: Any, sizes: Sequence[int], points: int | None = None) -> Any:
+        """Return the arrays of an earlier call, or None where none are given."""
+        if out is None:
+            return None
+        given = out if isinstance(out, tuple) and len(out) == len(sizes) else ()
+        points = getattr(given[0], "size", 0) // sizes[0] if given and points is None else points
+        if not given or not all(
+            _is_real(array, (size, points or 0)) and array.flags.writeable
+            for array, size in zip(given, sizes, strict=True)
+        ):
+            raise InputError(
+                f"{self._name}: out is not what an earlier call returned for as many points: give "
+                "the same tuple of arrays again, or nothing"
+            )
+        return out
+
+    def solve(self) -> Function:
+        """Return the planned solve."""
+        original, run = self._module.solve, getattr(self._library, f"{self._name}_solve")
+
+        def solve(nonzeros: Any, b: Any) -> Any:
+            nonzeros, b = np.asarray(nonzeros), np.asarray(b)
+            if "c" in (nonzeros.dtype.kind, b.dtype.kind):
+                return original(nonzeros, b)
+            shape = np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
+            x = empty((*shape, self._n))
+            system = System(math.prod(shape), x=Numbers(x.ctypes.data, 1, self._n))
+            system.nonzeros = numbers_of_batch(
+                matrix := _rows(nonzeros, shape, self._shapes["nonzeros"])
+            )
+            system.b = numbers_of_batch(right := _rows(b, shape, (self._m,)))
+            run(byref(system))
+            del matrix, right  # until here their memory is read
+            return x
+
+        return solve
+
+    def march(self) -> Function:
+        """Return the march over a time grid."""
+        run = getattr(self._library, f"{self._name}_march")
+        run.restype = c_size_t
+
+        def march(
+            inputs: Inputs,
+            states: Sequence[Array],
+            residual: Array,
+            status: NDArray[np.intc],
+            iterations: NDArray[np.intc],
+        ) -> int:
+            """Follow the motion from the guess as long as every point converges.
+
+            Fills position, velocity and acceleration, (n, N) each, and of every point the largest
+            absolute value of Phi, the `Status` and the Newton iterations, (N,) each. Returns how
+            many points converged, from the first one on.
+            """
+            t, p, guess = inputs.t, inputs.p, inputs.guess
+            motion = Motion(t.size, t.ctypes.data, p.ctypes.data, guess.ctypes.data)
+            motion.tolerance, motion.max_iterations = inputs.tolerance, inputs.max_iterations
+            motion.q, motion.q_dot, motion.q_ddot = (numbers_of_batch(state) for state in states)
+            motion.residual, motion.status = residual.ctypes.data, status.ctypes.data
+            motion.iterations = iterations.ctypes.data
+            return int(run(byref(motion)))
+
+        return march
+
+    def march_variants(self) -> Function:
+        """Return the march of many parameter sets."""
+        run = getattr(self._library, f"{self._name}_march_variants")
+        run.restype = c_size_t
+
+        def march_variants(
+            inputs: Inputs,
+            sets: Array,
+            states: Array,
+            residual: Array,
+            status: NDArray[np.intc],
+            iterations: NDArray[np.intc],
+        ) -> int:
+            """Follow the motion of each variant from the guess as long as it converges.
+
+            `sets` (B, k) are the parameters; filled are `states` (3, N, n, B) with position,
+            velocity and acceleration, and residual, status and iterations, (N, B) each. Returns
+            how many variants converged at all times.
+            """
+            t, guess = inputs.t, inputs.guess
+            motions = Variants(t.size, len(sets), t.ctypes.data, numbers_of_batch(sets.T))
+            motions.guess, motions.tolerance = guess.ctypes.data, inputs.tolerance
+            motions.max_iterations = inputs.max_iterations
+            motions.q, motions.q_dot, motions.q_ddot = (
+                numbers_of_batch(state[0]) for state in states
+            )
+            motions.time = states.strides[1] // NUMBER
+            motions.residual, motions.status = residual.ctypes.data, status.ctypes.data
+            motions.iterations = iterations.ctypes.data
+            return int(run(byref(motions)))
+
+        return march_variants
+
+
+def _is_real(value: Any, shape: tuple[int, ...]) -> bool:
+    """Return whether something is an array of real numbers that C can read where it lies."""
+    return (
+        type(value) is np.ndarray
+        and value.shape == shape
+        and value.dtype is REAL
+        and value.flags.aligned
+        and all(stride % NUMBER == 0 for stride in value.strides)
+    )
+
+
+def _is_plain(value: Any, shape: tuple[int, ...]) -> bool:
+    return _is_real(value, shape) and value.flags.c_contiguous
+
+
+def _rows(array: Any, shape: tuple[int, ...], entries: tuple[int, ...]) -> Array:
+    """Return an array (..., n), broadcast to a batch's shape, as (n, N)."""
+    spread = np.broadcast_to(array.astype(np.float64, copy=False), (*shape, *entries))
+    rows: Array = spread.reshape(math.prod(shape), *entries).T
+    return rows
+
+
+def _copied(results: tuple[Array, ...], out: tuple[Array, ...] | None) -> tuple[Array, ...]:
+    """Return results, in the arrays given for them if there are any."""
+    if out is None:
+        return results
+    for place, result in zip(out, results, strict=True):
+        place[...] = result
+    return out
+
+
+def _in_lines(size: int, points: int) -> Array:
+    """Return a new array (size, N) whose rows each begin where a cache line does.
+
+    The rows are an odd number of lines apart: at powers of two they would get in each other's way.
+    """
+    lines = -(-points * NUMBER // LINE) | 1
+    rows: Array = empty((size, lines * LINE // NUMBER))[:, :points]
+    return rows

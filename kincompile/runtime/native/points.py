@@ -1,0 +1,149 @@
+"""One point evaluated by compiled code, with as little around the call as can be.
+
+What is around the code takes ten times as long as the code itself: arguments are looked at once,
+and nothing is called that need not be.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import addressof, byref, c_double, c_int, c_void_p
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.runtime.native.structures import REAL, Batch, Numbers, numbers_of_point
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Function = Callable[..., Any]
+
+COPIED: Mapping[int, Function] = {
+    1: lambda a: a.copy(),
+    2: lambda a, b: (a.copy(), b.copy()),
+    4: lambda a, b, c, d: (a.copy(), b.copy(), c.copy(), d.copy()),
+}
+"""Copies of so many arrays. A loop takes longer."""
+
+
+class Places:
+    """Numbers of one point at addresses that stay, so that a call of C needs no new ones.
+
+    A call takes a place and puts it back. Threads that call at the same time have different ones.
+    """
+
+    def __init__(
+        self,
+        module: ModuleType,
+        loaded: ctypes.CDLL,
+        quantities: Sequence[str],
+        shapes: Mapping[str, tuple[int, ...]],
+    ) -> None:
+        self.shape, self.defaults = module.GUESS.shape, module.DEFAULTS
+        self.quantities, self.copied = quantities, COPIED[len(quantities)]
+        self._shapes = [shapes[quantity] for quantity in quantities]
+        # To give up the interpreter's lock for a point would take longer than the point.
+        prototype = ctypes.PYFUNCTYPE(c_int, c_void_p)
+        self.run: Function = prototype((f"{module.NAME}_evaluate", loaded))
+        self.free = [self.new()]
+
+    def new(self) -> tuple[Array, Array, c_double, Array, list[Array], Any, Any]:
+        """Return where q, q_dot, t, p are written, the results, and what C is told.
+
+        That is: to take the default parameters, or those that are written.
+        """
+        q, q_dot = np.zeros((2, *self.shape))
+        time, parameters = c_double(), self.defaults.copy()
+        results = [np.zeros(shape) for shape in self._shapes]
+        batches = []
+        for p in (self.defaults, parameters):
+            batch = Batch(
+                1,
+                numbers_of_point(q),
+                numbers_of_point(q_dot),
+                Numbers(addressof(time)),
+                numbers_of_point(p),
+            )
+            for quantity, result in zip(self.quantities, results, strict=True):
+                setattr(batch, quantity, numbers_of_point(result))
+            self.run(byref(batch))
+            batch.varying_only = 1  # from now on the constants are in place
+            batches.append(byref(batch))
+        return q, q_dot, time, parameters, results, batches[0], batches[1]
+
+
+def function_of_states(places: Places, evaluate: Function, original: Function) -> Function:
+    """Return a function of q, q_dot, t and p."""
+    defaults, quantities, copied = places.defaults, places.quantities, places.copied
+    ndarray, shape, p_shape, real = np.ndarray, places.shape, defaults.shape, REAL
+    run, new, take, put_back = places.run, places.new, places.free.pop, places.free.append
+
+    def of_states(q: Any, q_dot: Any, t: Any, p: Any = defaults) -> Any:
+        if (
+            isinstance(t, float)
+            and type(q) is ndarray and q.shape == shape and q.dtype is real
+            and type(q_dot) is ndarray and q_dot.shape == shape and q_dot.dtype is real
+            and (p is defaults
+                 or (type(p) is ndarray and p.shape == p_shape and p.dtype is real))
+        ):  # fmt: skip
+            try:
+                place = take()
+            except IndexError:  # all are taken by other threads
+                place = new()
+            q_place, q_dot_place, time, parameters, results, own, given = place
+            q_place[...] = q
+            q_dot_place[...] = q_dot
+            time.value = t
+            if p is defaults:
+                failed = run(own)
+            else:
+                parameters[...] = p
+                failed = run(given)
+            found = copied(*results)
+            put_back(place)
+            if not failed:
+                return found
+        found = evaluate(quantities, (q, q_dot), t, p)
+        return original(q, q_dot, t, p) if found is None else found
+
+    return of_states
+
+
+def function_of_positions(places: Places, evaluate: Function, original: Function) -> Function:
+    """Return a function of q, t and p; the same without rates, of which C then reads none."""
+    defaults, quantities, copied = places.defaults, places.quantities, places.copied
+    ndarray, shape, p_shape, real = np.ndarray, places.shape, defaults.shape, REAL
+    run, new, take, put_back = places.run, places.new, places.free.pop, places.free.append
+
+    def of_positions(q: Any, t: Any, p: Any = defaults) -> Any:
+        if (
+            isinstance(t, float)
+            and type(q) is ndarray and q.shape == shape and q.dtype is real
+            and (p is defaults
+                 or (type(p) is ndarray and p.shape == p_shape and p.dtype is real))
+        ):  # fmt: skip
+            try:
+                place = take()
+            except IndexError:
+                place = new()
+            q_place, _, time, parameters, results, own, given = place
+            q_place[...] = q
+            time.value = t
+            if p is defaults:
+                failed = run(own)
+            else:
+                parameters[...] = p
+                failed = run(given)
+            found = copied(*results)
+            put_back(place)
+            if not failed:
+                return found
+        found = evaluate(quantities, (q,), t, p)
+        return original(q, t, p) if found is None else found
+
+    return of_positions

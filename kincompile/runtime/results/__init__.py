@@ -1,0 +1,1 @@
+"""Solutions: their columns, tables, files, plots and summaries."""

@@ -1,0 +1,214 @@
+"""The motion that `solve` found, point by point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.errors import InputError
+from kincompile.pictures import picture_html
+from kincompile.runtime.results.display import table_html
+from kincompile.runtime.results.labelled import LabelledViews
+from kincompile.runtime.results.motion_plot import plot_columns, plot_html
+from kincompile.runtime.singular.branches import counted_signatures, signatures
+from kincompile.runtime.singular.condition import conditions
+from kincompile.runtime.singular.events import BIFURCATION, Event
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Solution(LabelledViews):
+    """Position, velocity and acceleration over a time grid of N points, n coordinates.
+
+    Where B variants were solved, all arrays but `t` have a leading axis of length B.
+    ``solution["phi_rod"]``, ``solution["x_crank_dot"]`` and ``solution["x_crank_ddot"]`` give
+    columns by name, and so do ``solution["rod.phi"]`` and ``solution["crank.x_dot"]``.
+
+    Attributes
+    ----------
+    t : ndarray, shape (N,)
+        Time, in the order in which it was asked for.
+    q, q_dot, q_ddot : ndarray, shape (N, n)
+        Coordinates and their first and second time derivatives, in the units of `units` per second
+        and per second squared. NaN where they were not found: `status` then says why.
+    status : ndarray of int, shape (N,)
+        A `Status` per point; 0 where everything converged.
+    residual : ndarray, shape (N,)
+        Largest absolute value of Phi after the last correction; NaN where nothing was evaluated.
+    iterations : ndarray of int, shape (N,)
+        Newton iterations spent on the way from the point before, sub-steps included.
+    success : bool
+        Whether every point converged.
+    message : str
+        One sentence; on failure the time, the status, the equations with the largest residual and
+        what to do.
+    name : str
+        Name of the mechanism.
+    coordinates, equations : tuple of str
+        Names of the columns of q and of the rows of Phi.
+    units : dict
+        Unit of each coordinate and parameter, "" if none.
+    parameters : dict
+        Value of each parameter that was used; of variants one each, shape (B,).
+    statistics : dict
+        How it was found: ``coarse``, points of the coarse march of a grid; ``marched``, points that
+        were followed one by one with a pivoted solve; of large mechanisms ``pivoted``, solves for
+        which the planned one was not good enough.
+    events : list of Event
+        Lock-ups, bifurcations and jumps, in order, each with `.kind`, `.t`, `.bodies`, `.message`.
+        Those of variants are found by solving a variant alone.
+    module : module or None
+        The emitted module; None in a copy from another process.
+    """
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    q_dot: NDArray[np.float64]
+    q_ddot: NDArray[np.float64]
+    status: NDArray[np.int64]
+    residual: NDArray[np.float64]
+    iterations: NDArray[np.int64]
+    success: bool
+    message: str
+    name: str
+    coordinates: tuple[str, ...]
+    equations: tuple[str, ...]
+    units: dict[str, str]
+    parameters: dict[str, Any]
+    statistics: dict[str, int]
+    events: list[Event]
+    module: ModuleType | None
+
+    @property
+    def condition(self) -> NDArray[np.float64]:
+        """Condition number of the scaled Phi_q at every point, shape (N,); NaN without a position.
+
+        Lengths count in sizes of the mechanism, angles in radians, so that it does not depend on
+        units. It is computed when it is asked for. 1e8 and more is a singular configuration.
+        """
+        return self._at_points(conditions)
+
+    @property
+    def branch(self) -> NDArray[np.int8]:
+        """Branch signature of every point, shape (N, blocks); 0 without a position.
+
+        The signs of the determinants of the structural blocks of Phi_q: as long as none changes,
+        the motion stays on its branch. It is computed when it is asked for.
+        """
+        if len(self.equations) > len(self.coordinates):
+            passed = [event.t for event in self.events if event.kind == BIFURCATION]
+            return counted_signatures(self.q, self.t, passed)
+        return self._at_points(signatures)
+
+    def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
+        """Apply a function of module, q, t and p to the motion, or to that of each variant."""
+        if self.module is None:
+            raise InputError(
+                f"this Solution of {self.name} was pickled, and the compiled module was not: take "
+                ".condition and .branch before, or solve again."
+            )
+        p = np.array(list(self.parameters.values()), dtype=np.float64)
+        if self.q.ndim == 2:
+            return function(self.module, self.q, self.t, p)
+        sets = p.T if p.size else np.zeros((len(self.q), 0))
+        variants = zip(self.q, sets, strict=True)
+        return np.array([function(self.module, q, self.t, one) for q, one in variants])
+
+    def __getstate__(self) -> list[Any]:
+        """Give everything but the module, which cannot be pickled."""
+        return [getattr(self, item.name) for item in fields(self)[:-1]] + [None]
+
+    def __setstate__(self, state: list[Any]) -> None:
+        """Take what `__getstate__` gave."""
+        for item, value in zip(fields(self), state, strict=True):
+            object.__setattr__(self, item.name, value)
+
+    def plot(self, *names: str, ax: Axes | None = None) -> Axes:
+        """Draw columns over time: coordinates, rates, second rates; events and gaps are marked.
+
+        Parameters
+        ----------
+        *names
+            Columns, as ``"phi_rod_dot"`` or ``"rod.phi_dot"``; without any, all coordinates.
+        ax : matplotlib.axes.Axes, optional
+            Draws all of them into this plot. Without it there is a new figure with a panel for
+            each unit, so that metres and radians do not share an axis.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            `ax`, or the first panel; ``.figure.axes`` has all.
+
+        Raises
+        ------
+        InputError
+            When no column has such a name; the message lists those that exist.
+        UnsupportedError
+            When matplotlib is not installed.
+        """
+        return plot_columns(self, names, ax)
+
+    def _repr_html_(self) -> str:
+        title = f"{self.t.size} points from t = {self.t[0]:g} to {self.t[-1]:g}. {self.message}"
+        table = table_html(self.name, title, *self._extremes())
+        return table + (picture_html(self) or plot_html(self))
+
+    def _extremes(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Return header and rows of a table: ends of the motion, if it is one, and extremes."""
+        columns = self.q.reshape(-1, len(self.coordinates)).T
+        values = [_range(column) for column in columns]
+        header: tuple[str, ...] = ("smallest", "largest")
+        if self.q.ndim == 2:
+            header = f"t = {self.t[0]:g}", f"t = {self.t[-1]:g}", *header
+            values = [
+                (column[0], column[-1], *both) for column, both in zip(columns, values, strict=True)
+            ]
+        rows = [
+            (name, self.units.get(name, ""), *(f"{x:.6g}" for x in row))
+            for name, row in zip(self.coordinates, values, strict=True)
+        ]
+        return ("coordinate", "unit", *header), rows
+
+    def __repr__(self) -> str:
+        """Give the name, the grid and the outcome in one line."""
+        ends = f"t = {self.t[0]:g}" + (f" to {self.t[-1]:g}" if self.t.size > 1 else "")
+        points = f"{self.t.size} point" + ("s" if self.t.size > 1 else "")
+        if self.q.ndim > 2:
+            points = f"{len(self.q)} variants of {points}"
+        return f"<Solution of {self.name}: {points}, {ends}; {self._outcome()}>"
+
+    def _outcome(self) -> str:
+        """Say in a few words how it went."""
+        if self.success:
+            return f"converged, largest residual {np.max(self.residual):.1e}"
+        good = np.count_nonzero(self.status == 0)
+        return f"failed, {good} of {self.status.size} points converged; see .message"
+
+
+def _range(values: NDArray[np.float64]) -> tuple[float, ...]:
+    """Give the smallest and the largest of the values that were found."""
+    found = values[np.isfinite(values)]
+    return (float(found.min()), float(found.max())) if found.size else (np.nan, np.nan)
+
+
+def require_solution(value: object) -> None:
+    """Refuse what is no solution.
+
+    Raises
+    ------
+    InputError
+        Says what was given, and where solutions come from.
+    """
+    if not isinstance(value, Solution):
+        raise InputError(
+            f"expected a Solution, got {type(value).__name__}: solve first, "
+            "solution = kc.solve(kc.compile(model), t)."
+        )

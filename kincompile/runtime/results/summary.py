@@ -1,0 +1,94 @@
+"""A solution in a few lines of text: the extremes of every coordinate, and how the solving went."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.runtime.status import Status
+from kincompile.tables import counted, table
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.results.solution import Solution
+
+NOISE = 1e-12
+"""Rounding errors, relative to the largest number of a kind."""
+
+_NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
+
+
+def summary(solution: Solution) -> str:
+    """Return a table with the extremes of every coordinate, and a line on how the solving went.
+
+    Parameters
+    ----------
+    solution
+        A solution, complete or partial; points that were not found do not count.
+
+    Returns
+    -------
+    str
+        Per coordinate its unit, its least and largest value with their times, and the largest
+        absolute values of its first and second derivative [unit/s, unit/s^2]; then the points by
+        status, the Newton iterations and the largest residual.
+    """
+    motion = [_without_noise(values).T for values in (solution.q, solution.q_dot, solution.q_ddot)]
+    rows = [
+        [name, solution.units[name], *_extremes(solution.t, q), _largest(q_dot), _largest(q_ddot)]
+        for name, q, q_dot, q_ddot in zip(solution.coordinates, *motion, strict=True)
+    ]
+    header = ("coordinate", "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
+    return "\n".join([*table(header, rows, right=_NUMBERS), "", _verdict(solution)])
+
+
+def _without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the values with zero for those that are zero up to rounding, next to the largest."""
+    largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
+    return np.where(np.abs(values) < NOISE * largest, 0.0, values)
+
+
+def _extremes(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[str, str, str, str]:
+    """Return the least value and its time, the largest value and its time."""
+    found = np.isfinite(values)
+    if not found.any():
+        return ("-",) * 4
+    t, values = t[found], values[found]
+    return (*_first(t, values, values.min()), *_first(t, values, values.max()))
+
+
+def _first(
+    t: NDArray[np.float64], values: NDArray[np.float64], extreme: np.float64
+) -> tuple[str, str]:
+    """Return an extreme and the first time at which it is reached, up to rounding."""
+    there = np.abs(values - extreme) <= NOISE * np.abs(values).max()
+    return _text(extreme), _text(t[there.argmax()])
+
+
+def _largest(values: NDArray[np.float64]) -> str:
+    """Return the largest absolute value."""
+    found = np.abs(values[np.isfinite(values)])
+    return _text(found.max()) if found.size else "-"
+
+
+def _text(number: np.float64) -> str:
+    return f"{number:.6g}"
+
+
+def _verdict(solution: Solution) -> str:
+    """Return the points by status, the iterations and the largest residual."""
+    counts = [(np.count_nonzero(solution.status == status), status) for status in Status]
+    by_status = ", ".join(f"{count} {status.name}" for count, status in counts if count)
+    return (
+        f"{counted(solution.t.size, 'point')} from t = {solution.t[0]:g} to {solution.t[-1]:g}: "
+        f"{by_status}; {counted(int(solution.iterations.sum()), 'Newton iteration')}, "
+        f"largest residual {_largest_residual(solution)}"
+    )
+
+
+def _largest_residual(solution: Solution) -> str:
+    """Return the largest residual where the equations hold; of how it failed the message speaks."""
+    found = solution.residual[solution.status == Status.CONVERGED]
+    return f"{found.max():.1e}" if found.size else "-"

@@ -1,0 +1,1 @@
+"""Singular configurations: branches, events, assemblies, condition numbers."""

@@ -1,0 +1,290 @@
+r"""The solution curve of :math:`\Phi(q, t) = 0` in q and t together, followed by its arc length.
+
+Time is a coordinate like any other here, so that the curve can be followed where the motion cannot:
+around a lock-up, where it turns back in time, and through a bifurcation, where another curve
+crosses it. Both ends of a step tell which of them lies between (Allgower and Georg, Numerical
+Continuation Methods, chapters 2 and 8): at a lock-up the tangent's component along t changes its
+sign, at a bifurcation det Phi_q changes its own and the tangent goes on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.runtime.linear import solve_linear
+from kincompile.runtime.singular.branches import determinants
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from kincompile.runtime.march import State
+    from kincompile.runtime.problem import Problem, Vector
+
+LONGEST, FIRST, SHORTEST = 0.05, 0.01, 1e-9
+"""Lengths of steps along the curve, in radians and sizes of the mechanism."""
+
+MAX_STEPS = 400
+"""Steps after which a search along the curve is given up."""
+
+CORRECTIONS = 12
+"""Newton corrections of a step; four do away from a singular configuration."""
+
+SMALL_CORRECTION, TOLERABLE_CORRECTION = 1e-12, 1e-7
+"""Corrections with which a step ends, and that near a bifurcation may remain of rounding errors."""
+
+STRAIGHT = 0.98
+"""Cosine of the angle by which the tangent may turn in a step."""
+
+ROOT = 1e-13
+"""Length of the piece of curve in which a singular configuration is found."""
+
+AROUND = 2e-3
+"""Distance from a bifurcation, in radians and sizes of the mechanism, at which places on the curve
+are accurate to ten digits."""
+
+OFFSETS = (-2.0, -1.0, 1.0, 2.0)
+"""Where the curve is interpolated around a bifurcation, in that distance."""
+
+ROUGHLY = 1e-6
+"""Imaginary part of a root, relative to its real part, that is a rounding error."""
+
+ROOT_STEPS = 80
+"""Steps of the search in that piece; as many halvings as there are bits."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Place:
+    """A point of the curve.
+
+    Attributes
+    ----------
+    q : ndarray, shape (n,)
+        The position.
+    t : float
+        The time.
+    Phi_q : ndarray, shape (m, n)
+        The Jacobian there.
+    matrix : ndarray, shape (m, n + 1)
+        Derivatives of Phi with respect to q and t, in scales of the equations and coordinates.
+    tangent : ndarray, shape (n + 1,)
+        Unit vector along the curve, in scales of the coordinates and of time.
+    """
+
+    q: Vector
+    t: float
+    Phi_q: Vector
+    matrix: Vector
+    tangent: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bracket:
+    """Two points of the curve with a singular configuration between them.
+
+    Attributes
+    ----------
+    first, second : Place
+        The points, in the direction of the motion.
+    length : float
+        The step from one to the other.
+    turns : bool
+        Whether the curve turns back in time.
+    """
+
+    first: Place
+    second: Place
+    length: float
+    turns: bool
+
+
+class Curve:
+    """The curve through a point of a motion.
+
+    Parameters
+    ----------
+    equations
+        A module with its parameters set.
+    state
+        A good point of the motion.
+    duration
+        A time that is long for the motion.
+    """
+
+    def __init__(self, equations: Problem, state: State, duration: float) -> None:
+        self.equations = equations
+        spread = equations.spread(state.point.q)
+        self.scale = np.append(spread, duration)
+        terms = equations.terms(state.point, spread)
+        self._weights = 1 / np.where(terms > 0, terms, 1.0)
+
+    def start(self, state: State, direction: float) -> Place | None:
+        """Return a point of the motion as one of the curve, looking forward or back in time."""
+        towards = direction * np.append(state.q_dot, 1.0) / self.scale
+        return self._place(state.point.q, state.t, towards)
+
+    def step(self, place: Place, length: float) -> Place | None:
+        """Go a length along the curve; None where it cannot be followed so far."""
+        y = np.append(place.q, place.t) + length * place.tangent * self.scale
+        predicted = y.copy()
+        last = math.inf
+        for _ in range(CORRECTIONS):
+            found = self._derivatives(y[:-1], float(y[-1]))
+            if found is None:
+                return None
+            Phi, _, matrix = found
+            away = place.tangent @ ((y - predicted) / self.scale)
+            try:
+                change = solve_linear(
+                    np.vstack((matrix, place.tangent)), np.append(self._weights * Phi, away)
+                )
+            except np.linalg.LinAlgError:
+                return None
+            y = y - change * self.scale
+            size = float(np.max(np.abs(change)))
+            if size <= SMALL_CORRECTION or (size <= TOLERABLE_CORRECTION and size > last / 4):
+                break
+            last = size
+        else:
+            return None
+        moved = float(np.linalg.norm((y - predicted) / self.scale))
+        if not moved <= max(abs(length) / 4, TOLERABLE_CORRECTION):
+            return None
+        return self._place(y[:-1], float(y[-1]), place.tangent)
+
+    def next_singular(self, place: Place, latest: float) -> Bracket | None:
+        """Follow the curve up to a time, or to the first step that contains a singular point."""
+        length = FIRST
+        forward = math.copysign(1.0, latest - place.t)
+        for _ in range(MAX_STEPS):
+            following = self.step(place, length)
+            if following is None or following.tangent @ place.tangent < STRAIGHT:
+                length /= 2
+                if length < SHORTEST:
+                    return None
+                continue
+            turns = following.tangent[-1] * place.tangent[-1] <= 0
+            if turns or self._changed(place, following):
+                return Bracket(place, following, length, turns)
+            if (following.t - latest) * forward > 0:
+                return None
+            place, length = following, min(2 * length, LONGEST)
+        return None
+
+    def singular_point(self, bracket: Bracket) -> tuple[Place, float] | None:
+        """Return the singular configuration in a bracket, and how far along it lies."""
+        first = bracket.first
+        if bracket.turns:
+            at = _root(lambda length: self._forward(first, length), bracket.length)
+            place = self.step(first, at)
+            return None if place is None else (place, at)
+        blocks = self._changed(first, bracket.second)
+        at = _root(lambda length: self._least(first, length, blocks), bracket.length)
+        before = self.step(first, at - AROUND)
+        parts = np.zeros(len(blocks)) if before is None else self._parts(first, before, blocks)
+        return self._between(first, at, blocks[int(np.argmin(parts))])
+
+    def _between(self, first: Place, at: float, block: int) -> tuple[Place, float] | None:
+        """Return a bifurcation by interpolation of places so far from it that they are accurate."""
+        places = [self.step(first, at + offset * AROUND) for offset in OFFSETS]
+        known = [place for place in places if place is not None]
+        if len(known) < len(OFFSETS):
+            return None
+        powers = np.vander(OFFSETS)
+        values = np.array([
+            [*place.q, place.t, self._value(place, first, block)] for place in known
+        ])  # fmt: skip
+        coefficients = np.linalg.solve(powers, values)
+        roots = np.roots(coefficients[:, -1])
+        real = roots.real[np.abs(roots.imag) <= np.abs(roots.real) * ROUGHLY + ROUGHLY]
+        x = float(real[np.argmin(np.abs(real))]) if real.size else 0.0
+        y = np.vander([x], len(OFFSETS))[0] @ coefficients[:, :-1]
+        place = self._place(y[:-1], float(y[-1]), first.tangent)
+        return None if place is None else (place, at + x * AROUND)
+
+    def _value(self, place: Place, first: Place, block: int) -> float:
+        """Return the determinant of a block at a place."""
+        return determinants(self.equations, (place.q, place.t, place.Phi_q), first.Phi_q)[block]
+
+    def _forward(self, place: Place, length: float) -> float | None:
+        """Return the tangent's component along time, a length further on."""
+        found = self.step(place, length) if length else place
+        return None if found is None else float(found.tangent[-1])
+
+    def _least(self, place: Place, length: float, blocks: list[int]) -> float | None:
+        """Return what is left of the determinants of blocks, a length further on, of the least."""
+        found = self.step(place, length) if length else place
+        return None if found is None else float(np.min(self._parts(place, found, blocks)))
+
+    def _parts(self, before: Place, after: Place, blocks: list[int] | slice) -> Vector:
+        """Return the determinants of blocks, as parts of what they were."""
+        there, here = (
+            np.array(determinants(self.equations, (place.q, place.t, place.Phi_q), before.Phi_q))
+            for place in (before, after)
+        )
+        with np.errstate(all="ignore"):
+            return np.asarray((here / there)[blocks])
+
+    def _changed(self, before: Place, after: Place) -> list[int]:
+        """Return the blocks whose determinant has changed its sign, or is zero."""
+        parts = self._parts(before, after, slice(None))
+        return [int(block) for block in np.flatnonzero(~(parts > 0))]
+
+    def _derivatives(self, q: Vector, t: float) -> tuple[Vector, Vector, Vector] | None:
+        """Return Phi, Phi_q, and the scaled derivatives by q and t, or None where not finite."""
+        point = self.equations.at(q, t)
+        if point is None:
+            return None
+        try:
+            nu = self.equations.module.nu(q, t, self.equations.p)
+        except (ArithmeticError, ValueError):
+            return None
+        matrix = self._weights[:, np.newaxis] * np.column_stack((point.Phi_q, -nu)) * self.scale
+        return (point.Phi, point.Phi_q, matrix) if np.isfinite(matrix).all() else None
+
+    def _place(self, q: Vector, t: float, towards: Vector) -> Place | None:
+        found = self._derivatives(q, t)
+        if found is None:
+            return None
+        _, Phi_q, matrix = found
+        return Place(q, t, Phi_q, matrix, _tangent(matrix, towards))
+
+
+def _tangent(matrix: Vector, towards: Vector) -> Vector:
+    """Return the unit vector that a matrix takes to zero, in a direction."""
+    along = np.zeros(matrix.shape[0] + 1)
+    along[-1] = 1.0
+    try:  # a tenth of the time of singular values
+        tangent = solve_linear(np.vstack((matrix, towards)), along)
+    except np.linalg.LinAlgError:
+        tangent = np.linalg.svd(matrix)[2][-1]
+        tangent = tangent if tangent @ towards >= 0 else -tangent
+    return tangent / np.linalg.norm(tangent)
+
+
+def _root(function: Callable[[float], float | None], length: float) -> float:
+    """Return a zero in (0, length) of a function that changes its sign there.
+
+    Regula falsi with the weights of the Illinois method; a bisection every third step.
+    """
+    low, high = 0.0, length
+    at_low, at_high = function(low), function(high)
+    if at_low is None or at_high is None or at_low == 0 or at_high == 0:
+        return low if at_low == 0 else high
+    for k in range(ROOT_STEPS):
+        middle = (low + high) / 2
+        if k % 3 < 2:
+            middle = (low * at_high - high * at_low) / (at_high - at_low)
+        value = function(middle)
+        if value is None:  # rounding errors at the singular point itself
+            return middle
+        if value == 0 or high - low <= ROOT:
+            return middle
+        if value * at_low > 0:
+            low, at_low, at_high = middle, value, at_high / 2
+        else:
+            high, at_high, at_low = middle, value, at_low / 2
+    return (low + high) / 2

@@ -1,0 +1,268 @@
+r"""Singular configurations of a motion: located in time, told apart, and named.
+
+Where :math:`\Phi_q` is singular, its null vector :math:`v` is a movement that no equation forbids.
+At a lock-up the drivers demand what the joints cannot give: velocities grow beyond all bounds, and
+time cannot go on. At a bifurcation two motions cross, velocities stay finite, and the mechanism
+may go on along either.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.names import body_coordinates, listed
+from kincompile.runtime.march import State, complete
+from kincompile.runtime.singular.curve import Bracket, Curve
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from types import ModuleType
+
+    from kincompile.runtime.problem import Point, Problem, Vector
+
+LOCK_UP, BIFURCATION, BRANCH_SWITCH = "lock-up", "bifurcation", "branch switch"
+"""Kinds of events."""
+
+INVOLVED = 0.02
+"""Part of the largest movement in a null vector from which on a coordinate is involved in it."""
+
+PASSAGE = 2e-3
+"""Half of the piece of curve around a bifurcation, in radians and sizes of the mechanism, over
+which the motion is interpolated: beyond it Phi_q is good to ten digits."""
+
+LATE = 1e-6
+"""Time after the point that failed, relative to the way to it, up to which an event explains it."""
+
+IN_RANGE = 1e-6
+"""Part of nu that the equations cannot give, below which a singular point is no lock-up."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Event:
+    """Something that happens to the motion as a whole.
+
+    Attributes
+    ----------
+    kind : str
+        ``"lock-up"``, ``"bifurcation"`` or ``"branch switch"``.
+    t : float
+        When; of a branch switch the last time up to which the motion could be followed.
+    bodies : tuple of str
+        Bodies that take part in the movement that nothing determines there, in the order of the
+        mechanism; coordinates that belong to no body under their own names.
+    message : str
+        What happens, and what to do.
+    q : ndarray, shape (n,)
+        The position there.
+    null_vector : dict
+        Share of each coordinate in that movement: of lengths in sizes of the mechanism, of angles
+        in radians, the largest being 1. Empty for a branch switch.
+    """
+
+    kind: str
+    t: float
+    bodies: tuple[str, ...]
+    message: str
+    q: Vector
+    null_vector: dict[str, float]
+
+    def __repr__(self) -> str:
+        """Give kind, time and bodies."""
+        return f"<{self.kind} at t = {self.t:.10g}: {listed(self.bodies)}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passage:
+    """The motion on both sides of a bifurcation, on the smooth branch.
+
+    Attributes
+    ----------
+    before, after : State
+        Points of the motion so far from the bifurcation that their rates are accurate.
+    """
+
+    before: State
+    after: State
+
+    def at(self, t: float) -> tuple[Vector, Vector, Vector]:
+        """Return position, velocity and acceleration between the two, by interpolation."""
+        h = self.after.t - self.before.t
+        left = np.array([self.before.point.q, h * self.before.q_dot, h * h * self.before.q_ddot])
+        right = np.array([self.after.point.q, h * self.after.q_dot, h * h * self.after.q_ddot])
+        coefficients = np.concatenate((left[:2], left[2:] / 2, _QUINTIC @ np.vstack((left, right))))
+        s = (t - self.before.t) / h
+        powers = s ** np.arange(6)
+        order = np.arange(1, 6)
+        first = np.append(0.0, order * powers[:5])
+        second = np.append([0.0, 0.0], (order * (order - 1))[1:] * powers[:4])
+        return (
+            powers @ coefficients,
+            first @ coefficients / h,
+            second @ coefficients / h**2,
+        )
+
+
+_QUINTIC = np.array([
+    [-10, -6, -1.5, 10, -4, 0.5],
+    [15, 8, 1.5, -15, 7, -1],
+    [-6, -3, -0.5, 6, -3, 0.5],
+])  # fmt: skip
+"""Coefficients of s^3, s^4, s^5 from q, h q_dot, h^2 q_ddot at both ends of the interval."""
+
+
+def locate(
+    equations: Problem, state: State, latest: float, duration: float
+) -> tuple[Event, Passage | None] | None:
+    """Find the singular configuration that a motion cannot pass.
+
+    Parameters
+    ----------
+    equations
+        The module with its parameters and scales.
+    state
+        The last good point of the motion.
+    latest
+        The time that was not reached.
+    duration
+        A time that is long for the motion.
+
+    Returns
+    -------
+    tuple or None
+        The event, and for a bifurcation the motion on both sides of it. None where the curve goes
+        on to that time, or nowhere.
+    """
+    curve = Curve(equations, state, duration)
+    forward = math.copysign(1.0, latest - state.t)
+    start = curve.start(state, forward)
+    bracket = start and curve.next_singular(start, latest + LATE * (latest - state.t))
+    if not bracket:
+        return None
+    singular = curve.singular_point(bracket)
+    if singular is None:
+        return None
+    place, at = singular
+    if (place.t - latest) * forward > LATE * max(duration, abs(latest - state.t)):
+        return None
+    kind = LOCK_UP if bracket.turns else BIFURCATION
+    event = _event(equations, kind, place.q, place.t, place.Phi_q)
+    return event, None if bracket.turns else _passage(curve, bracket, at)
+
+
+def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
+    """Tell what a position is from which no motion is known: a lock-up or a bifurcation.
+
+    Parameters
+    ----------
+    equations
+        The module with its parameters and scales.
+    point
+        A position that is assembled and at which Phi_q is singular.
+    t
+        Its time.
+    """
+    try:
+        nu = equations.module.nu(point.q, t, equations.p)
+    except (ArithmeticError, ValueError):
+        return None
+    if not (np.isfinite(nu).all() and np.isfinite(point.Phi_q).all()):
+        return None
+    scaled = point.Phi_q * equations.spread(point.q)
+    basis, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
+    missing = basis[:, sizes <= IN_RANGE * sizes[0]].T @ nu
+    demanded = float(np.linalg.norm(missing)) > IN_RANGE * float(np.linalg.norm(nu))
+    kind = LOCK_UP if demanded else BIFURCATION
+    return _event(equations, kind, point.q, t, point.Phi_q)
+
+
+def branch_switch(module: ModuleType, state: State, t: float, q: Vector, spread: Vector) -> Event:
+    """Return the event of a position that the mechanism could only jump to.
+
+    Parameters
+    ----------
+    module
+        The emitted module.
+    state
+        The last good point of the motion.
+    t, q
+        The time that was not reached, and the position found there.
+    spread
+        The distance that is large for each coordinate.
+    """
+    jump = (q - state.point.q) / spread
+    bodies = _involved(module, jump)
+    return Event(
+        BRANCH_SWITCH, state.t, bodies,
+        f"Branch switch at t = {state.t:.10g}: at t = {t:.10g} the mechanism can be assembled, but "
+        f"{listed(bodies)} would have to jump there. Make the drivers continuous, or start a new "
+        "motion at that time if the jump is wanted.",
+        q, {},
+    )  # fmt: skip
+
+
+def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:
+    """Name what moves, and say what to do."""
+    spread = equations.spread(q)
+    _, sizes, directions = np.linalg.svd(Phi_q * spread)
+    null = directions[-1] / directions[-1][np.argmax(np.abs(directions[-1]))]
+    module = equations.module
+    # Equal loops become singular together: then several movements are free.
+    free = directions[np.append(sizes[:-1] <= IN_RANGE * sizes[0], True)]
+    bodies = _involved(module, np.linalg.norm(free, axis=0))
+    return Event(
+        kind, t, bodies, _message(kind, t, bodies), q,
+        dict(zip(module.COORDINATES, null.tolist(), strict=True)),
+    )  # fmt: skip
+
+
+def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
+    moving = listed(bodies)
+    if kind == LOCK_UP:
+        return (
+            f"Lock-up at t = {t:.10g}: Phi_q is singular, and the velocities of {moving} grow "
+            "beyond all bounds: the drivers demand what the joints cannot give. End the motion "
+            "before this time (shorten the range of the drivers), change lengths, or drive one of "
+            "these bodies instead."
+        )
+    return (
+        f"Bifurcation at t = {t:.10g}: Phi_q is singular, but velocities stay finite: {moving} may "
+        "go on in two ways. kc.solve(..., through='smooth'), or --through smooth, goes on along "
+        "the smooth branch; otherwise end the motion before this time, change a length slightly, "
+        "or drive one of these bodies near this time."
+    )
+
+
+def _involved(module: ModuleType, movement: Vector) -> tuple[str, ...]:
+    """Return the bodies that take part in a movement, and coordinates that belong to none."""
+    large = np.abs(movement) > INVOLVED * np.max(np.abs(movement), initial=0.0)
+    owners = owner_of_coordinates(module.COORDINATES)
+    names = zip(module.COORDINATES, large.tolist(), strict=True)
+    return tuple(dict.fromkeys(owners[name] for name, is_large in names if is_large))
+
+
+def owner_of_coordinates(coordinates: Sequence[str]) -> Mapping[str, str]:
+    """Return the body of each coordinate; one that belongs to none stands for itself."""
+    owners = {name: name for name in coordinates}
+    for k, name in enumerate(coordinates):
+        body = name.removeprefix("x_")
+        triple = body_coordinates(body)
+        if tuple(coordinates[k : k + 3]) == triple:
+            owners.update(dict.fromkeys(triple, body))
+    return owners
+
+
+def _passage(curve: Curve, bracket: Bracket, at: float) -> Passage | None:
+    """Return the motion on both sides of a bifurcation."""
+    sides = []
+    for length in (at - PASSAGE, at + PASSAGE):
+        place = curve.step(bracket.first, length)
+        point = place and curve.equations.at(place.q, place.t)
+        state = point and place and complete(curve.equations, place.t, point)
+        if not isinstance(state, State):
+            return None
+        sides.append(state)
+    return Passage(*sides)

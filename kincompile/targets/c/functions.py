@@ -1,0 +1,245 @@
+"""The functions of a program as C text: each works on one point of a block of points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.ir.graph import operands_of
+from kincompile.targets.functions import inputs_read
+from kincompile.targets.headings import place, title
+from kincompile.targets.layout import assigned, wrapped
+from kincompile.targets.printers import CPrinter
+from kincompile.targets.solving import components, explained
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
+    from kincompile.targets.functions import Listing
+    from kincompile.targets.solving import SolveListing
+
+ABOUT = {
+    "Phi": "Constraint vector Phi(q, t).",
+    "Phi_q": "Jacobian of Phi by q: the entries that vary.",
+    "nu": "Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.",
+    "gamma": "Right side of the acceleration equation Phi_q q_ddot = gamma.",
+    "position": "Phi and Phi_q in one go: a step of Newton's method.",
+    "velocity": "Phi_q and nu in one go: the velocity equation.",
+    "acceleration": "Phi_q and gamma in one go: the acceleration equation.",
+    "kinematics": "Phi, Phi_q, nu and gamma in one go.",
+}
+"""What each function gives."""
+
+ANGLE_FUNCTIONS = frozenset({"cos", "sin", "cos_sin"})
+"""Functions whose fast form does not reach all angles."""
+
+
+def evaluator(
+    name: str, code: InlineProgram, listing: Listing, names: Mapping[str, str], prefix: str = ""
+) -> list[str]:
+    """Return a function that evaluates quantities at a point, and the one for a block.
+
+    Their names begin with the prefix.
+    """
+    printer = CPrinter(code.nodes, listing.names)
+    has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
+    body = ["int64_t far = 0;"] if has_angles else []
+    body += _inputs(code.program, listing, names)
+    body += _frames(listing, printer)
+    for section, assignments in listing.steps:
+        body.append(f"// {title(section)}")
+        for item in assignments:
+            body += assigned(f"const double {item.name}", printer.text(item.node, own=True))
+    entry_numbers = {place: k for k, place in enumerate(code.pattern())}
+    for quantity, rows in listing.results:
+        for section, entries in rows:
+            if entries:
+                body.append(f"// {title(section)}")
+            for entry in entries:
+                index = entry.row
+                if quantity == "Phi_q":
+                    index = entry_numbers[entry.row, entry.column]
+                lines = assigned(f"at->{quantity}[{index}][lane]", printer.text(entry.node))
+                comment = place(quantity, entry, code)
+                lines[-1] += f"  // {comment}" if comment else ""
+                body += lines
+    write = _with_angles if has_angles else _plain
+    return [f"// {ABOUT[name]}", *write(f"{prefix}{name}", body)]
+
+
+def _plain(name: str, body: list[str]) -> list[str]:
+    # A function of a whole point that is constant, or has no entry that varies, is possible.
+    used = any("[lane]" in line for line in body)
+    return [
+        f"INLINE void {name}_at(block *at, size_t lane)",
+        "{",
+        *(f"    {line}" for line in (body if used else ["(void)at, (void)lane;"])),
+        "}",
+        "",
+        *_block_function(name),
+    ]
+
+
+def _with_angles(name: str, body: list[str]) -> list[str]:
+    return [
+        f"INLINE int64_t {name}_at(block *at, size_t lane, int exact)",
+        "{",
+        *(f"    {line}" for line in (*body, "return far;")),
+        "}",
+        "",
+        f"static void {name}_of_block(block *at, size_t count)",
+        "{",
+        "    int64_t far = 0;",
+        "    for (size_t lane = 0; lane < count; lane++)",
+        f"        far |= {name}_at(at, lane, 0);",
+        "    for (size_t lane = 0; far && lane < count; lane++)",
+        f"        {name}_at(at, lane, 1);",
+        "}",
+    ]
+
+
+def _block_function(name: str) -> list[str]:
+    return [
+        f"static void {name}_of_block(block *at, size_t count)",
+        "{",
+        "    for (size_t lane = 0; lane < count; lane++)",
+        f"        {name}_at(at, lane);",
+        "}",
+    ]
+
+
+def _inputs(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:
+    """Return the lines that name the inputs that are read."""
+    lines = [
+        f"const double {names[member]} = at->{vector}[{k}][lane];"
+        for vector, k, member in inputs_read(program, listing)
+    ]
+    return [*lines, "const double t = at->t[lane];"] if "t" in listing.inputs else lines
+
+
+def _frames(listing: Listing, printer: CPrinter) -> list[str]:
+    """Return the cosine and sine of each body's angle, a line a body."""
+    if not listing.frames:
+        return []
+    lines = ["// body frames: A = [[c, -s], [s, c]]"]
+    for frame in listing.frames:
+        if len(frame.values) == 2:
+            c, s = (item.name for item in frame.values)
+            angle = printer.text(frame.angle)
+            lines += [f"double {c}, {s};", f"far |= cos_sin({angle}, exact, &{c}, &{s});"]
+        else:
+            item = frame.values[0]
+            lines.append(f"const double {item.name} = {printer.text(item.node, own=True)};")
+    return lines
+
+
+def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
+    """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
+    printer, plan, names = CPrinter(listing.plan.nodes, listing.names), listing.plan, listing.names
+    numbers = {place: k for k, place in enumerate(code.pattern())}
+    read = _read(listing, (*listing.factor_steps, *listing.factors, *plan.determinants))
+    factor = [
+        f"const double {names[node]} = at->Phi_q[{numbers[row, column]}][lane];"
+        for row, column, node in plan.entries
+        if node in read
+    ]
+    factor += _steps(listing.factor_steps, listing, printer)
+    factor += [f"at->F[{k}][lane] = {names[node]};" for k, node in enumerate(listing.factors)]
+    factor += [
+        f"at->determinants[{k}][lane] = {printer.text(node)};"
+        for k, node in enumerate(plan.determinants)
+    ]
+    return [
+        "// What a solve needs of Phi_q, and the determinants of its blocks.",
+        *(f"// {line}" for line in explained(code, plan)),
+        *_plain(f"{prefix}factor", factor),
+        "",
+        *_solution(listing, printer, prefix),
+    ]
+
+
+def _solution(listing: SolveListing, printer: CPrinter, prefix: str) -> list[str]:
+    """Return the function that solves for a right side."""
+    plan, names = listing.plan, listing.names
+    read = _read(listing, (*listing.solve_steps, *plan.solution))
+    body = [f"const double {names[node]} = F[{k}][lane];" for k, node in enumerate(listing.factors)]
+    body += [
+        f"const double {names[node]} = right[{k}][lane];"
+        for k, node in enumerate(plan.right)
+        if node in read
+    ]
+    body += _steps(listing.solve_steps, listing, printer)
+    body += [f"to[{k}][lane] = {printer.text(node)};" for k, node in enumerate(plan.solution)]
+    return [
+        "// x of Phi_q x = right.",
+        f"INLINE void {prefix}solve_at(const double (*restrict F)[LANES],",
+        "    const double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)",
+        "{",
+        *(f"    {line}" for line in (body if listing.factors else ["(void)F;", *body])),
+        "}",
+    ]
+
+
+def _read(listing: SolveListing, starts: Iterable[int]) -> set[int]:
+    """Return the named nodes that code reads, which is what it must declare."""
+    found: set[int] = set()
+    stack = [operand for node in starts for operand in _operands(listing, node)]
+    stack += [node for node in starts if node in listing.names]
+    while stack:
+        node = stack.pop()
+        if node in listing.names:
+            found.add(node)
+        else:
+            stack += _operands(listing, node)
+    return found
+
+
+def _operands(listing: SolveListing, node: int) -> tuple[int, ...]:
+    return operands_of(listing.plan.nodes[node])
+
+
+def _steps(nodes: Iterable[int], listing: SolveListing, printer: CPrinter) -> list[str]:
+    """Return an assignment for each node; a larger block's solution comes from one call."""
+    lines: list[str] = []
+    done: set[int] = set()
+    for node in nodes:
+        operation, *content = listing.plan.nodes[node]
+        if operation != "linear":
+            lines += assigned(f"const double {listing.names[node]}", printer.text(node, own=True))
+        elif content[0] == "determinant":
+            lines += _determinant(node, listing, printer)
+        elif node not in done:
+            same = components(listing.plan, node)
+            done |= set(same)
+            lines += _block_solution(same, listing, printer)
+    return lines
+
+
+def _determinant(node: int, listing: SolveListing, printer: CPrinter) -> list[str]:
+    _, _, size, _, *matrix = listing.plan.nodes[node]
+    return [
+        f"const double {listing.names[node]} = block_determinant({size}, (const double[]){{",
+        *_indented(matrix, printer),
+        "});",
+    ]
+
+
+def _block_solution(same: list[int], listing: SolveListing, printer: CPrinter) -> list[str]:
+    """Return the call that solves a block, and the names of the components."""
+    _, _, size, _, *operands = listing.plan.nodes[same[0]]
+    names = [listing.names[node] for node in same]
+    vector = f"block_of_{names[0]}"
+    return [
+        f"double {vector}[{size}];",
+        f"block_solve({size}, (const double[]){{",
+        *_indented(operands[: size * size], printer),
+        "}, (const double[]){",
+        *_indented(operands[size * size :], printer),
+        f"}}, {vector});",
+        *(f"const double {name} = {vector}[{k}];" for k, name in enumerate(names)),
+    ]
+
+
+def _indented(nodes: list[int], printer: CPrinter) -> list[str]:
+    return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]

@@ -1,0 +1,1 @@
+"""NumPy modules, inline and grouped."""

@@ -1,0 +1,231 @@
+"""The NumPy target for large mechanisms: one function a group of constraints, arrays in a file.
+
+The text of the module depends on the number of groups and of classes of equal blocks, not on the
+number of constraints; the arrays are in ``<name>.npz`` beside it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.ir.inline import Entry, InlineProgram, Section
+from kincompile.targets.functions import schedule
+from kincompile.targets.layout import indented, quoted, wrapped
+from kincompile.targets.naming import NameTable
+from kincompile.targets.numpy.grouped_solve import (
+    plan_solving,
+    solving_arrays,
+    solving_code,
+    solving_table,
+)
+from kincompile.targets.numpy.module import (
+    FORMAT,
+    RESERVED,
+    array_functions,
+    function_body,
+    scalar_functions,
+    shared_text,
+)
+from kincompile.targets.target import Emitted
+from kincompile.targets.templates import fill
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.ir.grouping import Group, GroupedProgram
+
+FUNCTIONS = {"position": ("Phi", "Phi_q"), "nu": ("nu",), "gamma": ("gamma",)}
+"""What is computed together; the right sides alone, because Phi_q is then already at hand."""
+
+
+def emit_grouped(grouped: GroupedProgram) -> Emitted:
+    """Return a program as a NumPy module with a companion file of arrays."""
+    program = grouped.program
+    arrays: dict[str, NDArray[Any]] = {
+        "numbers": grouped.numbers,
+        "angles": np.array(grouped.angles, dtype=np.intp),
+    }
+    rows, columns, constants, order = pattern_of(grouped)
+    arrays["pattern"] = np.stack((rows, columns), axis=1)
+    arrays["constants"] = np.nan_to_num(constants)
+    arrays["coordinates"] = _text([item.name for item in program.coordinates])
+    arrays["units"] = _text([item.unit for item in program.coordinates])
+    arrays["equations"] = _text(program.equations)
+    for name, spline in program.tables.items():
+        arrays[f"{name}.breaks"] = np.array(spline.breaks)
+        arrays[f"{name}.coefficients"] = np.array(spline.coefficients)
+    arrays["guess"] = np.array([item.guess for item in program.coordinates])
+    code: list[str] = []
+    called: set[str] = set()
+    tables = [_group_code(item, grouped, arrays, code, called) for item in grouped.groups]
+    _entry_numbers(grouped, order, arrays)
+    code += ["", "", *_values_code(grouped, called)]
+    stages = plan_solving(program, rows, columns, constants)
+    arrays |= solving_arrays(stages)
+    code += solving_code(stages, program)
+    source = fill(
+        "numpy/grouped.py.jinja",
+        _data(grouped, code, tables, solving_table(stages), sorted(called), len(rows)),
+    )
+    return Emitted(program.name, {f"{program.name}.py": source}, _small(arrays))
+
+
+def pattern_of(
+    grouped: GroupedProgram,
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp]]:
+    """Return rows, columns and constants of Phi_q row by row, and the order of its entries."""
+    rows, columns, constants = [], [], []
+    for item in grouped.groups:
+        for row, column, node in item.Phi_q:
+            value = item.number(node)
+            rows.append(item.rows + row)
+            columns.append(item.columns[:, column])
+            constants.append(np.full(item.rows.size, np.nan if value is None else float(value)))
+    found = [np.concatenate(parts) for parts in (rows, columns, constants)]
+    order = np.lexsort((found[1], found[0]))
+    return found[0][order], found[1][order], found[2][order], order
+
+
+def _entry_numbers(
+    grouped: GroupedProgram, order: NDArray[np.intp], arrays: dict[str, NDArray[Any]]
+) -> None:
+    """Write down where each group's varying entries of Phi_q stand in the pattern."""
+    place = np.empty(order.size, dtype=np.intp)
+    place[order] = np.arange(order.size)
+    start = 0
+    for item in grouped.groups:
+        count = item.rows.size
+        kept = []
+        for _, _, node in item.Phi_q:
+            if item.number(node) is None:
+                kept.append(place[start : start + count])
+            start += count
+        arrays[f"{item.name}.entries"] = np.array(kept, dtype=np.intp).reshape(-1, count)
+
+
+def _identifier(name: str) -> str:
+    """Return a kernel's input as a Python name: `cos phi_i` is `cos_i`, `r_i.x` is `x_i`."""
+    for function in ("cos", "sin"):
+        if name.startswith(f"{function} phi_"):
+            return f"{function}_{name[8:]}"
+    vector, dot, axis = name.partition(".")
+    if dot and vector.startswith("r_"):
+        return f"{axis}{vector[1:]}"
+    return name.replace(".", "_").replace("'", "_prime")
+
+
+def _group_code(
+    item: Group,
+    grouped: GroupedProgram,
+    arrays: dict[str, NDArray[Any]],
+    code: list[str],
+    called: set[str],
+) -> list[str]:
+    """Write the functions of a group; return the lines of its entry in the module's table."""
+    table = NameTable((*RESERVED, *grouped.program.tables))
+    names = {name: table.take(_identifier(name)) for name in item.inputs}
+    sections = (Section(item.sample, "", _local_entries(item)),)
+    inline = InlineProgram(grouped.program, item.nodes, sections, item.hints)
+    arrays[f"{item.name}.rows"] = item.rows
+    lines = [f'Group("{item.name}", {len(item.Phi)}, {{']
+    lines += [f'    "{names[name]}": "{source.kind}",' for name, source in item.inputs.items()]
+    lines.append("}, {")
+    for name, source in item.inputs.items():
+        arrays[f"{item.name}.{names[name]}"] = source.index
+    for function, quantities in FUNCTIONS.items():
+        listing = schedule(inline, quantities, names, table)
+        called |= set(listing.functions)
+        read = [names[name] for name in item.inputs if name in listing.inputs]
+        body = function_body(quantities, inline, listing, titled=False)
+        code += ["", "", f"def _{item.name}_{function}({', '.join(('f', *read))}):"]
+        code += [f'    """{function} of {item.rows.size} constraints like "{item.sample.name}"."""']
+        code += [f"    {line}" for line in body]
+        quoted = "".join(f'"{name}", ' for name in read)
+        lines.append(f'    "{function}": (_{item.name}_{function}, ({quoted})),')
+    return [*lines, "}),"]
+
+
+def _local_entries(item: Group) -> dict[str, tuple[Entry, ...]]:
+    vectors = {"Phi": item.Phi, "nu": item.nu, "gamma": item.gamma}
+    entries = {
+        name: tuple(Entry(row, 0, node) for row, node in enumerate(nodes))
+        for name, nodes in vectors.items()
+    }
+    return {**entries, "Phi_q": tuple(Entry(row, column, node) for row, column, node in item.Phi_q)}
+
+
+def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
+    """Return the function of the values that depend on t, p and contact parameters."""
+    program = grouped.program
+    table = NameTable((*RESERVED, *program.tables))
+    coordinates = [item.name for item in program.coordinates]
+    parameters = [item.name for item in program.parameters]
+    names = {"t": "t", **{name: table.take(name) for name in (*parameters, *coordinates)}}
+    sample = program.instances[0]
+    entries = tuple(Entry(k, 0, node) for k, node in enumerate(grouped.values))
+    inline = InlineProgram(program, program.values, (Section(sample, "", {"values": entries}),), {})
+    listing = schedule(inline, ("values",), names, table)
+    called |= set(listing.functions)
+    unpack = [
+        f"{names[name]} = p[{k}]" for k, name in enumerate(parameters) if name in listing.inputs
+    ]
+    unpack += [
+        f"{names[name]} = q[{k}]" for k, name in enumerate(coordinates) if name in listing.inputs
+    ]
+    body = function_body(("values",), inline, listing, titled=False)
+    return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
+
+
+def _data(
+    grouped: GroupedProgram,
+    code: list[str],
+    tables: Sequence[list[str]],
+    solving: Sequence[str],
+    called: Sequence[str],
+    nonzeros: int,
+) -> dict[str, Any]:
+    program = grouped.program
+    return {
+        "title": program.name,
+        "name": program.name,
+        "format": FORMAT,
+        "fingerprint": program.fingerprint,
+        "n": len(program.coordinates),
+        "m": len(program.equations),
+        "nonzeros": nonzeros,
+        "k": len(program.parameters),
+        "redundant": indented(quoted(program.redundant)),
+        "is_planned": bool(solving),
+        "parameters": indented(quoted([item.name for item in program.parameters])),
+        "parameter_units": indented(
+            [f"{item.name!r}: {item.unit!r}," for item in program.parameters]
+        ),
+        "tables": "\n".join(
+            f'{name} = _data["{name}.breaks"], _data["{name}.coefficients"]'
+            for name in program.tables
+        ),
+        "defaults": indented(wrapped([repr(item.default) for item in program.parameters])),
+        "scalar_functions": indented(scalar_functions(called)),
+        "array_functions": indented(array_functions(called)),
+        "kernels": "\n".join(code),
+        "groups": indented(line for lines in tables for line in lines),
+        "stages": indented(solving),
+        **shared_text(),
+    }
+
+
+def _text(names: Sequence[str]) -> NDArray[np.uint8]:
+    """Return names as bytes, a line each."""
+    return np.frombuffer("\n".join(names).encode(), dtype=np.uint8)
+
+
+def _small(arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the arrays in the order of their names, indices in as few bytes as they need."""
+    return {
+        name: values.astype(np.int32) if values.dtype.kind == "i" else values
+        for name, values in sorted(arrays.items())
+    }

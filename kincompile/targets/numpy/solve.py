@@ -1,0 +1,101 @@
+"""The planned solve as Python text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.targets.layout import broken, wrapped
+from kincompile.targets.printers import PythonPrinter
+from kincompile.targets.solving import components, explained
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.targets.solving import SolveListing
+
+
+def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
+    """Return the lines of `_factor` and `_solve`, with a prefix where there are several."""
+    printer, names = PythonPrinter(listing.plan.nodes, listing.names), listing.names
+    factor = [*_unpack([names[node] for node in listing.entries], "J")]
+    factor += _steps(listing.factor_steps, listing, printer)
+    factor += ["return (", *_tuple([names[node] for node in listing.factors]), "), ("]
+    factor += [*_tuple([printer.text(node) for node in listing.plan.determinants]), ")"]
+    solve = [*_unpack([names[node] for node in listing.factors], "F")]
+    solve += _unpack([names[node] for node in listing.plan.right], "b")
+    solve += _steps(listing.solve_steps, listing, printer)
+    solve += ["return (", *_tuple([printer.text(node) for node in listing.plan.solution]), ")"]
+    return [
+        f"def {prefix}_factor(f, J):",
+        '    """Return what a solve needs of Phi_q, and the determinants of its blocks."""',
+        *(
+            f"    {line}"
+            for line in (*(f"# {line}" for line in explained(code, listing.plan)), *factor)
+        ),
+        "",
+        "",
+        f"def {prefix}_solve(f, F, b):",
+        '    """Return x of Phi_q x = b."""',
+        *(f"    {line}" for line in solve),
+    ]
+
+
+def _steps(nodes: Iterable[int], listing: SolveListing, printer: PythonPrinter) -> list[str]:
+    """Return an assignment for each node; a larger block's solution comes from one call."""
+    lines: list[str] = []
+    done: set[tuple[int, ...]] = set()
+    for node in nodes:
+        operation, *content = listing.plan.nodes[node]
+        if operation == "linear":
+            name, size, _, *operands = content
+            if (name, *operands) in done:
+                continue
+            done.add((name, *operands))
+            lines += _block_call(node, name, size, operands, listing, printer)
+            continue
+        first, *rest = broken(printer.text(node, own=True))
+        if rest:
+            lines += [
+                f"{listing.names[node]} = (",
+                f"    {first}",
+                *(f"    {line}" for line in rest),
+                ")",
+            ]
+        else:
+            lines.append(f"{listing.names[node]} = {first}")
+    return lines
+
+
+def _block_call(
+    node: int,
+    name: str,
+    size: int,
+    operands: list[int],
+    listing: SolveListing,
+    printer: PythonPrinter,
+) -> list[str]:
+    """Return the call of LAPACK for a block: its solution, or its determinant."""
+    left = [listing.names[node]]
+    if name == "solve":
+        left = [listing.names[k] for k in components(listing.plan, node)]
+    matrix, right = operands[: size * size], operands[size * size :]
+    lines = [f"{', '.join(left)} = f.block_{name}({size}, (", *_indented(matrix, printer)]
+    if right:
+        lines += ["), (", *_indented(right, printer)]
+    return [*lines, "))"]
+
+
+def _indented(nodes: list[int], printer: PythonPrinter) -> list[str]:
+    return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]
+
+
+def _unpack(names: list[str], vector: str) -> list[str]:
+    if not names:
+        return []
+    lines = wrapped(names)
+    return ["(", *(f"    {line}" for line in lines), f") = {vector}"]
+
+
+def _tuple(texts: list[str]) -> list[str]:
+    return [f"    {text}," for text in texts]

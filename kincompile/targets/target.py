@@ -1,0 +1,96 @@
+"""What a target is, and what it gives: named files, written whole or not at all."""
+
+from __future__ import annotations
+
+import io
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from kincompile.writing import write_atomically
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from kincompile.ir.inline import InlineProgram
+
+
+@dataclass(frozen=True, slots=True)
+class Emitted:
+    """The files of one target.
+
+    Attributes
+    ----------
+    name
+        Name of the mechanism.
+    files
+        Text by file name; the first is the main one.
+    arrays
+        Arrays that belong to the main file; none for most targets.
+    companion
+        Name of the file of the arrays, ``<name>.npz`` if it is empty.
+    """
+
+    name: str
+    files: Mapping[str, str]
+    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    companion: str = ""
+
+    @property
+    def source(self) -> str:
+        """Text of the main file."""
+        return next(iter(self.files.values()))
+
+    @property
+    def companions(self) -> tuple[str, ...]:
+        """Names of the files beside the main one."""
+        arrays = (self.companion or f"{self.name}.npz",) if self.arrays else ()
+        return (*list(self.files)[1:], *arrays)
+
+    def write(self, folder: str | Path, main: str | None = None) -> tuple[Path, ...]:
+        """Write the files into a folder, which is made if it is missing, and return their paths.
+
+        Parameters
+        ----------
+        folder
+            Where to write.
+        main
+            Another name for the main file.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be written to.
+        """
+        # Where the folder cannot be made, writing the first file says why.
+        with suppress(OSError):
+            Path(folder).mkdir(parents=True, exist_ok=True)
+        paths = []
+        for k, (name, text) in enumerate(self.files.items()):
+            path = Path(folder) / (main if main and k == 0 else name)
+            write_atomically(path, text)
+            paths.append(path)
+        if self.arrays:
+            path = Path(folder) / self.companions[-1]
+            write_atomically(path, _packed(self.arrays))
+            paths.append(path)
+        return tuple(paths)
+
+
+def _packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Return arrays as the bytes of a .npz file."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    return buffer.getvalue()
+
+
+class Target(Protocol):
+    """A language to emit."""
+
+    def __call__(self, code: InlineProgram) -> Emitted:
+        """Return the files of a program."""

@@ -1,1 +1,0 @@
-"""Teaching: derivations shown step by step, and hand-derived formulas checked against them."""

@@ -1,0 +1,377 @@
+r"""Verification of an emitted module by oracles that know nothing of derivatives.
+
+Phi_q is compared with a complex step of Phi, nu with one in time, and gamma with the line oracle:
+along :math:`q + s\,\dot q,\ t + s`, where no acceleration acts, gamma is minus the second
+derivative of Phi by s. All that is used is the Phi of the module itself: who trusts Phi, which is
+what was written down, may then trust the rest.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import kincompile.compiler as compiler
+from kincompile.errors import InputError, RedundantConstraintWarning
+from kincompile.runtime.contract import check as check_contract
+from kincompile.runtime.newton import newton
+from kincompile.runtime.problem import problem
+from kincompile.runtime.status import Status
+from kincompile.tables import indented, table
+from kincompile.verify.oracles import ORACLES, Oracle
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+Array = NDArray[Any]
+
+STATES, SEED = 6, 1989
+"""States of each kind, generic ones and assembled ones."""
+
+FAR = 100.0
+"""How far from the guess, in radians and sizes of the mechanism, an assembled position may be: far
+away a coordinate has no digits left for a difference."""
+
+ALL_SHOWN = 60
+"""Equations up to which each has lines of its own; beyond, the largest errors stand for all."""
+
+LEGEND = (
+    "complex step: Phi_q = Im Phi(q + i h) / h, nu = -Im Phi(q, t + i h) / h",
+    "line oracle: gamma = -d2/ds2 Phi(q + s q_dot, t + s) at s = 0",
+)
+"""What is compared with, for who reads the table."""
+
+LARGEST = 10
+"""How many of the largest errors of each quantity stand for all."""
+
+
+FORMS: Mapping[str, tuple[tuple[str, int], ...]] = {
+    "Phi": (("position", 0), ("kinematics", 0)),
+    "Phi_q": (("Phi_q", -1), ("position", 1), ("velocity", 0), ("acceleration", 0),
+              ("kinematics", 1)),
+    "nu": (("nu", -1), ("velocity", 1), ("kinematics", 2)),
+    "gamma": (("gamma", -1), ("acceleration", 1), ("kinematics", 3)),
+}  # fmt: skip
+"""The functions that give each quantity, and its place in what they return, -1 for all of it."""
+
+MOVING = {"gamma", "acceleration", "kinematics"}
+"""Functions that take q_dot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """The comparison of one quantity of one equation.
+
+    Attributes
+    ----------
+    quantity
+        ``"Phi_q"``, ``"nu"`` or ``"gamma"``; ``"Phi"`` for the functions that give Phi with others.
+    equation
+        Name of the equation.
+    coordinate
+        Of Phi_q, the coordinate of the entry with the largest error; else "".
+    oracle
+        What it was compared with.
+    error
+        Largest difference over all states, relative to what the terms contribute.
+    passed
+        Whether it is small enough.
+    """
+
+    quantity: str
+    equation: str
+    coordinate: str
+    oracle: str
+    error: float
+    passed: bool
+
+    @property
+    def entry(self) -> str:
+        """The entry as in ``Phi_q of A.x by phi_rod``."""
+        by = f" by {self.coordinate}" if self.coordinate else ""
+        return f"{self.quantity} of {self.equation}{by}"
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What `kc.verify` finds.
+
+    Attributes
+    ----------
+    name
+        Name of the mechanism.
+    states
+        Number of generic states, and of assembled ones.
+    checks
+        One for each equation and quantity.
+    """
+
+    name: str
+    states: tuple[int, int]
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything agrees."""
+        return bool(self.checks) and all(check.passed for check in self.checks)
+
+    @property
+    def table(self) -> tuple[Check, ...]:
+        """The checks, row by row."""
+        return self.checks
+
+    def to_text(self) -> str:
+        """Give the table and the verdict as plain text."""
+        shown = self._shown()
+        rows = [
+            [
+                check.equation,
+                check.quantity,
+                check.coordinate,
+                check.oracle,
+                f"{check.error:.1e}",
+                "agrees" if check.passed else "DIFFERS",
+            ]
+            for check in shown
+        ]
+        header = ("equation", "quantity", "worst by", "compared with", "error", "verdict")
+        rest = len(self.checks) - len(shown)
+        more = [f"  {rest} more comparisons agree better than these"] if rest else []
+        return "\n".join([
+            f"Verification of {self.name}",
+            *indented(table(header, rows, right=("error",))),
+            *more,
+            *indented(LEGEND),
+            f"  {self._verdict()}",
+        ])  # fmt: skip
+
+    def _shown(self) -> list[Check]:
+        """Return the checks to be shown: all, or what differs and the largest errors."""
+        if len(self.checks) <= len(ORACLES) * ALL_SHOWN:
+            return list(self.checks)
+        shown: set[Check] = {check for check in self.checks if not check.passed}
+        for quantity in ORACLES:
+            own = [check for check in self.checks if check.quantity == quantity]
+            shown |= set(sorted(own, key=lambda check: -check.error)[:LARGEST])
+        return [check for check in self.checks if check in shown]
+
+    def _verdict(self) -> str:
+        generic, assembled = self.states
+        wrong = [check.entry for check in self.checks if not check.passed]
+        verdict = f"DIFFERS: {', '.join(wrong)}" if wrong else "all agree"
+        if not assembled:
+            verdict += (
+                "; no assembled position was found near the guess, so that none is among them "
+                "(`kincompile inspect` says what does not fit)"
+            )
+        return f"{generic} generic and {assembled} assembled states: {verdict}"
+
+    def __str__(self) -> str:
+        """Give the text."""
+        return self.to_text()
+
+
+def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
+    """Compare Phi_q, nu and gamma of an emitted module with what follows from its Phi alone.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system of free equations, which is compiled; or an emitted module.
+
+    Returns
+    -------
+    Verification
+        `.passed`, a `.table` with an entry for each equation and quantity, and `.to_text()`.
+
+    Raises
+    ------
+    ModelError, StructuralError
+        As `kc.compile` does.
+    ContractError
+        If the module is not an emitted one.
+    InputError
+        If the equations have no finite value near the guess.
+    """
+    if isinstance(model, ModuleType):
+        check_contract(model)
+        module = model
+    else:
+        module = _compiled(model)
+    with np.errstate(all="ignore"):
+        states, assembled = _states(module)
+        if not states:
+            raise InputError(
+                f"the equations of {module.NAME} have no finite value near the guess: give a guess "
+                "near the assembled mechanism."
+            )
+        checks = tuple(_checks(module, states))
+    return Verification(module.NAME, (len(states) - assembled, assembled), checks)
+
+
+def _compiled(model: Mechanism | ConstraintSystem) -> ModuleType:
+    """Compile a model; that equations are redundant is no matter here."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RedundantConstraintWarning)
+        return compiler.compile(model)
+
+
+State = tuple[Array, Array, float]
+
+
+def _states(module: ModuleType) -> tuple[list[State], int]:
+    """Return states q, q_dot, t, and how many of them, the last ones, are assembled."""
+    random = np.random.default_rng(SEED)
+    guess, p = module.GUESS, module.DEFAULTS
+    reference = problem(module, p, guess, 0.0).reference
+    generic: list[State] = []
+    assembled: list[State] = []
+    for _ in range(STATES):
+        t = float(random.uniform(0.1, 0.9))
+        away, rates = random.uniform(-0.4, 0.4, (2, guess.size)) * reference
+        if _is_finite(module, guess + away, t):
+            generic.append((guess + away, 3 * rates, t))
+        found = newton(module, t, guess)
+        is_near = np.max(np.abs(found.q - guess) / reference, initial=0.0) <= FAR
+        if found.status is Status.CONVERGED and is_near:
+            assembled.append((found.q, 3 * rates, t))
+    return generic + assembled, len(assembled)
+
+
+def _is_finite(module: ModuleType, q: Array, t: float) -> bool:
+    try:
+        return bool(np.isfinite(module.Phi(q, t)).all() and np.isfinite(module.Phi_q(q, t)).all())
+    except (ArithmeticError, ValueError):
+        return False
+
+
+def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
+    """Yield what the oracles say of each equation."""
+    reference = problem(module, module.DEFAULTS, module.GUESS, 0.0).reference
+    for quantity in ORACLES:
+        size = _sizes(module, states, quantity, reference)
+        error, limit, judge = _judged(module, states, quantity, size)
+        # The entry and the state at which an equation is worst, compared with what is allowed.
+        columns = np.argmax(error, axis=2)
+        errors = np.max(error, axis=2)
+        worst = np.argmax(errors / limit, axis=0)
+        for row, equation in enumerate(module.EQUATIONS):
+            at = worst[row], row
+            column = module.COORDINATES[columns[at]] if quantity == "Phi_q" else ""
+            yield Check(
+                quantity,
+                equation,
+                column,
+                ORACLES[quantity][judge[at]][0],
+                float(errors[at]),
+                bool(errors[at] <= limit[at]),
+            )
+
+
+def _sizes(module: ModuleType, states: list[State], quantity: str, reference: Array) -> Array:
+    """Return what errors are relative to, (states, m, k): what the terms of an equation contribute.
+
+    Of Phi_q k is n, else 1.
+    """
+    Phi_q = np.array([module.Phi_q(q, t) for q, _, t in states])
+    terms = np.abs(Phi_q) @ reference
+    terms = np.where(terms > 0, terms, 1.0)[:, :, np.newaxis]
+    if quantity == "Phi_q":
+        return np.asarray(terms / reference)
+    if quantity == "gamma":
+        fastest = np.array([np.max(np.abs(q_dot / reference)) for _, q_dot, _ in states])
+        terms = terms * np.maximum(1.0, fastest**2)[:, np.newaxis, np.newaxis]
+    return np.asarray(terms)
+
+
+def _forms(module: ModuleType, states: list[State], quantity: str) -> Iterator[Array]:
+    """Yield a quantity as each function of the module gives it, (states, m, k).
+
+    They are written out one by one, and a batch runs on other numbers than a single state.
+    """
+    shape = len(states), len(module.EQUATIONS), -1
+    q, q_dot, t = (np.array(part) for part in zip(*states, strict=True))
+    for name, place in FORMS[quantity]:
+
+        def value(q: Array, q_dot: Array, t: Any, name: str = name, place: int = place) -> Array:
+            function = getattr(module, name)
+            found = function(q, q_dot, t) if name in MOVING else function(q, t)
+            return np.asarray(found[place] if place >= 0 else found)
+
+        yield np.array([value(*state) for state in states]).reshape(shape)
+        yield value(q, q_dot, t).reshape(shape)
+    found = module.kinematics_batch_last(q.T, q_dot.T, t)[list(FORMS).index(quantity)].T
+    if quantity != "Phi_q":
+        yield found.reshape(shape)
+        return
+    Phi_q = np.zeros((len(states), len(module.EQUATIONS), len(module.COORDINATES)))
+    Phi_q[:, module.PATTERN[:, 0], module.PATTERN[:, 1]] = found
+    yield Phi_q
+
+
+def _judged(
+    module: ModuleType, states: list[State], quantity: str, size: Array
+) -> tuple[Array, Array, Array]:
+    """Return errors (states, m, k), the allowed ones and the number of the oracle (states, m).
+
+    What disagrees with the exact oracle may be wrong, or the oracle may: Phi need not have a
+    continuation to complex numbers. It is believed where it agrees with the plain one.
+    """
+    exact, plain = ORACLES[quantity]
+    found = _estimates(module, states, quantity, exact)
+    error = _error(module, states, quantity, found, size)
+    limit, judge = np.full(error.shape[:2], exact[2]), np.zeros(error.shape[:2], dtype=int)
+    if (error > exact[2]).any():
+        other = _estimates(module, states, quantity, plain)
+        doubted = np.max(_away(found, other, size), axis=2) > plain[2]
+        error[doubted] = _error(module, states, quantity, other, size)[doubted]
+        limit[doubted], judge[doubted] = plain[2], 1
+        # Beside a pole, and where a root begins, no oracle tells: the other states do.
+        silent = doubted & ~np.isfinite(other).all(axis=2)
+        silent &= ~silent.all(axis=0)
+        error[silent] = 0.0
+    return error, limit, judge
+
+
+def _error(
+    module: ModuleType, states: list[State], quantity: str, found: Array, size: Array
+) -> Array:
+    """Return how far what the module gives is at most from what an oracle found."""
+    size = np.maximum(size, np.abs(found)) if quantity != "Phi_q" else size
+    error = np.zeros(found.shape)
+    for form in _forms(module, states, quantity):
+        error = np.maximum(error, _away(form, found, size))
+    return error
+
+
+def _away(found: Array, given: Array, size: Array) -> Array:
+    """Return how far numbers are apart; infinitely, where one of them is not finite."""
+    return np.asarray(np.nan_to_num(np.abs(found - given) / size, nan=np.inf))
+
+
+def _estimates(module: ModuleType, states: list[State], quantity: str, oracle: Oracle) -> Array:
+    """Return what an oracle gives for a quantity at all states, (states, m, k); NaN for nothing."""
+    _, derivative, _ = oracle
+    found = []
+    for q, q_dot, t in states:
+        along, time = (
+            (np.eye(q.size), 0.0)
+            if quantity == "Phi_q"
+            else (np.zeros((1, q.size)), 1.0)
+            if quantity in ("Phi", "nu")
+            else (q_dot[np.newaxis], 1.0)
+        )
+        try:
+            rates = derivative(module, q, t, along, time).T
+        except (ArithmeticError, TypeError, ValueError):
+            rates = np.full((len(module.EQUATIONS), len(along)), np.nan)
+        found.append(-rates if quantity in ("nu", "gamma") else rates)
+    return np.array(found)
