@@ -9,6 +9,7 @@ import sympy
 import kincompile as kc
 from kincompile.calculus.expand import Expansion, Pair
 from kincompile.calculus.expressions import Vector
+from kincompile.compare.compare import compare
 from kincompile.compare.entries import Verdict
 from kincompile.compare.faults import SQUARES, X_AND_Y, VectorFaults
 from kincompile.compare.mutations import (
@@ -63,7 +64,7 @@ def faulty(quantity: str, entries: dict[tuple[str, str] | str, str]) -> Report:
         rows[ROW[row]][COLUMN.get(column, 0)] = text
     # With gamma at hand a reversed nu is not a convention that both would follow.
     given = {"gamma": RIGHT["gamma"], quantity: rows}
-    report: Report = kc.compare(REFERENCE, **given, aliases={"w_i": "phi_id", "w_j": "phi_jd"})
+    report: Report = compare(REFERENCE, **given, aliases={"w_i": "phi_id", "w_j": "phi_jd"})
     return report
 
 
@@ -164,7 +165,7 @@ def judged(quantity: str, entries: dict[tuple[int, int], Any]) -> Report:
     matrix = RIGHT[quantity].as_mutable()
     for place, item in entries.items():
         matrix[place] = item
-    report: Report = kc.compare(REFERENCE, **{quantity: matrix})
+    report: Report = compare(REFERENCE, **{quantity: matrix})
     return report
 
 
