@@ -6,20 +6,25 @@ from dataclasses import dataclass
 from itertools import permutations
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
-    from kincompile.compare.reference import Block, Reference
+    from kincompile.compare.reference import ConstraintBlock, Reference
+    from kincompile.compare.states import Array
 
 Columns = tuple[int | None, ...]
 _MOST_PERMUTED = 5  # 120 orders; with more bodies only the reversed order is tried
+_GROUND: Columns = (None, None, None)
+_WITH_GROUND = "columns of the ground are present (they are not checked)"
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Which generated column each hand-written column is; None where it belongs to the ground.
+    """The generated column of each hand-written column; None where it belongs to the ground.
 
     `convention` says in words how this differs from the order of the system, "" where it does not.
     """
@@ -27,75 +32,62 @@ class Layout:
     columns: Columns
     convention: str = ""
 
+    def arranged(self, values: Array) -> Array:
+        """Return values by column of the system, (..., n), in this order; NaN for the ground."""
+        last = np.full((*values.shape[:-1], 1), np.nan)
+        order = [-1 if column is None else column for column in self.columns]
+        return np.concatenate([values, last], axis=-1)[..., order]
 
-def usual_layout(reference: Reference, block: Block | None, width: int) -> Layout | None:
+
+def usual_layout(reference: Reference, block: ConstraintBlock | None, width: int) -> Layout | None:
     """Return the layout of the system's own order for a matrix of a width, None where none fits."""
     every = tuple(range(len(reference.coordinates)))
-    if width == len(every):
-        return Layout(every)
+    layouts = [Layout(every)]
     if block is not None:
-        own = tuple(column for column in block.columns if column is not None)
-        if width == len(own):
-            return Layout(own)
-        if width == len(block.columns):
-            return Layout(block.columns, _GROUND)
-    if width == len(every) + 3 and reference.system.bodies:
-        return Layout((None, None, None, *every), _GROUND)
-    return None
+        layouts.append(Layout(tuple(column for column in block.columns if column is not None)))
+        layouts.append(Layout(block.columns, _WITH_GROUND))
+    if reference.system.bodies:
+        layouts.append(Layout((*_GROUND, *every), _WITH_GROUND))
+    return next((layout for layout in layouts if len(layout.columns) == width), None)
 
 
-_GROUND = "columns of the ground are present (they are not checked)"
-
-
-def expected_widths(reference: Reference, block: Block | None) -> str:
-    """Say how many columns a Jacobian may have."""
-    every = len(reference.coordinates)
-    names = listed(reference.coordinates, 60)
-    text = f"{every} columns, one for each of: {names}"
+def expected_widths(reference: Reference, block: ConstraintBlock | None) -> str:
+    """Return in words how many columns a Jacobian may have."""
+    every = reference.coordinates
+    text = f"{len(every)} columns, one for each of: {listed(every, 60)}"
     if block is not None:
-        own = [reference.coordinates[k] for k in block.columns if k is not None]
+        own = [every[k] for k in block.columns if k is not None]
         text += f"; or {len(own)}, those of the constraint: {listed(own)}"
     return text
 
 
 def other_layouts(reference: Reference, usual: Layout, row_count: int) -> Iterator[Layout]:
     """Yield layouts in other orders: of the bodies, of their coordinates, of the ground."""
-    groups, rest = _groups(reference, usual.columns)
-    ground = [group for group in groups if group == (None, None, None)]
-    bodies = [group for group in groups if group not in ground]
+    triples, rest = _split(usual.columns, 3 * len(reference.system.bodies))
+    bodies = [triple for triple in triples if triple != _GROUND]
+    has_ground = bodies != triples
     seen = {usual.columns}
     for order in _orders(bodies):
-        for layout in _arranged(order, rest, moved=list(order) != bodies):
-            for columns in _with_ground(layout.columns, bool(ground)):
-                if columns not in seen:
-                    seen.add(columns)
-                    words = [layout.convention] if layout.convention else []
-                    yield Layout(columns, "; ".join([*words, *([_GROUND] if ground else [])]))
-    # One row alone cannot tell an order from a slip.
-    if not groups and row_count > 1 and len(rest) <= _MOST_PERMUTED:
-        for columns in permutations(rest):
-            if columns not in seen:
-                yield Layout(columns, "the coordinates have another order")
+        for words, columns in _arrangements(order, is_moved=list(order) != bodies):
+            for placed in _with_ground((*columns, *rest), has_ground):
+                if placed not in seen:
+                    seen.add(placed)
+                    text = [*words, _WITH_GROUND] if has_ground else words
+                    yield Layout(placed, "; ".join(text))
+    # One row alone cannot distinguish an order from a slip.
+    if not triples and row_count > 1 and len(rest) <= _MOST_PERMUTED:
+        for other in permutations(rest):
+            if other != usual.columns:
+                yield Layout(other, "the coordinates have another order")
 
 
-def _groups(reference: Reference, columns: Columns) -> tuple[list[Columns], Columns]:
+def _split(columns: Columns, body_columns: int) -> tuple[list[Columns], Columns]:
     """Return the triples of the bodies, ground included, and the other columns."""
-    body_columns = 3 * len(reference.system.bodies)
-    groups: list[Columns] = []
-    rest: list[int | None] = []
-    k = 0
-    while k < len(columns):
-        first = columns[k]
-        if first is None or first < body_columns:
-            groups.append(columns[k : k + 3])
-            k += 3
-        else:
-            rest.append(first)
-            k += 1
-    return groups, tuple(rest)
+    count = sum(column is None or column < body_columns for column in columns)
+    return [columns[k : k + 3] for k in range(0, count, 3)], columns[count:]
 
 
-def _orders(bodies: list[Columns]) -> Iterator[tuple[Columns, ...]]:
+def _orders(bodies: Sequence[Columns]) -> Iterator[tuple[Columns, ...]]:
     if len(bodies) <= _MOST_PERMUTED:
         yield from permutations(bodies)
     else:
@@ -103,21 +95,19 @@ def _orders(bodies: list[Columns]) -> Iterator[tuple[Columns, ...]]:
         yield tuple(reversed(bodies))
 
 
-def _arranged(order: tuple[Columns, ...], rest: Columns, moved: bool) -> Iterator[Layout]:
-    """Yield the ways to write the coordinates of bodies in a given order."""
-    words = ["the bodies have another order"] if moved else []
-    by_kind = list(zip(*order, strict=True))
-    arrangements = {
-        "": [column for x, y, phi in order for column in (x, y, phi)],
-        "each body has its angle first": [c for x, y, phi in order for c in (phi, x, y)],
-        "all x come first, then all y, then all angles": [c for kind in by_kind for c in kind],
-        "the positions come first, then the angles": [
-            *(column for x, y, _ in order for column in (x, y)),
-            *(phi for _, _, phi in order),
-        ],
-    }
-    for text, columns in arrangements.items():
-        yield Layout((*columns, *rest), "; ".join([*words, *([text] if text else [])]))
+def _arrangements(
+    order: tuple[Columns, ...], is_moved: bool
+) -> Iterator[tuple[list[str], list[int | None]]]:
+    """Yield the ways to write the coordinates of bodies in a given order, each with its name."""
+    words = ["the bodies have another order"] if is_moved else []
+    yield words, [column for triple in order for column in triple]
+    angle_first = [column for x, y, phi in order for column in (phi, x, y)]
+    yield [*words, "each body has its angle first"], angle_first
+    by_kind = [column for kind in zip(*order, strict=True) for column in kind]
+    yield [*words, "all x come first, then all y, then all angles"], by_kind
+    positions = [column for triple in order for column in triple[:2]]
+    angles = [triple[2] for triple in order]
+    yield [*words, "the positions come first, then the angles"], [*positions, *angles]
 
 
 def _with_ground(columns: Columns, has_ground: bool) -> Iterator[Columns]:
@@ -126,4 +116,4 @@ def _with_ground(columns: Columns, has_ground: bool) -> Iterator[Columns]:
         yield columns
         return
     for k in range(0, len(columns) + 1, 3):
-        yield (*columns[:k], None, None, None, *columns[k:])
+        yield (*columns[:k], *_GROUND, *columns[k:])

@@ -6,7 +6,7 @@ with a fault in it, written in vectors, gets its numbers in the same way as the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,7 @@ import sympy
 
 from kincompile.calculus.expand import Expansion, Pair, Value
 from kincompile.calculus.expressions import Expression, Scalar, Vector
+from kincompile.compare.reference import Values
 from kincompile.derive.derivation import derive
 from kincompile.model.expressions import alpha, t
 from kincompile.model.matrices import entry_columns
@@ -110,17 +111,7 @@ def entry_values(
     return np.stack([np.stack(column, axis=-1) for column in columns], axis=-1)
 
 
-@dataclass(frozen=True, slots=True)
-class JointValues:
-    """Phi, nu, gamma (N, rows) and Phi_q (N, rows, columns of the template) of one joint."""
-
-    Phi: Array
-    Phi_q: Array
-    nu: Array
-    gamma: Array
-
-
-def joint_values(joint: Joint, reference: Reference, states: States) -> JointValues:
+def joint_values(joint: Joint, reference: Reference, states: States) -> Values:
     """Evaluate a joint by itself."""
     expansion = numeric_expansion(joint, reference, states)
     coordinates = joint.template.coordinates
@@ -143,7 +134,7 @@ def joint_values(joint: Joint, reference: Reference, states: States) -> JointVal
         )
         for name in ("Phi", "nu", "gamma")
     )
-    return JointValues(Phi, np.concatenate(Phi_q, axis=1), nu, gamma)
+    return Values(Phi, np.concatenate(Phi_q, axis=1), nu, gamma)
 
 
 def with_roles_exchanged(joint: Joint) -> Joint | None:

@@ -10,7 +10,7 @@ import kincompile as kc
 from kincompile.calculus.expand import Expansion, Pair
 from kincompile.calculus.expressions import Vector
 from kincompile.compare.compare import compare
-from kincompile.compare.entries import Verdict
+from kincompile.compare.comparison import Verdict
 from kincompile.compare.faults import SQUARES, X_AND_Y, VectorFaults
 from kincompile.compare.mutations import (
     A_FOR_B,

@@ -10,7 +10,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compare.entries import Verdict
+from kincompile.compare.comparison import Verdict
 from kincompile.compare.report import Report
 
 Pair = tuple[str, str]
