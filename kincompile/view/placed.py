@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 PROFILE_POINTS = 180
 """Points of a cam profile: its chords are within 1.5e-4 of its radius."""
 
-OWNERS = {"s_i": 0, "s_P": 0, "s_Q": 0, "s_j": 1}
-"""The body that a point is fixed in, by the point's symbol; all others are of the ground."""
-
 
 def world(q: Array, place: Place) -> Array:
     """Return where a place is, shape (N, 2), at positions q of shape (N, n)."""
@@ -188,9 +185,10 @@ def number_pair(pair: tuple[Scalar, Scalar], values: Mapping[str, float]) -> Poi
 
 def frame_of(joint: Joint, symbol: str, frames: Mapping[str, int]) -> int:
     """Return the frame that a point of a joint is fixed in."""
-    if symbol not in OWNERS:
+    frame = joint.template.frame_of(symbol)
+    if frame is None:
         return GROUND_FRAME
-    return frames.get(joint.bodies[OWNERS[symbol]].name, GROUND_FRAME)
+    return frames.get(joint.bodies[joint.template.frames.index(frame)].name, GROUND_FRAME)
 
 
 def _along(q: Array, base: Place, axis: Point, follower: Place) -> Array:

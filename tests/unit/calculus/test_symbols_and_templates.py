@@ -3,8 +3,9 @@
 import pytest
 
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.expressions import Basis, Profile, Symbol, Turned, VectorSymbol
-from kincompile.calculus.symbols import Contact, Frame, contact_i, i, j, s_i, unit
+from kincompile.calculus.expressions import Basis, Profile, Symbol, VectorSymbol
+from kincompile.calculus.rotations import turned
+from kincompile.calculus.symbols import Contact, Frame, c, contact_i, i, j, s_i, s_j, s_Q, unit
 from kincompile.calculus.template import Template
 
 
@@ -15,19 +16,19 @@ def test_that_a_frame_names_its_symbols_by_its_body() -> None:
 
 
 def test_that_a_point_is_position_plus_turned_vector() -> None:
-    assert i.point(s_i) == i.r + Turned(i.phi, s_i)
+    assert i.point(s_i) == i.r + turned(i.phi, s_i)
 
 
 def test_that_the_tangent_of_a_profile_is_its_derivative() -> None:
     contact = Contact("k")
     rho, rho_prime = (Profile("rho_k", contact.alpha, order) for order in (0, 1))
-    u, u_prime = Turned(contact.alpha, Basis()), Turned(contact.alpha, Basis(), 1)
+    u, u_prime = turned(contact.alpha, Basis()), turned(contact.alpha, Basis(), 1)
     assert contact.a == rho * u
     assert contact.g == rho_prime * u + rho * u_prime
 
 
 def test_that_a_unit_vector_is_a_turned_basis() -> None:
-    assert unit(i.phi) == Turned(i.phi, Basis())
+    assert unit(i.phi) == turned(i.phi, Basis())
 
 
 def test_that_a_template_lists_coordinates_and_rates_in_the_same_order() -> None:
@@ -42,3 +43,11 @@ def test_that_something_else_cannot_be_expanded() -> None:
         expansion.scalar("x")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="not a vector expression"):
         expansion.vector("x")  # type: ignore[arg-type]
+
+
+def test_that_a_point_is_of_the_frame_that_turns_it() -> None:
+    template = Template("Pair", (i, j), (contact_i,), (i.point(s_i) - j.r + j.A(s_j - s_Q), c))
+    owners = [template.frame_of(name) for name in ("s_i", "s_j", "s_Q", "c")]
+    assert owners == [i, j, j, None]
+    with pytest.raises(LookupError, match="'s_P' is not in Phi of Pair"):
+        template.frame_of("s_P")
