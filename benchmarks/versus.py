@@ -32,7 +32,8 @@ STARTS = {
     "kincompile compile": (["compile", "examples/four_bar.py", "-o", os.devnull], False, 2.5),
     "kincompile run": (["run"], True, 3.0),
 }
-"""Commands whose start counts, whether they are given a data file, and how many times `import sympy` each may take."""
+"""Commands whose start counts, whether they are given a data file, and how many times as long as
+`import sympy` each may take."""
 
 
 def main(other: Path, rounds: int) -> None:
