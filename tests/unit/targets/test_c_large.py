@@ -10,7 +10,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.runtime import grid, march, newton, problem
+from kincompile import criteria
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1")
 LINKS = ("angle", "equation", "gear", "rocker")
@@ -250,14 +250,14 @@ def test_size_chooses_the_form(quick_compiler):
 def test_the_march_judges_by_the_numbers_of_the_runtime():
     source = kc.emit(loops(8, "angle"), target="c", form="grouped").source
     wanted = {
-        "ALLOWED_PART": march.ALLOWED_PART,
-        "SMALL_ERROR": march.SMALL_ERROR,
-        "LARGE_ERROR": march.LARGE_ERROR,
-        "KINK": march.KINK,
-        "SMOOTH": march.SMOOTH,
-        "SMALLEST_DETERMINANT": grid.SMALLEST_DETERMINANT,
-        "RESIDUAL_FACTOR": newton.RESIDUAL_FACTOR,
-        "ROUNDING": problem.ROUNDING,
+        "ALLOWED_PART": criteria.ALLOWED_PART,
+        "SMALL_ERROR": criteria.SMALL_ERROR,
+        "LARGE_ERROR": criteria.LARGE_ERROR,
+        "KINK": criteria.KINK,
+        "SMOOTH": criteria.SMOOTH,
+        "SMALLEST_DETERMINANT": criteria.SMALLEST_DETERMINANT,
+        "RESIDUAL_FACTOR": criteria.RESIDUAL_FACTOR,
+        "ROUNDING": criteria.ROUNDING,
     }
     for name, value in wanted.items():
         (text,) = re.findall(rf"\b{name} = ([^,;]+)[,;]", source)
