@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.errors import InputError, UnsupportedError, missing_package
+from kincompile.errors import InputError, UnsupportedError, package_of_extra
 from kincompile.model.mechanism import system_of
 from kincompile.model.origins import model_of
 from kincompile.names import listed, suggestion
-from kincompile.runtime.results.labelled import TIME_UNIT
+from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.view.marks import Place
 from kincompile.view.mechanism_plot import draw, move, require_bodies
@@ -82,11 +82,9 @@ def animate(
     UnsupportedError
         If matplotlib, or for MP4 ffmpeg, is not installed.
     """
-    try:
+    with package_of_extra("matplotlib", "plot"):
         from matplotlib import animation
         from matplotlib import pyplot as plt
-    except ImportError:
-        raise missing_package("matplotlib", "plot") from None
     if path is not None:
         _require_writer(Path(path), animation.writers.is_available)
     system = _moving(solution, model)

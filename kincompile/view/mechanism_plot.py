@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.errors import InputError, missing_package
+from kincompile.errors import InputError, package_of_extra
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed, suggestion
 from kincompile.view.placed import world
@@ -102,10 +102,8 @@ def plot_mechanism(
     UnsupportedError
         If matplotlib is not installed.
     """
-    try:
+    with package_of_extra("matplotlib", "plot"):
         from matplotlib import pyplot as plt
-    except ImportError:
-        raise missing_package("matplotlib", "plot") from None
     position = position_of(model, q)
     drawn = drawing(model, checked_parameters(model, p), position)
     if ax is None:

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile.html import picture_html
 from kincompile.model.origins import model_of
 from kincompile.model.system import ConstraintSystem
-from kincompile.pictures import picture_html
-from kincompile.runtime.results.figures import figure_html
+from kincompile.runtime.results.html import figure_html
 from kincompile.runtime.results.solution import Solution
 from kincompile.view.mechanism_plot import draw, position_of
 from kincompile.view.page import page

@@ -20,7 +20,7 @@ PACKAGE = "kincompile"
 FLOORS = {
     "errors": 0,
     "names": 0,
-    "pictures": 0,
+    "html": 0,
     "tables": 0,
     "writing": 0,
     "calculus": 1,
