@@ -12,9 +12,9 @@ from kincompile.model.origins import model_of
 from kincompile.model.system import ConstraintSystem
 from kincompile.runtime.results.html import figure_html
 from kincompile.runtime.results.solution import Solution
+from kincompile.view.drawing import drawing
 from kincompile.view.mechanism_plot import draw, position_of
 from kincompile.view.page import page
-from kincompile.view.shapes import drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
