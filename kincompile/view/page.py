@@ -11,6 +11,7 @@ import numpy as np
 
 from kincompile.compiler import compile as compile_model
 from kincompile.errors import InputError, StructuralError
+from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
@@ -37,8 +38,8 @@ SCRIPTS = (
 )  # fmt: skip
 """Scripts, in order: each uses those before it, and the method of Newton's panel."""
 
-FRAME_HEIGHT = 720
-"""Height of a page inside a notebook [pixels]."""
+FRAME_HEIGHT = "720px"
+"""Height of a page inside a notebook."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +83,7 @@ class Page:
         return write_atomically(path, self.html)
 
     def _repr_html_(self) -> str:
-        return (
-            f'<iframe srcdoc="{escape(self.html)}" title="{escape(self.name)}" '
-            f'style="width: 100%; height: {FRAME_HEIGHT}px; border: 0"></iframe>'
-        )
+        return framed_html(self.html, self.name, FRAME_HEIGHT)
 
     def __repr__(self) -> str:
         """Return name and size."""

@@ -21,7 +21,7 @@ FLOORS = {
     "criteria": 0,
     "errors": 0,
     "names": 0,
-    "pictures": 0,
+    "html": 0,
     "tables": 0,
     "writing": 0,
     "calculus": 1,
