@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import operands_of
+from kincompile.targets.c.dialect import C
 from kincompile.targets.functions import inputs_read
 from kincompile.targets.headings import place, title
 from kincompile.targets.layout import assigned, wrapped
-from kincompile.targets.printers import CPrinter
+from kincompile.targets.printer import Printer
 from kincompile.targets.solving import components, explained
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def evaluator(
 
     Their names begin with the prefix.
     """
-    printer = CPrinter(code.nodes, listing.names)
+    printer = Printer(C, code.nodes, listing.names)
     has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
     body = ["int64_t far = 0;"] if has_angles else []
     body += _inputs(code.program, listing, names)
@@ -118,7 +119,7 @@ def _inputs(program: Program, listing: Listing, names: Mapping[str, str]) -> lis
     return [*lines, "const double t = at->t[lane];"] if "t" in listing.inputs else lines
 
 
-def _frames(listing: Listing, printer: CPrinter) -> list[str]:
+def _frames(listing: Listing, printer: Printer) -> list[str]:
     """Return the cosine and sine of each body's angle, a line a body."""
     if not listing.frames:
         return []
@@ -136,7 +137,11 @@ def _frames(listing: Listing, printer: CPrinter) -> list[str]:
 
 def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
-    printer, plan, names = CPrinter(listing.plan.nodes, listing.names), listing.plan, listing.names
+    printer, plan, names = (
+        Printer(C, listing.plan.nodes, listing.names),
+        listing.plan,
+        listing.names,
+    )
     numbers = {place: k for k, place in enumerate(code.pattern())}
     read = _read(listing, (*listing.factor_steps, *listing.factors, *plan.determinants))
     factor = [
@@ -159,7 +164,7 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
     ]
 
 
-def _solution(listing: SolveListing, printer: CPrinter, prefix: str) -> list[str]:
+def _solution(listing: SolveListing, printer: Printer, prefix: str) -> list[str]:
     """Return the function that solves for a right side."""
     plan, names = listing.plan, listing.names
     read = _read(listing, (*listing.solve_steps, *plan.solution))
@@ -199,7 +204,7 @@ def _operands(listing: SolveListing, node: int) -> tuple[int, ...]:
     return operands_of(listing.plan.nodes[node])
 
 
-def _steps(nodes: Iterable[int], listing: SolveListing, printer: CPrinter) -> list[str]:
+def _steps(nodes: Iterable[int], listing: SolveListing, printer: Printer) -> list[str]:
     """Return an assignment for each node; a larger block's solution comes from one call."""
     lines: list[str] = []
     done: set[int] = set()
@@ -216,7 +221,7 @@ def _steps(nodes: Iterable[int], listing: SolveListing, printer: CPrinter) -> li
     return lines
 
 
-def _determinant(node: int, listing: SolveListing, printer: CPrinter) -> list[str]:
+def _determinant(node: int, listing: SolveListing, printer: Printer) -> list[str]:
     _, _, size, _, *matrix = listing.plan.nodes[node]
     return [
         f"const double {listing.names[node]} = block_determinant({size}, (const double[]){{",
@@ -225,7 +230,7 @@ def _determinant(node: int, listing: SolveListing, printer: CPrinter) -> list[st
     ]
 
 
-def _block_solution(same: list[int], listing: SolveListing, printer: CPrinter) -> list[str]:
+def _block_solution(same: list[int], listing: SolveListing, printer: Printer) -> list[str]:
     """Return the call that solves a block, and the names of the components."""
     _, _, size, _, *operands = listing.plan.nodes[same[0]]
     names = [listing.names[node] for node in same]
@@ -241,5 +246,5 @@ def _block_solution(same: list[int], listing: SolveListing, printer: CPrinter) -
     ]
 
 
-def _indented(nodes: list[int], printer: CPrinter) -> list[str]:
+def _indented(nodes: list[int], printer: Printer) -> list[str]:
     return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]

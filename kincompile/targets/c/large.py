@@ -18,13 +18,14 @@ from kincompile.ir.elimination import jacobian_entries
 from kincompile.ir.inline import Entry, InlineProgram, Section
 from kincompile.names import rate
 from kincompile.structure.stages import plan_stages
+from kincompile.targets.c.dialect import C
 from kincompile.targets.c.functions import evaluator, solve_functions
 from kincompile.targets.c.library import LANES, RESERVED, array_lines, elementary
 from kincompile.targets.functions import inputs_read, schedule
 from kincompile.targets.layout import assigned, indented, labelled
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.grouped import pattern_of
-from kincompile.targets.printers import CPrinter
+from kincompile.targets.printer import Printer
 from kincompile.targets.solving import schedule_solve
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
@@ -293,7 +294,7 @@ def _values(grouped: GroupedProgram) -> tuple[list[str], set[str]]:
     sections = (Section(program.instances[0], "", {"values": entries}),)
     code = InlineProgram(program, program.values, sections, {})
     listing = schedule(code, ("values",), names, table)
-    printer = CPrinter(code.nodes, listing.names)
+    printer = Printer(C, code.nodes, listing.names)
     lines = ["(void)t, (void)p, (void)values;"]
     if {"cos", "sin"} & set(listing.functions):
         lines += ["const int exact = 1;", "int64_t far = 0;"]

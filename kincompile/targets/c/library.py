@@ -12,7 +12,7 @@ from kincompile.targets.functions import EVALUATORS, schedule
 from kincompile.targets.headings import header
 from kincompile.targets.layout import wrapped
 from kincompile.targets.naming import NameTable
-from kincompile.targets.printers import C_FUNCTIONS
+from kincompile.targets.printer import ELEMENTARY
 from kincompile.targets.solving import schedule_solve
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
@@ -40,7 +40,7 @@ KEYWORDS = (
 RESERVED = (
     *KEYWORDS, "at", "lane", "t", "far", "exact", "F", "right", "to", "PI", "LANES",
     "square", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
-    *C_FUNCTIONS,
+    *ELEMENTARY,
 )  # fmt: skip
 """Names that the functions of a mechanism use."""
 

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 from kincompile.names import rate
 from kincompile.targets.functions import Listing, inputs_read, schedule
 from kincompile.targets.headings import header, place, title
+from kincompile.targets.javascript.dialect import JAVASCRIPT
 from kincompile.targets.layout import assigned, indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.module import FORMAT
-from kincompile.targets.printers import JavaScriptPrinter
+from kincompile.targets.printer import Printer
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 
@@ -127,7 +128,7 @@ def _function(
 
 def _body(quantity: str, code: InlineProgram, listing: Listing) -> list[str]:
     """Return the statements of a function, its inputs named."""
-    printer = JavaScriptPrinter(code.nodes, listing.names)
+    printer = Printer(JAVASCRIPT, code.nodes, listing.names)
     lines = ["// body frames: A = [[c, -s], [s, c]]"] if listing.frames else []
     for frame in listing.frames:
         for item in frame.values:

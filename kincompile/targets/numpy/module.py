@@ -10,8 +10,9 @@ from kincompile.targets.functions import EVALUATORS, Listing, schedule
 from kincompile.targets.headings import header, place, short_title, title
 from kincompile.targets.layout import WIDTH, broken, commented, indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
+from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.solve import solve_functions
-from kincompile.targets.printers import PythonPrinter
+from kincompile.targets.printer import Printer
 from kincompile.targets.solving import schedule_solve
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
@@ -170,7 +171,7 @@ def function_body(
 
     Without `titled` there are no comments that name constraints: the code is for many.
     """
-    printer = PythonPrinter(code.nodes, listing.names)
+    printer = Printer(NUMPY, code.nodes, listing.names)
     body = []
     if listing.functions:
         called = ", ".join(listing.functions)
@@ -239,7 +240,7 @@ def _targets(members: Sequence[str], vector: str) -> list[str]:
     return ["(", *(f"    {line}" for line in wrapped(members)), f") = {vector}"]
 
 
-def _frames(listing: Listing, printer: PythonPrinter) -> list[str]:
+def _frames(listing: Listing, printer: Printer) -> list[str]:
     """Return the cosine and sine of each body's angle, a line a body."""
     if not listing.frames:
         return []

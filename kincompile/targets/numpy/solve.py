@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.targets.layout import broken, wrapped
-from kincompile.targets.printers import PythonPrinter
+from kincompile.targets.numpy.dialect import NUMPY
+from kincompile.targets.printer import Printer
 from kincompile.targets.solving import components, explained
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
     """Return the lines of `_factor` and `_solve`, with a prefix where there are several."""
-    printer, names = PythonPrinter(listing.plan.nodes, listing.names), listing.names
+    printer, names = Printer(NUMPY, listing.plan.nodes, listing.names), listing.names
     factor = [*_unpack([names[node] for node in listing.entries], "J")]
     factor += _steps(listing.factor_steps, listing, printer)
     factor += ["return (", *_tuple([names[node] for node in listing.factors]), "), ("]
@@ -41,7 +42,7 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
     ]
 
 
-def _steps(nodes: Iterable[int], listing: SolveListing, printer: PythonPrinter) -> list[str]:
+def _steps(nodes: Iterable[int], listing: SolveListing, printer: Printer) -> list[str]:
     """Return an assignment for each node; a larger block's solution comes from one call."""
     lines: list[str] = []
     done: set[tuple[int, ...]] = set()
@@ -73,7 +74,7 @@ def _block_call(
     size: int,
     operands: list[int],
     listing: SolveListing,
-    printer: PythonPrinter,
+    printer: Printer,
 ) -> list[str]:
     """Return the call of LAPACK for a block: its solution, or its determinant."""
     left = [listing.names[node]]
@@ -86,7 +87,7 @@ def _block_call(
     return [*lines, "))"]
 
 
-def _indented(nodes: list[int], printer: PythonPrinter) -> list[str]:
+def _indented(nodes: list[int], printer: Printer) -> list[str]:
     return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]
 
 

@@ -15,7 +15,8 @@ from kincompile.targets.functions import Listing, inputs_read, schedule
 from kincompile.targets.headings import header, place, title
 from kincompile.targets.layout import broken
 from kincompile.targets.naming import NameTable
-from kincompile.targets.printers import OCTAVE_FUNCTIONS, OctavePrinter
+from kincompile.targets.octave.dialect import NAMES, dialect
+from kincompile.targets.printer import Printer
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 
@@ -46,7 +47,7 @@ KEYWORDS = (
 """Words of MATLAB and of Octave."""
 
 RESERVED = (
-    *KEYWORDS, *ABOUT, *OCTAVE_FUNCTIONS.values(), "q", "q_dot", "t", "p", "pi", "zeros", "nargin",
+    *KEYWORDS, *ABOUT, *NAMES.values(), "q", "q_dot", "t", "p", "pi", "zeros", "nargin",
     "either", "in_reals", "NaN", "isreal",
 )  # fmt: skip
 """Names that the functions use."""
@@ -136,7 +137,7 @@ def _inputs(program: Program, listing: Listing, names: Mapping[str, str]) -> lis
 
 def _body(quantity: str, code: InlineProgram, listing: Listing) -> list[str]:
     """Return the statements of a function, its inputs named."""
-    printer = OctavePrinter(code.nodes, listing.names, code.program.name)
+    printer = Printer(dialect(code.program.name), code.nodes, listing.names)
     lines = ["% body frames: A = [c, -s; s, c]"] if listing.frames else []
     for frame in listing.frames:
         for item in frame.values:
