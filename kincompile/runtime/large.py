@@ -32,8 +32,6 @@ from kincompile.runtime.status import Status
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from numpy.typing import NDArray
-
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.problem import Vector
 
@@ -97,22 +95,6 @@ class LargeMarch:
             self._smallest = SMALLEST_DETERMINANT * np.abs(found.determinants)
         return found
 
-    def run_compiled(
-        self,
-        first: int,
-        states: tuple[Vector, Vector, Vector],
-        residual: Vector,
-        iterations: NDArray[np.int64],
-    ) -> int:
-        """Let the module's own march, if it has one, fill the points from `first` on.
-
-        Returns how many it could; those before `first` are good.
-        """
-        march = getattr(self._module, "march", None)
-        if march is None:
-            return 0
-        return int(march(self._inputs, first, self._reach, states, residual, iterations))
-
     def leaves_branch(self, found: LargeState) -> bool:
         """Say whether the guess shows a branch, and a position found from it lies on another."""
         nonzeros = self._module.evaluate(self._inputs.guess, found.t, self._p)[1]
@@ -121,10 +103,6 @@ class LargeMarch:
         except RuntimeError:
             return False
         return bool(np.all(shown != 0) and np.any((shown > 0) != (found.determinants > 0)))
-
-    def take_up(self, q: Vector, t: float) -> LargeState | Status:
-        """Return the state at a position that is known to be good."""
-        return self._correct(q, t)
 
     def advance(self, state: LargeState, t: float) -> LargeState | Status:
         """Follow the motion from a good point to time `t`, in sub-steps where need be."""

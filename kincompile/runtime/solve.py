@@ -143,7 +143,7 @@ def _solve_one(
     motion = Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if is_staged(inputs.module):
-            outcome = follow_large(inputs, motion, may_be_compiled, smooth, progress)
+            outcome = follow_large(inputs, motion, smooth, progress)
         elif may_be_compiled and _march_compiled(inputs, motion):
             outcome = Outcome(Status.CONVERGED, 0, None)
         else:

@@ -32,14 +32,11 @@ class Emitted:
         Text by file name; the first is the main one.
     arrays
         Arrays that belong to the main file; none for most targets.
-    companion
-        Name of the file of the arrays, ``<name>.npz`` if it is empty.
     """
 
     name: str
     files: Mapping[str, str]
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    companion: str = ""
 
     @property
     def source(self) -> str:
@@ -49,7 +46,7 @@ class Emitted:
     @property
     def companions(self) -> tuple[str, ...]:
         """Names of the files beside the main one."""
-        arrays = (self.companion or f"{self.name}.npz",) if self.arrays else ()
+        arrays = (f"{self.name}.npz",) if self.arrays else ()
         return (*list(self.files)[1:], *arrays)
 
     def write(self, folder: str | Path, main: str | None = None) -> tuple[Path, ...]:

@@ -37,12 +37,9 @@ ANGLE_FUNCTIONS = frozenset({"cos", "sin", "cos_sin"})
 
 
 def evaluator(
-    name: str, code: InlineProgram, listing: Listing, names: Mapping[str, str], prefix: str = ""
+    name: str, code: InlineProgram, listing: Listing, names: Mapping[str, str]
 ) -> list[str]:
-    """Return a function that evaluates quantities at a point, and the one for a block.
-
-    Their names begin with the prefix.
-    """
+    """Return a function that evaluates quantities at a point, and the one for a block."""
     printer = Printer(C, code.nodes, listing.names)
     has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
     body = ["int64_t far = 0;"] if has_angles else []
@@ -66,7 +63,7 @@ def evaluator(
                 lines[-1] += f"  // {comment}" if comment else ""
                 body += lines
     write = _with_angles if has_angles else _plain
-    return [f"// {ABOUT[name]}", *write(f"{prefix}{name}", body)]
+    return [f"// {ABOUT[name]}", *write(name, body)]
 
 
 def _plain(name: str, body: list[str]) -> list[str]:
@@ -135,13 +132,10 @@ def _frames(listing: Listing, printer: Printer) -> list[str]:
     return lines
 
 
-def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
+def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
-    printer, plan, names = (
-        Printer(C, listing.plan.nodes, listing.names),
-        listing.plan,
-        listing.names,
-    )
+    plan, names = listing.plan, listing.names
+    printer = Printer(C, plan.nodes, names)
     numbers = {place: k for k, place in enumerate(code.pattern())}
     read = _read(listing, (*listing.factor_steps, *listing.factors, *plan.determinants))
     factor = [
@@ -158,13 +152,13 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
     return [
         "// What a solve needs of Phi_q, and the determinants of its blocks.",
         *(f"// {line}" for line in explained(code, plan)),
-        *_plain(f"{prefix}factor", factor),
+        *_plain("factor", factor),
         "",
-        *_solution(listing, printer, prefix),
+        *_solution(listing, printer),
     ]
 
 
-def _solution(listing: SolveListing, printer: Printer, prefix: str) -> list[str]:
+def _solution(listing: SolveListing, printer: Printer) -> list[str]:
     """Return the function that solves for a right side."""
     plan, names = listing.plan, listing.names
     read = _read(listing, (*listing.solve_steps, *plan.solution))
@@ -178,7 +172,7 @@ def _solution(listing: SolveListing, printer: Printer, prefix: str) -> list[str]
     body += [f"to[{k}][lane] = {printer.text(node)};" for k, node in enumerate(plan.solution)]
     return [
         "// x of Phi_q x = right.",
-        f"INLINE void {prefix}solve_at(const double (*restrict F)[LANES],",
+        "INLINE void solve_at(const double (*restrict F)[LANES],",
         "    const double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)",
         "{",
         *(f"    {line}" for line in (body if listing.factors else ["(void)F;", *body])),

@@ -104,20 +104,20 @@ def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]
     varying = [str(k) for k, value in enumerate(values) if value is None]
     nu, gamma = _computed_rows(code, "nu"), _computed_rows(code, "gamma")
     return {
-        "nu": array_lines(nu),
+        "nu": _array_lines(nu),
         "n_nu": len(nu),
-        "gamma": array_lines(gamma),
+        "gamma": _array_lines(gamma),
         "n_gamma": len(gamma),
         "lanes": LANES,
         "n_factors": 0 if listing is None else len(listing.factors),
         "n_blocks": 0 if listing is None else len(listing.plan.determinants),
         "fingerprint": program.fingerprint,
-        "defaults": array_lines([repr(item.default) for item in program.parameters]),
-        "guess": array_lines([repr(item.guess) for item in program.coordinates]),
-        "pattern": array_lines([f"{{{row}, {column}}}" for row, column in code.pattern()]),
-        "constants": array_lines(constants, "{0, 0.0}"),
+        "defaults": _array_lines([repr(item.default) for item in program.parameters]),
+        "guess": _array_lines([repr(item.guess) for item in program.coordinates]),
+        "pattern": _array_lines([f"{{{row}, {column}}}" for row, column in code.pattern()]),
+        "constants": _array_lines(constants, "{0, 0.0}"),
         "n_constants": len(constants),
-        "varying": array_lines(varying),
+        "varying": _array_lines(varying),
         "n_varying": len(varying),
     }
 
@@ -128,7 +128,7 @@ def _computed_rows(code: InlineProgram, quantity: str) -> list[str]:
     return [str(entry.row) for entry in entries if code.number(entry.node) is None]
 
 
-def array_lines(items: Sequence[str], placeholder: str = "0") -> str:
+def _array_lines(items: Sequence[str], placeholder: str = "0") -> str:
     """Return the lines of an array; C has no empty ones."""
     return "\n".join(f"    {line}" for line in wrapped(items or [placeholder]))
 
@@ -152,13 +152,13 @@ def _block(code: InlineProgram, listing: SolveListing | None) -> str:
         largest = max((len(block.rows) for block in listing.plan.blocks), default=0)
     data = {
         "is_planned": listing is not None,
-        "elementary": elementary(program, called, largest),
+        "elementary": _elementary(program, called, largest),
         "functions": "\n".join(lines),
     }
     return fill("c/block.c.jinja", data)
 
 
-def elementary(program: Program, called: Collection[str], largest: int) -> str:
+def _elementary(program: Program, called: Collection[str], largest: int) -> str:
     """Return what the code calls: functions of angles, splines, the solve of blocks of a size."""
     data = {
         "has_cosine": "cos" in called,
@@ -191,4 +191,4 @@ def _scales(program: Program) -> dict[str, str]:
     golden = (math.sqrt(5) - 1) / 2
     sequence = [k * golden % 1 for k in range(1, len(angular) + 1)]
     probe = [f"{(1 if x * 64 % 2 < 1 else -1) * (1 + x) / 2!r}" for x in sequence]
-    return {"angular": array_lines(angular), "probe": array_lines(probe)}
+    return {"angular": _array_lines(angular), "probe": _array_lines(probe)}
