@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import operands_of
 from kincompile.targets.c.dialect import C
-from kincompile.targets.functions import inputs_read
+from kincompile.targets.evaluators import inputs_read
 from kincompile.targets.headings import place, title
 from kincompile.targets.layout import assigned, wrapped
+from kincompile.targets.planned_solve import components, explained
 from kincompile.targets.printer import Printer
-from kincompile.targets.solving import components, explained
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
-    from kincompile.targets.functions import Listing
-    from kincompile.targets.solving import SolveListing
+    from kincompile.targets.evaluators import Listing
+    from kincompile.targets.planned_solve import SolveListing
 
 ABOUT = {
     "Phi": "Constraint vector Phi(q, t).",

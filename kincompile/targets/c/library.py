@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
 from kincompile.names import rate
 from kincompile.targets.c.functions import evaluator, solve_functions
-from kincompile.targets.functions import EVALUATORS, schedule
+from kincompile.targets.evaluators import EVALUATORS, schedule
 from kincompile.targets.headings import header
 from kincompile.targets.layout import wrapped
 from kincompile.targets.naming import NameTable
+from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.printer import ELEMENTARY
-from kincompile.targets.solving import schedule_solve
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
-    from kincompile.targets.solving import SolveListing
+    from kincompile.targets.planned_solve import SolveListing
 
 LANES = 32
 """Points in a block: enough for the widest registers, few enough for the nearest cache."""

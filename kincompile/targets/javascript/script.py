@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.names import rate
-from kincompile.targets.functions import Listing, inputs_read, schedule
+from kincompile.targets.evaluators import Listing, inputs_read, schedule
 from kincompile.targets.headings import header, place, title
 from kincompile.targets.javascript.dialect import JAVASCRIPT
 from kincompile.targets.layout import assigned, indented, quoted, wrapped

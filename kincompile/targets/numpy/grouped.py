@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.ir.inline import Entry, InlineProgram, Section
-from kincompile.targets.functions import schedule
+from kincompile.targets.evaluators import schedule
 from kincompile.targets.layout import indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.grouped_solve import (

@@ -13,7 +13,7 @@ from kincompile.structure.stages import Chain, Lanes, Sparse, Stage, plan_stages
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.module import RESERVED_IN_SOLVE
 from kincompile.targets.numpy.solve import solve_functions
-from kincompile.targets.solving import schedule_solve
+from kincompile.targets.planned_solve import schedule_solve
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.ir.elimination import plan_solve
 from kincompile.names import rate
-from kincompile.targets.functions import EVALUATORS, Listing, schedule
+from kincompile.targets.evaluators import EVALUATORS, Listing, schedule
 from kincompile.targets.headings import header, place, short_title, title
 from kincompile.targets.layout import WIDTH, broken, commented, indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.solve import solve_functions
+from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.printer import Printer
-from kincompile.targets.solving import schedule_solve
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from kincompile.targets.layout import broken, wrapped
 from kincompile.targets.numpy.dialect import NUMPY
+from kincompile.targets.planned_solve import components, explained
 from kincompile.targets.printer import Printer
-from kincompile.targets.solving import components, explained
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from kincompile.ir.inline import InlineProgram
-    from kincompile.targets.solving import SolveListing
+    from kincompile.targets.planned_solve import SolveListing
 
 
 def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:

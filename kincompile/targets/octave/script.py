@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.names import rate
-from kincompile.targets.functions import Listing, inputs_read, schedule
+from kincompile.targets.evaluators import Listing, inputs_read, schedule
 from kincompile.targets.headings import header, place, title
 from kincompile.targets.layout import broken
 from kincompile.targets.naming import NameTable
