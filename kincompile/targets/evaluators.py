@@ -49,7 +49,9 @@ class Listing:
     results
         Quantity by quantity: the entries of each section, in order.
     inputs
-        Names of the inputs that are read.
+        Names of the inputs that are read, in the model.
+    input_names
+        Names of all inputs in the target, by those in the model.
     functions
         Names of the elementary functions that are called.
     names
@@ -60,6 +62,7 @@ class Listing:
     steps: tuple[tuple[Section, tuple[Assignment, ...]], ...]
     results: tuple[tuple[str, tuple[tuple[Section, tuple[Entry, ...]], ...]], ...]
     inputs: frozenset[str]
+    input_names: Mapping[str, str]
     functions: tuple[str, ...]
     names: Mapping[int, str]
 
@@ -106,11 +109,19 @@ def schedule(
         if own:
             steps.append((section, own))
     functions = _functions(inline, uses, frames)
-    return Listing(frames, tuple(steps), results, frozenset(read.values()), functions, names)
+    inputs = frozenset(read.values())
+    return Listing(frames, tuple(steps), results, inputs, input_names, functions, names)
+
+
+def input_names(program: Program, table: NameTable) -> dict[str, str]:
+    """Return the names of t, coordinates, rates and parameters in a target, by the model's."""
+    wanted = [item.name for item in program.coordinates]
+    wanted += [*map(rate, wanted), *(item.name for item in program.parameters)]
+    return {"t": "t", **{name: table.take(name) for name in wanted}}
 
 
 def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, str]]:
-    """Yield vector, place in it and name of each coordinate, rate and parameter that is read."""
+    """Yield vector, index and name in the target of each input that is read, t apart."""
     coordinates = [item.name for item in program.coordinates]
     vectors = {
         "q": coordinates,
@@ -120,7 +131,7 @@ def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, 
     for vector, members in vectors.items():
         for k, member in enumerate(members):
             if member in listing.inputs:
-                yield vector, k, member
+                yield vector, k, listing.input_names[member]
 
 
 def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[Frame, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import number_of, operands_of
-from kincompile.targets.layout import wrapped
+from kincompile.targets.lines import wrapped
 from kincompile.targets.schedule import Scheduler, count_uses
 
 if TYPE_CHECKING:

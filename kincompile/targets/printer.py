@@ -71,7 +71,8 @@ class Dialect:
     select
         Text of a choice: condition, value where it holds, value elsewhere.
     table
-        Text of a tabulated function: name of the table, order of the derivative, argument.
+        Text of a tabulated function: name of the table, order of the derivative, argument; with
+        ``{mechanism}`` for the mechanism's name.
     signs
         Relations and connectives that are not those of Python's arrays.
     number
@@ -99,12 +100,21 @@ class Printer:
         The code.
     names
         Names of nodes, by number.
+    mechanism
+        Name of the mechanism, with which those of tables begin in some languages.
     """
 
-    def __init__(self, dialect: Dialect, nodes: Sequence[Node], names: Mapping[int, str]) -> None:
+    def __init__(
+        self,
+        dialect: Dialect,
+        nodes: Sequence[Node],
+        names: Mapping[int, str],
+        mechanism: str = "",
+    ) -> None:
         self._dialect = dialect
         self._nodes = nodes
         self._names = names
+        self._mechanism = mechanism
         self._operations = {
             **ARITHMETIC,
             "square": dialect.square,
@@ -112,14 +122,21 @@ class Printer:
             "select": Operation(dialect.select, (SUM, SUM, SUM), ATOM),
         }
 
-    def text(self, node: int, *, own: bool = False) -> str:
-        """Return a node as text; with `own`, its definition although it has a name."""
-        return self._print(node, own=own)[0]
+    def text(self, node: int) -> str:
+        """Return a node as text: its name if it has one."""
+        return self._print(node)[0]
 
-    def _print(self, node: int, *, own: bool = False) -> tuple[str, int]:
+    def definition(self, node: int) -> str:
+        """Return what a node with a name is."""
+        return self._written_out(node)[0]
+
+    def _print(self, node: int) -> tuple[str, int]:
         """Return a node as text, and how strongly that binds."""
-        if node in self._names and not own:
-            return self._names[node], ATOM
+        name = self._names.get(node)
+        return self._written_out(node) if name is None else (name, ATOM)
+
+    def _written_out(self, node: int) -> tuple[str, int]:
+        """Return a node in terms of its operands, and how strongly that binds."""
         kind, *content = self._nodes[node]
         if kind in self._operations:
             text, operands, strength = self._operations[kind]
@@ -137,7 +154,8 @@ class Printer:
                 sign = self._dialect.signs.get(sign, sign)
                 return f"({self.text(a)} {sign} {self.text(b)})"
             case "table", [name, order, a]:
-                return self._dialect.table.format(name, order, self.text(a))
+                table = self._dialect.table
+                return table.format(name, order, self.text(a), mechanism=self._mechanism)
         raise TypeError(f"cannot print {(kind, *content)!r}")
 
     def _at(self, node: int, strength: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.targets.layout import broken, wrapped
+from kincompile.targets.lines import broken, wrapped
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.planned_solve import components, explained
 from kincompile.targets.printer import Printer
@@ -55,7 +55,7 @@ def _steps(nodes: Iterable[int], listing: SolveListing, printer: Printer) -> lis
             done.add((name, *operands))
             lines += _block_call(node, name, size, operands, listing, printer)
             continue
-        first, *rest = broken(printer.text(node, own=True))
+        first, *rest = broken(printer.definition(node))
         if rest:
             lines += [
                 f"{listing.names[node]} = (",

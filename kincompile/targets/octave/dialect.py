@@ -8,17 +8,12 @@ PARTIAL = ("asin", "acos", "acosh", "atanh", "log", "sqrt", "pow")
 NAMES = {name: name for name in ELEMENTARY} | {"pow": "power"}
 """Octave's names of the elementary functions."""
 
-
-def dialect(mechanism: str) -> Dialect:
-    """Return the language; a table is a function whose name begins with the mechanism's."""
-    return Dialect(
-        "Octave",
-        {
-            name: f"in_reals({own}({{}}))" if name in PARTIAL else f"{own}({{}})"
-            for name, own in NAMES.items()
-        },
-        square=Operation("{}^2", (ATOM,), POWER),
-        select="either({}, {}, {})",
-        table=f"{mechanism}_{{}}({{}}, {{}})",
-        signs={"&": "&&", "|": "||", "!=": "~="},
-    )
+OCTAVE = Dialect(
+    "Octave",
+    {name: f"{own}({{}})" for name, own in NAMES.items()}
+    | {name: f"in_reals({NAMES[name]}({{}}))" for name in PARTIAL},
+    square=Operation("{}^2", (ATOM,), POWER),
+    select="either({}, {}, {})",
+    table="{mechanism}_{}({}, {})",
+    signs={"&": "&&", "|": "||", "!=": "~="},
+)

@@ -102,7 +102,7 @@ def test_that_a_named_node_is_printed_as_its_name(drawn: list[Any]) -> None:
     for k, node in enumerate(graph.nodes):
         assert printer.text(k) == f"n_{k}"
         if node[0] not in ("const", "input"):
-            own = printer.text(k, own=True)
+            own = printer.definition(k)
             assert all(f"n_{operand}" in own for operand in operands_of(node))
 
 
