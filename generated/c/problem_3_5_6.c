@@ -409,13 +409,14 @@ INLINE void factor_at(block *at, size_t lane)
     const double equation_2_phi3 = at->Phi_q[3][lane];
     const double equation_3_x2 = at->Phi_q[4][lane];
     const double equation_3_y2 = at->Phi_q[5][lane];
-    const double determinant = -(equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3);
-    const double k_2 = 1.0 / (equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3);
+    const double k_1 = equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3;
+    const double determinant = -k_1;
+    const double k_3 = 1.0 / k_1;
     at->F[0][lane] = equation_1_phi3;
     at->F[1][lane] = equation_2_phi3;
     at->F[2][lane] = equation_3_x2;
     at->F[3][lane] = equation_3_y2;
-    at->F[4][lane] = k_2;
+    at->F[4][lane] = k_3;
     at->determinants[0][lane] = determinant;
 }
 
@@ -433,11 +434,11 @@ INLINE void solve_at(const double (*restrict F)[LANES],
     const double equation_2_phi3 = F[1][lane];
     const double equation_3_x2 = F[2][lane];
     const double equation_3_y2 = F[3][lane];
-    const double k_2 = F[4][lane];
+    const double k_3 = F[4][lane];
     const double equation_1 = right[0][lane];
     const double equation_2 = right[1][lane];
     const double equation_3 = right[2][lane];
-    const double b_1 = (equation_3 - equation_3_x2 * equation_1 - equation_3_y2 * equation_2) * k_2;
+    const double b_1 = (equation_3 - equation_3_x2 * equation_1 - equation_3_y2 * equation_2) * k_3;
     const double phi3 = -b_1;
     const double y2 = equation_2 + equation_2_phi3 * b_1;
     const double x2 = equation_1 + equation_1_phi3 * b_1;
