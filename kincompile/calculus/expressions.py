@@ -13,7 +13,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, overload
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
 Value = Any
 """A number, a SymPy expression, a node of code: what adds and multiplies."""
@@ -259,26 +259,6 @@ class Scaled(Vector):
 ZERO = Number(Fraction(0))
 ONE = Number(Fraction(1))
 ZERO_VECTOR = VectorSum(())
-
-
-def parts(expression: Expression) -> Iterator[Expression]:
-    """Yield an expression and everything it is made of, outside in."""
-    yield expression
-    match expression:
-        case Sum(items) | VectorSum(items) | Product(items):
-            inner: tuple[Expression, ...] = items
-        case Dot(left, right) | Scaled(left, right):
-            inner = (left, right)
-        case Power(base, _):
-            inner = (base,)
-        case Rotated(rotation, vector):
-            inner = (*rotation.coordinates, vector)
-        case Perpendicular(vector) | Norm(vector):
-            inner = (vector,)
-        case _:
-            inner = ()
-    for item in inner:
-        yield from parts(item)
 
 
 def as_scalar(value: ScalarLike) -> Scalar:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kincompile.calculus.expressions import VectorSymbol, parts
-
 if TYPE_CHECKING:
     from kincompile.calculus.expressions import Expression
     from kincompile.calculus.symbols import Contact, CoordinateSymbol, Frame
@@ -51,19 +49,3 @@ class Template:
     def rates(self) -> tuple[CoordinateSymbol, ...]:
         """The rates of the generalised coordinates, in the same order."""
         return tuple(item for owner in self.owners for item in owner.rates)
-
-    def frame_of(self, point: str) -> Frame | None:
-        """Return the frame that turns a point or direction in Phi; None for one of the ground.
-
-        Raises
-        ------
-        LookupError
-            If Phi has no such point.
-        """
-        found = {item for Phi in self.Phi for item in parts(Phi)}
-        symbol = next(
-            (item for item in found if isinstance(item, VectorSymbol) and item.name == point), None
-        )
-        if symbol is None:
-            raise LookupError(f"{point!r} is not in Phi of {self.type_name}")
-        return next((frame for frame in self.frames if frame.A(symbol) in found), None)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol, parts
+from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
 from kincompile.derivation.derivation_page import table
 from kincompile.derivation.document import Display, Math, Section, Text, Verbatim, text
@@ -30,12 +30,13 @@ from kincompile.derivation.joint_terms import (
     block_columns,
     block_entry,
     block_rows,
+    parts,
     telling,
 )
 from kincompile.derivation.rows_steps import expansion_step, placement_step, step
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
-from kincompile.model.constraint import Kind
+from kincompile.model.arguments import Kind
 from kincompile.model.expressions import depends_on
 
 if TYPE_CHECKING:

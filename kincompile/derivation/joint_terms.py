@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.calculus.expressions import (
     ONE,
@@ -12,15 +12,16 @@ from kincompile.calculus.expressions import (
     Dot,
     Expression,
     Number,
+    Power,
     Product,
     Rotated,
     Scalar,
     Scaled,
+    Sum,
     Symbol,
     Vector,
     VectorSum,
     VectorSymbol,
-    parts,
 )
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.derivation.document import Math
@@ -57,6 +58,24 @@ RULES: Mapping[Rule, Runs] = {
     Rule.PROFILE: ("profile, chain rule",),
 }
 """The rules worth a line; that a constant has no derivative is not."""
+
+
+def parts(expression: Any) -> Iterator[Expression]:
+    """Yield an expression and everything it is made of, outside in."""
+    yield expression
+    match expression:
+        case Sum(items) | VectorSum(items) | Product(items):
+            inner: tuple[Expression, ...] = items
+        case Dot(left, right) | Scaled(left, right):
+            inner = (left, right)
+        case Power(base, _):
+            inner = (base,)
+        case Rotated(rotation, vector):
+            inner = (*rotation.coordinates, vector)
+        case other:
+            inner = (other.vector,) if hasattr(other, "vector") else ()
+    for item in inner:
+        yield from parts(item)
 
 
 def abbreviations(template: Template) -> dict[Expression, Glyph]:

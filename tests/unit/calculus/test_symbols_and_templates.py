@@ -5,7 +5,7 @@ import pytest
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Basis, Profile, Symbol, VectorSymbol
 from kincompile.calculus.rotations import turned
-from kincompile.calculus.symbols import Contact, Frame, c, contact_i, i, j, s_i, s_j, s_Q, unit
+from kincompile.calculus.symbols import Contact, Frame, contact_i, i, j, s_i, unit
 from kincompile.calculus.template import Template
 
 
@@ -43,11 +43,3 @@ def test_that_something_else_cannot_be_expanded() -> None:
         expansion.scalar("x")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="not a vector expression"):
         expansion.vector("x")  # type: ignore[arg-type]
-
-
-def test_that_a_point_is_of_the_frame_that_turns_it() -> None:
-    template = Template("Pair", (i, j), (contact_i,), (i.point(s_i) - j.r + j.A(s_j - s_Q), c))
-    owners = [template.frame_of(name) for name in ("s_i", "s_j", "s_Q", "c")]
-    assert owners == [i, j, j, None]
-    with pytest.raises(LookupError, match="'s_P' is not in Phi of Pair"):
-        template.frame_of("s_P")
