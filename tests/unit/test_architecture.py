@@ -37,8 +37,9 @@ RUNTIME = "runtime"
 BOTH_SIDES = {"__init__", "__main__", "compiler", "cli", "compare", "derivation", "verify", "view"}
 
 # Modules that may import kincompile inside a function. The lazy table of public names is what the
-# package promises: `import kincompile` loads nothing, a name loads its module.
-DEFERRED = {PACKAGE}
+# package promises: `import kincompile` loads nothing, a name loads its module. The command line
+# loads the command that is called.
+DEFERRED = {PACKAGE, f"{PACKAGE}.cli"}
 
 Sources = Mapping[str, str]  # module name -> source
 
@@ -55,7 +56,8 @@ def package_sources() -> dict[str, str]:
 
 def subpackage_inits() -> list[Path]:
     """Return the `__init__.py` of every folder below the package's own."""
-    return sorted((ROOT / PACKAGE).glob("*/**/__init__.py"))
+    every = set((ROOT / PACKAGE).glob("*/**/__init__.py"))
+    return sorted(every - {ROOT / PACKAGE / "cli" / "__init__.py"})  # the program itself
 
 
 def imported(node: ast.AST, importer: str, is_package: bool) -> Iterator[str]:
