@@ -4,7 +4,7 @@ mechanism -> system()        ConstraintSystem  names and attributes checked, all
 system    -> lower           Program           kernels x instances; each type derived once
 program   -> inline          InlineProgram     written out in one graph, where equal values meet
 pattern   -> redundant_equations               as many equations as coordinates, matched one to one
-program   -> emit_...        Emitted           the files of a target
+program   -> emit_program    Emitted           the files of a target
 emitted   -> from_source     module            loaded, its contract checked
 module    -> make_native     module            its functions replaced by compiled C, for target="c"
 """
@@ -38,34 +38,20 @@ from kincompile.runtime.native.module import make_native
 from kincompile.runtime.solve import solve
 from kincompile.structure.counting import require_square
 from kincompile.structure.report import inspect_system
-from kincompile.targets.c.library import emit_c
-from kincompile.targets.javascript.script import emit_javascript
-from kincompile.targets.numpy.grouped import emit_grouped
-from kincompile.targets.numpy.module import emit_numpy
-from kincompile.targets.octave.script import emit_octave
+from kincompile.targets.emission import emit_program
+from kincompile.targets.registry import TARGETS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
     from types import ModuleType
 
     from numpy.typing import NDArray
 
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.report import Inspection
-    from kincompile.targets.target import Emitted, Target
+    from kincompile.targets.target import Emitted
 
 LOG = logging.getLogger(__name__)
-
-TARGETS: Mapping[str, Target] = {
-    "numpy": emit_numpy,
-    "c": emit_c,
-    "octave": emit_octave,
-    "javascript": emit_javascript,
-}
-"""Languages to emit."""
-
-LOADABLE = ("numpy", "c")
-"""Targets whose code this process can call."""
 
 LARGEST_INLINE = 300
 """Coordinates up to which every constraint is written out."""
@@ -110,11 +96,11 @@ def emit(
     _check_target(target, form)
     with _without_collector():
         system = system_of(model)
-        if target != "numpy" and _is_grouped(system, form):
+        if _is_grouped(system, form) and not TARGETS[target].has_grouped_form:
             raise UnsupportedError(
                 f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
             )
-        return _emitted(_lowered(system, target, form), target)
+        return emit_program(target, _lowered(system, target, form))
 
 
 @contextmanager
@@ -155,7 +141,7 @@ def _lowered(
         require_square(system, code.pattern())
     elif found := redundant_equations(system, program, code.pattern()):
         redundant = tuple(name for item in found for name in item.equations)
-        if target != "numpy":
+        if not TARGETS[target].has_redundancy:
             raise UnsupportedError(
                 f"the target {target!r} has no redundant equations, such as {listed(redundant)}; "
                 "use target='numpy', or replace their joint by one with fewer equations"
@@ -164,13 +150,6 @@ def _lowered(
         warnings.warn(text, RedundantConstraintWarning, stacklevel=3)
         code = replace(code, program=replace(program, redundant=redundant))
     return code
-
-
-def _emitted(code: InlineProgram | GroupedProgram, target: str) -> Emitted:
-    """Return the files of a target."""
-    if isinstance(code, GroupedProgram):
-        return emit_grouped(code)
-    return TARGETS[target](code)
 
 
 def compile(  # noqa: A001 - the public name kc.compile
@@ -201,9 +180,10 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    if target not in LOADABLE:
+    loadable = [name for name, item in TARGETS.items() if item.is_loadable]
+    if target not in loadable:
         raise UnsupportedError(
-            f"only modules of the targets {listed(LOADABLE)} can be loaded, not {target!r}; "
+            f"only modules of the targets {listed(loadable)} can be loaded, not {target!r}; "
             f"kc.emit(model, {target!r}).write(folder) gives the files"
         )
     _check_target(target, form)
@@ -214,10 +194,10 @@ def compile(  # noqa: A001 - the public name kc.compile
             target = "numpy"
         code = _lowered(system, target, form)
         # The NumPy module has the constants, the checks and the careful march of the compiled one.
-        emitted = _emitted(code, "numpy")
+        emitted = emit_program("numpy", code)
         module = from_source(emitted.source, system.name, emitted.arrays)
         if isinstance(code, InlineProgram) and target == "c":
-            module = make_native(module, emit_c(code).files)
+            module = make_native(module, emit_program("c", code).files)
     return remember_model(module, system)
 
 

@@ -10,12 +10,14 @@ import click
 import kincompile as kc
 from kincompile.cli.shared import print_data, read_model, require_output
 from kincompile.errors import InputError
+from kincompile.names import listed
+from kincompile.targets.registry import TARGETS
 from kincompile.writing import require_writable
 
 if TYPE_CHECKING:
     from kincompile.targets.target import Emitted
 
-ENDINGS = {".py": "numpy", ".c": "c", ".h": "c", ".m": "octave", ".js": "javascript"}
+ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.endings}
 """The target whose files have an ending."""
 
 
@@ -32,7 +34,7 @@ ENDINGS = {".py": "numpy", ".c": "c", ".h": "c", ".m": "octave", ".js": "javascr
     "--target",
     default="numpy",
     metavar="NAME",
-    help="What to emit: numpy, c, octave or javascript.",
+    help=f"What to emit: {listed(TARGETS)}.",
 )
 def command(model: str, output: str, target: str) -> None:
     """Write Phi, Phi_q, nu and gamma of MODEL as a module.

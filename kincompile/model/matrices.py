@@ -12,11 +12,11 @@ from kincompile.calculus.expressions import Expression, Scalar, Vector
 from kincompile.derive.derivation import derive
 from kincompile.derive.equations import derive_equation
 from kincompile.errors import ModelError
+from kincompile.html import picture_html
 from kincompile.model.display import constraints_html, equations_latex, problems_html
 from kincompile.model.expressions import alpha, as_sympy, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.names import rate
-from kincompile.pictures import picture_html
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

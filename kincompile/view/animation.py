@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.errors import InputError, UnsupportedError, missing_package
+from kincompile.errors import InputError, UnsupportedError, package_of_extra
 from kincompile.model.mechanism import system_of
 from kincompile.model.origins import model_of
 from kincompile.names import listed, suggestion
-from kincompile.runtime.results.labelled import TIME_UNIT
+from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.solution import Solution, require_solution
-from kincompile.view.marks import Place
+from kincompile.view.drawing import drawing
+from kincompile.view.marks import BodyPoint
 from kincompile.view.mechanism_plot import draw, move, require_bodies
-from kincompile.view.placed import world
-from kincompile.view.shapes import drawing
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
-    from kincompile.view.shapes import Drawing
+    from kincompile.view.drawing import Drawing
 
 WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
 """Matplotlib's writer for each kind of file."""
@@ -82,11 +81,9 @@ def animate(
     UnsupportedError
         If matplotlib, or for MP4 ffmpeg, is not installed.
     """
-    try:
+    with package_of_extra("matplotlib", "plot"):
         from matplotlib import animation
         from matplotlib import pyplot as plt
-    except ImportError:
-        raise missing_package("matplotlib", "plot") from None
     if path is not None:
         _require_writer(Path(path), animation.writers.is_available)
     system = _moving(solution, model)
@@ -97,7 +94,7 @@ def animate(
     figure, ax = plt.subplots(layout="constrained")
     artists = draw(ax, system, drawn, good)
     for place in traced:
-        ax.plot(*world(good, place).T, color="0.5", linewidth=1, zorder=1)
+        ax.plot(*place.at(good).T, color="0.5", linewidth=1, zorder=1)
     times = _time_texts(solution, rows)
     ax.set_title(times[0], loc="left")
     figure.draw_without_rendering()
@@ -177,9 +174,9 @@ def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
     require_writable(path)
 
 
-def _traced(drawn: Drawing, names: Iterable[str]) -> list[Place]:
+def _traced(drawn: Drawing, names: Iterable[str]) -> list[BodyPoint]:
     """Return the points that leave a line."""
-    places = {body: Place(k, (0.0, 0.0)) for k, body in enumerate(drawn.bodies)}
+    places = {body: BodyPoint(k, (0.0, 0.0)) for k, body in enumerate(drawn.bodies)}
     places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
     for name in (chosen := list(names)):
         if name not in places:

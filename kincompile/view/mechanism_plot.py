@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.errors import InputError, missing_package
+from kincompile.errors import InputError, package_of_extra
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed, suggestion
-from kincompile.view.placed import world
-from kincompile.view.shapes import drawing
-from kincompile.view.strokes import strokes
+from kincompile.view.drawing import drawing
+from kincompile.view.polylines import polylines
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
-    from kincompile.view.shapes import Drawing
-    from kincompile.view.strokes import Stroke
+    from kincompile.view.drawing import Drawing
+    from kincompile.view.polylines import Polyline
 
 GROUND_COLOUR, DRIVER_COLOUR, GAP_COLOUR = "0.35", "0.1", "red"
 """Colours of what stands still, of drivers, and of joints that are not assembled."""
@@ -51,7 +50,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "head": {"linewidth": 0, "edgecolor": DRIVER_COLOUR, "facecolor": DRIVER_COLOUR},
     "gap": {"linewidth": 2.0, "color": GAP_COLOUR, "linestyle": ":"},
 }
-"""What the strokes look like; those without a colour have that of their body."""
+"""What the polylines look like; those without a colour have that of their body."""
 
 NAME: dict[str, Any] = {
     "xytext": (9, 9),
@@ -102,10 +101,8 @@ def plot_mechanism(
     UnsupportedError
         If matplotlib is not installed.
     """
-    try:
+    with package_of_extra("matplotlib", "plot"):
         from matplotlib import pyplot as plt
-    except ImportError:
-        raise missing_package("matplotlib", "plot") from None
     position = position_of(model, q)
     drawn = drawing(model, checked_parameters(model, p), position)
     if ax is None:
@@ -185,8 +182,8 @@ def draw(
     model: Mechanism | ConstraintSystem,
     drawn: Drawing,
     q: NDArray[np.float64],
-) -> list[tuple[Stroke, Any]]:
-    """Draw all strokes at the first of the positions, and return each with its artist.
+) -> list[tuple[Polyline, Any]]:
+    """Draw all polylines at the first of the positions, and return each with its artist.
 
     Parameters
     ----------
@@ -197,7 +194,8 @@ def draw(
     """
     x_low, x_high, y_low, y_high = drawn.extent(q)
     artists = [
-        (stroke, _artist(ax, stroke, q[0], order)) for order, stroke in enumerate(strokes(drawn))
+        (polyline, _artist(ax, polyline, q[0], order))
+        for order, polyline in enumerate(polylines(drawn))
     ]
     unit = model.system().length_unit
     ax.set_aspect("equal")
@@ -210,21 +208,21 @@ def draw(
     return artists
 
 
-def move(artists: list[tuple[Stroke, Any]], q: NDArray[np.float64]) -> None:
+def move(artists: list[tuple[Polyline, Any]], q: NDArray[np.float64]) -> None:
     """Move what `draw` returned to a position, shape (n,)."""
-    for stroke, artist in artists:
-        points = stroke.world(q)
-        if stroke.is_area:
+    for polyline, artist in artists:
+        points = polyline.at(q)
+        if polyline.is_area:
             artist.set_xy(points)
         else:
             artist.set_data(*points.T)
 
 
-def _artist(ax: Axes, stroke: Stroke, q: NDArray[np.float64], order: int) -> Any:
-    """Make the artist of a stroke."""
-    colour = f"C{stroke.frame % 10}" if stroke.frame >= 0 else GROUND_COLOUR
-    look, points, zorder = LOOKS[stroke.look], stroke.world(q), 2 + order * 1e-3
-    if not stroke.is_area:
+def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
+    """Make the artist of a polyline."""
+    colour = f"C{polyline.frame % 10}" if polyline.frame >= 0 else GROUND_COLOUR
+    look, points, zorder = LOOKS[polyline.look], polyline.at(q), 2 + order * 1e-3
+    if not polyline.is_area:
         (line,) = ax.plot(*points.T, **{"color": colour, "zorder": zorder, **look})
         return line
     style = {"edgecolor": colour, "facecolor": (colour, FILL), **look}
@@ -237,7 +235,7 @@ def _write_names(ax: Axes, drawn: Drawing, q: NDArray[np.float64]) -> None:
     at: dict[tuple[float, float], list[str]] = {}
     for joint in drawn.joints:
         if joint.place is not None:
-            x, y = world(q[None], joint.place)[0]
+            x, y = joint.place.at(q)
             step = drawn.size * 1e-3
             at.setdefault((round(x / step) * step, round(y / step) * step), []).append(joint.name)
     for place, names in at.items():

@@ -11,7 +11,7 @@ import numpy as np
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.runtime.status import Status
-from kincompile.view.shapes import drawing
+from kincompile.view.drawing import drawing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.results.solution import Solution
-    from kincompile.view.shapes import Drawing
+    from kincompile.view.drawing import Drawing
 
     Array: TypeAlias = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.compiler import inspect
-from kincompile.errors import InputError, missing_package
+from kincompile.errors import InputError, package_of_extra
 from kincompile.tables import counted
 
 if TYPE_CHECKING:
@@ -59,11 +59,9 @@ def plot_sparsity(
     UnsupportedError
         If matplotlib is not installed.
     """
-    try:
+    with package_of_extra("matplotlib", "plot"):
         from matplotlib import pyplot as plt
         from matplotlib.collections import PolyCollection
-    except ImportError:
-        raise missing_package("matplotlib", "plot") from None
     if order not in ("solution", "written"):
         raise InputError(f"there is no order {order!r}; orders are: solution, written")
     found = inspect(model)

@@ -1,43 +1,39 @@
 """The marks of a drawing as lines and areas that move with q, for matplotlib.
 
-A stroke is a chain of points carried by a frame, by a place without turning, or stretched between
-two places. What a kind of mark looks like is said here once; colours and line widths are in `LOOKS`
-of `mechanism_plot`.
+A polyline is a chain of points that moves with a frame, is carried by a point without turning, or
+is stretched between two points. Colours and line widths are in `LOOKS` of `mechanism_plot`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.view.marks import (
     GROUND_FRAME,
     Block,
+    BodyPoint,
     Drive,
     Link,
     Mark,
     Outline,
     Pin,
-    Place,
     Profile,
     Rail,
     Span,
     Wheel,
+    in_ground,
 )
-from kincompile.view.placed import world
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    from kincompile.view.marks import Point
-    from kincompile.view.shapes import Drawing
-
-    Array: TypeAlias = NDArray[np.float64]
-
+    from kincompile.view.drawing import Drawing
+    from kincompile.view.marks import Array
 PIN, BLOCK_LENGTH, BLOCK_HEIGHT, HATCH, TURN = 0.45, 1.6, 0.9, 0.8, 1.9
 """Radius of a pin, half sides of a slider, length of a hatch line, radius of a turning arrow, in
 sizes of the drawing."""
@@ -53,7 +49,7 @@ CIRCLE = np.stack([f(np.radians(np.arange(0, 360, 5))) for f in (np.cos, np.sin)
 
 
 @dataclass(frozen=True, slots=True)
-class Stroke:
+class Polyline:
     """A line or an area.
 
     Attributes
@@ -63,10 +59,11 @@ class Stroke:
     frame
         The frame whose colour it has.
     points : ndarray, shape (k, 2)
-        In the frame; with `at`, offsets from that place in the axes of the ground; with `to` too,
-        the fraction of the way between both, and the distance to its left. NaN interrupts a line.
-    at, to
-        What carries it, if not the frame.
+        In the frame; with `start`, offsets from that point in the axes of the ground; with `end`
+        too, the fraction of the way between both, and the distance to its left. NaN interrupts a
+        line.
+    start, end
+        The points that carry it, if the frame does not.
     is_area
         Whether it is closed and filled.
     """
@@ -74,45 +71,35 @@ class Stroke:
     look: str
     frame: int
     points: Array
-    at: Place | None = None
-    to: Place | None = None
+    start: BodyPoint | None = None
+    end: BodyPoint | None = None
     is_area: bool = False
 
-    def world(self, q: Array) -> Array:
-        """Return its points, shape (k, 2), at a position q of shape (n,)."""
-        if self.at is None:
-            return _carried(q, self.frame, self.points)
-        start: Array = world(q[None], self.at)[0]
-        if self.to is None:
+    def at(self, q: Array) -> Array:
+        """Return where its points are, shape (k, 2), at a position q of shape (n,)."""
+        if self.start is None:
+            return in_ground(q, self.frame, self.points)
+        start = self.start.at(q)
+        if self.end is None:
             return start + self.points
-        way: Array = world(q[None], self.to)[0] - start
-        length = float(np.hypot(*way))
-        left = np.array((-way[1], way[0])) / (length or 1.0)
+        way = self.end.at(q) - start
+        left = _left_of(way) / (float(np.hypot(*way)) or 1.0)
         fraction, distance = self.points[:, :1], self.points[:, 1:]
-        return np.asarray(start + fraction * way + distance * left)
+        return start + fraction * way + distance * left
 
 
-def _carried(q: Array, frame: int, points: Array) -> Array:
-    """Return points of a frame in the ground."""
-    if frame == GROUND_FRAME:
-        return points
-    x, y, phi = q[3 * frame : 3 * frame + 3]
-    c, s = np.cos(phi), np.sin(phi)
-    return np.array((x, y)) + points @ np.array(((c, s), (-s, c)))
+def polylines(drawn: Drawing) -> list[Polyline]:
+    """Return the lines and areas of a drawing, from back to front."""
+    return [polyline for mark in drawn.marks for polyline in _of(mark, drawn.size)]
 
 
-def strokes(drawn: Drawing) -> list[Stroke]:
-    """Return what a drawing consists of, from back to front."""
-    return [stroke for mark in drawn.marks for stroke in _of(mark, drawn.size)]
-
-
-def _of(mark: Mark, size: float) -> Iterable[Stroke]:
-    """Return the strokes of a mark."""
+def _of(mark: Mark, size: float) -> Iterable[Polyline]:
+    """Return the polylines of a mark."""
     match mark:
         case Link():
             return _link(mark, size)
         case Outline():
-            return [Stroke("body", mark.frame, _array(mark.points), is_area=True)]
+            return [Polyline("body", mark.frame, _array(mark.points), is_area=True)]
         case Pin():
             return _pin(mark, size)
         case Rail():
@@ -133,29 +120,34 @@ def _array(points: ArrayLike) -> Array:
     return np.array(points, dtype=np.float64)
 
 
-def _link(mark: Link, size: float) -> list[Stroke]:
+def _left_of(direction: Array) -> Array:
+    """Return a vector turned by a right angle, counterclockwise."""
+    return np.array((-direction[1], direction[0]))
+
+
+def _link(mark: Link, size: float) -> list[Polyline]:
     """Draw a bar between two points, an area between more, a disc at one."""
     points = _array(mark.points)
     if len(points) == 1:
-        return [Stroke("body", mark.frame, points + 1.2 * size * CIRCLE, is_area=True)]
+        return [Polyline("body", mark.frame, points + 1.2 * size * CIRCLE, is_area=True)]
     if len(points) == 2:
-        return [Stroke("bar", mark.frame, points)]
-    return [Stroke("body", mark.frame, points, is_area=True)]
+        return [Polyline("bar", mark.frame, points)]
+    return [Polyline("body", mark.frame, points, is_area=True)]
 
 
-def _pin(mark: Pin, size: float) -> list[Stroke]:
+def _pin(mark: Pin, size: float) -> list[Polyline]:
     """Draw a small circle, on a stand where it is on the ground, and a gap where it is open."""
     found = [
-        Stroke("gap", mark.second.frame, _array(((0, 0), (1, 0))), mark.first, mark.second),
-        Stroke("pin", mark.second.frame, PIN * size * CIRCLE, mark.second, is_area=True),
+        Polyline("gap", mark.second.frame, _array(((0, 0), (1, 0))), mark.first, mark.second),
+        Polyline("pin", mark.second.frame, PIN * size * CIRCLE, mark.second, is_area=True),
     ]
     if mark.first.frame != GROUND_FRAME:
         return found
     stand = size * _array(((0, 0), (-1.1, -1.9), (1.1, -1.9)))
     floor = size * np.concatenate([_array(((-1.8, -1.9), (1.8, -1.9))), _hatching(-1.8, 1.8, -1.9)])
     return [
-        Stroke("stand", GROUND_FRAME, stand, mark.first, is_area=True),
-        Stroke("ground", GROUND_FRAME, floor, mark.first),
+        Polyline("stand", GROUND_FRAME, stand, mark.first, is_area=True),
+        Polyline("ground", GROUND_FRAME, floor, mark.first),
         *found,
     ]
 
@@ -168,55 +160,54 @@ def _hatching(low: float, high: float, height: float, side: float = -1.0) -> Arr
     return _array(ends).reshape(-1, 2)
 
 
-def _rail(mark: Rail, size: float) -> list[Stroke]:
+def _rail(mark: Rail, size: float) -> list[Polyline]:
     """Draw two parallel lines, hatched on the ground, the teeth of a rack, or a thick face."""
     start, end, axis = _array(mark.start), _array(mark.end), _array(mark.axis)
 
     def along(points: Array) -> Array:
         """Turn sizes along and to the left of the rail into points of its frame."""
-        return start + size * (points @ np.array((axis, (-axis[1], axis[0]))))
+        return start + size * (points @ np.stack((axis, _left_of(axis))))
 
     if mark.style == "face":
-        return [Stroke("bar", mark.frame, np.stack((start, end)))]
+        return [Polyline("bar", mark.frame, np.stack((start, end)))]
     reach = float((end - start) @ axis) / size
     if mark.style == "rack":
         teeth = _hatching(0.0, reach, 0.0)
         line = np.concatenate([_array(((0, 0), (reach, 0))), teeth])
-        return [Stroke("rack", mark.frame, along(line))]
+        return [Polyline("rack", mark.frame, along(line))]
     sides = [_array(((0, h), (reach, h))) for h in (BLOCK_HEIGHT, -BLOCK_HEIGHT)]
     if mark.frame != GROUND_FRAME:
-        return [Stroke("groove", mark.frame, along(side)) for side in sides]
+        return [Polyline("groove", mark.frame, along(side)) for side in sides]
     # Hatched below, or at the left of an upright rail, whichever way its axis points.
     side = -float(np.sign(axis[0])) if abs(axis[0]) > UPRIGHT else float(np.sign(axis[1]))
     hatch = _hatching(0.0, reach, side * BLOCK_HEIGHT, side)
-    return [Stroke("ground", GROUND_FRAME, along(line)) for line in (*sides, hatch)]
+    return [Polyline("ground", GROUND_FRAME, along(line)) for line in (*sides, hatch)]
 
 
-def _block(mark: Block, size: float) -> Stroke:
+def _block(mark: Block, size: float) -> Polyline:
     """Draw a rectangle along the axis."""
-    x, y = mark.axis
-    corners = size * _array(
-        [(s * BLOCK_LENGTH, r * BLOCK_HEIGHT) for s, r in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
-    )
-    points = _array(mark.place.point) + corners @ np.array(((x, y), (-y, x)))
-    return Stroke("block", mark.place.frame, points, is_area=True)
+    axis = _array(mark.axis)
+    half_sides = size * _array((BLOCK_LENGTH, BLOCK_HEIGHT))
+    corners = half_sides * _array(((1, 1), (-1, 1), (-1, -1), (1, -1)))
+    points = _array(mark.place.point) + corners @ np.stack((axis, _left_of(axis)))
+    return Polyline("block", mark.place.frame, points, is_area=True)
 
 
-def _span(mark: Span, size: float) -> list[Stroke]:
+def _span(mark: Span, size: float) -> list[Polyline]:
     """Draw a line; a cylinder is a barrel with a piston rod in it."""
     whole = _array(((0, 0), (1, 0)))
     frame = max(mark.first.frame, mark.second.frame)
     if mark.style != "cylinder":
-        return [Stroke(mark.style, frame, whole, mark.first, mark.second)]
+        return [Polyline(mark.style, frame, whole, mark.first, mark.second)]
     half = 0.8 * size
     barrel = _array(((0, half), (BARREL, half), (BARREL, -half), (0, -half)))
     return [
-        Stroke("piston", frame, whole, mark.first, mark.second),
-        Stroke("barrel", frame, barrel, mark.first, mark.second, is_area=True),
+        Polyline("piston", frame, whole, mark.first, mark.second),
+        Polyline("barrel", frame, barrel, mark.first, mark.second, is_area=True),
     ]
 
 
-def _wheel(mark: Wheel, size: float) -> list[Stroke]:
+def _wheel(mark: Wheel, size: float) -> list[Polyline]:
     """Draw the pitch circle with a tick, which on an internal gear is outside."""
     centre = _array(mark.place.point)
     rim = centre + mark.radius * CIRCLE
@@ -224,38 +215,39 @@ def _wheel(mark: Wheel, size: float) -> list[Stroke]:
     ends = (mark.radius, mark.radius + size) if mark.is_internal else (0.0, mark.radius)
     tick = np.stack([centre + end * direction for end in ends])
     frame = mark.place.frame
-    return [_curve(frame, rim, is_area=not mark.is_internal), Stroke("tick", frame, tick)]
+    return [_curve(frame, rim, is_area=not mark.is_internal), Polyline("tick", frame, tick)]
 
 
-def _profile(mark: Profile) -> list[Stroke]:
+def _profile(mark: Profile) -> list[Polyline]:
     """Draw a cam as an area, a slot as the closed line in which a pin runs."""
     return [_curve(mark.frame, _array(mark.points), is_area=mark.style == "cam")]
 
 
-def _curve(frame: int, points: Array, *, is_area: bool) -> Stroke:
+def _curve(frame: int, points: Array, *, is_area: bool) -> Polyline:
     """Draw a closed curve, as an area or as a line."""
     if is_area:
-        return Stroke("wheel", frame, points, is_area=True)
-    return Stroke("rim", frame, np.concatenate((points, points[:1])))
+        return Polyline("wheel", frame, points, is_area=True)
+    return Polyline("rim", frame, np.concatenate((points, points[:1])))
 
 
-def _drive(mark: Drive, size: float) -> list[Stroke]:
+def _drive(mark: Drive, size: float) -> list[Polyline]:
     """Draw an arrow, bent where the driver turns something."""
     if mark.axis is None:
         angles = np.radians(np.linspace(-30, 240, 46))
         line = TURN * size * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
-        heading = np.array((-np.sin(angles[-1]), np.cos(angles[-1])))
+        heading = _left_of(line[-1]) / np.hypot(*line[-1])
     else:
         heading = _array(mark.axis)
         line = size * np.outer((0.8, 2.8), heading)
     return [
-        Stroke("arrow", mark.place.frame, line, mark.place),
-        Stroke("head", mark.place.frame, _head(line[-1], heading, size), mark.place, is_area=True),
+        Polyline("arrow", mark.place.frame, line, mark.place),
+        Polyline(
+            "head", mark.place.frame, _head(line[-1], heading, size), mark.place, is_area=True
+        ),
     ]
 
 
 def _head(end: Array, heading: Array, size: float) -> Array:
     """Return the triangle at the end of an arrow."""
-    left = np.array((-heading[1], heading[0]))
-    corners: Sequence[Point] = ((0.9, 0.0), (-0.3, 0.5), (-0.3, -0.5))
-    return np.stack([end + size * (a * heading + b * left) for a, b in corners])
+    corners = size * _array(((0.9, 0.0), (-0.3, 0.5), (-0.3, -0.5)))
+    return end + corners @ np.stack((heading, _left_of(heading)))
