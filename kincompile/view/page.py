@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -10,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
-from kincompile.errors import InputError, StructuralError
+from kincompile.compiler import emit
+from kincompile.errors import InputError, StructuralError, UnsupportedError
 from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.newton import newton_script
 from kincompile.view.page_data import as_json, page_data
 from kincompile.writing import write_atomically
 
@@ -38,6 +39,9 @@ SCRIPTS = (
 )  # fmt: skip
 """Scripts, in order: each uses those before it."""
 
+MOST_COORDINATES = 60
+"""Coordinates up to which the panel of Newton's method shows every entry of Phi_q."""
+
 FRAME_HEIGHT = "720px"
 """Height of a page inside a notebook."""
 
@@ -51,9 +55,9 @@ class Page:
     name
         Name of the mechanism.
     html
-        The page with everything in it: data, style sheets, scripts. It asks for nothing.
+        The whole page: data, style sheets and scripts. It loads nothing else.
     data
-        What it shows, as `page_data` gives it.
+        The data it shows, as returned by `page_data`.
     """
 
     name: str
@@ -67,7 +71,7 @@ class Page:
 
     @property
     def message(self) -> str:
-        """What the solver, or the compiler, says."""
+        """The message of the solver or of the compiler."""
         return str(self.data["message"])
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -76,7 +80,7 @@ class Page:
         Raises
         ------
         InputError
-            When the name does not end in .html or .htm, or the file cannot be written; says why.
+            When the name does not end in .html or .htm, or the file cannot be written.
         """
         if Path(path).suffix not in (".html", ".htm"):
             raise InputError(f"cannot write {path}: end its name in .html")
@@ -86,7 +90,7 @@ class Page:
         return framed_html(self.html, self.name, FRAME_HEIGHT)
 
     def __repr__(self) -> str:
-        """Return name and size."""
+        """Return the name and the size."""
         return f"<Page of {self.name!r}: {len(self.html) / 1e6:.2f} MB>"
 
 
@@ -141,7 +145,7 @@ def page(
 
 
 def _require_motion_of(system: ConstraintSystem, solution: Solution) -> None:
-    """Refuse what is not one motion of this system."""
+    """Check that a solution is one motion of this system."""
     require_solution(solution)
     if solution.coordinates != tuple(item.name for item in system.coordinates):
         raise InputError(
@@ -161,10 +165,33 @@ def _solved(
     p: Mapping[str, float] | None,
     through: str | None,
 ) -> tuple[Solution | None, str]:
-    """Compile and solve a system, as far as that goes, and say how far."""
+    """Compile and solve a system; return the solution, if there is one, and the message."""
     try:
         module = compile_model(system)
     except StructuralError as error:
         return None, str(error)
     solution = solve(module, t, p, through=through)
     return solution, solution.message
+
+
+def newton_script(model: Mechanism | ConstraintSystem) -> str:
+    """Return the script that declares `emitted` for the panel of Newton's method.
+
+    It holds the functions of the mechanism, or `reason`, why there are none.
+    """
+    count = len(model.system().coordinates)
+    if count > MOST_COORDINATES:
+        return _without(f"{count} coordinates are too many to show Newton's method step by step.")
+    try:
+        source = emit(model, "javascript").source
+    except (StructuralError, UnsupportedError) as error:
+        return _without(f"Newton's method cannot be shown: {error}")
+    # In a function of its own, so that no name of a mechanism meets one of the page.
+    return (
+        f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{source}"
+        "return module.exports;\n})();\n"
+    )
+
+
+def _without(reason: str) -> str:
+    return f"const emitted = {json.dumps({'reason': reason})};\n".replace("<", "\\u003c")

@@ -12,7 +12,7 @@ import kincompile as kc
 from kincompile.runtime.newton import iterate
 from kincompile.runtime.problem import problem
 from kincompile.targets.templates import read
-from kincompile.view.newton import MOST_COORDINATES, newton_script
+from kincompile.view.page import MOST_COORDINATES, newton_script
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 STATUSES = {
