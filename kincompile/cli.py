@@ -28,8 +28,10 @@ import numpy as np
 
 import kincompile as kc
 from kincompile.errors import InputError, InternalError, KincompileError
+from kincompile.names import listed
 from kincompile.runtime.results.summary import summary
 from kincompile.runtime.results.write import require_known_suffix
+from kincompile.targets.registry import TARGETS
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -50,7 +52,7 @@ DERIVATIONS = (".html", ".tex", ".md", ".ipynb")
 TRACEBACK = "KINCOMPILE_TRACEBACK"
 """The environment variable that shows where an error comes from."""
 
-ENDINGS = {".py": "numpy", ".c": "c", ".h": "c", ".m": "octave", ".js": "javascript"}
+ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.endings}
 """The target whose files have an ending."""
 
 PATIENCE = 0.5
@@ -122,7 +124,7 @@ def cli() -> None:
     "--target",
     default="numpy",
     metavar="NAME",
-    help="What to emit: numpy, c, octave or javascript.",
+    help=f"What to emit: {listed(TARGETS)}.",
 )
 def compile_command(model: str, output: str, target: str) -> None:
     """Write Phi, Phi_q, nu and gamma of MODEL as a module.

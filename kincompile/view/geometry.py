@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.model.constraint import Kind
+from kincompile.model.arguments import Kind
+from kincompile.model.bodies import GROUND
 from kincompile.model.expressions import alpha, as_expression, depends_on, evaluate
 from kincompile.model.joints import Revolute
 from kincompile.view.marks import GROUND_FRAME, BodyPoint, Pin, Point, Profile, Rail, Span, Wheel
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
 PROFILE_POINTS = 180
 """Points of a cam profile: its chords are within 1.5e-4 of its radius."""
-
-OWNERS = {"s_i": 0, "s_P": 0, "s_Q": 0, "s_j": 1, "c": None}
-"""The body that a point is fixed in, by the point's symbol; None for the ground."""
 
 PITCH_LINE = ("s_P", "s_Q")
 """Symbols of the points between which a rack is drawn."""
@@ -62,10 +60,12 @@ class Geometry:
 
     def frame_of(self, joint: Joint, symbol: str) -> int:
         """Return the frame in which a point of a joint is fixed."""
-        owner = OWNERS[symbol]
-        if owner is None:
+        owner = joint.written.owners()[symbol]
+        if owner == GROUND.name:
             return GROUND_FRAME
-        return self.frames.get(joint.bodies[owner].name, GROUND_FRAME)
+        arguments = joint.written.arguments().values()
+        symbols = [item.symbol for item in arguments if item.kind is Kind.BODY]
+        return self.frames.get(joint.bodies[symbols.index(owner)].name, GROUND_FRAME)
 
     def point(self, joint: Joint, symbol: str) -> BodyPoint:
         """Return a point of a joint, in the frame of its body."""

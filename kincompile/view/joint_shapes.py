@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
+from kincompile.errors import UnsupportedError
 from kincompile.model.absolute import AbsoluteAngle, AbsoluteDistance, AbsoluteX, AbsoluteY
 from kincompile.model.cams import CamFlatFollower, CamFollower, PointFollower
 from kincompile.model.gears import Gear, RackAndPinion
@@ -168,7 +169,7 @@ DRAWINGS: Mapping[type[Constraint], DrawJoint] = {
 
 
 def marks_of(constraint: Constraint, joint: JointGeometry) -> list[Mark]:
-    """Return the marks of a constraint; a type without a drawing of its own has none.
+    """Return the marks of a constraint; a type without a drawing is drawn as the one it extends.
 
     Parameters
     ----------
@@ -176,7 +177,17 @@ def marks_of(constraint: Constraint, joint: JointGeometry) -> list[Mark]:
         The constraint as written: its type decides.
     joint
         Its attributes as numbers, and the motion that its marks must fit.
+
+    Raises
+    ------
+    UnsupportedError
+        If there is no drawing for the type.
     """
-    known = (DRAWINGS[kind] for kind in type(constraint).__mro__ if kind in DRAWINGS)
-    draw = next(known, None)
-    return [] if draw is None else draw(joint)
+    for kind in type(constraint).__mro__:
+        if kind in DRAWINGS:
+            return DRAWINGS[kind](joint)
+    name = type(constraint).__name__
+    raise UnsupportedError(
+        f"there is no drawing for the type {name} of {constraint.name!r}; add a function to "
+        "DRAWINGS in kincompile/view/joint_shapes.py"
+    )

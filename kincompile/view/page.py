@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -11,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
-from kincompile.compiler import emit
-from kincompile.errors import InputError, StructuralError, UnsupportedError
+from kincompile.errors import InputError, StructuralError
 from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
+from kincompile.view.newton_panel import newton_method, newton_script
 from kincompile.view.page_data import as_json, page_data
 from kincompile.writing import write_atomically
 
@@ -34,13 +33,10 @@ STYLES = ("vendor/uplot.css", "style.css", "newton.css")
 """Style sheets, in order."""
 
 SCRIPTS = (
-    "vendor/uplot.js", "player.js", "draw.js", "stage.js", "plots.js", "tables.js", "newton.js",
+    "vendor/uplot.js", "player.js", "draw.js", "stage.js", "plots.js", "tables.js",
     "newton_tables.js", "newton_stage.js", "newton_panel.js", "start.js",
 )  # fmt: skip
-"""Scripts, in order: each uses those before it."""
-
-MOST_COORDINATES = 60
-"""Coordinates up to which the panel of Newton's method shows every entry of Phi_q."""
+"""Scripts, in order: each uses those before it, and the method of Newton's panel."""
 
 FRAME_HEIGHT = "720px"
 """Height of a page inside a notebook."""
@@ -138,7 +134,11 @@ def page(
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "licence": read("view/vendor/uplot.LICENSE.txt"),
-        "scripts": [newton_script(system), *(read(f"view/{name}") for name in SCRIPTS)],
+        "scripts": [
+            newton_script(system),
+            newton_method(),
+            *(read(f"view/{name}") for name in SCRIPTS),
+        ],
         "data": as_json(shown),
     }
     return Page(system.name, fill("view/page.html.jinja", slots), shown)
@@ -172,26 +172,3 @@ def _solved(
         return None, str(error)
     solution = solve(module, t, p, through=through)
     return solution, solution.message
-
-
-def newton_script(model: Mechanism | ConstraintSystem) -> str:
-    """Return the script that declares `emitted` for the panel of Newton's method.
-
-    It holds the functions of the mechanism, or `reason`, why there are none.
-    """
-    count = len(model.system().coordinates)
-    if count > MOST_COORDINATES:
-        return _without(f"{count} coordinates are too many to show Newton's method step by step.")
-    try:
-        source = emit(model, "javascript").source
-    except (StructuralError, UnsupportedError) as error:
-        return _without(f"Newton's method cannot be shown: {error}")
-    # In a function of its own, so that no name of a mechanism meets one of the page.
-    return (
-        f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{source}"
-        "return module.exports;\n})();\n"
-    )
-
-
-def _without(reason: str) -> str:
-    return f"const emitted = {json.dumps({'reason': reason})};\n".replace("<", "\\u003c")

@@ -6,24 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.ir.elimination import plan_solve
 from kincompile.names import rate
-from kincompile.targets.functions import EVALUATORS, Listing, schedule
+from kincompile.targets.constants import constants
+from kincompile.targets.evaluators import EVALUATORS
 from kincompile.targets.headings import header, place, short_title, title
-from kincompile.targets.layout import WIDTH, broken, commented, indented, quoted, wrapped
+from kincompile.targets.lines import WIDTH, broken, commented, indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
+from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.solve import solve_functions
-from kincompile.targets.printers import PythonPrinter
-from kincompile.targets.solving import schedule_solve
-from kincompile.targets.target import Emitted
+from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
+    from kincompile.targets.evaluators import Listing
+    from kincompile.targets.printer import Printer
 
-FORMAT = 1
-"""Version of the contract of an emitted module."""
+DIALECT = NUMPY
 
 FUNCTIONS = {
     "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2",
@@ -38,7 +39,7 @@ SCALAR_FUNCTIONS = {
 }
 """Functions that `math` does not have."""
 
-RESERVED = (
+RESERVED: tuple[str, ...] = (
     "f", "q", "q_dot", "t", "p", "np", "math", "pi", "spline", *FUNCTIONS,
     "sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt",
 )  # fmt: skip
@@ -47,21 +48,21 @@ RESERVED = (
 RESERVED_IN_SOLVE = ("f", "J", "F", "b")
 
 
-def emit_numpy(code: InlineProgram) -> Emitted:
-    """Return a program as one NumPy module."""
-    program = code.program
-    table = NameTable((*RESERVED, *program.tables))
-    wanted = [item.name for item in program.coordinates]
-    wanted += [rate(name) for name in wanted] + [item.name for item in program.parameters]
-    names = {"t": "t", **{name: table.take(name) for name in wanted}}
-    kernels: list[str] = []
-    called: set[str] = set()
-    for name, quantities in EVALUATORS.items():
-        listing = schedule(code, quantities, names, table)
-        called |= set(listing.functions)
-        kernels += ["", "", *_function(name, quantities, code, listing, names)]
-    plan = plan_solve(code)
+def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the lines of a function of a point, or of arrays of points."""
+    quantities = EVALUATORS[name]
+    states = "q, q_dot" if "gamma" in quantities else "q"
+    body = [*_unpack(code.program, listing), *function_body(quantities, listing, code, printer)]
+    return ["", "", f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
+
+
+def files(
+    code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+) -> Mapping[str, str]:
+    """Return the module."""
+    kernels = [line for lines in functions.values() for line in lines]
     lanes = list(EVALUATORS)
+    plan = plan_solve(code)
     if plan is not None:
         solving = schedule_solve(code, plan, NameTable(RESERVED_IN_SOLVE))
         kernels += ["", "", *solve_functions(code, solving)]
@@ -71,40 +72,26 @@ def emit_numpy(code: InlineProgram) -> Emitted:
     data["is_planned"] = plan is not None
     data["has_large_blocks"] = plan is not None and plan.has_large_blocks
     data |= shared_text()
-    source = fill("numpy/module.py.jinja", data)
-    return Emitted(program.name, {f"{program.name}.py": source})
+    return {f"{code.program.name}.py": fill("numpy/module.py.jinja", data)}
 
 
 def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[str, Any]:
     program = code.program
-    names = [item.name for item in program.coordinates]
-    pattern = code.pattern()
     entries = [entry for section in code.sections for entry in section.entries["Phi_q"]]
     values = [code.number(entry.node) for entry in entries]
-    constants = [value for value in values if value is not None]
+    numbers = [value for value in values if value is not None]
     fixed = [k for k, value in enumerate(values) if value is not None]
     moving = [k for k, value in enumerate(values) if value is None]
     return {
+        **constants(code, 1, "({}, {})"),
         "title": program.name,
         "header": "\n".join(header(code)),
-        "name": program.name,
-        "format": FORMAT,
-        "fingerprint": program.fingerprint,
-        "n": len(names),
-        "m": len(program.equations),
-        "k": len(program.parameters),
-        "nonzeros": len(pattern),
-        "coordinates": indented(quoted(names)),
-        "equations": indented(quoted(program.equations)),
+        "nonzeros": len(entries),
         "redundant": indented(quoted(program.redundant)),
-        "parameters": indented(quoted([item.name for item in program.parameters])),
         "units": indented(_units(program)),
-        "defaults": indented(wrapped([repr(item.default) for item in program.parameters])),
-        "guess": indented(wrapped([repr(item.guess) for item in program.coordinates])),
-        "pattern": indented(wrapped([f"({row}, {column})" for row, column in pattern])),
-        "constants": indented(wrapped([repr(float(value)) for value in constants])),
-        "fixed": indented(wrapped([str(k) for k in fixed])),
-        "varying": indented(wrapped([str(k) for k in moving])),
+        "constants": indented(wrapped(repr(float(value)) for value in numbers)),
+        "fixed": indented(wrapped(map(str, fixed))),
+        "varying": indented(wrapped(map(str, moving))),
         "tables": "\n".join(_tables(program)),
         "scalar_functions": indented(scalar_functions(called)),
         "array_functions": indented(array_functions(called)),
@@ -150,27 +137,18 @@ def _tables(program: Program) -> list[str]:
     return lines
 
 
-def _function(
-    name: str,
-    quantities: Sequence[str],
-    code: InlineProgram,
-    listing: Listing,
-    names: Mapping[str, str],
-) -> list[str]:
-    """Return the lines of one function."""
-    states = "q, q_dot" if "gamma" in quantities else "q"
-    body = [*_unpack(code.program, listing, names), *function_body(quantities, code, listing)]
-    return [f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
-
-
 def function_body(
-    quantities: Sequence[str], code: InlineProgram, listing: Listing, *, titled: bool = True
+    quantities: Sequence[str],
+    listing: Listing,
+    code: InlineProgram,
+    printer: Printer,
+    *,
+    titled: bool = True,
 ) -> list[str]:
     """Return the lines of a function whose inputs have their names already.
 
     Without `titled` there are no comments that name constraints: the code is for many.
     """
-    printer = PythonPrinter(code.nodes, listing.names)
     body = []
     if listing.functions:
         called = ", ".join(listing.functions)
@@ -179,7 +157,7 @@ def function_body(
     for section, assignments in listing.steps:
         body += [f"# {short_title(section)}"] if titled else []
         for item in assignments:
-            body += _assignment(item.name, printer.text(item.node, own=True))
+            body += _assignment(item.name, printer.definition(item.node))
     body.append("return (")
     for quantity, rows in listing.results:
         if len(quantities) > 1:
@@ -212,7 +190,7 @@ def _element(text: str, comment: str) -> list[str]:
     return lines
 
 
-def _unpack(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:
+def _unpack(program: Program, listing: Listing) -> list[str]:
     """Return the lines that name the inputs: all of a vector, or the few that are read."""
     coordinates = [item.name for item in program.coordinates]
     vectors = {
@@ -220,7 +198,7 @@ def _unpack(program: Program, listing: Listing, names: Mapping[str, str]) -> lis
         "q_dot": [rate(name) for name in coordinates],
         "p": [item.name for item in program.parameters],
     }
-    lines = []
+    lines, names = [], listing.input_names
     for vector, members in vectors.items():
         read = [k for k, name in enumerate(members) if name in listing.inputs]
         if 2 * len(read) > len(members):
@@ -239,7 +217,7 @@ def _targets(members: Sequence[str], vector: str) -> list[str]:
     return ["(", *(f"    {line}" for line in wrapped(members)), f") = {vector}"]
 
 
-def _frames(listing: Listing, printer: PythonPrinter) -> list[str]:
+def _frames(listing: Listing, printer: Printer) -> list[str]:
     """Return the cosine and sine of each body's angle, a line a body."""
     if not listing.frames:
         return []
@@ -249,5 +227,5 @@ def _frames(listing: Listing, printer: PythonPrinter) -> list[str]:
         if len(frame.values) == 2:
             lines.append(f"{left} = cos_sin({printer.text(frame.angle)})")
         else:
-            lines.append(f"{left} = {printer.text(frame.values[0].node, own=True)}")
+            lines.append(f"{left} = {printer.definition(frame.values[0].node)}")
     return lines

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kincompile.ir.graph import Graph, operands_of
-from kincompile.targets.printers import PythonPrinter
+from kincompile.targets.numpy.dialect import NUMPY
+from kincompile.targets.printer import Printer
 
 VALUES = {"x": Fraction(3, 7), "y": Fraction(-5, 2)}
 
@@ -90,18 +91,18 @@ def test_that_the_text_has_the_value_of_the_code(drawn: list[Any]) -> None:
         expected = value_of(graph, last)
     except ZeroDivisionError:
         return
-    assert evaluated(PythonPrinter(graph.nodes, names).text(last), VALUES) == expected
+    assert evaluated(Printer(NUMPY, graph.nodes, names).text(last), VALUES) == expected
 
 
 @given(nodes)
 def test_that_a_named_node_is_printed_as_its_name(drawn: list[Any]) -> None:
     graph = code(drawn)
     names = {k: f"n_{k}" for k in range(len(graph.nodes))}
-    printer = PythonPrinter(graph.nodes, names)
+    printer = Printer(NUMPY, graph.nodes, names)
     for k, node in enumerate(graph.nodes):
         assert printer.text(k) == f"n_{k}"
         if node[0] not in ("const", "input"):
-            own = printer.text(k, own=True)
+            own = printer.definition(k)
             assert all(f"n_{operand}" in own for operand in operands_of(node))
 
 
@@ -126,9 +127,9 @@ def test_that_a_named_node_is_printed_as_its_name(drawn: list[Any]) -> None:
 def test_that_text_reads_well(make: Any, text: str) -> None:
     graph = Graph()
     x, y = graph.input("x"), graph.input("y")
-    assert PythonPrinter(graph.nodes, {x: "x", y: "y"}).text(make(graph, x, y)) == text
+    assert Printer(NUMPY, graph.nodes, {x: "x", y: "y"}).text(make(graph, x, y)) == text
 
 
 def test_that_an_unknown_node_is_not_printed() -> None:
     with pytest.raises(TypeError, match="cannot print"):
-        PythonPrinter([("magic", 0)], {}).text(0)
+        Printer(NUMPY, [("magic", 0)], {}).text(0)

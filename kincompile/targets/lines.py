@@ -71,14 +71,6 @@ def broken(text: str, width: int = WIDTH - 8) -> list[str]:
     return ["    " * depths[start] + text[start:stop].strip() for start, stop in spans]
 
 
-def assigned(left: str, text: str) -> list[str]:
-    """Return an assignment that a semicolon ends, a long one continued with indentation."""
-    first, *rest = broken(text)
-    lines = [f"{left} = {first}", *(f"    {line}" for line in rest)]
-    lines[-1] += ";"
-    return lines
-
-
 def _places_to_break(text: str) -> dict[int, list[int]]:
     """Return where a plus or minus stands, by the number of parentheses around it."""
     places: dict[int, list[int]] = {}

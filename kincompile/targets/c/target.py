@@ -2,30 +2,40 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
+from kincompile import criteria
 from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
-from kincompile.names import rate
-from kincompile.targets.c.functions import evaluator, solve_functions
-from kincompile.targets.functions import EVALUATORS, schedule
-from kincompile.targets.headings import header
-from kincompile.targets.layout import wrapped
+from kincompile.targets import evaluators
+from kincompile.targets.c.dialect import C
+from kincompile.targets.c.functions import LAYOUT, evaluator, solve_functions
+from kincompile.targets.lines import wrapped
 from kincompile.targets.naming import NameTable
-from kincompile.targets.printers import C_FUNCTIONS
-from kincompile.targets.solving import schedule_solve
-from kincompile.targets.target import Emitted
+from kincompile.targets.planned_solve import schedule_solve
+from kincompile.targets.printer import ELEMENTARY
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
-    from kincompile.targets.solving import SolveListing
+    from kincompile.targets.evaluators import Listing
+    from kincompile.targets.planned_solve import SolveListing
+    from kincompile.targets.printer import Printer
+
+DIALECT = C
+
+EVALUATORS = evaluators.EVALUATORS
 
 LANES = 32
 """Points in a block: enough for the widest registers, few enough for the nearest cache."""
+
+CRITERIA = (
+    "KINK", "MAX_CORRECTIONS", "MAX_SUBSTEPS", "NEARLY_SINGULAR", "NO_SIZE", "RESIDUAL_FACTOR",
+    "ROUNDING", "SMALL_ERROR", "SMALLEST_PART", "SMOOTH", "TOO_NEAR",
+)  # fmt: skip
+"""The numbers of `criteria` that the march judges by."""
 
 KEYWORDS = (
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else",
@@ -37,36 +47,39 @@ KEYWORDS = (
 )  # fmt: skip
 """Words of C and of later standards, and macros of headers and compilers."""
 
-RESERVED = (
+RESERVED: tuple[str, ...] = (
     *KEYWORDS, "at", "lane", "t", "far", "exact", "F", "right", "to", "PI", "LANES",
     "square", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
-    *C_FUNCTIONS,
+    *ELEMENTARY,
 )  # fmt: skip
 """Names that the functions of a mechanism use."""
 
 
-def emit_c(code: InlineProgram) -> Emitted:
-    """Return a program as C99 source and header.
+def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the lines of a function of a point, and of the one for a block of points."""
+    return ["", *evaluator(name, code, listing, printer)]
 
-    Raises
-    ------
-    UnsupportedError
-        If the program calls a function that C does not have.
-    """
+
+def files(
+    code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+) -> Mapping[str, str]:
+    """Return the source and the header."""
     program = code.program
     plan = plan_solve(code)
     listing = None
     if plan is not None:
         listing = schedule_solve(code, plan, NameTable(RESERVED))
     about = _about(code, listing)
-    body = [_block(code, listing), fill("c/batch.c.jinja", _only(about, "name", "is_planned"))]
+    lines = [line for own in functions.values() for line in own]
+    body = [_block(code, lines, called, listing)]
+    body.append(fill("c/batch.c.jinja", _only(about, "name", "is_planned")))
     if listing is not None:
         body.append(fill("c/march.c.jinja", {**_only(about, "name", "NAME"), **_scales(program)}))
     data = {**_without(about, "NAME"), **_tables(code, listing), "body": "".join(body)}
     source = fill("c/module.c.jinja", data)
     guard = f"{program.name.upper()}_H"
     head = fill("c/module.h.jinja", {**about, "guard": guard})
-    return Emitted(program.name, {f"{program.name}.c": source, f"{program.name}.h": head})
+    return {f"{program.name}.c": source, f"{program.name}.h": head}
 
 
 def _about(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
@@ -75,7 +88,7 @@ def _about(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
     return {
         "name": program.name,
         "NAME": program.name.upper(),
-        "header": "\n".join(f"// {line}".rstrip() for line in header(code)),
+        "header": LAYOUT.header(code),
         "n": len(program.coordinates),
         "m": len(program.equations),
         "k": len(program.parameters),
@@ -104,20 +117,20 @@ def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]
     varying = [str(k) for k, value in enumerate(values) if value is None]
     nu, gamma = _computed_rows(code, "nu"), _computed_rows(code, "gamma")
     return {
-        "nu": array_lines(nu),
+        "nu": _array_lines(nu),
         "n_nu": len(nu),
-        "gamma": array_lines(gamma),
+        "gamma": _array_lines(gamma),
         "n_gamma": len(gamma),
         "lanes": LANES,
         "n_factors": 0 if listing is None else len(listing.factors),
         "n_blocks": 0 if listing is None else len(listing.plan.determinants),
         "fingerprint": program.fingerprint,
-        "defaults": array_lines([repr(item.default) for item in program.parameters]),
-        "guess": array_lines([repr(item.guess) for item in program.coordinates]),
-        "pattern": array_lines([f"{{{row}, {column}}}" for row, column in code.pattern()]),
-        "constants": array_lines(constants, "{0, 0.0}"),
+        "defaults": _array_lines([repr(item.default) for item in program.parameters]),
+        "guess": _array_lines([repr(item.guess) for item in program.coordinates]),
+        "pattern": _array_lines([f"{{{row}, {column}}}" for row, column in code.pattern()]),
+        "constants": _array_lines(constants, "{0, 0.0}"),
         "n_constants": len(constants),
-        "varying": array_lines(varying),
+        "varying": _array_lines(varying),
         "n_varying": len(varying),
     }
 
@@ -128,37 +141,28 @@ def _computed_rows(code: InlineProgram, quantity: str) -> list[str]:
     return [str(entry.row) for entry in entries if code.number(entry.node) is None]
 
 
-def array_lines(items: Sequence[str], placeholder: str = "0") -> str:
+def _array_lines(items: Sequence[str], placeholder: str = "0") -> str:
     """Return the lines of an array; C has no empty ones."""
     return "\n".join(f"    {line}" for line in wrapped(items or [placeholder]))
 
 
-def _block(code: InlineProgram, listing: SolveListing | None) -> str:
+def _block(
+    code: InlineProgram, lines: list[str], called: Collection[str], listing: SolveListing | None
+) -> str:
     """Return the functions that work on a block of points, and what they need."""
-    program = code.program
-    table = NameTable((*RESERVED, *program.tables))
-    wanted = [item.name for item in program.coordinates]
-    wanted += [rate(name) for name in wanted] + [item.name for item in program.parameters]
-    names = {"t": "t", **{name: table.take(name) for name in wanted}}
-    lines: list[str] = []
-    called: set[str] = set()
-    for name, quantities in EVALUATORS.items():
-        scheduled = schedule(code, quantities, names, table)
-        called |= set(scheduled.functions)
-        lines += ["", *evaluator(name, code, scheduled, names)]
     largest = 0
     if listing is not None:
-        lines += ["", *solve_functions(code, listing)]
+        lines = [*lines, "", *solve_functions(code, listing)]
         largest = max((len(block.rows) for block in listing.plan.blocks), default=0)
     data = {
         "is_planned": listing is not None,
-        "elementary": elementary(program, called, largest),
+        "elementary": _elementary(code.program, called, largest),
         "functions": "\n".join(lines),
     }
     return fill("c/block.c.jinja", data)
 
 
-def elementary(program: Program, called: Collection[str], largest: int) -> str:
+def _elementary(program: Program, called: Collection[str], largest: int) -> str:
     """Return what the code calls: functions of angles, splines, the solve of blocks of a size."""
     data = {
         "has_cosine": "cos" in called,
@@ -186,9 +190,8 @@ def _splines(program: Program) -> Iterable[str]:
 
 
 def _scales(program: Program) -> dict[str, str]:
-    """Return what tells large from small in a march."""
+    """Return what tells large from small in a march: kinds of coordinates, and the criteria."""
     angular = [str(int(item.unit == "rad")) for item in program.coordinates]
-    golden = (math.sqrt(5) - 1) / 2
-    sequence = [k * golden % 1 for k in range(1, len(angular) + 1)]
-    probe = [f"{(1 if x * 64 % 2 < 1 else -1) * (1 + x) / 2!r}" for x in sequence]
-    return {"angular": array_lines(angular), "probe": array_lines(probe)}
+    probe = [repr(value) for value in criteria.probe_of(len(angular)).tolist()]
+    numbers = {name: repr(getattr(criteria, name)) for name in CRITERIA}
+    return {"angular": _array_lines(angular), "probe": _array_lines(probe), **numbers}
