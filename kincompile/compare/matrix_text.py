@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
-from kincompile.model.safe_expressions import ExpressionError, Place, unbalanced_bracket
+from kincompile.files.safe_expressions import ExpressionError, Place, unbalanced_bracket
 
 if TYPE_CHECKING:
     from collections.abc import Callable
