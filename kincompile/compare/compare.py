@@ -4,7 +4,7 @@ generated   the formulas the compiler derives, evaluated at random states   refe
 written     the formulas of the author: texts, arrays, functions            written.py, hand_file.py
 match       rows, columns, signs, scales that conventions leave open        matching.py, layouts.py
 agree       entry by entry: equal, equal on the manifold, different         agreement.py
-diagnose    the fault of the catalogue that gives the numbers that differ   faults.py, diagnosis.py
+diagnose    the fault of the catalogue that gives the numbers that differ   diagnosis.py, *fault*.py
 report      entries with verdicts, for people and for machines              report.py
 
 Equality is decided by numbers at a dozen random states, never by simplification.
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from kincompile.compare.faults import Place
+    from kincompile.compare.joint_faults import Index
     from kincompile.compare.reference import ConstraintBlock
     from kincompile.compare.states import Array, States
     from kincompile.compare.written import Written
@@ -232,9 +232,9 @@ class _Comparer:
     def _wrong(self, block: ConstraintBlock | None = None) -> list[Spot]:
         """Return the entries that are not right, of all constraints or of one."""
         wrong = [spot for spot, verdict in self._verdicts.items() if not verdict.is_right]
-        return [spot for spot in wrong if block is None or self._place(spot)[0] in block.rows]
+        return [spot for spot in wrong if block is None or self._index(spot)[0] in block.rows]
 
-    def _place(self, spot: Spot) -> Place:
+    def _index(self, spot: Spot) -> Index:
         """Return row and column in the system of an entry as written."""
         name, row, column = spot
         if name != "Phi_q":
@@ -270,13 +270,13 @@ class _Comparer:
     def _is_exchanged(self, block: ConstraintBlock) -> bool:
         return self._matching.exchanged.issuperset(block.rows)
 
-    def _in_system_terms(self, spots: Sequence[Spot]) -> dict[Place, Array]:
+    def _in_system_terms(self, spots: Sequence[Spot]) -> dict[Index, Array]:
         """Return written entries of a quantity by place, with the conventions taken out."""
         units = self._matching.units.column_factors(self._reference)
         values = {}
         for spot in spots:
             name, row, column = spot
-            place = self._place(spot)
+            place = self._index(spot)
             scale = self._matching.factors[row] * self._matching.sign(name)
             if name == "Phi_q":
                 scale = scale * units[place[1]]
@@ -332,7 +332,7 @@ class _Comparer:
                     block, name, self._in_system_terms(spots), self._is_exchanged(block)
                 )
                 for spot in spots:
-                    found[spot] = explained[self._place(spot)] or (self._unexplained(spot),)
+                    found[spot] = explained[self._index(spot)] or (self._unexplained(spot),)
         return found
 
     def _unexplained(self, spot: Spot) -> Diagnosis:
@@ -361,7 +361,7 @@ class _Comparer:
 
     def _entry(self, spot: Spot, diagnoses: tuple[Diagnosis, ...]) -> ComparedEntry:
         name, row, column = spot
-        system_row, system_column = self._place(spot)
+        system_row, system_column = self._index(spot)
         verdict = self._verdicts[spot]
         return ComparedEntry(
             name,

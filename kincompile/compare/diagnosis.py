@@ -1,8 +1,8 @@
-"""What explains entries that differ: a look-up in the catalogue of faults, by numbers.
+"""Explanations of entries that differ: a look-up in the catalogue of faults, by numbers.
 
-A fault explains a set of entries where it gives the author's numbers in each of them. One fault
-that explains all the entries of a constraint that differ comes first; then faults that explain
-some. Explanations that give the same numbers cannot be told apart, and are all named.
+A fault explains a set of entries if it gives the author's numbers in each of them. One fault that
+explains all the entries of a constraint that differ comes first; then faults that explain some.
+Explanations that give the same numbers are equivalent, and are all named.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import numpy as np
 
 from kincompile.compare.agreement import ABSOLUTE
 from kincompile.compare.comparison import Diagnosis
-from kincompile.compare.elementary import entry_faults
-from kincompile.compare.faults import LEFT_ZERO, Fault, Place, VectorFaults
+from kincompile.compare.entry_faults import entry_faults
+from kincompile.compare.fault import LEFT_ZERO
+from kincompile.compare.joint_faults import Index, JointFaults, NumericFault
 from kincompile.compare.vectors import with_roles_exchanged
 from kincompile.model.resolve import Joint
 
@@ -54,13 +55,13 @@ class Diagnostician:
     def __init__(self, reference: Reference, states: States) -> None:
         self._reference = reference
         self._states = states
-        self._catalogues: dict[tuple[str, str, bool], list[Fault]] = {}
-        self._entries: dict[tuple[str, Place], list[Fault]] = {}
+        self._catalogues: dict[tuple[str, str, bool], list[NumericFault]] = {}
+        self._entries: dict[tuple[str, Index], list[NumericFault]] = {}
         self._generated = reference.values(states)
 
     def explain(
-        self, block: ConstraintBlock, quantity: str, written: Mapping[Place, Array], exchanged: bool
-    ) -> dict[Place, tuple[Diagnosis, ...]]:
+        self, block: ConstraintBlock, quantity: str, written: Mapping[Index, Array], exchanged: bool
+    ) -> dict[Index, tuple[Diagnosis, ...]]:
         """Return the explanations of every entry of a constraint that differs.
 
         Parameters
@@ -76,14 +77,14 @@ class Diagnostician:
             Whether its author has the roles of bodies i and j exchanged.
         """
         left = {place: values for place, values in written.items() if np.isfinite(values).all()}
-        found: dict[Place, tuple[Diagnosis, ...]] = {}
+        found: dict[Index, tuple[Diagnosis, ...]] = {}
         found |= dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
         catalogue = list(self._catalogue(block, quantity, exchanged))
         for place in left:
             catalogue += self._entry_catalogue(quantity, place)
         while fitting := [fault for fault in catalogue if _fits(fault, left)]:
-            places = max(fitting, key=lambda fault: len(fault.values)).values.keys()
-            named = _named(fault for fault in fitting if fault.values.keys() == places)
+            places = max(fitting, key=lambda fault: len(fault.result)).result.keys()
+            named = _named(fault for fault in fitting if fault.result.keys() == places)
             for place in places:
                 del left[place]
                 found[place] = named
@@ -92,42 +93,41 @@ class Diagnostician:
         return found
 
     def is_one_fault(
-        self, block: ConstraintBlock, quantity: str, written: Mapping[Place, Array], exchanged: bool
+        self, block: ConstraintBlock, quantity: str, written: Mapping[Index, Array], exchanged: bool
     ) -> bool:
         """Return whether a single fault in vectors explains all the entries; see `explain`."""
         return any(
-            len(fault.values) == len(written) and _fits(fault, written)
+            len(fault.result) == len(written) and _fits(fault, written)
             for fault in self._catalogue(block, quantity, exchanged)
         )
 
-    def _catalogue(self, block: ConstraintBlock, quantity: str, exchanged: bool) -> list[Fault]:
+    def _catalogue(
+        self, block: ConstraintBlock, quantity: str, exchanged: bool
+    ) -> list[NumericFault]:
         """Return the faults in vectors of a constraint, by row and column of the system."""
-        joint = block.constraint
-        if not isinstance(joint, Joint):
+        joint = block.constraint if isinstance(block.constraint, Joint) else None
+        if joint is not None and exchanged:
+            joint = with_roles_exchanged(joint)
+        if joint is None:
             return []
         key = (joint.name, quantity, exchanged)
         if key not in self._catalogues:
-            other = with_roles_exchanged(joint) if exchanged else joint
-            assert other is not None
-            faults = VectorFaults(other, quantity, self._reference, self._states).faults()
-            placed = (self._placed(fault, other, block, quantity) for fault in faults)
-            self._catalogues[key] = [fault for fault in placed if fault.values]
+            numbers: dict[str | None, int] = {
+                name: k for k, name in enumerate(self._reference.coordinates)
+            }
+            columns = [numbers.get(name) for name in joint.columns]
+            self._catalogues[key] = []
+            for fault in JointFaults(joint, quantity, self._reference, self._states).faults():
+                result = {
+                    (block.rows[row], target): values
+                    for (row, column), values in fault.result.items()
+                    if (target := columns[column] if quantity == "Phi_q" else 0) is not None
+                }
+                if result:  # a fault in the columns of the ground alone does not show
+                    self._catalogues[key].append(replace(fault, result=result))
         return self._catalogues[key]
 
-    def _placed(self, fault: Fault, joint: Joint, block: ConstraintBlock, quantity: str) -> Fault:
-        """Return a fault by row and column of the system, without the columns of the ground."""
-        if quantity != "Phi_q":
-            values = {(block.rows[row], 0): item for (row, _), item in fault.values.items()}
-        else:
-            number = {name: k for k, name in enumerate(self._reference.coordinates)}
-            values = {
-                (block.rows[row], number[name]): item
-                for (row, column), item in fault.values.items()
-                if (name := joint.columns[column]) is not None
-            }
-        return Fault(fault.kind, fault.text, values, fault.detail)
-
-    def _entry_catalogue(self, quantity: str, place: Place) -> list[Fault]:
+    def _entry_catalogue(self, quantity: str, place: Index) -> list[NumericFault]:
         key = (quantity, place)
         if key not in self._entries:
             row, column = place
@@ -137,13 +137,13 @@ class Diagnostician:
         return self._entries[key]
 
     def _one_entry(
-        self, quantity: str, place: Place, values: Array, catalogue: list[Fault]
+        self, quantity: str, place: Index, values: Array, catalogue: list[NumericFault]
     ) -> tuple[Diagnosis, ...]:
         """Explain an entry alone: by a fault that should show elsewhere too, or not at all."""
         partly = _named(
             fault
             for fault in catalogue
-            if place in fault.values and _close(fault.values[place], values)
+            if place in fault.result and _close(fault.result[place], values)
         )
         if partly:
             return tuple(
@@ -160,10 +160,10 @@ class Diagnostician:
         return ()
 
 
-def _fits(fault: Fault, left: Mapping[Place, Array]) -> bool:
+def _fits(fault: NumericFault, left: Mapping[Index, Array]) -> bool:
     """Return whether a fault shows in entries that differ only, with the author's numbers."""
     return all(
-        place in left and _close(values, left[place]) for place, values in fault.values.items()
+        place in left and _close(values, left[place]) for place, values in fault.result.items()
     )
 
 
@@ -172,12 +172,12 @@ def _close(one: Array, other: Array) -> bool:
     return bool(np.max(np.abs(one - other)) <= CLOSE * size + ABSOLUTE)
 
 
-def _named(faults: Iterable[Fault]) -> tuple[Diagnosis, ...]:
+def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
     """Return one diagnosis for each kind of fault, the first of its kind."""
-    by_kind: dict[str, Fault] = {}
+    by_kind: dict[str, NumericFault] = {}
     for fault in faults:
         by_kind.setdefault(fault.kind, fault)
-    if LEFT_ZERO in by_kind and not any(map(np.any, by_kind[LEFT_ZERO].values.values())):
+    if LEFT_ZERO in by_kind and not any(map(np.any, by_kind[LEFT_ZERO].result.values())):
         # Zero is what was written; that it would also follow from a term missing says no more.
         by_kind = {LEFT_ZERO: by_kind[LEFT_ZERO]}
     return tuple(

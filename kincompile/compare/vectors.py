@@ -1,7 +1,7 @@
 """A joint's formulas in vectors, evaluated in numbers: the leaves of an expansion are arrays.
 
-The walk is the compiler's own (`Expansion`); only what the leaves stand for differs. So a formula
-with a fault in it, written in vectors, gets its numbers in the same way as the right one.
+The expansion is the compiler's own (`Expansion`), with other leaves. So a formula with a fault in
+it, written in vectors, gets its numbers in the same way as the right one.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         Components,
         Expression,
         Profile,
+        Rotation,
         Symbol,
         TimeFunction,
         Value,
@@ -42,11 +43,11 @@ class Exchanged(VectorSymbol):
     __slots__ = ()
 
 
-class NumericEnvironment(SymbolicEnvironment):
+class NumericEnvironment:
     """The leaves of a joint's template as arrays over states."""
 
     def __init__(self, joint: Joint, reference: Reference, states: States) -> None:
-        super().__init__(joint)
+        self._symbolic = SymbolicEnvironment(joint)
         self._reference = reference
         self._states = states
 
@@ -64,21 +65,25 @@ class NumericEnvironment(SymbolicEnvironment):
 
     def symbol(self, symbol: Symbol) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
-        return self._number(super().symbol(symbol))
+        return self._number(self._symbolic.symbol(symbol))
 
     def vector(self, symbol: VectorSymbol) -> Components:
         """Return a position, a velocity or a body-fixed vector; its components may be exchanged."""
         plain = VectorSymbol(symbol.name, symbol.size)
-        components = tuple(self._number(item) for item in super().vector(plain))
+        components = tuple(self._number(item) for item in self._symbolic.vector(plain))
         return components[::-1] if isinstance(symbol, Exchanged) else components
 
     def time_function(self, function: TimeFunction) -> Value:
         """Return C(t) or one of its derivatives."""
-        return self._number(super().time_function(function))
+        return self._number(self._symbolic.time_function(function))
 
     def profile(self, profile: Profile) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
-        return self._number(super().profile(profile))
+        return self._number(self._symbolic.profile(profile))
+
+    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
+        """Return the numbers of a rotation that all vectors share."""
+        return expand.entries(rotation)
 
     def call(self, function: str, value: Value) -> Value:
         """Return an elementary function."""
@@ -86,7 +91,7 @@ class NumericEnvironment(SymbolicEnvironment):
 
 
 def numeric_expansion(joint: Joint, reference: Reference, states: States) -> Expansion:
-    """Return what expands expressions of a joint's template to arrays over states."""
+    """Return the expansion of a joint's template to arrays over states."""
     return Expansion(NumericEnvironment(joint, reference, states))
 
 
@@ -115,7 +120,7 @@ def joint_values(joint: Joint, reference: Reference, states: States) -> Values:
 
 
 def with_roles_exchanged(joint: Joint) -> Joint | None:
-    """Return the joint with bodies i and j in each other's place, or None where that is none.
+    """Return the joint with bodies i and j in each other's place, or None if there is none.
 
     Every attribute of body i must have its counterpart on body j: an axis on body i alone makes
     the other order another type of joint.
