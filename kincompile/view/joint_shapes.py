@@ -36,7 +36,7 @@ from kincompile.view.marks import (
 if TYPE_CHECKING:
     from kincompile.model.constraint import Constraint
 
-Drawing: TypeAlias = Callable[[JointGeometry], list[Mark]]
+DrawJoint: TypeAlias = Callable[[JointGeometry], list[Mark]]
 
 ALONG_X, ALONG_Y = (1.0, 0.0), (0.0, 1.0)
 
@@ -74,7 +74,7 @@ def _translational_distance(joint: JointGeometry) -> list[Mark]:
     return [joint.span("s_i", "s_j", "cylinder" if joint.is_driver else "dimension")]
 
 
-def _distance(first: str, second: str) -> Drawing:
+def _distance(first: str, second: str) -> DrawJoint:
     """Return the drawing of a length between two points."""
 
     def drawing(joint: JointGeometry) -> list[Mark]:
@@ -84,7 +84,7 @@ def _distance(first: str, second: str) -> Drawing:
     return drawing
 
 
-def _relative(axis: Point) -> Drawing:
+def _relative(axis: Point) -> DrawJoint:
     """Return the drawing of a component from point to point."""
 
     def drawing(joint: JointGeometry) -> list[Mark]:
@@ -94,7 +94,7 @@ def _relative(axis: Point) -> Drawing:
     return drawing
 
 
-def _absolute(axis: Point, across: Point) -> Drawing:
+def _absolute(axis: Point, across: Point) -> DrawJoint:
     """Return the drawing of a point at C along `axis`: on a rail of the ground, or driven."""
 
     def drawing(joint: JointGeometry) -> list[Mark]:
@@ -146,7 +146,7 @@ def _point_follower(joint: JointGeometry) -> list[Mark]:
     return [joint.profile("s_j", "rho_j", "slot"), Pin(joint.name, pin, pin)]
 
 
-DRAWINGS: Mapping[type[Constraint], Drawing] = {
+DRAWINGS: Mapping[type[Constraint], DrawJoint] = {
     Revolute: _revolute,
     Translational: _translational,
     RevoluteTranslational: _revolute_translational,

@@ -9,6 +9,7 @@ import numpy as np
 from kincompile.errors import InputError, package_of_extra
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed, suggestion
+from kincompile.runtime.results.columns import titled
 from kincompile.view.drawing import drawing
 from kincompile.view.polylines import polylines
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from kincompile.view.polylines import Polyline
 
 GROUND_COLOUR, DRIVER_COLOUR, GAP_COLOUR = "0.35", "0.1", "red"
-"""Colours of what stands still, of drivers, and of joints that are not assembled."""
+"""Colours of the ground, of drivers, and of joints that are not assembled."""
 
 FILL = 0.22
 """Opacity of the areas of bodies."""
@@ -50,7 +51,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "head": {"linewidth": 0, "edgecolor": DRIVER_COLOUR, "facecolor": DRIVER_COLOUR},
     "gap": {"linewidth": 2.0, "color": GAP_COLOUR, "linestyle": ":"},
 }
-"""What the polylines look like; those without a colour have that of their body."""
+"""Style of each kind of polyline; without a colour, it has that of its body."""
 
 NAME: dict[str, Any] = {
     "xytext": (9, 9),
@@ -59,7 +60,7 @@ NAME: dict[str, Any] = {
     "zorder": 10,
     "bbox": {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
 }
-"""How the name of a joint is written: beside it, on a pale ground."""
+"""Style of the name of a joint: beside it, on a pale ground."""
 
 
 def plot_mechanism(
@@ -115,12 +116,12 @@ def plot_mechanism(
 
 
 def position_of(model: Mechanism | ConstraintSystem, q: ArrayLike | None) -> NDArray[np.float64]:
-    """Return the position that is meant, shape (n,), of a model that can be drawn.
+    """Return a checked position, shape (n,), of a model that can be drawn.
 
     Raises
     ------
     InputError
-        If there is nothing to draw, or `q` is no finite position.
+        If there is nothing to draw, or `q` is not a finite position.
     """
     system = require_bodies(system_of(model))
     names = [item.name for item in system.coordinates]
@@ -142,7 +143,7 @@ def position_of(model: Mechanism | ConstraintSystem, q: ArrayLike | None) -> NDA
 
 
 def require_bodies(system: ConstraintSystem) -> ConstraintSystem:
-    """Return a system that has bodies.
+    """Return a system after checking that it has bodies.
 
     Raises
     ------
@@ -160,12 +161,12 @@ def require_bodies(system: ConstraintSystem) -> ConstraintSystem:
 def checked_parameters(
     model: Mechanism | ConstraintSystem, p: Mapping[str, float] | None
 ) -> dict[str, float]:
-    """Return the parameters that are given, all of which the model has.
+    """Return the given parameters after checking that the model has them.
 
     Raises
     ------
     InputError
-        If the model has none of such a name.
+        If the model has no parameter of such a name.
     """
     known = [item.name for item in model.system().parameters]
     for name in p or {}:
@@ -183,14 +184,9 @@ def draw(
     drawn: Drawing,
     q: NDArray[np.float64],
 ) -> list[tuple[Polyline, Any]]:
-    """Draw all polylines at the first of the positions, and return each with its artist.
+    """Draw all polylines at the first of the positions q, and return each with its artist.
 
-    Parameters
-    ----------
-    ax, model, drawn
-        Where, of what, and its shapes.
-    q : ndarray, shape (N, n)
-        Positions that the limits of the plot must hold.
+    The limits of the plot hold all positions, shape (N, n).
     """
     x_low, x_high, y_low, y_high = drawn.extent(q)
     artists = [
@@ -203,13 +199,13 @@ def draw(
     room = 2 * drawn.size
     ax.set_xlim(x_low - room, x_high + room)
     ax.set_ylim(y_low - room, y_high + room)
-    ax.set_xlabel(f"x [{unit}]" if unit else "x")
-    ax.set_ylabel(f"y [{unit}]" if unit else "y")
+    ax.set_xlabel(titled("x", unit))
+    ax.set_ylabel(titled("y", unit))
     return artists
 
 
 def move(artists: list[tuple[Polyline, Any]], q: NDArray[np.float64]) -> None:
-    """Move what `draw` returned to a position, shape (n,)."""
+    """Move the artists that `draw` returned to a position, shape (n,)."""
     for polyline, artist in artists:
         points = polyline.at(q)
         if polyline.is_area:
@@ -219,7 +215,7 @@ def move(artists: list[tuple[Polyline, Any]], q: NDArray[np.float64]) -> None:
 
 
 def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
-    """Make the artist of a polyline."""
+    """Return the artist of a polyline."""
     colour = f"C{polyline.frame % 10}" if polyline.frame >= 0 else GROUND_COLOUR
     look, points, zorder = LOOKS[polyline.look], polyline.at(q), 2 + order * 1e-3
     if not polyline.is_area:
@@ -231,7 +227,7 @@ def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) ->
 
 
 def _write_names(ax: Axes, drawn: Drawing, q: NDArray[np.float64]) -> None:
-    """Write the names of constraints where they are; those of one place together."""
+    """Write the names of constraints at their places; those of one place together."""
     at: dict[tuple[float, float], list[str]] = {}
     for joint in drawn.joints:
         if joint.place is not None:

@@ -1,4 +1,4 @@
-"""What a mechanism and its motion look like in a notebook; importing this registers it.
+"""Pictures of a mechanism and of its motion in a notebook; importing this registers them.
 
 A mechanism is drawn at its guess; a motion is played on its page, in a frame and without a server.
 """

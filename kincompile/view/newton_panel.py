@@ -1,4 +1,4 @@
-"""The mechanism's functions as a script of the page, for the panel that shows Newton's method."""
+"""Scripts for the panel of Newton's method: the functions of the mechanism, and the method."""
 
 from __future__ import annotations
 
@@ -15,26 +15,19 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
 MOST_COORDINATES = 60
-"""Coordinates up to which every entry of Phi_q can be looked at."""
-
+"""Coordinates up to which the panel shows every entry of Phi_q."""
 
 CRITERIA = ("TOLERANCE", "RESIDUAL_FACTOR", "ROUNDING", "MAX_ITERATIONS", "NO_SIZE")
-"""The numbers of `criteria` that the page's method judges by."""
+"""The numbers of `criteria` that the method of the page uses."""
 
 
 def newton_method() -> str:
-    """Return the script of Newton's method, which judges as the runtime does."""
+    """Return the script of Newton's method, with the criteria of the runtime."""
     return fill("view/newton.js.jinja", {name: getattr(criteria, name) for name in CRITERIA})
 
 
 def newton_script(model: Mechanism | ConstraintSystem) -> str:
-    """Return the script that declares `emitted`: the functions, or `reason`, why there are none.
-
-    Parameters
-    ----------
-    model
-        A mechanism or a system of free equations.
-    """
+    """Return the script that declares `emitted`: the functions, or `reason`, why there are none."""
     count = len(model.system().coordinates)
     if count > MOST_COORDINATES:
         return _without(f"{count} coordinates are too many to show Newton's method step by step.")
