@@ -38,7 +38,7 @@ enum {
     BLOCKS = 3,  // blocks of the planned solve
 };
 
-const char cam_flat_follower_fingerprint[] = "dc70f608d91330ad121079edfe1d311f";
+const char cam_flat_follower_fingerprint[] = "528b5b94e2c16b3cc60b1e8194a6346c";
 const double cam_flat_follower_defaults[] = {
     0.04, 0.02, 6.283185307179586,
 };

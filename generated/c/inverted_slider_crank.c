@@ -38,7 +38,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char inverted_slider_crank_fingerprint[] = "d6357080bf2fb32a30ee1b0957d182c2";
+const char inverted_slider_crank_fingerprint[] = "159e583ec366e5c998c79a11da441ac8";
 const double inverted_slider_crank_defaults[] = {
     0,
 };

@@ -37,7 +37,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char rack_and_pinion_fingerprint[] = "be41ae4b0a3414a68fb2075524bc5c90";
+const char rack_and_pinion_fingerprint[] = "76e3cf45db5c844ea511c3535fe00519";
 const double rack_and_pinion_defaults[] = {
     0.05, 2.0,
 };

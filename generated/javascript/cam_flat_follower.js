@@ -21,7 +21,7 @@ const cam_flat_follower = (() => {
 
     const NAME = "cam_flat_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "dc70f608d91330ad121079edfe1d311f";
+    const FINGERPRINT = "528b5b94e2c16b3cc60b1e8194a6346c";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

@@ -20,7 +20,7 @@ const rack_and_pinion = (() => {
 
     const NAME = "rack_and_pinion";
     const FORMAT = 1;
-    const FINGERPRINT = "be41ae4b0a3414a68fb2075524bc5c90";
+    const FINGERPRINT = "76e3cf45db5c844ea511c3535fe00519";
     const N_COORDINATES = 6;
     const N_EQUATIONS = 6;
     const COORDINATES = [

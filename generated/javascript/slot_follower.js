@@ -21,7 +21,7 @@ const slot_follower = (() => {
 
     const NAME = "slot_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "367e36de90eba0a903b4b1f776fcce6a";
+    const FINGERPRINT = "4ca7a0d8e6121c4e2babb77dd532e1bb";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

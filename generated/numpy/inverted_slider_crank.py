@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "inverted_slider_crank"
 FORMAT = 1
-FINGERPRINT = "d6357080bf2fb32a30ee1b0957d182c2"
+FINGERPRINT = "159e583ec366e5c998c79a11da441ac8"
 N_COORDINATES = 9
 N_EQUATIONS = 9
 COORDINATES = (

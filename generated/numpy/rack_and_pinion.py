@@ -25,7 +25,7 @@ import numpy as np
 
 NAME = "rack_and_pinion"
 FORMAT = 1
-FINGERPRINT = "be41ae4b0a3414a68fb2075524bc5c90"
+FINGERPRINT = "76e3cf45db5c844ea511c3535fe00519"
 N_COORDINATES = 6
 N_EQUATIONS = 6
 COORDINATES = (

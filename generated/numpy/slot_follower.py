@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "slot_follower"
 FORMAT = 1
-FINGERPRINT = "367e36de90eba0a903b4b1f776fcce6a"
+FINGERPRINT = "4ca7a0d8e6121c4e2babb77dd532e1bb"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (
