@@ -20,11 +20,11 @@ BENCH_READY := $(VENV)/bench.stamp
 
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test test-slow lint format types goldens update-goldens bench clean
+.PHONY: help demo test test-all test-slow lint format types goldens update-goldens bench clean
 
 help:
 	@echo "make demo            compile the wrecker boom, run it, show it on a page"
-	@echo "make test            run the tests                 make test-slow    packaging, pages in a browser"
+	@echo "make test            run the tests (4 minutes)     make test-all     and the exhaustive rest"
 	@echo "make lint            ruff check, ruff format       make format       repair what ruff can"
 	@echo "make types           mypy                          make bench        the benchmarks"
 	@echo "make goldens         compare generated/ with re-emission, under several hash seeds"
@@ -43,7 +43,7 @@ $(DEMO_READY): $(VENV_READY) pyproject.toml .ci/constraints.txt
 
 $(TEST_READY): $(DEMO_READY)
 	@echo "Installing the test tools into $(VENV)"
-	@$(PIP) --editable '.[test,plot]'
+	@$(PIP) --editable '.[test,plot,tables]'
 	@touch $@
 
 $(PAGES_READY): $(TEST_READY)
@@ -70,6 +70,9 @@ demo: $(DEMO_READY)
 test: $(TEST_READY)
 	@$(PYTEST) --numprocesses=auto
 
+test-all: test test-slow
+
+# The exhaustive rest: packaging, pages in a browser, large corpora.
 test-slow: $(PAGES_READY)
 	@$(PYTEST) --numprocesses=auto -m slow
 
@@ -91,7 +94,7 @@ goldens: $(TEST_READY)
 
 # Fails by design after a rewrite, so that nothing passes by updating.
 update-goldens: $(TEST_READY)
-	@$(PYTEST) tests/goldens --update-goldens
+	@$(PYTEST) tests/goldens tests/unit/test_readme.py --update-goldens -k 'golden or table'
 
 # A peer that cannot be installed here is skipped, and the tables say so.
 $(BENCH_READY): $(DEMO_READY)

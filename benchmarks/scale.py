@@ -28,7 +28,6 @@ UNITS = (1.0, 1e6, 1e-3, 1e-3)
 HEADS = ("N", "contender", "model + compile, s", "peak MB", "all four, ms", "one step, ms")
 NAMES = {
     "kincompile": "kincompile, NumPy",
-    "kincompile-c": "kincompile, C by block types; all four are NumPy's",
     "casadi": "CasADi VM, fast_newton, sparse QR; gears as a ratio of angles",
     "casadi-rolling": "CasADi VM, fast_newton, sparse QR; gears by kc.Gear's equation",
     "superlu": "kincompile's values, SciPy's SuperLU",
@@ -106,10 +105,6 @@ def reached(found: Measured, sizes: Sequence[int]) -> Iterator[Target]:
         for what, limit, unit in limits:
             measured = ours[what].median / UNITS[what]
             yield Target(f"N = 10,000: {HEADS[what + 2]}", measured, "at most", limit, unit)
-    compiled = found.get(("kincompile-c", "gears", SIZES[-1]))
-    if compiled:
-        measured = compiled[STEP].median / UNITS[STEP]
-        yield Target(f"C, N = 10,000: {HEADS[STEP + 2]}", measured, "at most", 2, "ms")
     if len(sizes) > 1:
         for what in (BUILD, FOUR, STEP):
             measured = exponent(found, "kincompile", min(sizes), max(sizes), what)

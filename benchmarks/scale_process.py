@@ -51,10 +51,10 @@ class Contender:
 
 
 class Kincompile(Contender):
-    """The module of a target; what a C compiler takes is not in the time of this process."""
+    """The NumPy module."""
 
-    def __init__(self, loops: Loops, *, target: str = "numpy") -> None:
-        self.module = kc.compile(loops.mechanism(), target=target, form="grouped")
+    def __init__(self, loops: Loops) -> None:
+        self.module = kc.compile(loops.mechanism(), form="grouped")
         self._q = np.array(self.module.GUESS)
         # Another position each time: a module keeps the cosines and sines of the last one.
         self._positions = itertools.cycle((self._q, self._q + 0.01))
@@ -148,7 +148,6 @@ class HandLoop(Contender):
 
 CONTENDERS: dict[str, Callable[[Loops], Contender]] = {
     "kincompile": Kincompile,
-    "kincompile-c": partial(Kincompile, target="c"),
     "casadi": Casadi,
     "casadi-rolling": partial(Casadi, is_rolling=True),
     "superlu": SuperLU,

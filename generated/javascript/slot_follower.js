@@ -21,7 +21,7 @@ const slot_follower = (() => {
 
     const NAME = "slot_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "4ca7a0d8e6121c4e2babb77dd532e1bb";
+    const FINGERPRINT = "2078c57d7cdee5b4001ac79029f642f7";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

@@ -28,7 +28,7 @@ const wrecker_boom = (() => {
 
     const NAME = "wrecker_boom";
     const FORMAT = 1;
-    const FINGERPRINT = "c73b8c8d689cabad62703687efc4385e";
+    const FINGERPRINT = "b567cc20bf36e08925ddd1e25a1b50b2";
     const N_COORDINATES = 15;
     const N_EQUATIONS = 15;
     const COORDINATES = [

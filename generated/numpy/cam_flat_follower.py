@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "cam_flat_follower"
 FORMAT = 1
-FINGERPRINT = "528b5b94e2c16b3cc60b1e8194a6346c"
+FINGERPRINT = "1873cd6622df32759a29baf955016efb"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (

@@ -28,7 +28,7 @@ import numpy as np
 
 NAME = "gear_train"
 FORMAT = 1
-FINGERPRINT = "f87bd4e756f823dbd53556cad720b90d"
+FINGERPRINT = "40c55a3d90bf6516d6f5a2effd08e56f"
 N_COORDINATES = 9
 N_EQUATIONS = 9
 COORDINATES = (

@@ -243,14 +243,15 @@ def _factor(f, J):
     (
         equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2,
     ) = J
-    determinant = -(equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3)
-    k_2 = 1 / (equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3)
+    k_1 = equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3
+    determinant = -k_1
+    k_3 = 1 / k_1
     return (
         equation_1_phi3,
         equation_2_phi3,
         equation_3_x2,
         equation_3_y2,
-        k_2,
+        k_3,
     ), (
         determinant,
     )
@@ -259,12 +260,12 @@ def _factor(f, J):
 def _solve(f, F, b):
     """Return x of Phi_q x = b."""
     (
-        equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2, k_2,
+        equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2, k_3,
     ) = F
     (
         equation_1, equation_2, equation_3,
     ) = b
-    b_1 = (equation_3 - equation_3_x2 * equation_1 - equation_3_y2 * equation_2) * k_2
+    b_1 = (equation_3 - equation_3_x2 * equation_1 - equation_3_y2 * equation_2) * k_3
     phi3 = -b_1
     y2 = equation_2 + equation_2_phi3 * b_1
     x2 = equation_1 + equation_1_phi3 * b_1

@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "slot_follower"
 FORMAT = 1
-FINGERPRINT = "4ca7a0d8e6121c4e2babb77dd532e1bb"
+FINGERPRINT = "2078c57d7cdee5b4001ac79029f642f7"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (

@@ -33,7 +33,7 @@ import numpy as np
 
 NAME = "wrecker_boom"
 FORMAT = 1
-FINGERPRINT = "c73b8c8d689cabad62703687efc4385e"
+FINGERPRINT = "b567cc20bf36e08925ddd1e25a1b50b2"
 N_COORDINATES = 15
 N_EQUATIONS = 15
 COORDINATES = (

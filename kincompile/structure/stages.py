@@ -96,7 +96,7 @@ SHARED = 4
 
 
 def plan_stages(
-    rows: Index, columns: Index, constants: Values, size: int, shared: int = SHARED
+    rows: Index, columns: Index, constants: Values, size: int
 ) -> tuple[Stage, ...] | None:
     """Split a large square system into stages.
 
@@ -108,9 +108,6 @@ def plan_stages(
         Its value where it is a plain number, NaN where it varies.
     size
         Number of equations, and of coordinates.
-    shared
-        Blocks a class, on average, that a chain must have; others are left to a sparse
-        factorization.
 
     Returns
     -------
@@ -135,7 +132,7 @@ def plan_stages(
     for together, is_cyclic in _class_order(needs, len(classes)):
         chosen = np.concatenate([members[number] for number in together])
         largest = int(np.bincount(blocks.of_row)[chosen].max())
-        if largest > LARGEST_BLOCK or (is_cyclic and chosen.size < shared * len(together)):
+        if largest > LARGEST_BLOCK or (is_cyclic and chosen.size < SHARED * len(together)):
             stages.append(_sparse(chosen, blocks))
             continue
         lanes = []
@@ -274,8 +271,7 @@ def _sparse(chosen: Index, blocks: _Blocks) -> Sparse:
 def _positions(heads: Index, tails: Index, count: int) -> Index:
     """Return the position of each block in an order in which none needs a later one.
 
-    Each head needs its tail. What a block makes ready follows it at once, so that blocks that hand
-    on numbers to each other stand near each other.
+    Each head needs its tail.
     """
     followers: list[list[int]] = [[] for _ in range(count)]
     missing = np.bincount(heads, minlength=count).tolist()

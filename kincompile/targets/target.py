@@ -13,11 +13,13 @@ import numpy as np
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from numpy.typing import NDArray
 
     from kincompile.ir.inline import InlineProgram
+    from kincompile.targets.evaluators import Listing
+    from kincompile.targets.printer import Dialect, Printer
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +34,11 @@ class Emitted:
         Text by file name; the first is the main one.
     arrays
         Arrays that belong to the main file; none for most targets.
-    companion
-        Name of the file of the arrays, ``<name>.npz`` if it is empty.
     """
 
     name: str
     files: Mapping[str, str]
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    companion: str = ""
 
     @property
     def source(self) -> str:
@@ -49,7 +48,7 @@ class Emitted:
     @property
     def companions(self) -> tuple[str, ...]:
         """Names of the files beside the main one."""
-        arrays = (self.companion or f"{self.name}.npz",) if self.arrays else ()
+        arrays = (f"{self.name}.npz",) if self.arrays else ()
         return (*list(self.files)[1:], *arrays)
 
     def write(self, folder: str | Path, main: str | None = None) -> tuple[Path, ...]:
@@ -90,7 +89,35 @@ def _packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:
 
 
 class Target(Protocol):
-    """A language to emit."""
+    """A language to emit: what the module `target` of its folder has.
 
-    def __call__(self, code: InlineProgram) -> Emitted:
-        """Return the files of a program."""
+    Loops, names and schedules are not its concern: `emission` calls `function` for each evaluator,
+    then `files`.
+    """
+
+    DIALECT: Dialect
+    """How it writes expressions."""
+    RESERVED: tuple[str, ...]
+    """Words of the language, and names that its functions use."""
+    EVALUATORS: Mapping[str, tuple[str, ...]]
+    """Its functions, and the quantities that each gives."""
+
+    def function(
+        self, name: str, code: InlineProgram, listing: Listing, printer: Printer
+    ) -> list[str]:
+        """Return the lines of a function."""
+
+    def files(
+        self, code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+    ) -> Mapping[str, str]:
+        """Return the files, the main one first.
+
+        Parameters
+        ----------
+        code
+            The program, for constants and whatever else the files say of it.
+        functions
+            Lines of the functions, by name.
+        called
+            Elementary functions that they call.
+        """

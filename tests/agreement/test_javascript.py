@@ -10,7 +10,8 @@ import sympy
 
 import kincompile as kc
 from kincompile.ir import from_sympy
-from kincompile.targets.printers import JAVASCRIPT_FUNCTIONS, JavaScriptPrinter
+from kincompile.targets.javascript.dialect import JAVASCRIPT
+from kincompile.targets.printer import Printer
 
 STATES = 3
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
@@ -197,10 +198,10 @@ def test_that_every_function_and_every_condition_agrees(run):
 
 
 def test_that_no_function_of_the_compiler_is_forgotten():
-    assert set(from_sympy.FUNCTIONS.values()) | {"sqrt", "pow"} <= JAVASCRIPT_FUNCTIONS
+    assert set(from_sympy.FUNCTIONS.values()) | {"sqrt", "pow"} <= JAVASCRIPT.functions.keys()
 
 
 def test_that_a_function_javascript_does_not_have_is_named():
-    printer = JavaScriptPrinter([("input", "x"), ("call", "erf", 0)], {0: "x"})
+    printer = Printer(JAVASCRIPT, [("input", "x"), ("call", "erf", 0)], {0: "x"})
     with pytest.raises(kc.UnsupportedError, match="the JavaScript target has no function 'erf'"):
         printer.text(1)

@@ -8,17 +8,8 @@ import pytest
 
 import kincompile as kc
 
-PATHS = (
-    "march",
-    "grid",
-    "variants",
-    "compiled",
-    "compiled variants",
-    "grouped",
-    "compiled grouped",
-)
-MODULES = {"compiled": "c", "compiled variants": "c", "grouped": "grouped",
-           "compiled grouped": "compiled grouped"}  # fmt: skip
+PATHS = ("march", "grid", "variants", "compiled", "compiled variants", "grouped")
+MODULES = {"compiled": "c", "compiled variants": "c", "grouped": "grouped"}
 START = 1.0
 FLAT = np.pi - START
 """When the parallelogram, whose crank starts at START and turns with 1 rad/s, is flat."""
@@ -32,7 +23,6 @@ def parallelograms(build, quick_compiler):
         "numpy": kc.compile(model),
         "c": kc.compile(model, target="c"),
         "grouped": kc.compile(model, form="grouped"),
-        "compiled grouped": kc.compile(model, target="c", form="grouped"),
     }
 
 
@@ -86,7 +76,7 @@ def test_that_points_close_to_the_bifurcation_do_not_lead_past_it(parallelograms
             check(parallelograms, path, t)
 
 
-@pytest.mark.parametrize("path", ["march", "grid", "compiled", "grouped", "compiled grouped"])
+@pytest.mark.parametrize("path", ["march", "grid", "compiled", "grouped"])
 @pytest.mark.parametrize("points", [20, 1000])
 def test_that_every_path_goes_on_along_the_smooth_branch(parallelograms, path, points):
     module = parallelograms[MODULES.get(path, "numpy")]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import kincompile as kc
-from kincompile import cli
+from kincompile.cli import progress as cli
 
 
 def test_that_a_bug_is_a_message_that_asks_for_a_report(kincompile, pendulum, monkeypatch):
@@ -45,30 +45,39 @@ def test_that_too_many_points_for_the_memory_are_a_message(kincompile, pendulum,
     assert (done.exit_code, "not enough memory; ask for fewer points" in done.stderr) == (2, True)
 
 
-def test_that_ctrl_c_ends_a_process_without_a_traceback(tmp_path):
+# A shell starts background jobs with SIGINT ignored, and its children inherit that.
+INTERRUPTIBLE = (
+    "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "runpy.run_module('kincompile', run_name='__main__')"
+)
+
+
+@pytest.mark.parametrize("inherited", [signal.SIG_DFL, signal.SIG_IGN], ids=["shell", "background"])
+def test_that_ctrl_c_ends_a_process_without_a_traceback(tmp_path, start_process, inherited):
     (tmp_path / "endless.py").write_text(
         "import sys, time\n"
         "print('running', file=sys.stderr, flush=True)\n"
         "while True:\n"
         "    time.sleep(60)\n"
     )
-    command = [sys.executable, "-m", "kincompile", "run", str(tmp_path / "endless.py")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
-        assert running.stderr
-        assert running.stderr.readline() == b"running\n"
-        running.send_signal(signal.SIGINT)
-        stdout, stderr = running.communicate(timeout=60)
-    assert (running.returncode, stdout, stderr) == (130, b"", b"Interrupted.\n")
+    before = signal.signal(signal.SIGINT, inherited)
+    try:
+        running = start_process(
+            [sys.executable, "-c", INTERRUPTIBLE, "run", str(tmp_path / "endless.py")]
+        )
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert running.stderr.readline() == "running\n"
+    running.send_signal(signal.SIGINT)
+    stdout, stderr = running.communicate(timeout=60)
+    assert (running.returncode, stdout, stderr) == (130, "", "Interrupted.\n")
 
 
-def test_that_a_reader_who_has_seen_enough_is_no_error(pendulum):
-    command = [sys.executable, "-m", "kincompile", "inspect", str(pendulum)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
-        assert running.stdout
-        running.stdout.close()
-        assert running.stderr
-        assert running.stderr.read() == b""
-    assert running.returncode == -signal.SIGPIPE
+def test_that_a_reader_who_has_seen_enough_is_no_error(pendulum, start_process):
+    running = start_process([sys.executable, "-m", "kincompile", "inspect", str(pendulum)])
+    running.stdout.close()
+    assert running.stderr.read() == ""
+    assert running.wait(timeout=60) == -signal.SIGPIPE
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")

@@ -15,7 +15,7 @@ from kincompile.compare.hand_file import read_hand_file
 from kincompile.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[3]
-DATA = ROOT / "tests" / "teach_data"
+DATA = ROOT / "tests" / "data"
 EXAMPLE = str(ROOT / "examples" / "problem_3_5_6.py")
 
 

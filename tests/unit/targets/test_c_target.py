@@ -12,10 +12,10 @@ from sympy import Piecewise
 
 import kincompile as kc
 from kincompile.ir import from_sympy
-from kincompile.runtime import march, newton, problem
 from kincompile.runtime.status import Status
+from kincompile.targets.c.dialect import C
 from kincompile.targets.naming import NameTable
-from kincompile.targets.printers import C_ANGLE_FUNCTIONS, C_FUNCTIONS, CPrinter
+from kincompile.targets.printer import Printer
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
 x, y = sympy.symbols("x y")
@@ -71,25 +71,6 @@ def test_the_text_says_what_the_numpy_module_says(example):
         assert f"// {section}" in source
 
 
-def test_the_march_judges_by_the_numbers_of_the_runtime(example_named):
-    source = next(iter(example_named("four_bar").files("c").values()))
-    wanted = {
-        "LARGEST_ERROR": march.SMALL_ERROR,
-        "SMALLEST_PART": march.SMALLEST_PART,
-        "NEARLY_SINGULAR": march.NEARLY_SINGULAR,
-        "KINK": march.KINK,
-        "SMOOTH": march.SMOOTH,
-        "TOO_NEAR": march.TOO_NEAR,
-        "RESIDUAL_FACTOR": newton.RESIDUAL_FACTOR,
-        "ROUNDING": problem.ROUNDING,
-    }
-    for name, value in wanted.items():
-        (text,) = re.findall(rf"\b{name} = ([^,;]+)", source)
-        assert eval(text) == value, name
-    assert f"MAX_SUBSTEPS = {march.MAX_SUBSTEPS} " in source
-    assert f"<= {problem.NO_SIZE!r} ? 1" in source
-
-
 def test_the_statuses_are_those_of_the_runtime(example_named):
     header = list(example_named("four_bar").files("c").values())[1]
     found = dict(re.findall(r"FOUR_BAR_(\w+) = (\d),  +//", header))
@@ -121,13 +102,11 @@ def test_every_function_gives_the_numbers_of_numpy():
 
 
 def test_no_function_of_the_compiler_is_forgotten():
-    supported = C_FUNCTIONS | C_ANGLE_FUNCTIONS.keys()
-    called = set(from_sympy.FUNCTIONS.values()) | {"sqrt", "pow"}
-    assert called <= supported
+    assert set(from_sympy.FUNCTIONS.values()) | {"sqrt", "pow"} <= C.functions.keys()
 
 
 def test_a_function_that_c_does_not_have_is_named():
-    printer = CPrinter([("input", "x"), ("call", "erf", 0)], {0: "x"})
+    printer = Printer(C, [("input", "x"), ("call", "erf", 0)], {0: "x"})
     with pytest.raises(kc.UnsupportedError, match="the C target has no function 'erf'"):
         printer.text(1)
 

@@ -264,6 +264,23 @@ def test_that_variants_are_solved_one_after_the_other(example_named):
     assert found.message == known.message
 
 
+def test_that_a_large_mechanism_stays_numpys_where_c_is_asked_for(caplog):
+    with caplog.at_level("INFO", logger="kincompile"):
+        module = kc.compile(loops(40, "angle"), target="c")
+    assert "loops is in grouped form, which C does not have: it stays NumPy's" in caplog.text
+    assert module.FORM == "grouped"
+    assert not hasattr(module, "march")
+    assert kc.solve(module, [0.0, 0.1]).success
+
+
+@pytest.mark.parametrize("target", ["c", "octave", "javascript"])
+@pytest.mark.parametrize(("count", "form"), [(40, None), (2, "grouped")])
+def test_that_other_targets_say_what_to_do_with_a_large_mechanism(target, count, form):
+    wanted = f"target '{target}' has no grouped form; use target='numpy', or form='inline'"
+    with pytest.raises(kc.UnsupportedError, match=wanted):
+        kc.emit(loops(count, "angle"), target, form)
+
+
 def test_an_unknown_form_is_refused():
     with pytest.raises(kc.InputError, match="forms are: inline, grouped"):
         kc.emit(loops(1, "angle"), form="tree")

@@ -1,0 +1,145 @@
+"""The format of a model file, in one place: what the reader checks and the JSON Schema says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from kincompile.model.arguments import Kind
+from kincompile.model.catalogue import CONSTRAINTS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from kincompile.model.constraint import Constraint
+
+VERSION = 1
+"""Version of the format, the value of the key `kincompile`."""
+MOST_POINTS = 10_000_000
+"""Largest time grid that a file may ask for."""
+SMOOTHNESS = 4
+"""Continuous derivatives of a profile given by a table: it is a periodic quintic spline."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A field of a table.
+
+    Attributes
+    ----------
+    schema
+        What JSON Schema says of its value.
+    is_required
+        Whether it must be there.
+    """
+
+    schema: Mapping[str, Any]
+    is_required: bool = True
+
+
+_TEXT: dict[str, Any] = {"type": "string"}
+_NAME: dict[str, Any] = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$"}
+_NUMBER: dict[str, Any] = {"type": "number"}
+_EXPRESSION: dict[str, Any] = {"$ref": "#/$defs/expression"}
+_POINT: dict[str, Any] = {
+    "type": "array", "items": _EXPRESSION, "minItems": 2, "maxItems": 2,
+}  # fmt: skip
+_NUMBERS: dict[str, Any] = {"type": "array", "items": _NUMBER, "minItems": 6}
+_TABLE: dict[str, Any] = {
+    "type": "object",
+    "properties": {"angles": _NUMBERS, "radii": _NUMBERS, "smoothness": {"const": SMOOTHNESS}},
+    "required": ["angles", "radii", "smoothness"],
+    "additionalProperties": False,
+}
+
+
+def _list(name: str) -> dict[str, Any]:
+    return {"type": "array", "items": {"$ref": f"#/$defs/{name}"}}
+
+
+FIELDS: Mapping[str, Mapping[str, Field]] = {
+    "model": {
+        "$schema": Field(_TEXT, is_required=False),
+        "kincompile": Field({"const": VERSION}),
+        "name": Field(_NAME),
+        "length_unit": Field(_TEXT, is_required=False),
+        "analysis": Field({"$ref": "#/$defs/analysis"}, is_required=False),
+        "parameters": Field(_list("parameter"), is_required=False),
+        "bodies": Field(_list("body"), is_required=False),
+        "coordinates": Field(_list("coordinate"), is_required=False),
+        "constraints": Field(_list("constraint")),
+    },
+    "analysis": {
+        "end": Field(_NUMBER, is_required=False),
+        "points": Field(
+            {"type": "integer", "minimum": 1, "maximum": MOST_POINTS}, is_required=False
+        ),
+    },
+    "parameter": {
+        "name": Field(_NAME),
+        "default": Field(_NUMBER),
+        "unit": Field(_TEXT, is_required=False),
+    },
+    "body": {
+        "name": Field(_NAME),
+        "guess": Field({**_POINT, "minItems": 3, "maxItems": 3}, is_required=False),
+        "outline": Field({"type": "array", "items": _POINT, "minItems": 3}, is_required=False),
+    },
+    "coordinate": {"name": Field(_NAME), "guess": Field(_EXPRESSION, is_required=False)},
+    "profile": {key: Field(_TABLE["properties"][key]) for key in ("angles", "radii", "smoothness")},
+    "Equation": {
+        "type": Field({"const": "Equation"}),
+        "name": Field(_NAME),
+        "expressions": Field({"type": "array", "items": _EXPRESSION, "minItems": 1}),
+    },
+}
+"""Fields of the file itself, of its tables, and of a free equation."""
+
+_KINDS: Mapping[Kind, Mapping[str, Any]] = {
+    Kind.BODY: _NAME,
+    Kind.POINT: _POINT,
+    Kind.AXIS: _POINT,
+    Kind.PROFILE: {"anyOf": [_EXPRESSION, _TABLE]},
+}
+
+
+def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
+    """Return the fields of a constraint type: its arguments, and a guess where it has contacts."""
+    fields = {"type": Field({"const": constraint.__name__}), "name": Field(_NAME)}
+    for name, item in constraint.arguments().items():
+        fields[name] = Field(_KINDS.get(item.kind, _EXPRESSION))
+    if constraint.contacts:
+        guesses = {"type": "array", "items": _EXPRESSION, "minItems": len(constraint.contacts)}
+        fields["guess"] = Field({"anyOf": [_EXPRESSION, guesses]}, is_required=False)
+    return fields
+
+
+def model_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a model file.
+
+    What it cannot say, whether a formula can be read and a body exists, `kincompile inspect` says.
+    """
+    tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
+    kinds = [_object(constraint_fields(item)) for item in CONSTRAINTS.values()]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"Mechanism for kincompile, format {VERSION}",
+        **_object(FIELDS["model"]),
+        "$defs": {
+            "expression": {
+                "description": "a number, or a formula such as -a/2 + sin(omega*t)",
+                "type": ["number", "string"],
+            },
+            **tables,
+            "constraint": {"oneOf": [*kinds, _object(FIELDS["Equation"])]},
+        },
+    }
+
+
+def _object(fields: Mapping[str, Field]) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "properties": {name: item.schema for name, item in fields.items()},
+        "required": [name for name, item in fields.items() if item.is_required],
+        "additionalProperties": False,
+    }

@@ -1,0 +1,180 @@
+"""A model as the text of a file, TOML or JSON, which reads back to the same model."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import sympy
+from sympy.printing.str import StrPrinter
+
+from kincompile.errors import ModelError
+from kincompile.files.file_format import SMOOTHNESS, VERSION
+from kincompile.model.arguments import Kind
+from kincompile.model.constraint import CamConstraint, Constraint
+from kincompile.model.expressions import as_expression
+from kincompile.model.resolve import Joint
+from kincompile.model.system import ConstraintSystem
+from kincompile.model.text_views import model_text
+from kincompile.names import body_coordinates
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from kincompile.model.bodies import Body, Coordinate, Parameter
+    from kincompile.model.resolve import FreeEquation
+
+
+@model_text.register(ConstraintSystem)
+def _model_text(system: ConstraintSystem, form: str) -> str:
+    """Return a system as the text of a file."""
+    data = model_data(system)
+    if form == "toml":
+        return toml_text(data)
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+
+
+def model_data(system: ConstraintSystem) -> dict[str, Any]:
+    """Return a system as the values of a model file."""
+    sections = {
+        "parameters": [_parameter(item) for item in system.parameters],
+        "bodies": [_body(item) for item in system.bodies],
+        "coordinates": [
+            {"name": item.name, "guess": item.guess} for item in _free_coordinates(system)
+        ],
+        "constraints": [_constraint(item) for item in system.constraints],
+    }
+    return {
+        "kincompile": VERSION,
+        "name": system.name,
+        "length_unit": system.length_unit,
+        "analysis": {"end": float(system.end), "points": int(system.points)},
+        **{name: rows for name, rows in sections.items() if rows},
+    }
+
+
+def _parameter(item: Parameter) -> dict[str, Any]:
+    row = {"name": item.name, "default": item.default}
+    return {**row, "unit": item.unit} if item.unit else row
+
+
+def _body(item: Body) -> dict[str, Any]:
+    row: dict[str, Any] = {"name": item.name, "guess": [value(number) for number in item.guess]}
+    corners = [[value(number) for number in corner] for corner in item.outline]
+    return {**row, "outline": corners} if corners else row
+
+
+def _free_coordinates(system: ConstraintSystem) -> Iterable[Coordinate]:
+    """Return the coordinates that neither a body nor a cam has brought along."""
+    others = {name for body in system.bodies for name in body_coordinates(body.name)}
+    for item in system.constraints:
+        if isinstance(item, Joint):
+            others.update(item.written.contact_names if item.written.contacts else ())
+    return (item for item in system.coordinates if item.name not in others)
+
+
+def _constraint(item: Joint | FreeEquation) -> dict[str, Any]:
+    if not isinstance(item, Joint):
+        expressions = [value(expression) for expression in item.expressions]
+        return {"type": "Equation", "name": item.name, "expressions": expressions}
+    written = item.written
+    row: dict[str, Any] = {"type": type(written).__name__, "name": written.name}
+    bodies = iter(item.bodies)
+    for name, argument in written.arguments().items():
+        if argument.kind is Kind.BODY:
+            row[name] = next(bodies).name
+        elif argument.kind in (Kind.POINT, Kind.AXIS):
+            row[name] = [value(number) for number in item.points[argument.symbol]]
+        elif argument.kind is Kind.PROFILE:
+            row[name] = _profile(written, name, item.profiles[argument.symbol])
+        else:
+            row[name] = value(item.scalars[argument.symbol])
+    return row | _guess(written)
+
+
+def _profile(written: Constraint, name: str, rho: sympy.Expr) -> Any:
+    """Return a profile: the table as it was given, or the formula in alpha."""
+    given = getattr(written, name)
+    if isinstance(given, tuple | list):
+        angles, radii = ([float(number) for number in column] for column in given)
+        return {"angles": angles, "radii": radii, "smoothness": SMOOTHNESS}
+    return value(rho)
+
+
+def _guess(written: Constraint) -> dict[str, Any]:
+    if not isinstance(written, CamConstraint) or written.guess is None:
+        return {}
+    guess = written.guess
+    if isinstance(guess, tuple | list):
+        return {"guess": [value(item) for item in guess]}
+    return {"guess": value(guess)}
+
+
+def value(given: Any) -> int | float | str:
+    """Return a number as it is, an expression as the text that is read back to it."""
+    expression = as_expression(given)
+    if not isinstance(expression, sympy.Expr):
+        return expression
+    if isinstance(expression, sympy.Integer):
+        return int(expression)
+    if isinstance(expression, sympy.Float):
+        return float(expression)
+    rare = expression.atoms(sympy.NumberSymbol) - {sympy.pi, sympy.E}
+    if rare:
+        expression = expression.xreplace({symbol: sympy.Float(symbol) for symbol in rare})
+    return str(_Printer().doprint(expression))  # type: ignore[no-untyped-call]
+
+
+class _Printer(StrPrinter):
+    """Prints an expression in the language of `safe_expressions`, no digit lost."""
+
+    def _print_Float(self, expr: sympy.Float) -> str:
+        return repr(float(expr))
+
+    def _print_Exp1(self, expr: sympy.Expr) -> str:
+        del expr
+        return "exp(1)"
+
+    def _print_And(self, expr: sympy.And) -> str:
+        return self._connected(expr, " and ")
+
+    def _print_Or(self, expr: sympy.Or) -> str:
+        return self._connected(expr, " or ")
+
+    def _connected(self, expr: sympy.And | sympy.Or, word: str) -> str:
+        arguments = sorted(expr.args, key=sympy.default_sort_key)
+        return word.join(f"({self._print(item)})" for item in arguments)
+
+    def _print_PeriodicSpline(self, expr: sympy.Expr) -> str:
+        raise ModelError(
+            f"{expr} is a table within an expression, which a file cannot hold; give the table as "
+            "the profile itself"
+        )
+
+
+def toml_text(data: dict[str, Any]) -> str:
+    """Return the values of a model file as TOML: a line a body, a block a constraint."""
+    lines: list[str] = []
+    for key, content in data.items():
+        if key == "constraints":
+            for row in content:
+                lines += ["", "[[constraints]]"]
+                lines += [f"{name} = {_toml(item)}" for name, item in row.items()]
+        elif isinstance(content, list):
+            lines += [f"{key} = [", *(f"    {_toml(row)}," for row in content), "]"]
+        else:
+            lines.append(f"{key} = {_toml(content)}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(item: Any) -> str:
+    """Return a value as TOML, on one line."""
+    if isinstance(item, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in item.items()) + " }"
+    if isinstance(item, list):
+        return _listed(item)
+    return json.dumps(item, ensure_ascii=False) if isinstance(item, str) else repr(item)
+
+
+def _listed(items: Sequence[Any]) -> str:
+    return "[" + ", ".join(_toml(item) for item in items) + "]"
