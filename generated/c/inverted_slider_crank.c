@@ -38,7 +38,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char inverted_slider_crank_fingerprint[] = "d6357080bf2fb32a30ee1b0957d182c2";
+const char inverted_slider_crank_fingerprint[] = "21a4f6133a501417c90e882101d84d6c";
 const double inverted_slider_crank_defaults[] = {
     0,
 };

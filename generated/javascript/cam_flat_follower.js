@@ -21,7 +21,7 @@ const cam_flat_follower = (() => {
 
     const NAME = "cam_flat_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "dc70f608d91330ad121079edfe1d311f";
+    const FINGERPRINT = "b6ee97b117891b711e52c1bac1c42baa";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

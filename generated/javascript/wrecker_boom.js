@@ -28,7 +28,7 @@ const wrecker_boom = (() => {
 
     const NAME = "wrecker_boom";
     const FORMAT = 1;
-    const FINGERPRINT = "69106bbdffea01f63486434029109af2";
+    const FINGERPRINT = "415d188a386864830f7d3b0a57941100";
     const N_COORDINATES = 15;
     const N_EQUATIONS = 15;
     const COORDINATES = [

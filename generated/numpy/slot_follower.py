@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "slot_follower"
 FORMAT = 1
-FINGERPRINT = "367e36de90eba0a903b4b1f776fcce6a"
+FINGERPRINT = "6e1e26f39b987127200b8e8b72dd3127"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.ir.grouping import GroupedProgram
+from kincompile.ir.inline import InlineProgram
 from kincompile.targets.evaluators import input_names, schedule
 from kincompile.targets.naming import NameTable
 from kincompile.targets.printer import Printer
@@ -12,7 +12,7 @@ from kincompile.targets.registry import load_grouped_form, load_target
 from kincompile.targets.target import Emitted
 
 if TYPE_CHECKING:
-    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.grouping import GroupedProgram
 
 
 def emit_program(name: str, code: InlineProgram | GroupedProgram) -> Emitted:
@@ -23,7 +23,7 @@ def emit_program(name: str, code: InlineProgram | GroupedProgram) -> Emitted:
     UnsupportedError
         If the target cannot print the program.
     """
-    if isinstance(code, GroupedProgram):
+    if not isinstance(code, InlineProgram):
         return load_grouped_form(name)(code)
     target, program = load_target(name), code.program
     own = (program.name, *program.tables, *(f"{program.name}_{item}" for item in program.tables))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.cli import ENDINGS
+from kincompile.cli.compile import ENDINGS
 from kincompile.targets.registry import TARGETS
 
 
