@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 Columns = tuple[int | None, ...]
 _MOST_PERMUTED = 5  # 120 orders; with more bodies only the reversed order is tried
-_GROUND: Columns = (None, None, None)
 _WITH_GROUND = "columns of the ground are present (they are not checked)"
 
 
@@ -47,8 +46,13 @@ def usual_layout(reference: Reference, block: ConstraintBlock | None, width: int
         layouts.append(Layout(tuple(column for column in block.columns if column is not None)))
         layouts.append(Layout(block.columns, _WITH_GROUND))
     if reference.system.bodies:
-        layouts.append(Layout((*_GROUND, *every), _WITH_GROUND))
+        layouts.append(Layout((*_ground(reference), *every), _WITH_GROUND))
     return next((layout for layout in layouts if len(layout.columns) == width), None)
+
+
+def _ground(reference: Reference) -> Columns:
+    """Return the columns of the ground, as many as a body has."""
+    return (None,) * len(next(iter(reference.system.body_columns), ()))
 
 
 def expected_widths(reference: Reference, block: ConstraintBlock | None) -> str:
@@ -63,28 +67,33 @@ def expected_widths(reference: Reference, block: ConstraintBlock | None) -> str:
 
 def other_layouts(reference: Reference, usual: Layout, row_count: int) -> Iterator[Layout]:
     """Yield layouts in other orders: of the bodies, of their coordinates, of the ground."""
-    triples, rest = _split(usual.columns, 3 * len(reference.system.bodies))
-    bodies = [triple for triple in triples if triple != _GROUND]
-    has_ground = bodies != triples
+    groups, rest = _split(reference, usual.columns)
+    bodies = [group for group in groups if None not in group]
+    ground = _ground(reference) if len(bodies) < len(groups) else ()
     seen = {usual.columns}
     for order in _orders(bodies):
         for words, columns in _arrangements(order, is_moved=list(order) != bodies):
-            for placed in _with_ground((*columns, *rest), has_ground):
+            for placed in _with_ground((*columns, *rest), ground):
                 if placed not in seen:
                     seen.add(placed)
-                    text = [*words, _WITH_GROUND] if has_ground else words
+                    text = [*words, _WITH_GROUND] if ground else words
                     yield Layout(placed, "; ".join(text))
     # One row alone cannot distinguish an order from a slip.
-    if not triples and row_count > 1 and len(rest) <= _MOST_PERMUTED:
+    if not groups and row_count > 1 and len(rest) <= _MOST_PERMUTED:
         for other in permutations(rest):
             if other != usual.columns:
                 yield Layout(other, "the coordinates have another order")
 
 
-def _split(columns: Columns, body_columns: int) -> tuple[list[Columns], Columns]:
-    """Return the triples of the bodies, ground included, and the other columns."""
-    count = sum(column is None or column < body_columns for column in columns)
-    return [columns[k : k + 3] for k in range(0, count, 3)], columns[count:]
+def _split(reference: Reference, columns: Columns) -> tuple[list[Columns], Columns]:
+    """Return the columns of each body, ground included, and the other columns."""
+    widths: dict[int | None, int] = {own[0]: len(own) for own in reference.system.body_columns}
+    widths[None] = len(_ground(reference))
+    groups: list[Columns] = []
+    while columns and (width := widths.get(columns[0], 0)):
+        groups.append(columns[:width])
+        columns = columns[width:]
+    return groups, columns
 
 
 def _orders(bodies: Sequence[Columns]) -> Iterator[tuple[Columns, ...]]:
@@ -110,10 +119,7 @@ def _arrangements(
     yield [*words, "the positions come first, then the angles"], [*positions, *angles]
 
 
-def _with_ground(columns: Columns, has_ground: bool) -> Iterator[Columns]:
+def _with_ground(columns: Columns, ground: Columns) -> Iterator[Columns]:
     """Yield the columns with those of the ground at every place between two bodies."""
-    if not has_ground:
-        yield columns
-        return
-    for k in range(0, len(columns) + 1, 3):
-        yield (*columns[:k], *_GROUND, *columns[k:])
+    for k in range(0, len(columns) + 1, len(ground)) if ground else (0,):
+        yield (*columns[:k], *ground, *columns[k:])
