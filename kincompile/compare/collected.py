@@ -120,7 +120,7 @@ def _paired(left: Vector, right: Vector) -> Scalar:
 
 
 def _order(vector: Vector) -> tuple[int, str]:
-    """Sort what is not turned first, then by the angle, so that like products meet."""
+    """Return a key: vectors without a rotation first, then by angle, so that like products meet."""
     if not isinstance(vector, Rotated):
         return 0, repr(vector)
     (angle,) = vector.rotation.coordinates

@@ -299,7 +299,7 @@ class _Comparer:
         """Compare the entries that differ once more, at states at which the constraint holds.
 
         The constraint alone comes first; an entry may also need the other constraints to hold.
-        Phi itself is zero there, whatever it is.
+        Phi itself is zero there, right or wrong.
         """
         if not all(item.takes_states for item in self._quantities.values()):
             return

@@ -1,4 +1,4 @@
-"""The conventions of a matching in words: what may differ between two right answers."""
+"""The conventions of a matching in words: the differences between two right answers."""
 
 from __future__ import annotations
 

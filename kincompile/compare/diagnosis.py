@@ -178,7 +178,7 @@ def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
     for fault in faults:
         by_kind.setdefault(fault.kind, fault)
     if LEFT_ZERO in by_kind and not any(map(np.any, by_kind[LEFT_ZERO].result.values())):
-        # Zero is what was written; that it would also follow from a term missing says no more.
+        # Zero was written. That a missing term would also give zero is no further explanation.
         by_kind = {LEFT_ZERO: by_kind[LEFT_ZERO]}
     return tuple(
         Diagnosis(fault.kind, f"{fault.text}.", fault.detail)

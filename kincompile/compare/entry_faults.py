@@ -54,16 +54,21 @@ def entry_faults(
     faults = [*whole_faults(quantity, "the entry", lambda factor: factor * entry, str(entry))]
     text = "sine and cosine are swapped throughout"
     faults.append(Fault(SINE_COSINE, text, _sine_cosine(entry), str(entry)))
-    formulas = [fault.result for fault in faults]
     terms = sympy.Add.make_args(entry)
-    for term in terms if len(terms) <= MOST_TERMS else ():
-        for fault in _faults_of_term(term, angles):
-            faults.append(fault)
-            formulas.append(entry - term + fault.result)
-    values, sizes = (item[..., None] for item in reference.evaluate([entry, *formulas], states))
-    equal = np.all(agrees(values[:, 1:], sizes[:, 1:], values[:, :1]), axis=(0, 2))
+    parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
+    replaced = [0] * len(faults)  # number of the part in whose place the result stands
+    for k, term in enumerate(parts[1:], 1):
+        found = list(_faults_of_term(term, angles))
+        faults += found
+        replaced += [k] * len(found)
+    # Sums are taken of numbers: SymPy would sort the terms of each.
+    results = [fault.result for fault in faults]
+    values, sizes = (item[..., None] for item in reference.evaluate([*parts, *results], states))
+    right, wrong = values[:, :1], values[:, :1] - values[:, replaced] + values[:, len(parts) :]
+    sizes = sizes[:, :1] + np.abs(values[:, replaced]) + sizes[:, len(parts) :]
+    equal = np.all(agrees(wrong, sizes, right), axis=(0, 2))
     for k in np.flatnonzero(~equal):
-        yield replace(faults[k], result={(row, column): values[:, k + 1, 0]})
+        yield replace(faults[k], result={(row, column): wrong[:, k, 0]})
 
 
 def _faults_of_term(

@@ -25,7 +25,7 @@ _WITH_GROUND = "columns of the ground are present (they are not checked)"
 class Layout:
     """The generated column of each hand-written column; None where it belongs to the ground.
 
-    `convention` says in words how this differs from the order of the system, "" where it does not.
+    `convention` is the difference from the order of the system in words, "" where there is none.
     """
 
     columns: Columns

@@ -90,7 +90,7 @@ class _Splitter:
         return start, end
 
     def _after_bracket(self, start: int) -> int:
-        """Return the offset behind the partner of a bracket."""
+        """Return the offset after the closing partner of a bracket."""
         return self._depth.index(self._depth[start], start + 1)
 
     def _bracketed_rows(self, start: int, end: int) -> list[Span]:

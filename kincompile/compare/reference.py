@@ -110,7 +110,7 @@ class Reference:
 
     @cached_property
     def _rows(self) -> list[Row]:
-        """The rows as SymPy expressions, for what people read."""
+        """The rows as SymPy expressions, which people read."""
         return assemble(self.system)
 
     def expression(self, quantity: str, row: int, column: int) -> sympy.Expr:

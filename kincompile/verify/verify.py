@@ -80,7 +80,7 @@ class Check:
     oracle
         Name of the oracle.
     error
-        Largest difference over all states, relative to what the terms contribute.
+        Largest difference over all states, relative to the size of the terms.
     passed
         Whether it is small enough.
     """
@@ -175,7 +175,7 @@ class Verification:
 
 
 def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
-    """Compare Phi_q, nu and gamma of an emitted module with what follows from its Phi alone.
+    """Compare Phi_q, nu and gamma of an emitted module with derivatives of its Phi.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
     for quantity in ORACLES:
         size = _sizes(module, states, quantity, reference)
         error, limit, judge = _judged(module, states, quantity, size)
-        # The entry and the state at which an equation is worst, compared with what is allowed.
+        # The entry and the state with the largest error, compared with the allowed one.
         columns = np.argmax(error, axis=2)
         errors = np.max(error, axis=2)
         worst = np.argmax(errors / limit, axis=0)
