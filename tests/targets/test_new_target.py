@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import kincompile as kc
-from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect, Operation
+from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
 from kincompile.targets.registry import TARGETS, Listed
 from kincompile.targets.statements import Layout
 from kincompile.targets.target import Target
@@ -37,7 +37,7 @@ class Plain:
 
     DIALECT = Dialect(
         "plain", {name: f"{name}({{}})" for name in ELEMENTARY},
-        square=Operation("{}**2", (ATOM,), POWER), select="({1} if {0} else {2})",
+        square=("{}**2", (ATOM,), POWER), select="({1} if {0} else {2})",
     )  # fmt: skip
     RESERVED: tuple[str, ...] = ("q", "q_dot", "t", "p", "pi", *ELEMENTARY)
     EVALUATORS: Mapping[str, tuple[str, ...]] = {
