@@ -116,32 +116,30 @@ def constraint_kernel(template: Template) -> Kernel:
     """Return the kernel of a constraint type."""
     environment = KernelEnvironment(template)
     expansion = Expansion(environment)
-    Phi: list[int] = []
-    nu: list[int] = []
-    gamma: list[int] = []
-    entries: list[tuple[int, int, int]] = []
+    outputs: dict[str, list[tuple[int, int, int]]] = {}
+    first = 0
     for block in derive(template):
         columns: list[tuple[Code, ...]] = []
         is_vector = isinstance(block.Phi, Vector)
         for coordinate, entry in zip(template.coordinates, block.Phi_q, strict=True):
             columns += entry_columns(entry, is_vector, isinstance(coordinate, Vector), expansion)
-        entries += [
-            (len(Phi) + row, column, item.node)
+        outputs.setdefault("Phi_q", []).extend(
+            (first + row, column, item.node)
             for column, items in enumerate(columns)
             for row, item in enumerate(items)
             if environment.graph.value_of(item.node) != 0
-        ]
-        Phi += [item.node for item in expansion.components(block.Phi)]
-        nu += [item.node for item in expansion.components(block.nu)]
-        gamma += [item.node for item in expansion.components(block.gamma)]
+        )
+        vectors = {"Phi": block.Phi, "nu": block.nu, "gamma": block.gamma}
+        for name, vector in vectors.items():
+            outputs.setdefault(name, []).extend(
+                (first + row, 0, item.node) for row, item in enumerate(expansion.components(vector))
+            )
+        first = len(outputs["Phi"])
     return Kernel(
         template.type_name,
         tuple(environment.inputs),
         tuple(environment.graph.nodes),
-        tuple(Phi),
-        tuple(sorted(entries)),
-        tuple(nu),
-        tuple(gamma),
+        {name: tuple(sorted(entries)) for name, entries in outputs.items()},
         _hints(expansion),
     )
 
@@ -191,9 +189,9 @@ def equation_kernel(equation: FreeEquation) -> Kernel:
         for row, item in enumerate(found)
         for column, entry in enumerate(item.Phi_q)
     ]
-    Phi, nu, gamma = (
-        tuple(convert(getattr(item, quantity)) for item in found)
-        for quantity in ("Phi", "nu", "gamma")
-    )
-    kept = tuple(entry for entry in entries if graph.value_of(entry[2]) != 0)
-    return Kernel("Equation", tuple(inputs), tuple(graph.nodes), Phi, kept, nu, gamma, ())
+    outputs = {"Phi_q": tuple(entry for entry in entries if graph.value_of(entry[2]) != 0)}
+    for name in ("Phi", "nu", "gamma"):
+        outputs[name] = tuple(
+            (row, 0, convert(getattr(item, name))) for row, item in enumerate(found)
+        )
+    return Kernel("Equation", tuple(inputs), tuple(graph.nodes), outputs, ())

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import operands_of
 from kincompile.names import rate
+from kincompile.quantities import quantity_named
 from kincompile.targets.naming import NameTable, content_name
 
 if TYPE_CHECKING:
@@ -15,19 +16,6 @@ if TYPE_CHECKING:
 
     from kincompile.ir.inline import Entry, InlineProgram, Section
     from kincompile.ir.program import Program
-
-EVALUATORS: Mapping[str, tuple[str, ...]] = {
-    "Phi": ("Phi",),
-    "Phi_q": ("Phi_q",),
-    "nu": ("nu",),
-    "gamma": ("gamma",),
-    "position": ("Phi", "Phi_q"),
-    "velocity": ("Phi_q", "nu"),
-    "acceleration": ("Phi_q", "gamma"),
-    "kinematics": ("Phi", "Phi_q", "nu", "gamma"),
-}
-"""The functions of a module and the quantities each returns; the last four share work."""
-
 
 DEEPEST = 60
 """Operations within each other, a long sum's for instance, after which a value gets a name: neither
@@ -79,9 +67,9 @@ class Listing:
 
 
 def varying(inline: InlineProgram, section: Section, quantity: str) -> tuple[Entry, ...]:
-    """Return the entries a function computes: of Phi_q only those that are not plain numbers."""
+    """Return the entries a function computes: of a matrix those that are not plain numbers."""
     entries = section.entries[quantity]
-    if quantity != "Phi_q":
+    if not quantity_named(quantity).is_matrix:
         return entries
     return tuple(entry for entry in entries if inline.number(entry.node) is None)
 

@@ -21,6 +21,7 @@ FLOORS = {
     "errors": 0,
     "names": 0,
     "pictures": 0,
+    "quantities": 0,
     "tables": 0,
     "writing": 0,
     "calculus": 1,

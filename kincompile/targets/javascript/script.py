@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile import quantities
 from kincompile.names import rate
+from kincompile.quantities import FORMAT, functions
 from kincompile.targets.functions import Listing, inputs_read, schedule
 from kincompile.targets.headings import header, place, title
 from kincompile.targets.layout import assigned, indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
-from kincompile.targets.numpy.module import FORMAT
 from kincompile.targets.printers import JavaScriptPrinter
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
@@ -22,14 +23,7 @@ if TYPE_CHECKING:
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
-
-ABOUT = {
-    "Phi": "Constraint vector Phi(q, t).",
-    "Phi_q": "Jacobian of Phi by q.",
-    "nu": "Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.",
-    "gamma": "Right side of the acceleration equation Phi_q q_ddot = gamma.",
-}
-"""The functions, and what each gives."""
+    from kincompile.quantities import Quantity
 
 KEYWORDS = (
     "arguments", "await", "break", "case", "catch", "class", "const", "continue", "debugger",
@@ -42,7 +36,7 @@ KEYWORDS = (
 """Words of the language, and names that it does not let be declared."""
 
 RESERVED = (
-    *KEYWORDS, *ABOUT, "q", "q_dot", "t", "p", "Array", "Math", "require_length", "square",
+    *KEYWORDS, "q", "q_dot", "t", "p", "Array", "Math", "require_length", "square",
     "spline", "DEFAULTS", "N_COORDINATES",
 )  # fmt: skip
 """Names that the functions use."""
@@ -62,17 +56,18 @@ def emit_javascript(code: InlineProgram) -> Emitted:
         If a function does not exist in JavaScript.
     """
     program = code.program
-    table = NameTable((*RESERVED, *program.tables))
+    table = NameTable((*RESERVED, *functions(), *program.tables))
     wanted = [item.name for item in program.coordinates]
     wanted += [rate(name) for name in wanted] + [item.name for item in program.parameters]
     names = {"t": "t", **{name: table.take(name) for name in wanted}}
-    functions: list[str] = []
-    for quantity in ABOUT:
-        listing = schedule(code, (quantity,), names, table)
-        functions += ["", *_function(quantity, code, listing, names)]
-    text = indented(functions)
+    lines: list[str] = []
+    for quantity in quantities.QUANTITIES:
+        listing = schedule(code, (quantity.name,), names, table)
+        lines += ["", *_function(quantity, code, listing, names)]
+    text = indented(lines)
     data = {
         **_constants(code),
+        "returned": "".join(f", {item.name}" for item in quantities.QUANTITIES),
         "header": "\n".join(f"// {line}".rstrip() for line in header(code)),
         "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
         "tables": indented(_tables(program)),
@@ -106,26 +101,26 @@ def _constants(code: InlineProgram) -> dict[str, object]:
 
 
 def _function(
-    quantity: str, code: InlineProgram, listing: Listing, names: Mapping[str, str]
+    quantity: Quantity, code: InlineProgram, listing: Listing, names: Mapping[str, str]
 ) -> list[str]:
     """Return the lines of one function."""
-    vectors = ["q", "q_dot"] if quantity == "gamma" else ["q"]
+    vectors = [name for name in quantity.arguments if name in ("q", "q_dot")]
     checks = [f'require_length("{vector}", {vector}, N_COORDINATES);' for vector in vectors]
     checks.append('require_length("p", p, DEFAULTS.length);')
     inputs = [
         f"const {names[member]} = {vector}[{k}];"
         for vector, k, member in inputs_read(code.program, listing)
     ]
-    body = [*checks, *inputs, *_body(quantity, code, listing), f"return {quantity};"]
+    body = [*checks, *inputs, *_body(quantity, code, listing), f"return {quantity.name};"]
     return [
-        f"// {ABOUT[quantity]}",
-        f"function {quantity}({', '.join(vectors)}, t, p = DEFAULTS) {{",
+        f"// {quantity.about}",
+        f"function {quantity.name}({', '.join(vectors)}, t, p = DEFAULTS) {{",
         *(f"    {line}" for line in body),
         "}",
     ]
 
 
-def _body(quantity: str, code: InlineProgram, listing: Listing) -> list[str]:
+def _body(quantity: Quantity, code: InlineProgram, listing: Listing) -> list[str]:
     """Return the statements of a function, its inputs named."""
     printer = JavaScriptPrinter(code.nodes, listing.names)
     lines = ["// body frames: A = [[c, -s], [s, c]]"] if listing.frames else []
@@ -136,26 +131,28 @@ def _body(quantity: str, code: InlineProgram, listing: Listing) -> list[str]:
         lines.append(f"// {title(section)}")
         for item in assignments:
             lines += assigned(f"const {item.name}", printer.text(item.node, own=True))
-    lines.append(f"const {quantity} = {_zeros(quantity, code.program)};")
+    lines.append(f"const {quantity.name} = {_zeros(quantity, code.program)};")
     for section in code.sections:
         # Zeros are there already.
-        entries = [entry for entry in section.entries[quantity] if code.number(entry.node) != 0]
+        entries = [
+            entry for entry in section.entries[quantity.name] if code.number(entry.node) != 0
+        ]
         lines += [f"// {title(section)}"] if entries else []
         for entry in entries:
-            column = f"[{entry.column}]" if quantity == "Phi_q" else ""
-            text = assigned(f"{quantity}[{entry.row}]{column}", printer.text(entry.node))
-            where = place(quantity, entry, code)
+            column = f"[{entry.column}]" if quantity.is_matrix else ""
+            text = assigned(f"{quantity.name}[{entry.row}]{column}", printer.text(entry.node))
+            where = place(quantity.name, entry, code)
             text[-1] += f"  // {where}" if where else ""
             lines += text
     return lines
 
 
-def _zeros(quantity: str, program: Program) -> str:
+def _zeros(quantity: Quantity, program: Program) -> str:
     """Return a vector or a matrix of zeros, to be filled."""
-    n, m = len(program.coordinates), len(program.equations)
-    if quantity == "Phi_q":
-        return f"Array.from({{ length: {m} }}, () => new Array({n}).fill(0))"
-    return f"new Array({m}).fill(0)"
+    rows, *columns = program.shape_of(quantity)
+    if columns:
+        return f"Array.from({{ length: {rows} }}, () => new Array({columns[0]}).fill(0))"
+    return f"new Array({rows}).fill(0)"
 
 
 def _tables(program: Program) -> list[str]:

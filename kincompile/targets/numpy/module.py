@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import itertools
+from typing import TYPE_CHECKING, Any, Literal
 
+from kincompile import quantities
 from kincompile.ir.elimination import plan_solve
 from kincompile.names import rate
-from kincompile.targets.functions import EVALUATORS, Listing, schedule
+from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
+from kincompile.targets.functions import Listing, schedule, varying
 from kincompile.targets.headings import header, place, short_title, title
-from kincompile.targets.layout import WIDTH, broken, commented, indented, quoted, wrapped
+from kincompile.targets.layout import WIDTH, broken, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.solve import solve_functions
 from kincompile.targets.printers import PythonPrinter
@@ -17,13 +20,13 @@ from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.inline import Entry, InlineProgram, Section
     from kincompile.ir.program import Program
+    from kincompile.quantities import Quantity
 
-FORMAT = 1
-"""Version of the contract of an emitted module."""
+Style = Literal["titled", "plain", "packed"]
 
 FUNCTIONS = {
     "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2",
@@ -50,40 +53,44 @@ RESERVED_IN_SOLVE = ("f", "J", "F", "b")
 def emit_numpy(code: InlineProgram) -> Emitted:
     """Return a program as one NumPy module."""
     program = code.program
-    table = NameTable((*RESERVED, *program.tables))
+    taken = NameTable((*RESERVED, *program.tables))
     wanted = [item.name for item in program.coordinates]
     wanted += [rate(name) for name in wanted] + [item.name for item in program.parameters]
-    names = {"t": "t", **{name: table.take(name) for name in wanted}}
-    kernels: list[str] = []
+    names = {"t": "t", **{name: taken.take(name) for name in wanted}}
+    lines: list[str] = []
     called: set[str] = set()
-    for name, quantities in EVALUATORS.items():
-        listing = schedule(code, quantities, names, table)
+    lanes = kernels()
+    for name, computed in lanes.items():
+        listing = schedule(code, computed, names, taken)
         called |= set(listing.functions)
-        kernels += ["", "", *_function(name, quantities, code, listing, names)]
+        lines += ["", "", *_kernel(name, computed, code, listing, names)]
+    keys = list(lanes)
     plan = plan_solve(code)
-    lanes = list(EVALUATORS)
     if plan is not None:
         solving = schedule_solve(code, plan, NameTable(RESERVED_IN_SOLVE))
-        kernels += ["", "", *solve_functions(code, solving)]
-        lanes += ["factor", "solve"]
-    data = _data(code, kernels, sorted(called))
-    data["lanes"] = indented(f'"{name}": _{name},' for name in lanes)
-    data["is_planned"] = plan is not None
-    data["has_large_blocks"] = plan is not None and plan.has_large_blocks
-    data |= shared_text()
-    source = fill("numpy/module.py.jinja", data)
-    return Emitted(program.name, {f"{program.name}.py": source})
+        lines += ["", "", *solve_functions(code, solving)]
+        keys += ["factor", "solve"]
+    data = {
+        **_constants(code),
+        "kernels": "\n".join(lines),
+        "functions": "\n".join(_functions(code)),
+        "results": "\n".join(_results()),
+        "lanes": indented(wrapped(f'"{name}": _{name}' for name in keys)),
+        "scalar_functions": indented(scalar_functions(sorted(called))),
+        "array_functions": indented(array_functions(sorted(called))),
+        "is_planned": plan is not None,
+        "has_large_blocks": plan is not None and plan.has_large_blocks,
+        "has_frames": "cos_sin" in called,
+        **shared_text(),
+    }
+    return Emitted(program.name, {f"{program.name}.py": fill("numpy/module.py.jinja", data)})
 
 
-def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[str, Any]:
+def _constants(code: InlineProgram) -> dict[str, Any]:
+    """Return what the head of the module says."""
     program = code.program
     names = [item.name for item in program.coordinates]
-    pattern = code.pattern()
-    entries = [entry for section in code.sections for entry in section.entries["Phi_q"]]
-    values = [code.number(entry.node) for entry in entries]
-    constants = [value for value in values if value is not None]
-    fixed = [k for k, value in enumerate(values) if value is not None]
-    moving = [k for k, value in enumerate(values) if value is None]
+    units = {item.name: item.unit for item in (*program.coordinates, *program.parameters)}
     return {
         "title": program.name,
         "header": "\n".join(header(code)),
@@ -93,23 +100,100 @@ def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[st
         "n": len(names),
         "m": len(program.equations),
         "k": len(program.parameters),
-        "nonzeros": len(pattern),
-        "coordinates": indented(quoted(names)),
-        "equations": indented(quoted(program.equations)),
-        "redundant": indented(quoted(program.redundant)),
-        "parameters": indented(quoted([item.name for item in program.parameters])),
-        "units": indented(_units(program)),
-        "defaults": indented(wrapped([repr(item.default) for item in program.parameters])),
-        "guess": indented(wrapped([repr(item.guess) for item in program.coordinates])),
-        "pattern": indented(wrapped([f"({row}, {column})" for row, column in pattern])),
-        "constants": indented(wrapped([repr(float(value)) for value in constants])),
-        "fixed": indented(wrapped([str(k) for k in fixed])),
-        "varying": indented(wrapped([str(k) for k in moving])),
+        "nonzeros": len(code.pattern()),
+        "coordinates": tuple_text(f'"{name}"' for name in names),
+        "equations": tuple_text(f'"{name}"' for name in program.equations),
+        "redundant": tuple_text(f'"{name}"' for name in program.redundant),
+        "is_redundant": bool(program.redundant),
+        "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
+        "bodies": bodies_text(program),
+        "units": indented(wrapped([f'"{name}": "{unit}"' for name, unit in units.items()])),
+        "defaults": tuple_text(repr(item.default) for item in program.parameters),
+        "guess": tuple_text(repr(item.guess) for item in program.coordinates),
+        "patterns": "\n".join(_patterns(code)),
         "tables": "\n".join(_tables(program)),
-        "scalar_functions": indented(scalar_functions(called)),
-        "array_functions": indented(array_functions(called)),
-        "kernels": "\n".join(kernels),
     }
+
+
+def tuple_text(items: Iterable[str]) -> str:
+    """Return a tuple as text: on one line, or its elements on lines of their own."""
+    items = list(items)
+    text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
+    return text if len(text) <= WIDTH - 36 else f"(\n{indented(wrapped(items))}\n)"
+
+
+def bodies_text(program: Program) -> str:
+    """Return the bodies: name, first column and number of columns of each."""
+    return tuple_text(f'("{body}", {angle - 2}, 3)' for body, angle in program.frames)
+
+
+def _pattern_name(quantity: Quantity) -> str:
+    return "PATTERN" if quantity.name == "Phi_q" else f"PATTERN_{quantity.name}"
+
+
+def _patterns(code: InlineProgram) -> Iterator[str]:
+    """Yield the places of the entries of each matrix, and its entries that never change."""
+    for quantity in quantities.QUANTITIES:
+        if not quantity.is_matrix:
+            continue
+        entries, name = code.entries(quantity.name), _pattern_name(quantity)
+        places = wrapped([f"({entry.row}, {entry.column})" for entry in entries])
+        values = {k: code.number(entry.node) for k, entry in enumerate(entries)}
+        constants = [f"{k}: {float(x)!r}" for k, x in values.items() if x is not None]
+        yield f"# row, column of the entries of {quantity.name} that are not identically zero"
+        yield f"{name} = np.array((\n{indented(places)}\n), dtype=int).reshape(-1, 2)"
+        yield "# number in the pattern and value of the entries that never change"
+        suffix = name.removeprefix("PATTERN")
+        yield f"_CONSTANTS{suffix} = {{\n{indented(wrapped(constants))}\n}}"
+
+
+def _results() -> Iterator[str]:
+    """Yield the lines that say what the functions return."""
+    sizes = {
+        "equations": "N_EQUATIONS",
+        "coordinates": "N_COORDINATES",
+        "outputs": "N_OUTPUTS",
+        "parameters": "len(PARAMETERS)",
+    }
+    for quantity in quantities.QUANTITIES:
+        rows, name = sizes[quantity.rows], f"_{quantity.name.upper()}"
+        if not quantity.is_matrix:
+            yield f"{name} = _Quantity(({rows},), range({rows}))"
+            continue
+        columns, pattern = sizes[quantity.columns], _pattern_name(quantity)
+        constants = f"_CONSTANTS{pattern.removeprefix('PATTERN')}"
+        places = f"{pattern} @ ({columns}, 1)"
+        yield f"{name} = _Quantity(({rows}, {columns}), {places}, {constants})"
+        size = f"len({pattern})"
+        yield f"{name}_NONZEROS = _Quantity(({size},), range({size}), {constants})"
+
+
+def _functions(code: InlineProgram) -> Iterator[str]:
+    """Yield the public functions of the quantities."""
+    for quantity, name, lines in public_functions(code.program, len(code.pattern())):
+        kernel, states = kernel_of((quantity.name,)), "q, q_dot" if quantity.is_moving else "q"
+        computed = kernels()[kernel]
+        before = computed[: computed.index(quantity.name)]
+        skip = sum(len(varying(code, part, item)) for item in before for part in code.sections)
+        result = f"_{name.upper()}"
+        yield from lines
+        yield f"    return _evaluate(_{kernel}, {skip}, ({result},), t, p, {states})[0]\n\n"
+
+
+def public_functions(
+    program: Program, nonzeros: int
+) -> Iterator[tuple[Quantity, str, tuple[str, ...]]]:
+    """Yield name and first lines of the functions of quantities, of a matrix also its nonzeros."""
+    for quantity in quantities.QUANTITIES:
+        shape = ", ".join(map(str, program.shape_of(quantity)))
+        texts = {quantity.name: f"{quantity.about.rstrip('.')}, shape (..., {shape})."}
+        if quantity.is_matrix:
+            size = nonzeros if quantity.name == "Phi_q" else "nonzeros"
+            order = f"Entries of {quantity.name} in the order of {_pattern_name(quantity)}"
+            texts[f"{quantity.name}_nonzeros"] = f"{order}, shape (..., {size})."
+        states = "q, q_dot" if quantity.is_moving else "q"
+        for name, text in texts.items():
+            yield quantity, name, (f"def {name}({states}, t, p=DEFAULTS):", f'    """{text}"""')
 
 
 def shared_text() -> dict[str, str]:
@@ -133,12 +217,6 @@ def array_functions(called: Iterable[str]) -> list[str]:
     return [f"{name} = {FUNCTIONS.get(name, f'np.{name}')}" for name in called]
 
 
-def _units(program: Program) -> list[str]:
-    units = {item.name: item.unit for item in program.coordinates}
-    units.update({item.name: item.unit for item in program.parameters})
-    return [f"{name!r}: {unit!r}," for name, unit in units.items()]
-
-
 def _tables(program: Program) -> list[str]:
     lines = []
     for name, spline in program.tables.items():
@@ -150,25 +228,30 @@ def _tables(program: Program) -> list[str]:
     return lines
 
 
-def _function(
+def _kernel(
     name: str,
-    quantities: Sequence[str],
+    computed: Sequence[str],
     code: InlineProgram,
     listing: Listing,
     names: Mapping[str, str],
 ) -> list[str]:
-    """Return the lines of one function."""
-    states = "q, q_dot" if "gamma" in quantities else "q"
-    body = [*_unpack(code.program, listing, names), *function_body(quantities, code, listing)]
-    return [f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
+    """Return the lines of the code of some quantities."""
+    states = "q, q_dot" if is_moving(tuple(computed)) else "q"
+    body = [*_unpack(code.program, listing, names)]
+    body += function_body(code, listing, style="packed" if name == "kinematics" else "titled")
+    matrix = _matrix(code, listing) if name == "position" else []
+    return [*matrix, f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
 
 
-def function_body(
-    quantities: Sequence[str], code: InlineProgram, listing: Listing, *, titled: bool = True
-) -> list[str]:
+def function_body(code: InlineProgram, listing: Listing, *, style: Style) -> list[str]:
     """Return the lines of a function whose inputs have their names already.
 
-    Without `titled` there are no comments that name constraints: the code is for many.
+    Parameters
+    ----------
+    style
+        ``"titled"``: an entry a line, under comments that name constraints; ``"plain"``: without
+        such comments, since the code is for many constraints; ``"packed"``: entries that stand
+        elsewhere with comments, as many a line as fit.
     """
     printer = PythonPrinter(code.nodes, listing.names)
     body = []
@@ -177,23 +260,67 @@ def function_body(
         body.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
     body += _frames(listing, printer)
     for section, assignments in listing.steps:
-        body += [f"# {short_title(section)}"] if titled else []
+        body += [f"# {short_title(section)}"] if style == "titled" else []
         for item in assignments:
             body += _assignment(item.name, printer.text(item.node, own=True))
     body.append("return (")
-    for quantity, rows in listing.results:
-        if len(quantities) > 1:
-            body.append(f"    # {quantity}")
+    for name, rows in listing.results:
+        body += [f"    # {name}"] if len(listing.results) > 1 else []
+        if style == "packed":
+            body += _packed([printer.text(entry.node) for _, own in rows for entry in own])
+            continue
         for section, entries in rows:
-            if titled and entries:
-                body += [f"    {line}" for line in commented(title(section))]
-            for entry in entries:
-                comment = place(quantity, entry, code) if titled else ""
-                body += _element(printer.text(entry.node), comment)
+            body += _section(name, section, entries, code, printer, style)
     body.append(")")
     if body[-2] == "return (":
         body[-2:] = ["return ()"]
     return body
+
+
+def _section(
+    name: str,
+    section: Section,
+    entries: Sequence[Entry],
+    code: InlineProgram,
+    printer: PythonPrinter,
+    style: Style,
+) -> list[str]:
+    """Return the entries of a constraint; what is nothing but numbers on one line."""
+    texts = [printer.text(entry.node) for entry in entries]
+    if style == "plain" or not entries:
+        return [line for text in texts for line in _element(text, "")]
+    is_own = quantity_named(name).rows == "equations"
+    if is_own and all(code.number(entry.node) == 0 for entry in entries):
+        return [f"    {', '.join(texts)},  # {short_title(section)}"]
+    lines = [f"    {line}" for line in commented(title(section))] if is_own else []
+    for entry, text in zip(entries, texts, strict=True):
+        lines += _element(text, place(name, entry, code))
+    return lines
+
+
+def _packed(texts: Sequence[str]) -> list[str]:
+    """Return the elements of a tuple, as many a line as fit."""
+    lines: list[str] = []
+    for is_long, group in itertools.groupby(texts, lambda text: len(text) > WIDTH - 8):
+        if is_long:
+            lines += [line for text in group for line in _element(text, "")]
+        else:
+            lines += [f"    {line}" for line in wrapped(group)]
+    return lines
+
+
+def _matrix(code: InlineProgram, listing: Listing) -> list[str]:
+    """Return Phi_q as a comment, with all its entries, where it is not wider than a line."""
+    printer = PythonPrinter(code.nodes, listing.names)
+    coordinates = [item.name for item in code.program.coordinates]
+    rows = [[name, *("." for _ in coordinates)] for name in code.program.equations]
+    for entry in code.entries("Phi_q"):
+        rows[entry.row][entry.column + 1] = printer.text(entry.node)
+    for heads in (coordinates, [str(k) for k in range(len(coordinates))]):
+        lines = table([["", *heads], *rows], gap=1)
+        if max(map(len, lines)) <= WIDTH:
+            return [f"# {line}" for line in ("Phi_q with all its entries:", *lines)]
+    return []
 
 
 def _assignment(name: str, text: str) -> list[str]:

@@ -98,4 +98,4 @@ def _unpack(names: list[str], vector: str) -> list[str]:
 
 
 def _tuple(texts: list[str]) -> list[str]:
-    return [f"    {text}," for text in texts]
+    return [f"    {line}" for line in wrapped(texts)]

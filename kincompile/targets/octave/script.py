@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from kincompile import quantities
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.names import rate
+from kincompile.quantities import functions
 from kincompile.targets.functions import Listing, inputs_read, schedule
 from kincompile.targets.headings import header, place, title
 from kincompile.targets.layout import broken
@@ -25,17 +27,10 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
     from kincompile.model.spline import SplineTable
+    from kincompile.quantities import Quantity
 
 LONGEST_NAME = 63
 """Characters of a name; MATLAB drops those behind them."""
-
-ABOUT = {
-    "Phi": "Constraint vector Phi(q, t), a column.",
-    "Phi_q": "Jacobian of Phi by q.",
-    "nu": "Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, a column.",
-    "gamma": "Right side of the acceleration equation Phi_q q_ddot = gamma, a column.",
-}
-"""The functions, and what each gives."""
 
 KEYWORDS = (
     "break", "case", "catch", "classdef", "continue", "do", "else", "elseif", "end", "endif",
@@ -46,7 +41,7 @@ KEYWORDS = (
 """Words of MATLAB and of Octave."""
 
 RESERVED = (
-    *KEYWORDS, *ABOUT, *OCTAVE_FUNCTIONS.values(), "q", "q_dot", "t", "p", "pi", "zeros", "nargin",
+    *KEYWORDS, *OCTAVE_FUNCTIONS.values(), "q", "q_dot", "t", "p", "pi", "zeros", "nargin",
     "either", "in_reals", "NaN", "isreal",
 )  # fmt: skip
 """Names that the functions use."""
@@ -64,14 +59,14 @@ def emit_octave(code: InlineProgram) -> Emitted:
     """
     program = code.program
     spline_names = {name: f"{program.name}_{name}" for name in program.tables}
-    table = NameTable((*RESERVED, program.name, *spline_names.values()))
+    table = NameTable((*RESERVED, *functions(), program.name, *spline_names.values()))
     wanted = [item.name for item in program.coordinates]
     wanted += [rate(name) for name in wanted] + [item.name for item in program.parameters]
     names = {"t": "t", **{name: table.take(name) for name in wanted}}
     files = {f"{program.name}.m": _script(code)}
-    for quantity in ABOUT:
-        listing = schedule(code, (quantity,), names, table)
-        files[f"{program.name}_{quantity}.m"] = _function(quantity, code, listing, names)
+    for quantity in quantities.QUANTITIES:
+        listing = schedule(code, (quantity.name,), names, table)
+        files[f"{program.name}_{quantity.name}.m"] = _function(quantity, code, listing, names)
         _require_short(listing.names.values())
     for name, spline in program.tables.items():
         files[f"{spline_names[name]}.m"] = _spline(spline_names[name], spline)
@@ -90,20 +85,19 @@ def _require_short(names: Iterable[str]) -> None:
 
 
 def _function(
-    quantity: str, code: InlineProgram, listing: Listing, names: Mapping[str, str]
+    quantity: Quantity, code: InlineProgram, listing: Listing, names: Mapping[str, str]
 ) -> str:
     """Return the file of one function."""
     program = code.program
-    arguments = ["q", "q_dot", "t", "p"] if quantity == "gamma" else ["q", "t", "p"]
     body = [*_inputs(program, listing, names), *_body(quantity, code, listing)]
     text = "\n".join(body)
     data = {
-        "result": quantity,
-        "quantity": quantity,
+        "result": quantity.name,
+        "quantity": quantity.name,
         "name": program.name,
-        "arguments": ", ".join(arguments),
-        "n_arguments": len(arguments),
-        "about": ABOUT[quantity],
+        "arguments": ", ".join(quantity.arguments),
+        "n_arguments": len(quantity.arguments),
+        "about": quantity.about if quantity.is_matrix else f"{quantity.about[:-1]}, a column.",
         "header": _header(code),
         "fingerprint": program.fingerprint,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 2),
@@ -134,7 +128,7 @@ def _inputs(program: Program, listing: Listing, names: Mapping[str, str]) -> lis
     ]
 
 
-def _body(quantity: str, code: InlineProgram, listing: Listing) -> list[str]:
+def _body(quantity: Quantity, code: InlineProgram, listing: Listing) -> list[str]:
     """Return the statements of a function, its inputs named."""
     printer = OctavePrinter(code.nodes, listing.names, code.program.name)
     lines = ["% body frames: A = [c, -s; s, c]"] if listing.frames else []
@@ -145,16 +139,19 @@ def _body(quantity: str, code: InlineProgram, listing: Listing) -> list[str]:
         lines.append(f"% {title(section, first=1)}")
         for item in assignments:
             lines += _assigned(item.name, printer.text(item.node, own=True))
-    n, m = len(code.program.coordinates), len(code.program.equations)
-    lines += ["", f"{quantity} = zeros({m}, {n if quantity == 'Phi_q' else 1});"]
+    rows, columns = (*code.program.shape_of(quantity), 1)[:2]
+    lines += ["", f"{quantity.name} = zeros({rows}, {columns});"]
     for section in code.sections:
         # Of a vector the zeros are there already.
-        entries = [entry for entry in section.entries[quantity] if code.number(entry.node) != 0]
+        entries = [
+            entry for entry in section.entries[quantity.name] if code.number(entry.node) != 0
+        ]
         lines += [f"% {title(section, first=1)}"] if entries else []
         for entry in entries:
-            column = f", {entry.column + 1}" if quantity == "Phi_q" else ""
-            where = place(quantity, entry, code)
-            assigned = _assigned(f"{quantity}({entry.row + 1}{column})", printer.text(entry.node))
+            column = f", {entry.column + 1}" if quantity.is_matrix else ""
+            where = place(quantity.name, entry, code)
+            left = f"{quantity.name}({entry.row + 1}{column})"
+            assigned = _assigned(left, printer.text(entry.node))
             assigned[-1] += f"  % {where}" if where else ""
             lines += assigned
     return lines if lines[0] else lines[1:]
