@@ -3,84 +3,65 @@
     import kincompile as kc
 
 Public names are loaded when they are first used, so that the runtime works without SymPy being
-imported.
+imported. `__init__.pyi` lists them, for type checkers and for this file.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from kincompile.names import suggestion
 
-_PUBLIC = {
-    "kincompile.compiler": ("compile", "emit", "inspect"),
-    "kincompile.files.files": ("read", "read_analysis", "read_model"),
-    "kincompile.model.file_format": ("model_schema",),
-    "kincompile.model.mechanism": ("Mechanism",),
-    "kincompile.model.system": ("ConstraintSystem",),
-    "kincompile.model.equation": ("Equation",),
-    "kincompile.model.absolute": ("AbsoluteX", "AbsoluteY", "AbsoluteAngle", "AbsoluteDistance"),
-    "kincompile.model.relative": ("RelativeX", "RelativeY", "RelativeAngle", "Distance"),
-    "kincompile.model.joints": (
-        "Revolute", "Translational", "RevoluteTranslational", "TranslationalDistance",
-    ),
-    "kincompile.model.gears": ("Gear", "RackAndPinion"),
-    "kincompile.model.cams": ("CamFollower", "CamFlatFollower", "PointFollower"),
-    "kincompile.model.expressions": ("t", "pi", "alpha"),
-    "kincompile.runtime.load": ("load",),
-    "kincompile.runtime.results.write": ("write",),
-    "kincompile.runtime.newton": ("newton",),
-    "kincompile.runtime.singular.assemblies": ("assemblies",),
-    "kincompile.runtime.singular.events": ("Event",),
-    "kincompile.runtime.solve": ("solve",),
-    "kincompile.runtime.results.solution": ("Solution",),
-    "kincompile.runtime.status": ("Status",),
-    "kincompile.compare.compare": ("compare", "compare_file"),
-    "kincompile.verify.verify": ("verify",),
-    "kincompile.derivation.derivation": ("derivation",),
-    "kincompile.view.animation": ("animate",),
-    "kincompile.view.gallery": ("gallery",),
-    "kincompile.view.mechanism_plot": ("plot_mechanism",),
-    "kincompile.view.page": ("page",),
-    "kincompile.view.sparsity_plot": ("plot_sparsity",),
-    "kincompile.errors": (
-        "KincompileError", "ModelError", "StructuralError", "UnsupportedError", "TemplateError",
-        "ContractError", "InputError", "SolveError", "InternalError",
-        "SingularConfigurationWarning", "BranchSwitchWarning", "RedundantConstraintWarning",
-    ),
-}  # fmt: skip
-_HOME = {name: module for module, names in _PUBLIC.items() for name in names}
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+_HOME = {
+    name: module for module, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.MULTILINE)
+}
+_CATALOGUE = "kincompile.model.catalogue"
 _WITHOUT_SYMPY = ("kincompile.runtime", "kincompile.errors")
 
-__all__ = sorted(_HOME)
 __version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(
-            f"module 'kincompile' has no attribute {name!r}{suggestion(name, _HOME)}"
-        )
-    module = _HOME[name]
+    if name == "__all__":
+        return sorted((*_HOME, *_constraint_types()))
+    homes = _HOME
+    if name not in homes and (name[:1].isupper() or _CATALOGUE in sys.modules):
+        homes = _HOME | dict.fromkeys(_constraint_types(), _CATALOGUE)
+    if name not in homes:
+        near = suggestion(name, homes)
+        raise AttributeError(f"module 'kincompile' has no attribute {name!r}{near}")
+    module = homes[name]
     if not module.startswith(_WITHOUT_SYMPY):
-        # The compiling side is loaded as a whole at its first use, so that no later call pays for
-        # an import.
-        import_module("kincompile.compiler")
+        # What models need that they do not import: the text of a file, and pictures in a notebook.
+        import_module("kincompile.files.write_model")
         if "IPython" in sys.modules:
             import_module("kincompile.view.notebook")
     value = globals()[name] = getattr(import_module(module), name)
     return value
 
 
+def _constraint_types() -> tuple[str, ...]:
+    """Return the names of all types of constraints, for which SymPy is loaded."""
+    names: tuple[str, ...] = import_module(_CATALOGUE).__all__
+    return names
+
+
 def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+    return [*__getattr__("__all__"), "__version__"]
 
 
 class _Package(ModuleType):
-    """The package; importing the subpackage `emit` does not hide the public name `emit`."""
+    """The package: a folder does not hide the public function of the same name.
+
+    Importing `kincompile.compare`, `derivation` or `verify` would put the folder in the place of
+    `kc.compare`, `kc.derivation` or `kc.verify`.
+    """
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _HOME and isinstance(value, ModuleType)):

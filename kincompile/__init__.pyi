@@ -1,4 +1,8 @@
-"""The public names as a type checker sees them: `__init__.py` loads them when they are used."""
+"""The public names and where each is defined: for type checkers, and for `__init__.py`.
+
+`__init__.py` reads the lines below and loads a name when it is first used. The types of constraints
+are those of the catalogue.
+"""
 
 from kincompile.compare.compare import compare as compare
 from kincompile.compare.compare import compare_file as compare_file
@@ -18,32 +22,16 @@ from kincompile.errors import SolveError as SolveError
 from kincompile.errors import StructuralError as StructuralError
 from kincompile.errors import TemplateError as TemplateError
 from kincompile.errors import UnsupportedError as UnsupportedError
+from kincompile.files.file_format import model_schema as model_schema
 from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis
 from kincompile.files.files import read_model as read_model
-from kincompile.model.absolute import AbsoluteAngle as AbsoluteAngle
-from kincompile.model.absolute import AbsoluteDistance as AbsoluteDistance
-from kincompile.model.absolute import AbsoluteX as AbsoluteX
-from kincompile.model.absolute import AbsoluteY as AbsoluteY
-from kincompile.model.cams import CamFlatFollower as CamFlatFollower
-from kincompile.model.cams import CamFollower as CamFollower
-from kincompile.model.cams import PointFollower as PointFollower
+from kincompile.model.catalogue import *
 from kincompile.model.equation import Equation as Equation
 from kincompile.model.expressions import alpha as alpha
 from kincompile.model.expressions import pi as pi
 from kincompile.model.expressions import t as t
-from kincompile.model.file_format import model_schema as model_schema
-from kincompile.model.gears import Gear as Gear
-from kincompile.model.gears import RackAndPinion as RackAndPinion
-from kincompile.model.joints import Revolute as Revolute
-from kincompile.model.joints import RevoluteTranslational as RevoluteTranslational
-from kincompile.model.joints import Translational as Translational
-from kincompile.model.joints import TranslationalDistance as TranslationalDistance
 from kincompile.model.mechanism import Mechanism as Mechanism
-from kincompile.model.relative import Distance as Distance
-from kincompile.model.relative import RelativeAngle as RelativeAngle
-from kincompile.model.relative import RelativeX as RelativeX
-from kincompile.model.relative import RelativeY as RelativeY
 from kincompile.model.system import ConstraintSystem as ConstraintSystem
 from kincompile.runtime.load import load as load
 from kincompile.runtime.newton import newton as newton

@@ -787,29 +787,29 @@ static const double PROBE[] = {
 static const double LARGEST_ERROR = 0.05;
 // Sensitivity is the movement, in scales, for an error of one scale in the equations: beyond this
 // Phi_q is singular, or so nearly that rates are too uncertain to go on from.
-static const double TOO_NEAR = 1e5;
+static const double TOO_NEAR = 100000.0;
 // Sensitivity from which on two branches may be so near each other that Newton confuses them. On one
 // branch the error of the predicted velocity, times the step, is a few times that of the position;
 // on another it is not. Below SMOOTH rounding errors decide.
-static const double NEARLY_SINGULAR = 30, KINK = 8, SMOOTH = 1e-9;
+static const double NEARLY_SINGULAR = 30.0, KINK = 8.0, SMOOTH = 1e-09;
 // How much larger than the tolerance, relative to its terms, a residual may be at the end, and
-// the residual that rounding leaves.
-static const double RESIDUAL_FACTOR = 10, ROUNDING = 16 * 2.220446049250313e-16;
+// the part of a coordinate or of an equation's terms that rounding leaves.
+static const double RESIDUAL_FACTOR = 10.0, ROUNDING = 3.552713678800501e-15;
 // Newton iterations of a predicted point; a good prediction takes three.
 enum { MAX_CORRECTIONS = 6 };
 // A step of this part of the distance between two times is not halved again; sub-steps between two
 // times after which the march is given up.
-static const double SMALLEST_PART = 1.0 / (1 << 20);
+static const double SMALLEST_PART = 9.5367431640625e-07;
 enum { MAX_SUBSTEPS = 10000 };
 
-// Measure the mechanism at the positions in a block, which stay as they are.
-static void measure(block *b, size_t count, scales *s)
+// Measure the mechanism by a guess and the positions in a block, which stay as they are.
+static void measure(block *b, const double *guess, size_t count, scales *s)
 {
     double q[N][LANES], size[LANES] = { 0 };
     memcpy(q, b->q, sizeof q);
     for (int i = 0; i < N; i++)
         for (size_t k = 0; !ANGULAR[i] && k < count; k++)
-            size[k] = fmax(size[k], fmax(fabs(q[i][k]), fabs(double_pendulum_guess[i])));
+            size[k] = fmax(size[k], fmax(fabs(q[i][k]), fabs(guess[i])));
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
             s->reference[i][k] = ANGULAR[i] || size[k] <= 1e-12 ? 1 : size[k];
@@ -825,8 +825,8 @@ static void measure(block *b, size_t count, scales *s)
     memcpy(b->q, q, sizeof q);
 }
 
-// Apply corrections until they are small; a point whose corrections are stays where it is.
-// Returns how many points are left that did not get there.
+// Apply corrections until they are small, in scales of the coordinates; a point whose corrections
+// are stays where it is. Returns how many points are left that did not get there.
 static int correct(block *b, const scales *s, size_t count, int max_iterations, outcome *o)
 {
     double change[N][LANES], going[LANES], iterations[LANES];
@@ -836,21 +836,21 @@ static int correct(block *b, const scales *s, size_t count, int max_iterations, 
         iterations[k] = 0;
     }
     for (int iteration = 0; left && iteration < max_iterations; iteration++) {
-        double correction[LANES] = { 0 }, length[LANES] = { 0 };
+        double larger[LANES] = { 0 };
         position_of_block(b, count);
         factor_of_block(b, count);
         solve_of_block(b, b->Phi, change, count);
         for (int i = 0; i < N; i++)
             for (size_t k = 0; k < count; k++) {
                 b->q[i][k] -= going[k] != 0 ? change[i][k] : 0;
-                correction[k] += square(change[i][k]);
-                length[k] += square(b->q[i][k]);
+                const double scale = s->tolerance * s->reference[i][k];
+                const double allowed = scale + ROUNDING * fabs(b->q[i][k]);
+                larger[k] += fabs(change[i][k]) <= allowed ? 0 : 1;
             }
         left = 0;
         for (size_t k = 0; k < count; k++) {
             iterations[k] += going[k];
-            const int small = sqrt(correction[k]) <= s->tolerance * (1 + sqrt(length[k]));
-            going[k] = small ? 0 : going[k];
+            going[k] = larger[k] == 0 ? 0 : going[k];
             left += going[k] != 0;
         }
     }
@@ -1036,11 +1036,11 @@ static void assemble(block *b, scales *s, double t, const double *guess, int max
         for (int i = 0; i < N; i++)
             b->q[i][k] = guess[i];
     }
-    measure(b, count, s);
+    measure(b, guess, count, s);
     correct(b, s, count, max_iterations, o);
     complete(b, s, count, o);
     // The guess may be rough: from here on the assembled mechanism gives the size.
-    measure(b, count, s);
+    measure(b, guess, count, s);
 }
 
 size_t double_pendulum_march(const double_pendulum_motion *motion)

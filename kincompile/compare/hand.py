@@ -12,14 +12,14 @@ import sympy
 
 from kincompile.compare.matrix_text import Cell, split_matrix
 from kincompile.errors import InputError
-from kincompile.model.expressions import NotAnExpressionError, as_expression, symbol_names, t
-from kincompile.model.safe_expressions import (
+from kincompile.files.safe_expressions import (
     CONSTANTS,
     FUNCTIONS,
     ExpressionError,
     Place,
     parse_expression,
 )
+from kincompile.model.expressions import NotAnExpressionError, as_expression, symbol_names, t
 from kincompile.names import listed, name_problem, rate, suggestion
 
 if TYPE_CHECKING:

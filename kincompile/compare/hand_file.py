@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.compare.matrix_text import Cell, Rows, split_matrix
 from kincompile.compare.reference import QUANTITIES
 from kincompile.errors import InputError
-from kincompile.model.safe_expressions import ExpressionError, Place
+from kincompile.files.safe_expressions import ExpressionError, Place
 from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kincompile.model.safe_expressions import ExpressionError, Place, unbalanced_bracket
+from kincompile.files.safe_expressions import ExpressionError, Place, unbalanced_bracket
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.criteria import size_of
 from kincompile.errors import InputError
 from kincompile.names import listed
 
@@ -120,7 +121,7 @@ def _spread_states(
 ) -> States:
     angular = is_angular(system)
     guess = np.array([item.guess for item in system.coordinates])
-    size = float(np.max(np.abs(guess[~angular]), initial=0.0)) or 1.0
+    size = size_of(angular, guess) or 1.0
     scale = np.where(angular, 1.3, size)
     shape = (count, guess.size)
     q = spread * scale * _generic(random, shape) + (guess if spread < 1 else 0.0)

@@ -35,7 +35,7 @@ from kincompile.derivation.joint_terms import (
 )
 from kincompile.derivation.rows_steps import expansion_step, placement_step, step
 from kincompile.derive.derivation import derive
-from kincompile.model.constraint import Kind
+from kincompile.model.arguments import Kind
 from kincompile.model.expressions import depends_on
 
 if TYPE_CHECKING:

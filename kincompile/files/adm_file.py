@@ -20,9 +20,9 @@ import sympy
 from kincompile.errors import ModelError
 from kincompile.files.data_text import decoded, listed_problems, read_json
 from kincompile.files.file_fields import FieldReader, shown
+from kincompile.files.file_format import MOST_POINTS
 from kincompile.model.absolute import AbsoluteAngle, AbsoluteDistance, AbsoluteX, AbsoluteY
 from kincompile.model.expressions import evaluate, t
-from kincompile.model.file_format import MOST_POINTS
 from kincompile.model.gears import RackAndPinion
 from kincompile.model.joints import Revolute, Translational
 from kincompile.model.mechanism import Mechanism

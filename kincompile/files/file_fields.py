@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from kincompile.model.safe_expressions import ExpressionError, parse_expression
+from kincompile.files.safe_expressions import ExpressionError, parse_expression
 from kincompile.names import listed, name_problem, suggestion, unit_problem
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from kincompile.files.data_lines import Address
     from kincompile.files.data_text import Document
-    from kincompile.model.file_format import Field
+    from kincompile.files.file_format import Field
 
 _KINDS: dict[type, str] = {
     dict: "a table",

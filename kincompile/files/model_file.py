@@ -25,18 +25,19 @@ import sympy
 from kincompile.errors import ModelError
 from kincompile.files.data_text import decoded, listed_problems, read_json, read_toml
 from kincompile.files.file_fields import FieldReader, shown
-from kincompile.model.bodies import GROUND, Body, Parameter
-from kincompile.model.constraint import CamConstraint, Kind
-from kincompile.model.equation import Equation
-from kincompile.model.expressions import alpha, t
-from kincompile.model.file_format import (
-    CONSTRAINTS,
+from kincompile.files.file_format import (
     FIELDS,
     MOST_POINTS,
     SMOOTHNESS,
     VERSION,
     constraint_fields,
 )
+from kincompile.model.arguments import Kind
+from kincompile.model.bodies import GROUND, Body, Parameter
+from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.model.constraint import CamConstraint
+from kincompile.model.equation import Equation
+from kincompile.model.expressions import alpha, t
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.system import ConstraintSystem
 from kincompile.names import body_coordinates, listed, suggestion
@@ -46,7 +47,8 @@ if TYPE_CHECKING:
 
     from kincompile.files.data_lines import Address
     from kincompile.files.data_text import Document
-    from kincompile.model.constraint import Argument, Constraint
+    from kincompile.model.arguments import Argument
+    from kincompile.model.constraint import Constraint
 
 Row = dict[str, Any]
 

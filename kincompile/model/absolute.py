@@ -2,34 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 from kincompile.calculus.expressions import Basis, Expression, Perpendicular, dot
 from kincompile.calculus.symbols import C, c, i, s_i
-from kincompile.model.constraint import Constraint, Kind, argument
+from kincompile.model import arguments as argument
+from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.constraint import Constraint, constraint_type
 
 
-@dataclass(frozen=True)
+@constraint_type
 class AbsoluteX(Constraint):
-    """The global x coordinate of a point on a body is C.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    body
-        The body, or its name.
-    point
-        Point (xi, eta) in the body's frame [length].
-    value
-        C [length], a number or an expression of parameters; with `t` in it, a driver.
-    """
+    """The global x coordinate of a point on a body is C."""
 
     source = "Haug 3.2.3"
-    body: Any = argument(Kind.BODY, "i")
-    point: Any = argument(Kind.POINT, "s_i")
-    value: Any = argument(Kind.VALUE, "C")
+    body: BodyLike = argument.body("i")
+    point: PointLike = argument.point("s_i", on="i")
+    value: ValueLike = argument.value()
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -37,26 +24,14 @@ class AbsoluteX(Constraint):
         return (dot(Basis(), i.point(s_i)) - C,)
 
 
-@dataclass(frozen=True)
+@constraint_type
 class AbsoluteY(Constraint):
-    """The global y coordinate of a point on a body is C.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    body
-        The body, or its name.
-    point
-        Point (xi, eta) in the body's frame [length].
-    value
-        C [length], a number or an expression of parameters; with `t` in it, a driver.
-    """
+    """The global y coordinate of a point on a body is C."""
 
     source = "Haug 3.2.4"
-    body: Any = argument(Kind.BODY, "i")
-    point: Any = argument(Kind.POINT, "s_i")
-    value: Any = argument(Kind.VALUE, "C")
+    body: BodyLike = argument.body("i")
+    point: PointLike = argument.point("s_i", on="i")
+    value: ValueLike = argument.value()
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -64,23 +39,13 @@ class AbsoluteY(Constraint):
         return (dot(Perpendicular(Basis()), i.point(s_i)) - C,)
 
 
-@dataclass(frozen=True)
+@constraint_type
 class AbsoluteAngle(Constraint):
-    """The angle of a body is C.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    body
-        The body, or its name.
-    angle
-        C [rad], a number or an expression of parameters; with `t` in it, a driver.
-    """
+    """The angle of a body is C."""
 
     source = "Haug 3.2.6"
-    body: Any = argument(Kind.BODY, "i")
-    angle: Any = argument(Kind.VALUE, "C")
+    body: BodyLike = argument.body("i")
+    angle: ValueLike = argument.value("rad")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -88,29 +53,15 @@ class AbsoluteAngle(Constraint):
         return (i.phi - C,)
 
 
-@dataclass(frozen=True)
+@constraint_type
 class AbsoluteDistance(Constraint):
-    """The distance from a ground point to a point on a body is C > 0.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    body
-        The body, or its name.
-    point
-        Point (xi, eta) in the body's frame [length].
-    ground_point
-        Point (x, y) of the ground [length].
-    distance
-        C [length], a number or an expression of parameters; with `t` in it, a driver.
-    """
+    """The distance from a ground point to a point on a body is C > 0."""
 
     source = "Haug 3.2.1"
-    body: Any = argument(Kind.BODY, "i")
-    point: Any = argument(Kind.POINT, "s_i")
-    ground_point: Any = argument(Kind.POINT, "c")
-    distance: Any = argument(Kind.DISTANCE, "C")
+    body: BodyLike = argument.body("i")
+    point: PointLike = argument.point("s_i", on="i")
+    ground_point: PointLike = argument.point("c", on="ground")
+    distance: ValueLike = argument.distance()
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:

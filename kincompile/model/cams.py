@@ -5,43 +5,26 @@ A profile is given in polar form about its centre; the contact parameters are co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 from kincompile.calculus.expressions import Expression, dot, perpendicular
 from kincompile.calculus.symbols import contact_i, contact_j, i, j, s_i, s_j, v_j
-from kincompile.model.constraint import CamConstraint, Kind, argument
+from kincompile.model import arguments as argument
+from kincompile.model.arguments import BodyLike, PointLike, ProfileLike
+from kincompile.model.constraint import CamConstraint, constraint_type
 
 
-@dataclass(frozen=True)
+@constraint_type
 class CamFollower(CamConstraint):
-    """Two profiles touch: a common point and a common tangent.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; its equations are ``name.x``, ``name.y`` and ``name.tangent``, its
-        contact parameters ``alpha_i_name`` and ``alpha_j_name``.
-    i, j
-        Bodies, or their names; one may be the ground.
-    centre_i, centre_j
-        Centres (xi, eta) of the profiles in the frames of i and j [length].
-    profile_i, profile_j
-        Polar radius [length] about the centre: an expression of `alpha`, a function of alpha, or a
-        table (angles [rad], radii) over one revolution.
-    guess
-        Start values of the contact parameters for Newton's method [rad], 0 if not given.
-    """
+    """Two profiles touch: a common point and a common tangent."""
 
     source = "Haug 3.4"
     row_names = ("x", "y", "tangent")
     contacts = (contact_i, contact_j)
-    i: Any = argument(Kind.BODY, "i")
-    centre_i: Any = argument(Kind.POINT, "s_i")
-    profile_i: Any = argument(Kind.PROFILE, "rho_i")
-    j: Any = argument(Kind.BODY, "j")
-    centre_j: Any = argument(Kind.POINT, "s_j")
-    profile_j: Any = argument(Kind.PROFILE, "rho_j")
+    i: BodyLike = argument.body("i")
+    centre_i: PointLike = argument.point("s_i", on="i", what="Centre of the profile")
+    profile_i: ProfileLike = argument.profile("rho_i")
+    j: BodyLike = argument.body("j")
+    centre_j: PointLike = argument.point("s_j", on="j", what="Centre of the profile")
+    profile_j: ProfileLike = argument.profile("rho_j")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -50,39 +33,19 @@ class CamFollower(CamConstraint):
         return gap, dot(perpendicular(i.A(contact_i.g)), j.A(contact_j.g))
 
 
-@dataclass(frozen=True)
+@constraint_type
 class CamFlatFollower(CamConstraint):
-    """A cam (body i) touches a flat face of the follower (body j).
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; its equations are ``name.contact`` and ``name.tangent``, its contact
-        parameter ``alpha_name``.
-    cam, follower
-        Bodies, or their names; one may be the ground.
-    centre
-        Centre (xi, eta) of the profile in the cam's frame [length].
-    profile
-        Polar radius [length] about the centre: an expression of `alpha`, a function of alpha, or a
-        table (angles [rad], radii) over one revolution.
-    point
-        Point (xi, eta) on the face, in the follower's frame [length].
-    axis
-        Direction (xi, eta) of the face in the follower's frame, of any length but zero.
-    guess
-        Start value of the contact parameter for Newton's method [rad], 0 if not given.
-    """
+    """A cam (body i) touches a flat face of the follower (body j)."""
 
     source = "Haug 3.4"
     row_names = ("contact", "tangent")
     contacts = (contact_i,)
-    cam: Any = argument(Kind.BODY, "i")
-    centre: Any = argument(Kind.POINT, "s_i")
-    profile: Any = argument(Kind.PROFILE, "rho_i")
-    follower: Any = argument(Kind.BODY, "j")
-    point: Any = argument(Kind.POINT, "s_j")
-    axis: Any = argument(Kind.AXIS, "v_j")
+    cam: BodyLike = argument.body("i")
+    centre: PointLike = argument.point("s_i", on="i", what="Centre of the profile")
+    profile: ProfileLike = argument.profile("rho_i")
+    follower: BodyLike = argument.body("j")
+    point: PointLike = argument.point("s_j", on="j", what="Point of the face")
+    axis: PointLike = argument.axis("v_j", on="j")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -92,36 +55,18 @@ class CamFlatFollower(CamConstraint):
         return dot(normal, d), dot(normal, i.A(contact_i.g))
 
 
-@dataclass(frozen=True)
+@constraint_type
 class PointFollower(CamConstraint):
-    """A point of body i runs on a profile of body j: a pin in a curved slot.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; its equations are ``name.x`` and ``name.y``, its contact parameter
-        ``alpha_name``.
-    i, j
-        Bodies, or their names; one may be the ground.
-    point_i
-        Point (xi, eta) in the frame of i [length].
-    centre_j
-        Centre (xi, eta) of the profile in the frame of j [length].
-    profile_j
-        Polar radius [length] about the centre: an expression of `alpha`, a function of alpha, or a
-        table (angles [rad], radii) over one revolution.
-    guess
-        Start value of the contact parameter for Newton's method [rad], 0 if not given.
-    """
+    """A point of body i runs on a profile of body j: a pin in a curved slot."""
 
     source = "Haug 3.4.32"
     row_names = ("x", "y")
     contacts = (contact_j,)
-    i: Any = argument(Kind.BODY, "i")
-    point_i: Any = argument(Kind.POINT, "s_i")
-    j: Any = argument(Kind.BODY, "j")
-    centre_j: Any = argument(Kind.POINT, "s_j")
-    profile_j: Any = argument(Kind.PROFILE, "rho_j")
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    j: BodyLike = argument.body("j")
+    centre_j: PointLike = argument.point("s_j", on="j", what="Centre of the profile")
+    profile_j: ProfileLike = argument.profile("rho_j")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:

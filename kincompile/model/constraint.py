@@ -2,44 +2,28 @@
 
 from __future__ import annotations
 
+import inspect
+import textwrap
 from dataclasses import dataclass, field, fields
-from enum import Enum
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar, dataclass_transform
 
 import sympy
 
 from kincompile.calculus.symbols import Contact, Frame
 from kincompile.calculus.template import Template
+from kincompile.model import arguments as argument
+from kincompile.model.arguments import Argument, Kind, ValueLike
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from kincompile.calculus.expressions import Expression
 
+    Numbers = Callable[[str], tuple[float | None, ...]]
+    """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
 
-class Kind(Enum):
-    """What an argument of a constraint is."""
-
-    BODY = "a body"
-    POINT = "a point (xi, eta) in the body's frame"
-    AXIS = "a direction (xi, eta) in the body's frame, not zero"
-    SCALAR = "a number or an expression of parameters"
-    RADIUS = "a radius, not zero"
-    VALUE = "a number or an expression of parameters and t"
-    DISTANCE = "a positive distance, or an expression of parameters and t"
-    PROFILE = "a radius rho(alpha) or a table (angles, radii)"
-
-
-@dataclass(frozen=True, slots=True)
-class Argument:
-    """One argument of a constraint type: its kind and its symbol in the textbook's formula."""
-
-    kind: Kind
-    symbol: str
-
-
-def argument(kind: Kind, symbol: str) -> Any:
-    """Declare a field of a constraint type."""
-    return field(metadata={"argument": Argument(kind, symbol)})
+Type = TypeVar("Type", bound="Constraint")
 
 
 @dataclass(frozen=True)
@@ -47,8 +31,8 @@ class Constraint:
     """A joint, or a driver where its value is a function of `t`. Every type is a subclass.
 
     A subclass declares its attributes as fields, in the book's order, and its Phi in vectors.
-    Nothing else: Phi_q, nu and gamma follow by differentiation. Its arguments are checked together
-    with the whole mechanism, by `Mechanism.system`.
+    Phi_q, nu and gamma follow by differentiation. Its arguments are checked together with the whole
+    mechanism, by `Mechanism.system`. The types that come with the package are in `catalogue`.
     """
 
     name: str
@@ -59,11 +43,21 @@ class Constraint:
     """Names of the equations where there is more than one."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
     """Contact parameters: coordinates that the constraint brings along."""
+    simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
+    """Pairs: where this one of two equations depends on others, the type that keeps the other."""
+    replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"
+    """The advice to take the simpler type, in words."""
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return the constraint in vectors, with the attributes as symbols."""
         raise NotImplementedError
+
+    @staticmethod
+    def problem(numbers: Numbers) -> str | None:
+        """Return what is wrong with several arguments together; each alone is good."""
+        del numbers
+        return None
 
     @classmethod
     @cache
@@ -77,6 +71,12 @@ class Constraint:
 
     @classmethod
     @cache
+    def owners(cls) -> dict[str, str]:
+        """Return, by the symbol of each point and direction, that of the body it is fixed in."""
+        return {item.symbol: item.on for item in cls.arguments().values() if item.on}
+
+    @classmethod
+    @cache
     def template(cls) -> Template:
         """Return the template of this type, made once."""
         frames = tuple(
@@ -87,23 +87,66 @@ class Constraint:
     @property
     def equation_names(self) -> tuple[str, ...]:
         """Names of the constraint's equations: its own, or with the row appended."""
-        if not self.row_names:
-            return (self.name,)
-        return tuple(f"{self.name}.{row}" for row in self.row_names)
+        return _equation_names(self.name, type(self))
 
     @property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contact parameters, `alpha_<name>` or `alpha_i_<name>`, `alpha_j_<name>`."""
-        if len(self.contacts) == 1:
-            return (f"alpha_{self.name}",)
-        return tuple(f"alpha_{contact.index}_{self.name}" for contact in self.contacts)
+        return _contact_names(self.name, type(self))
+
+
+def _equation_names(name: str, cls: type[Constraint]) -> tuple[str, ...]:
+    return tuple(f"{name}.{row}" for row in cls.row_names) or (name,)
+
+
+def _contact_names(name: str, cls: type[Constraint]) -> tuple[str, ...]:
+    if len(cls.contacts) == 1:
+        return (f"alpha_{name}",)
+    return tuple(f"alpha_{contact.index}_{name}" for contact in cls.contacts)
+
+
+@dataclass_transform(
+    frozen_default=True,
+    field_specifiers=(
+        argument.angle, argument.axis, argument.body, argument.distance, argument.point,
+        argument.profile, argument.radius, argument.value, field,
+    ),
+)  # fmt: skip
+def constraint_type(cls: type[Type]) -> type[Type]:
+    """Make a class a constraint type: a frozen dataclass whose docstring has its arguments."""
+    made = dataclass(frozen=True)(cls)
+    made.__doc__ = _documentation(made)
+    return made
+
+
+def _documentation(cls: type[Constraint]) -> str:
+    """Return the docstring of a type with its arguments, in NumPy's form."""
+    given = cls.arguments()
+    bodies = {item.symbol: name for name, item in given.items() if item.kind is Kind.BODY}
+    ground = "; one of the two may be the ground" if len(bodies) > 1 else ""
+    equations = _listed("equation", _equation_names("name", cls))
+    entries = {"name": f"Name of the constraint; its {equations}."}
+    for name, item in given.items():
+        entries[name] = item.text.format(on=bodies.get(item.on, ""), ground=ground)
+    if cls.contacts:
+        contacts = _listed("contact parameter", _contact_names("name", cls))
+        entries["guess"] = f"Where Newton's method begins [rad], 0 if not given; the {contacts}."
+    lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]
+    for name, text in entries.items():
+        lines += [name, textwrap.fill(text, 92, initial_indent="    ", subsequent_indent="    ")]
+    return "\n".join(lines)
+
+
+def _listed(what: str, names: Sequence[str]) -> str:
+    called = ", ".join(f"``{name}``" for name in names)
+    return f"{what}s are {called}" if len(names) > 1 else f"{what} is {called}"
 
 
 @dataclass(frozen=True)
 class CamConstraint(Constraint):
     """A constraint with contact parameters, whose guess it carries."""
 
-    guess: Any = field(default=None, kw_only=True)
+    guess: ValueLike | tuple[ValueLike, ...] | None = field(default=None, kw_only=True)
 
     @property
     def alpha(self) -> sympy.Symbol:

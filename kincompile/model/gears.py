@@ -2,45 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from kincompile.calculus.expressions import Expression, Norm, Pi, dot, perpendicular
 from kincompile.calculus.symbols import R_i, R_j, i, j, s_j, s_P, s_Q, theta_i, theta_j, unit
-from kincompile.model.constraint import Constraint, Kind, argument
+from kincompile.model import arguments as argument
+from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.constraint import Constraint, constraint_type
 from kincompile.model.relative import separation
 
+if TYPE_CHECKING:
+    from kincompile.model.constraint import Numbers
 
-@dataclass(frozen=True)
+
+@constraint_type
 class Gear(Constraint):
     """Two gears roll on each other; a negative radius is an internal gear.
 
     The distance of the centres is a constraint of its own. Phi is also zero with the gears on
     opposite sides of each other: the guess decides.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    i, j
-        Bodies, or their names; one may be the ground.
-    centre_i, centre_j
-        Centres (xi, eta) in the frames of i and j [length].
-    radius_i, radius_j
-        Pitch radii [length], numbers or expressions of parameters, not zero.
-    theta_i, theta_j
-        Directions [rad] in the frames of i and j that point at the other gear together.
     """
 
     source = "Haug 3.4.1"
-    i: Any = argument(Kind.BODY, "i")
-    centre_i: Any = argument(Kind.POINT, "s_i")
-    radius_i: Any = argument(Kind.RADIUS, "R_i")
-    theta_i: Any = argument(Kind.SCALAR, "theta_i")
-    j: Any = argument(Kind.BODY, "j")
-    centre_j: Any = argument(Kind.POINT, "s_j")
-    radius_j: Any = argument(Kind.RADIUS, "R_j")
-    theta_j: Any = argument(Kind.SCALAR, "theta_j")
+    i: BodyLike = argument.body("i")
+    centre_i: PointLike = argument.point("s_i", on="i", what="Centre")
+    radius_i: ValueLike = argument.radius("R_i")
+    theta_i: ValueLike = argument.angle("theta_i", on="i", what="that points at the other gear")
+    j: BodyLike = argument.body("j")
+    centre_j: PointLike = argument.point("s_j", on="j", what="Centre")
+    radius_j: ValueLike = argument.radius("R_j")
+    theta_j: ValueLike = argument.angle("theta_j", on="j", what="that points back at the same time")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -48,39 +39,37 @@ class Gear(Constraint):
         rolled = R_i * (i.phi + theta_i) + R_j * (j.phi + theta_j) - R_j * Pi()
         return (dot(separation(), perpendicular(unit(rolled / (R_i + R_j)))),)
 
+    @staticmethod
+    def problem(numbers: Numbers) -> str | None:
+        """Return what is wrong with two radii that add to zero."""
+        (first,), (second,) = numbers("R_i"), numbers("R_j")
+        if first is None or second is None or first + second != 0:
+            return None
+        return (
+            f"the radii {first:g} and {second:g} add to zero; an internal gear needs two different "
+            "radii"
+        )
 
-@dataclass(frozen=True)
+
+@constraint_type
 class RackAndPinion(Constraint):
     """A pinion (body j) rolls on the pitch line of a rack (body i).
 
-    Parameters
-    ----------
-    name
-        Name of the constraint; its equations are ``name.roll`` and ``name.pitch``.
-    rack, pinion
-        Bodies, or their names; one may be the ground.
-    point_p, point_q
-        Two points (xi, eta) on the pitch line, in the rack's frame [length]. The pinion is to the
-        left of the line from P to Q.
-    theta_rack, theta_pinion
-        Directions [rad] in the two frames: of the line from P to Q, and of the pinion's radius that
-        meets the line where the pinion is at Q.
-    centre
-        Centre of the pinion (xi, eta) in its frame [length].
-    radius
-        Pitch radius of the pinion [length], not zero.
+    The pinion is to the left of the line from P to Q.
     """
 
     source = "Haug 3.4"
     row_names = ("roll", "pitch")
-    rack: Any = argument(Kind.BODY, "i")
-    point_p: Any = argument(Kind.POINT, "s_P")
-    point_q: Any = argument(Kind.POINT, "s_Q")
-    theta_rack: Any = argument(Kind.SCALAR, "theta_i")
-    pinion: Any = argument(Kind.BODY, "j")
-    centre: Any = argument(Kind.POINT, "s_j")
-    radius: Any = argument(Kind.RADIUS, "R_j")
-    theta_pinion: Any = argument(Kind.SCALAR, "theta_j")
+    rack: BodyLike = argument.body("i")
+    point_p: PointLike = argument.point("s_P", on="i", what="Point P of the pitch line")
+    point_q: PointLike = argument.point("s_Q", on="i", what="Point Q of the pitch line")
+    theta_rack: ValueLike = argument.angle("theta_i", on="i", what="of the line from P to Q")
+    pinion: BodyLike = argument.body("j")
+    centre: PointLike = argument.point("s_j", on="j", what="Centre")
+    radius: ValueLike = argument.radius("R_j")
+    theta_pinion: ValueLike = argument.angle(
+        "theta_j", on="j", what="of the radius that meets the line where the pinion is at Q"
+    )
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -95,3 +84,11 @@ class RackAndPinion(Constraint):
             dot(from_q, pitch_line) - reach * angle,
             dot(from_p, perpendicular(pitch_line)) - reach,
         )
+
+    @staticmethod
+    def problem(numbers: Numbers) -> str | None:
+        """Return what is wrong with a pitch line through one point."""
+        p = numbers("s_P")
+        if p != numbers("s_Q") or None in p:
+            return None
+        return "point_p and point_q are equal; two different points fix the pitch line"

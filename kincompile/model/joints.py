@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 from kincompile.calculus.expressions import Expression, Norm, dot, perpendicular
 from kincompile.calculus.symbols import C, i, j, s_i, s_j, v_i, v_j
-from kincompile.model.constraint import Constraint, Kind, argument
-from kincompile.model.relative import separation
+from kincompile.model import arguments as argument
+from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.constraint import Constraint, constraint_type
+from kincompile.model.relative import (
+    PointToPoint,
+    RelativeAngle,
+    RelativeX,
+    RelativeY,
+    separation,
+)
 
 
-@dataclass(frozen=True)
-class Revolute(Constraint):
-    """A point on body i and a point on body j coincide.
-
-    Parameters
-    ----------
-    name
-        Name of the joint; its equations are ``name.x`` and ``name.y``.
-    i, j
-        Bodies, or their names; one may be the ground.
-    point_i, point_j
-        Points (xi, eta) in the frames of i and j [length].
-    """
+@constraint_type
+class Revolute(PointToPoint):
+    """A point on body i and a point on body j coincide."""
 
     source = "Haug 3.3.10"
     row_names = ("x", "y")
-    i: Any = argument(Kind.BODY, "i")
-    point_i: Any = argument(Kind.POINT, "s_i")
-    j: Any = argument(Kind.BODY, "j")
-    point_j: Any = argument(Kind.POINT, "s_j")
+    simpler = (("x", RelativeY), ("y", RelativeX))
+    replaced_by = (
+        "a point on a line: a {simpler} with value 0 keeps {kept}, a RevoluteTranslational or a "
+        "Distance does as well"
+    )
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -38,65 +34,23 @@ class Revolute(Constraint):
         return (i.point(s_i) - j.point(s_j),)
 
 
-@dataclass(frozen=True)
-class Translational(Constraint):
-    """Body j slides along an axis of body i without turning: the two axes stay on one line.
+@constraint_type
+class PointAndAxis(Constraint):
+    """A constraint of an axis of body i and a point on body j; the types are its subclasses."""
 
-    Parameters
-    ----------
-    name
-        Name of the joint; its equations are ``name.normal`` and ``name.parallel``.
-    i, j
-        Bodies, or their names; one may be the ground.
-    point_i, point_j
-        Points (xi, eta) on the two axes, in the frames of i and j [length].
-    axis_i, axis_j
-        Directions (xi, eta) in the frames of i and j, of any length but zero.
-    """
-
-    source = "Haug 3.3.13"
-    row_names = ("normal", "parallel")
-    i: Any = argument(Kind.BODY, "i")
-    point_i: Any = argument(Kind.POINT, "s_i")
-    axis_i: Any = argument(Kind.AXIS, "v_i")
-    j: Any = argument(Kind.BODY, "j")
-    point_j: Any = argument(Kind.POINT, "s_j")
-    axis_j: Any = argument(Kind.AXIS, "v_j")
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return (R A_i v_i)^T d and (R A_i v_i)^T A_j v_j."""
-        normal = perpendicular(i.A(v_i))
-        return dot(normal, separation()), dot(normal, j.A(v_j))
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("v_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+    distance: ValueLike = argument.value()
 
 
-@dataclass(frozen=True)
-class RevoluteTranslational(Constraint):
-    """A point on body j keeps the distance C from an axis of body i, counted to its left.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    i, j
-        Bodies, or their names; one may be the ground.
-    point_i
-        Point (xi, eta) on the axis, in the frame of i [length].
-    axis_i
-        Direction (xi, eta) in the frame of i, of any length but zero.
-    point_j
-        Point (xi, eta) in the frame of j [length].
-    distance
-        C [length], a number or an expression of parameters; with `t` in it, a driver.
-    """
+@constraint_type
+class RevoluteTranslational(PointAndAxis):
+    """A point on body j keeps the distance C from an axis of body i, counted to its left."""
 
     source = "Haug 3.3"
-    i: Any = argument(Kind.BODY, "i")
-    point_i: Any = argument(Kind.POINT, "s_i")
-    axis_i: Any = argument(Kind.AXIS, "v_i")
-    j: Any = argument(Kind.BODY, "j")
-    point_j: Any = argument(Kind.POINT, "s_j")
-    distance: Any = argument(Kind.VALUE, "C")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -104,35 +58,34 @@ class RevoluteTranslational(Constraint):
         return (dot(perpendicular(i.A(v_i)), separation()) / Norm(v_i) - C,)
 
 
-@dataclass(frozen=True)
-class TranslationalDistance(Constraint):
-    """A point on body j is at C along an axis of body i, counted from a point on the axis.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    i, j
-        Bodies, or their names; one may be the ground.
-    point_i
-        Point (xi, eta) on the axis, in the frame of i [length].
-    axis_i
-        Direction (xi, eta) in the frame of i, of any length but zero.
-    point_j
-        Point (xi, eta) in the frame of j [length].
-    distance
-        C [length], a number or an expression of parameters; with `t` in it, a driver.
-    """
+@constraint_type
+class TranslationalDistance(PointAndAxis):
+    """A point on body j is at C along an axis of body i, counted from a point on the axis."""
 
     source = "Haug 3.5"
-    i: Any = argument(Kind.BODY, "i")
-    point_i: Any = argument(Kind.POINT, "s_i")
-    axis_i: Any = argument(Kind.AXIS, "v_i")
-    j: Any = argument(Kind.BODY, "j")
-    point_j: Any = argument(Kind.POINT, "s_j")
-    distance: Any = argument(Kind.VALUE, "C")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return (A_i v_i)^T d / |v_i| - C."""
         return (dot(i.A(v_i), separation()) / Norm(v_i) - C,)
+
+
+@constraint_type
+class Translational(Constraint):
+    """Body j slides along an axis of body i without turning: the two axes stay on one line."""
+
+    source = "Haug 3.3.13"
+    row_names = ("normal", "parallel")
+    simpler = (("normal", RelativeAngle), ("parallel", RevoluteTranslational))
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("v_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+    axis_j: PointLike = argument.axis("v_j", on="j")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return (R A_i v_i)^T d and (R A_i v_i)^T A_j v_j."""
+        normal = perpendicular(i.A(v_i))
+        return dot(normal, separation()), dot(normal, j.A(v_j))

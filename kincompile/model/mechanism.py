@@ -12,7 +12,7 @@ from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.system import ConstraintSystem
-from kincompile.model.write_model import TextViews
+from kincompile.model.text_views import TextViews
 
 Item = TypeVar("Item", bound=Constraint | Equation)
 

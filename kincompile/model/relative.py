@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 from kincompile.calculus.expressions import Basis, Expression, Perpendicular, Vector, dot
 from kincompile.calculus.symbols import C, i, j, s_i, s_j
-from kincompile.model.constraint import Constraint, Kind, argument
+from kincompile.model import arguments as argument
+from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.constraint import Constraint, constraint_type
 
 
 def separation() -> Vector:
@@ -15,28 +14,22 @@ def separation() -> Vector:
     return j.point(s_j) - i.point(s_i)
 
 
-@dataclass(frozen=True)
-class RelativeX(Constraint):
-    """The global x component from a point on body i to a point on body j is C.
+@constraint_type
+class PointToPoint(Constraint):
+    """A constraint of a point on body i and a point on body j; the types are its subclasses."""
 
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    i, j
-        Bodies, or their names; one may be the ground.
-    point_i, point_j
-        Points (xi, eta) in the frames of i and j [length].
-    value
-        C [length], a number or an expression of parameters; with `t` in it, a driver.
-    """
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+
+
+@constraint_type
+class RelativeX(PointToPoint):
+    """The global x component from a point on body i to a point on body j is C."""
 
     source = "Haug 3.3"
-    i: Any = argument(Kind.BODY, "i")
-    point_i: Any = argument(Kind.POINT, "s_i")
-    j: Any = argument(Kind.BODY, "j")
-    point_j: Any = argument(Kind.POINT, "s_j")
-    value: Any = argument(Kind.VALUE, "C")
+    value: ValueLike = argument.value()
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -44,28 +37,12 @@ class RelativeX(Constraint):
         return (dot(Basis(), separation()) - C,)
 
 
-@dataclass(frozen=True)
-class RelativeY(Constraint):
-    """The global y component from a point on body i to a point on body j is C.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    i, j
-        Bodies, or their names; one may be the ground.
-    point_i, point_j
-        Points (xi, eta) in the frames of i and j [length].
-    value
-        C [length], a number or an expression of parameters; with `t` in it, a driver.
-    """
+@constraint_type
+class RelativeY(PointToPoint):
+    """The global y component from a point on body i to a point on body j is C."""
 
     source = "Haug 3.3"
-    i: Any = argument(Kind.BODY, "i")
-    point_i: Any = argument(Kind.POINT, "s_i")
-    j: Any = argument(Kind.BODY, "j")
-    point_j: Any = argument(Kind.POINT, "s_j")
-    value: Any = argument(Kind.VALUE, "C")
+    value: ValueLike = argument.value()
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -73,24 +50,14 @@ class RelativeY(Constraint):
         return (dot(Perpendicular(Basis()), separation()) - C,)
 
 
-@dataclass(frozen=True)
+@constraint_type
 class RelativeAngle(Constraint):
-    """The angle of body j relative to body i is C.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    i, j
-        Bodies, or their names; one may be the ground.
-    angle
-        C [rad], a number or an expression of parameters; with `t` in it, a driver.
-    """
+    """The angle of body j relative to body i is C."""
 
     source = "Haug 3.3"
-    i: Any = argument(Kind.BODY, "i")
-    j: Any = argument(Kind.BODY, "j")
-    angle: Any = argument(Kind.VALUE, "C")
+    i: BodyLike = argument.body("i")
+    j: BodyLike = argument.body("j")
+    angle: ValueLike = argument.value("rad")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -98,28 +65,12 @@ class RelativeAngle(Constraint):
         return (j.phi - i.phi - C,)
 
 
-@dataclass(frozen=True)
-class Distance(Constraint):
-    """The distance between a point on body i and a point on body j is C > 0: a massless coupler.
-
-    Parameters
-    ----------
-    name
-        Name of the constraint; so are its equations called.
-    i, j
-        Bodies, or their names; one may be the ground.
-    point_i, point_j
-        Points (xi, eta) in the frames of i and j [length].
-    distance
-        C [length], a number or an expression of parameters; with `t` in it, a driver.
-    """
+@constraint_type
+class Distance(PointToPoint):
+    """The distance between a point on body i and a point on body j is C > 0: a massless coupler."""
 
     source = "Haug 3.3.7"
-    i: Any = argument(Kind.BODY, "i")
-    point_i: Any = argument(Kind.POINT, "s_i")
-    j: Any = argument(Kind.BODY, "j")
-    point_j: Any = argument(Kind.POINT, "s_j")
-    distance: Any = argument(Kind.DISTANCE, "C")
+    distance: ValueLike = argument.distance()
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import sympy
 
+from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
-from kincompile.model.constraint import Constraint, Kind
 from kincompile.model.expressions import (
     NotAnExpressionError,
     Scalar,
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from kincompile.calculus.template import Template
+    from kincompile.model.constraint import Constraint
     from kincompile.model.equation import Equation
 
 Point = tuple[Scalar, Scalar]
@@ -371,23 +372,14 @@ def _check_whole(
     constraint: Constraint, scalars: Mapping[str, Scalar], points: Mapping[str, Point], scope: Scope
 ) -> None:
     """Check what involves several arguments of a constraint."""
-    what = _title(constraint)
-    if {"R_i", "R_j"} <= scalars.keys():
-        first, second = (evaluate(scalars[symbol], scope.defaults) for symbol in ("R_i", "R_j"))
-        if first is not None and second is not None and first + second == 0:
-            scope.problems.append(
-                f"{what}: the radii {first:g} and {second:g} add to zero; an internal gear needs "
-                "two different radii"
-            )
-    if {"s_P", "s_Q"} <= points.keys():
-        p, q = (
-            [evaluate(value, scope.defaults) for value in points[symbol]]
-            for symbol in ("s_P", "s_Q")
-        )
-        if p == q and None not in p:
-            scope.problems.append(
-                f"{what}: point_p and point_q are equal; two different points fix the pitch line"
-            )
+
+    def numbers(symbol: str) -> tuple[float | None, ...]:
+        given = points[symbol] if symbol in points else (scalars[symbol],)
+        return tuple(evaluate(value, scope.defaults) for value in given)
+
+    problem = constraint.problem(numbers)
+    if problem is not None:
+        scope.problems.append(f"{_title(constraint)}: {problem}")
 
 
 def _text(constraint: Constraint) -> str:

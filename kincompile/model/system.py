@@ -16,7 +16,7 @@ from kincompile.model.equation import Equation
 from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
-from kincompile.model.write_model import TextViews
+from kincompile.model.text_views import TextViews
 from kincompile.names import body_coordinates, listed, name_problem, rate, unit_problem
 
 
@@ -309,8 +309,9 @@ def _contact_coordinates(
         if not isinstance(item, CamConstraint):
             continue
         names = item.contact_names
-        guess = (0.0,) * len(names) if item.guess is None else item.guess
-        guess = tuple(guess) if isinstance(guess, tuple | list) else (guess,)
+        guess: Sequence[Any] = (0.0,) * len(names)
+        if item.guess is not None:
+            guess = item.guess if isinstance(item.guess, tuple | list) else (item.guess,)
         if len(guess) != len(names):
             problems.append(
                 f"{type(item).__name__} {item.name!r}: the guess has {len(guess)} values; give one "

@@ -11,6 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kincompile.criteria import KINK_UNSEEN, MAX_CORRECTIONS, ROUNDING, SMOOTH_UNSEEN
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -29,12 +31,6 @@ LARGEST_ERROR = 0.0015
 
 SMALLEST_STEP_COUNT = 8
 """No step is longer than this part of the grid."""
-
-KINK, SMOOTH = 16.0, 1e-6
-"""As in `march`, but loose: where the velocity has a kink, the careful march decides."""
-
-CORRECTIONS = 6
-"""Newton iterations of a coarse step; a good prediction takes three."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +74,7 @@ def coarse_march(
     spread
         The distance that is large for each coordinate.
     tolerance
-        Norm of the last correction.
+        Bound of the last correction, in `spread`.
 
     Returns
     -------
@@ -120,14 +116,12 @@ def _step(
         x + h * (v + 0.5 * h * a) for x, v, a in zip(node.q, node.q_dot, node.q_ddot, strict=True)
     ]
     q = predicted
-    for _ in range(CORRECTIONS):
+    limits = [tolerance * s + ROUNDING * abs(x) for x, s in zip(q, spread, strict=True)]
+    for _ in range(MAX_CORRECTIONS):
         at = code.position(q, t)
         correction = code.solve(at, at.Phi)
         q = [x - d for x, d in zip(q, correction, strict=True)]
-        size = math.sqrt(math.fsum([d * d for d in correction]))
-        if not size < math.inf:
-            return None
-        if size <= tolerance:
+        if all([abs(d) <= limit for d, limit in zip(correction, limits, strict=True)]):  # noqa: C419 - faster
             break
     else:
         return None
@@ -139,6 +133,6 @@ def _step(
     error = max([abs(x - y) / s for x, y, s in zip(q, predicted, spread, strict=True)])
     rates = zip(q_dot, node.q_dot, node.q_ddot, spread, strict=True)
     kink = abs(h) * max([abs(w - v - h * a) / s for w, v, a, s in rates])
-    if kink > KINK * (error + SMOOTH):
+    if kink > KINK_UNSEEN * (error + SMOOTH_UNSEEN):
         return None
     return Node(index, q, q_dot, q_ddot, at.determinants), error

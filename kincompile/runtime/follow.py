@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.march import (
-    SMALL_ERROR,
-    TOO_NEAR,
     Outcome,
     State,
     advance,
@@ -19,7 +18,6 @@ from kincompile.runtime.march import (
     leaves_branch,
     start,
 )
-from kincompile.runtime.newton import RESIDUAL_FACTOR
 from kincompile.runtime.problem import Point, problem
 from kincompile.runtime.singular.events import branch_switch, locate, singular_start
 from kincompile.runtime.status import Status
@@ -38,7 +36,7 @@ def follow(
 ) -> Outcome:
     """Go through the grid up to its end, or to the first point that fails."""
     t = float(inputs.t[0])
-    at_guess = problem(inputs.module, inputs.p, inputs.guess, t)
+    at_guess = problem(inputs.module, inputs.p, inputs.guess, t, inputs.guess)
     outcome = start(at_guess, t, inputs)
     motion.put(0, outcome)
     if progress:
@@ -46,7 +44,7 @@ def follow(
     motion.note = other_branch(at_guess, inputs, outcome.position)
     # The guess may be rough: from here on the assembled mechanism gives the size.
     assembled = inputs.guess if outcome.position is None else outcome.position.q
-    equations = problem(inputs.module, inputs.p, assembled, t)
+    equations = problem(inputs.module, inputs.p, assembled, t, inputs.guess)
     return go_on(equations, inputs, motion, 1, outcome, on_grid, smooth, progress)
 
 

@@ -45,7 +45,7 @@ def follow_large(
         return outcome
     if good is None:
         return follow(inputs, motion, False, smooth, progress)
-    equations = problem(inputs.module, inputs.p, good.q, times[0])
+    equations = problem(inputs.module, inputs.p, good.q, times[0], inputs.guess)
     outcome = taken_up(equations, motion, good.t, index - 1)
     return go_on(equations, inputs, motion, index, outcome, False, smooth, progress)
 
@@ -58,7 +58,7 @@ def _large_march(inputs: Inputs, motion: Motion) -> LargeMarch:
     found = march.start(t)
     if isinstance(found, Status) or not march.leaves_branch(found):
         return march
-    at_guess = problem(inputs.module, inputs.p, inputs.guess, t)
+    at_guess = problem(inputs.module, inputs.p, inputs.guess, t, inputs.guess)
     careful = start(at_guess, t, inputs).position
     motion.note = other_branch(at_guess, inputs, careful or at_guess.at(found.q, t))
     return march if careful is None else LargeMarch(replace(inputs, guess=careful.q))

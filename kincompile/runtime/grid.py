@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import LAST_CORRECTION, RESIDUAL_FACTOR, ROUNDING, SMALLEST_DETERMINANT
 from kincompile.runtime.coarse import Node, coarse_march
 from kincompile.runtime.lanes import LaneCode
-from kincompile.runtime.newton import RESIDUAL_FACTOR
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -37,14 +37,8 @@ BLOCK = 3000
 LARGEST_DISPLACEMENT = 1e-3
 """Distance from the interpolation, in radians or sizes of the mechanism, that is still trusted."""
 
-SMALLEST_DETERMINANT = 1e-5
-"""Determinant, relative to the largest of the coarse march, that is still trusted."""
-
 CORRECTIONS_ON_GRID = 2
 """Newton corrections of every point."""
-
-LAST_CORRECTION = 1e-11
-"""Norm of the second correction up to which Phi_q before it serves velocity and acceleration."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,8 +96,9 @@ def solve_grid(
         math.copysign(SMALLEST_DETERMINANT * max(map(abs, values)), values[0])
         for values in zip(*(node.determinants for node in nodes), strict=True)
     ]
+    farthest = np.max(np.abs([node.q for node in nodes]), axis=0)
     limits = _Limits(
-        min(tolerance, LAST_CORRECTION),
+        min(tolerance, LAST_CORRECTION) * spread + ROUNDING * farthest,
         LARGEST_DISPLACEMENT * spread,
         RESIDUAL_FACTOR * tolerance * equations.magnitude,
         blocks,
@@ -120,7 +115,7 @@ def solve_grid(
 class _Limits:
     """What a point must keep to be trusted."""
 
-    correction: float
+    correction: Array
     displacement: Array
     residual: Array
     determinants: list[float]
@@ -178,11 +173,10 @@ def _solve_block(
             good &= np.abs(change) <= limit
     at = code.position(q, t)
     changes = code.solve(at, at.Phi)
-    for row, change in zip(q, changes, strict=True):
+    for row, change, limit in zip(q, changes, limits.correction.tolist(), strict=True):
         row -= change
-    if not sum(map(_squared, changes)) <= limits.correction**2:
-        square = sum(change * change for change in changes)
-        good &= square <= limits.correction**2
+        if not _squared(change) <= limit**2:
+            good &= np.abs(change) <= limit
     residual = result.residual[block]
     residual[:] = 0.0
     for value, limit in zip(at.Phi, limits.residual.tolist(), strict=True):

@@ -37,7 +37,7 @@ class Inputs:
     guess : ndarray, shape (n,)
         Where Newton starts.
     tolerance : float
-        Bound for the norm of the last correction, relative to 1 + ||q||.
+        Bound for the last correction, in scales of the coordinates.
     max_iterations : int
         Newton iterations after which an attempt is given up.
     """

@@ -13,19 +13,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.runtime.grid import LAST_CORRECTION, SMALLEST_DETERMINANT
-from kincompile.runtime.march import (
+from kincompile.criteria import (
     ALLOWED_PART,
     KINK,
     LARGE_ERROR,
+    LAST_CORRECTION,
     NEARLY_SINGULAR,
+    RESIDUAL_FACTOR,
+    ROUNDING,
     SMALL_ERROR,
+    SMALLEST_DETERMINANT,
     SMALLEST_PART,
     SMOOTH,
     TOO_NEAR,
+    probe_of,
+    size_of,
 )
-from kincompile.runtime.newton import RESIDUAL_FACTOR
-from kincompile.runtime.problem import ROUNDING, probe_of
 from kincompile.runtime.staged import StagedFactors, StagedSolver
 from kincompile.runtime.status import Status
 
@@ -79,8 +82,13 @@ class LargeMarch:
         self._p, self._inputs = inputs.p, inputs
         self._solver = StagedSolver(inputs.module)
         angular = np.array([unit == "rad" for unit in inputs.module.UNITS.values()])
-        self._angular = angular[: inputs.guess.size]
-        self._reach = max(float(np.max(np.abs(inputs.guess[~self._angular]), initial=0.0)), 1e-12)
+        angular = angular[: inputs.guess.size]
+        self._reach = size_of(angular, inputs.guess) or 1.0
+        self._spread = np.where(angular, 1.0, self._reach)
+        # At a dead point a whole row may vanish: what it contributes elsewhere measures it.
+        generic = inputs.guess + self._spread * probe_of(inputs.guess.size)
+        _, self._generic = self._module.evaluate(generic, float(inputs.t[0]), self._p)
+        self._magnitude = self._terms(self._generic)
         self._smallest: Vector = np.zeros(0)
 
     @property
@@ -131,7 +139,7 @@ class LargeMarch:
         found = self._correct(predicted, t)
         if isinstance(found, Status):
             return found
-        spread = np.where(self._angular, 1.0, self._reach)
+        spread = self._spread
         turn = h * (found.q_dot - state.q_dot - h * state.q_ddot)
         error, movement, kink = (
             np.max(np.abs(change) / spread) for change in (found.q - predicted, move, turn)
@@ -154,19 +162,22 @@ class LargeMarch:
 
     def _sensitivity(self, state: LargeState) -> float:
         """Return the movement, in scales, for an error of one scale in the equations."""
-        spread = np.where(self._angular, 1.0, self._reach)
         probe = probe_of(state.q.size)
-        # At a dead point a whole row may vanish: what it contributes elsewhere measures it.
-        _, generic = self._module.evaluate(state.q + spread * probe, state.t, self._p)
         _, nonzeros = self._module.evaluate(state.q, state.t, self._p)
-        rows, columns = self._module.PATTERN.T
-        sizes = np.maximum(np.abs(nonzeros), np.abs(generic)) * spread[columns]
         try:
             factors = self._solver.factor(nonzeros)
         except RuntimeError:
             return np.inf
-        movement = self._solver.solve(factors, np.bincount(rows, sizes) * probe)
-        return float(np.max(np.abs(movement) / spread))
+        sizes = np.maximum(np.abs(nonzeros), np.abs(self._generic))
+        movement = self._solver.solve(factors, self._terms(sizes) * probe)
+        return float(np.max(np.abs(movement) / self._spread))
+
+    def _terms(self, nonzeros: Vector) -> Vector:
+        """Return what the terms of each equation contribute at the scales of the coordinates."""
+        rows, columns = self._module.PATTERN.T
+        sizes = np.abs(nonzeros) * self._spread[columns]
+        terms = np.bincount(rows, sizes, self._module.N_EQUATIONS)
+        return np.asarray(terms, dtype=np.float64)
 
     def _correct(self, q: Vector, t: float, *, damped: bool = False) -> LargeState | Status:
         """Run Newton's method, and solve for velocity and acceleration where it converges."""
@@ -181,7 +192,7 @@ class LargeMarch:
             if not np.isfinite(correction).all():
                 return Status.SINGULAR if np.isfinite(Phi).all() else Status.NOT_FINITE
             q, Phi, nonzeros = self._apply(q, Phi, correction, t, damped=damped)
-            largest = np.abs(correction) - ROUNDING * np.abs(q)
+            largest = (np.abs(correction) - ROUNDING * np.abs(q)) / self._spread
             if np.max(largest) <= self._inputs.tolerance:
                 if np.max(largest) > LAST_CORRECTION:
                     factors = solver.factor(nonzeros)
@@ -205,8 +216,8 @@ class LargeMarch:
     ) -> LargeState | Status:
         """Solve for velocity and acceleration; check the equations and both solutions."""
         module, p, solver = self._module, self._p, self._solver
-        allowed = RESIDUAL_FACTOR * self._inputs.tolerance * max(1.0, self._reach)
-        if not np.max(np.abs(Phi)) <= allowed:
+        allowed = RESIDUAL_FACTOR * self._inputs.tolerance * self._magnitude
+        if not np.all(np.abs(Phi) <= allowed):
             return Status.NOT_CONVERGED
         q_dot = solver.solve(factors, module.nu(q, t, p))
         if not np.isfinite(q_dot).all():

@@ -17,6 +17,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import (
+    AGREEMENT,
+    ALLOWED_PART,
+    KINK,
+    LARGE_ERROR,
+    MAX_SUBSTEPS,
+    NEARLY_SINGULAR,
+    SINGULAR_SENSITIVITY,
+    SMALL_ERROR,
+    SMALLEST_PART,
+    SMOOTH,
+    TOO_NEAR,
+)
 from kincompile.runtime.linear import solve_linear
 from kincompile.runtime.newton import Attempt, assemble, iterate, safeguarded_step
 from kincompile.runtime.problem import Point, Problem, norm
@@ -26,40 +39,6 @@ from kincompile.runtime.status import Status
 if TYPE_CHECKING:
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.problem import Vector
-
-SMALLEST_PART = 2.0**-20
-"""A step of this part of the distance between two grid points is not halved again."""
-
-MAX_SUBSTEPS = 10_000
-"""Sub-steps between two grid points after which the march is given up, about a second."""
-
-SMALL_ERROR, LARGE_ERROR = 0.05, 0.5
-"""Errors of the prediction that are always and never good, in radians or sizes of the mechanism.
-Near a lock-up the predicted movement is tens of radians, and a part of it proves nothing."""
-
-ALLOWED_PART = 0.25
-"""Error of the prediction, as a part of the predicted movement, that is good in between."""
-
-SINGULAR_SENSITIVITY = 1e7
-"""Movement, in scales of the coordinates, for an error of one scale in the equations: beyond this
-rounding has taken half of the digits of q, and a double root cannot be told from two roots."""
-
-AGREEMENT = 1e-6
-"""Part of the terms by which redundant equations may contradict each other in the rates."""
-
-
-NEARLY_SINGULAR = 30.0
-"""Sensitivity from which on two branches may be so near each other that Newton confuses them."""
-
-KINK, SMOOTH = 8.0, 1e-9
-"""Just past a bifurcation the other branch is as near as the error of the prediction. It shows in
-the velocity: on one branch its error, times the step, is three times that of the position, for
-higher orders some more; on the other it is finite however near the position. Below the second
-number, in radians and sizes of the mechanism, rounding errors decide."""
-
-TOO_NEAR = 1e5
-"""Sensitivity of a sub-step beyond which its rates are too uncertain to go on from: a bifurcation
-is approached to 1e-5 of the way, a lock-up, whose sensitivity grows as a root, to 1e-10."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

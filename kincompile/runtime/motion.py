@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.runtime.march import TOO_NEAR
+from kincompile.criteria import TOO_NEAR
 from kincompile.runtime.staged import is_staged
 from kincompile.runtime.status import Status
 from kincompile.runtime.verdict import unassembled

@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from kincompile.criteria import MAX_ITERATIONS, RESIDUAL_FACTOR, ROUNDING, TOLERANCE
 from kincompile.errors import InputError
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.linear import solve_linear
-from kincompile.runtime.problem import ROUNDING, Point, Problem, norm, problem
+from kincompile.runtime.problem import Point, Problem, norm, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -51,9 +52,6 @@ SUFFICIENT = 1e-4
 
 SHORTEST_STEP = 2.0**-20
 """A step shortened to this part without a decrease is at a minimum of the residual."""
-
-RESIDUAL_FACTOR = 10.0
-"""How much larger than the tolerance, relative to its terms, a residual may be at the end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,8 +119,8 @@ def newton(
     q0: Values,
     p: Values = None,
     *,
-    tolerance: float = 1e-10,
-    max_iterations: int = 25,
+    tolerance: float = TOLERANCE,
+    max_iterations: int = MAX_ITERATIONS,
 ) -> NewtonResult:
     """Solve Phi(q, t) = 0 for the position at one time.
 
@@ -137,7 +135,8 @@ def newton(
     p : array_like, shape (k,), or mapping, or None
         Parameters; a mapping overrides the module's DEFAULTS.
     tolerance : float
-        The correction, relative to 1 + ||q||, at which to stop.
+        The correction at which to stop, relative to the scales of the coordinates: one radian for
+        an angle, for a length the size of the mechanism.
     max_iterations : int
         Cap on the iterations of each of the two attempts, plain and safeguarded.
 
@@ -158,7 +157,7 @@ def newton(
         raise InputError(f"newton works at one time, got {inputs.t.size}: use solve for a grid.")
     with np.errstate(all="ignore"):
         time = float(inputs.t[0])
-        equations = problem(module, inputs.p, inputs.guess, time)
+        equations = problem(module, inputs.p, inputs.guess, time, inputs.guess)
         attempt = assemble(equations, time, inputs.guess, inputs.tolerance, inputs.max_iterations)
     return _result(attempt, inputs.guess)
 
@@ -286,8 +285,8 @@ def _clamp(equations: Problem, point: Point, correction: Vector) -> float:
 
 def _converged(equations: Problem, attempt: Attempt, tolerance: float) -> bool:
     """Say whether the last correction was small, or rounding forbids better, and Phi is zero."""
-    point, correction = attempt.last, attempt.corrections[-1]
-    small = correction <= tolerance * (1 + norm(point.q))
+    before, point = attempt.points[-2:]
+    small = equations.is_small(point.q - before.q, point.q, tolerance)
     if small and equations.holds(point, RESIDUAL_FACTOR * tolerance):
         return True
     # Near a singular configuration rounding alone keeps the corrections above any tolerance.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from kincompile.criteria import NO_SIZE, ROUNDING, STEEP, WILD, probe_of, size_of
 from kincompile.runtime.staged import StagedSolver, is_staged
 
 if TYPE_CHECKING:
@@ -22,19 +23,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Vector: TypeAlias = NDArray[np.float64]
-
-ROUNDING = 16 * float(np.finfo(np.float64).eps)
-"""A residual this small, relative to its terms, is all that floating point has to give."""
-
-STEEP = 1e6
-"""An equation this much steeper than at a generic position is beside a pole, where it is measured
-by what it is at the generic one: tan(x) at pi/2 is no root, however near one a step says it is."""
-
-WILD = 1e3
-"""A coordinate beyond this many references is an iterate gone wild, not a larger scale."""
-
-NO_SIZE = 1e-12
-"""Lengths up to this are taken for rounding errors of zero; the unit then stands for the size."""
 
 
 @dataclass(slots=True, eq=False)
@@ -108,8 +96,13 @@ class Problem:
 
         A mechanism that starts folded at the origin shows its size only later.
         """
-        size = np.max(np.abs(np.where(self.angular, 0.0, q)), initial=0.0)
+        size = size_of(self.angular, q)
         return np.where(self.angular, 1.0, np.maximum(self.reference, size))
+
+    def is_small(self, correction: Vector, q: Vector, tolerance: float) -> bool:
+        """Say whether a correction that led to q is small, or all that floating point can give."""
+        allowed = tolerance * self.reference + ROUNDING * np.abs(q)
+        return bool(np.all(np.abs(correction) <= allowed))
 
     def terms(self, point: Point, scale: Vector) -> Vector:
         """Give what the terms of each equation contribute at the scales of the coordinates.
@@ -135,15 +128,19 @@ class Problem:
         return bool(np.all(np.abs(point.Phi) <= ROUNDING * terms))
 
 
-def problem(module: ModuleType, p: Vector, q: Vector, t: float) -> Problem:
-    """Set a module's parameters; position and guess tell the size of the mechanism."""
+def problem(
+    module: ModuleType, p: Vector, q: Vector, t: float, guess: Vector | None = None
+) -> Problem:
+    """Set a module's parameters; a position and the guess give the size of the mechanism.
+
+    The guess is the module's where none is given.
+    """
     angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES], dtype=bool)
     m: int = module.N_EQUATIONS
     equations = Problem(module, p, angular, np.ones(q.size), probe_of(m), np.zeros(m))
     equations.staged = StagedSolver(module) if is_staged(module) else None
-    lengths = np.abs(np.where(angular, 0.0, (q, module.GUESS)))
-    size = np.max(lengths, initial=0.0)
-    if size <= NO_SIZE and (point := equations.at(q, t)) is not None:
+    size = size_of(angular, q, module.GUESS if guess is None else guess)
+    if not size and (point := equations.at(q, t)) is not None:
         size = _size_in_equations(point, angular)
     if size > NO_SIZE:
         equations.reference = np.where(angular, 1.0, size)
@@ -165,14 +162,6 @@ def _size_in_equations(point: Point, angular: NDArray[np.bool_]) -> float:
     rows = along > 0
     size = float(np.max(shown[rows] / along[rows], initial=0.0))
     return size if math.isfinite(size) else 0.0
-
-
-def probe_of(n: int) -> Vector:
-    """Give n numbers of size 1/2 to 1 and either sign: a quasi-random sequence."""
-    golden = (math.sqrt(5) - 1) / 2
-    sequence = np.arange(1, n + 1) * golden % 1
-    signs = np.where(sequence * 64 % 2 < 1, 1.0, -1.0)
-    return np.asarray(signs * (1 + sequence) / 2, dtype=np.float64)
 
 
 def norm(vector: Vector) -> float:

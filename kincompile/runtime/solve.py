@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import (
     BranchSwitchWarning,
     InputError,
@@ -55,8 +56,8 @@ def solve(
     p: Values = None,
     guess: Values = None,
     *,
-    tolerance: float = 1e-10,
-    max_iterations: int = 25,
+    tolerance: float = TOLERANCE,
+    max_iterations: int = MAX_ITERATIONS,
     method: str | None = None,
     through: str | None = None,
     throw: bool = False,
@@ -78,7 +79,8 @@ def solve(
     guess : array_like, shape (n,), or mapping, or None
         Where Newton starts at the first time; a mapping overrides the module's GUESS.
     tolerance : float
-        Norm of Newton's correction, relative to 1 + ||q||, at which to stop.
+        Newton's correction at which to stop, relative to the scales of the coordinates: one radian
+        for an angle, for a length the size of the mechanism. The same in every system of units.
     max_iterations : int
         Cap on Newton's iterations in one attempt.
     method : {"grid", "march"}, optional
@@ -194,7 +196,7 @@ def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
         return False
     # A large step of Newton's from the guess may have ended on another branch.
     time = float(inputs.t[0])
-    equations = problem(inputs.module, inputs.p, inputs.guess, time)
+    equations = problem(inputs.module, inputs.p, inputs.guess, time, inputs.guess)
     guess, found = (equations.at(q, time) for q in (inputs.guess, motion.q[0].copy()))
     if guess is None or found is None or leaves_branch(equations, time, guess, found):
         return False

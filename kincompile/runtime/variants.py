@@ -12,13 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import (
+    KINK_UNSEEN,
+    MAX_CORRECTIONS,
+    RESIDUAL_FACTOR,
+    ROUNDING,
+    SMALL_ERROR,
+    SMALLEST_DETERMINANT,
+    SMOOTH_UNSEEN,
+    TOO_NEAR,
+)
 from kincompile.errors import InputError
 from kincompile.names import listed
-from kincompile.runtime.coarse import KINK, SMOOTH
-from kincompile.runtime.grid import SMALLEST_DETERMINANT
 from kincompile.runtime.lanes import LaneCode
-from kincompile.runtime.march import SMALL_ERROR, TOO_NEAR, State, advance, complete, start
-from kincompile.runtime.newton import RESIDUAL_FACTOR
+from kincompile.runtime.march import State, advance, complete, start
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
@@ -31,15 +38,13 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.march import Outcome
+    from kincompile.runtime.problem import Problem
 
     Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]
 
 CHUNK = 2048
 """Variants at a time, so that intermediate arrays stay in the cache and memory is bounded."""
-
-CORRECTIONS = 8
-"""Newton corrections of a step that all variants take together; a good prediction needs three."""
 
 
 def read_variants(module: ModuleType, p: object) -> Array | None:
@@ -174,7 +179,7 @@ class _Chunk:
         self._q, self._q_dot, self._q_ddot = np.empty((3, inputs.guess.size, count))
         self._signs: Any = np.zeros((0, count))
         self._smallest: Any = 0.0
-        nominal = problem(inputs.module, sets[0], inputs.guess, float(inputs.t[0]))
+        nominal = problem(inputs.module, sets[0], inputs.guess, float(inputs.t[0]), inputs.guess)
         self._allowed = RESIDUAL_FACTOR * inputs.tolerance * nominal.magnitude
         self._spread = nominal.spread(inputs.guess)[:, np.newaxis]
 
@@ -186,9 +191,7 @@ class _Chunk:
         self._record(0, good, iterations)
         self._smallest = SMALLEST_DETERMINANT * self._sizes
         for variant in np.flatnonzero(~good).tolist():
-            equations = problem(
-                self._inputs.module, self._sets[variant], self._inputs.guess, times[0]
-            )
+            equations = self._equations(variant, self._inputs.guess, times[0])
             self._take(0, variant, start(equations, times[0], self._inputs_of(variant)))
         for index in range(1, len(times)):
             self._step(index, times)
@@ -199,15 +202,13 @@ class _Chunk:
         before = self._q.copy(), self._q_dot.copy(), self._q_ddot.copy()
         signs = self._signs.copy()
         predicted = self._q + h * (self._q_dot + (0.5 * h) * self._q_ddot)
-        good, iterations = self._correct(predicted, times[index], CORRECTIONS)
+        good, iterations = self._correct(predicted, times[index], MAX_CORRECTIONS)
         good &= np.max(np.abs(self._q - predicted) / self._spread, axis=0) <= SMALL_ERROR
         good &= (self._signs == signs).all(axis=0)
         good &= self._is_smooth(before, predicted, h)
         self._record(index, good, iterations)
         for variant in np.flatnonzero(self._alive & ~good).tolist():
-            equations = problem(
-                self._inputs.module, self._sets[variant], before[0][:, variant], times[index - 1]
-            )
+            equations = self._equations(variant, before[0][:, variant], times[index - 1])
             state = _state(equations, times[index - 1], [part[:, variant] for part in before])
             if isinstance(state, Status):
                 self._fail(index, variant, state)
@@ -220,7 +221,7 @@ class _Chunk:
         change = self._q_dot - (before[1] + h * before[2])
         kink = abs(h) * np.max(np.abs(change) / self._spread, axis=0)
         error = np.max(np.abs(self._q - predicted) / self._spread, axis=0)
-        return np.asarray(kink <= KINK * (error + SMOOTH))
+        return np.asarray(kink <= KINK_UNSEEN * (error + SMOOTH_UNSEEN))
 
     def _correct(self, q: Array, t: float, corrections: int) -> tuple[Mask, NDArray[np.int64]]:
         """Run Newton's method on all variants; keep what it gives, and say where it is good."""
@@ -234,8 +235,8 @@ class _Chunk:
             change[:, done] = 0.0
             q -= change
             iterations += ~done
-            size = np.sqrt(np.sum(change * change, axis=0))
-            done |= size <= tolerance * (1 + np.sqrt(np.sum(q * q, axis=0)))
+            allowed = tolerance * self._spread + ROUNDING * np.abs(q)
+            done |= (np.abs(change) <= allowed).all(axis=0)
             if (done | ~self._alive).all():
                 break
         return self._complete(q, t, done), iterations
@@ -298,6 +299,9 @@ class _Chunk:
         self._alive[variant] = False
         self._q[:, variant] = self._inputs.guess
         self._q_dot[:, variant] = self._q_ddot[:, variant] = 0.0
+
+    def _equations(self, variant: int, q: Array, t: float) -> Problem:
+        return problem(self._inputs.module, self._sets[variant], q, t, self._inputs.guess)
 
     def _inputs_of(self, variant: int) -> Inputs:
         return replace(self._inputs, p=self._sets[variant])

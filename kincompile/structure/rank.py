@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
+from kincompile.criteria import ASSEMBLED, size_of
 from kincompile.errors import InputError
 from kincompile.names import listed
 
@@ -34,9 +35,6 @@ be the same way of assembling it."""
 ITERATIONS, PATIENCE = 60, 8
 """Steps of Levenberg and Marquardt towards an assembled state, and how many good ones may go by
 that shorten the residual by less than a hundredth."""
-
-ASSEMBLED = 1e-9
-"""Residual, relative to what the terms of an equation contribute, of an assembled state."""
 
 DEPENDENT = 1e-6
 """Part of a row that is left when the rows before are taken out of it, below which it depends."""
@@ -144,7 +142,7 @@ class _Analysis:
         end: float,
     ) -> None:
         random = np.random.default_rng(SEED)
-        size = np.max(np.abs(guess[~angular]), initial=0.0) or 1.0
+        size = size_of(angular, guess) or 1.0
         self._evaluate = evaluate
         self._angular = angular
         self._scale = np.where(angular, 1.0, size)

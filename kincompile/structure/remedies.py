@@ -10,19 +10,9 @@ from kincompile.model.resolve import Joint
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from kincompile.model.resolve import FreeEquation
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.rank import RankReport
-
-SIMPLER: Mapping[tuple[str, tuple[str, ...]], str] = {
-    ("Revolute", ("x",)): "RelativeY",
-    ("Revolute", ("y",)): "RelativeX",
-    ("Translational", ("normal",)): "RelativeAngle",
-    ("Translational", ("parallel",)): "RevoluteTranslational",
-}
-"""The type that keeps the other equations of a joint, by the joint's type and what is dependent."""
 
 DRIVEN_BY = ("AbsoluteX", "AbsoluteY", "AbsoluteAngle")
 """The driver of each coordinate of a body."""
@@ -48,6 +38,8 @@ class Surplus:
         Names of its equations that do not depend on others, and are to be kept.
     instead
         The type of constraint that keeps them; "" where there is none.
+    advice
+        How to say so, with places for ``{simpler}`` and ``{kept}``.
     """
 
     constraint: str
@@ -58,6 +50,7 @@ class Surplus:
     repeats: tuple[str, ...]
     others: tuple[str, ...]
     instead: str
+    advice: str
 
     @property
     def text(self) -> str:
@@ -95,13 +88,8 @@ class Surplus:
             return f"leave out {listed(self.equations)}"
         if not self.others:
             return f"remove {called}"
-        if self.kind == "Revolute":
-            return (
-                f"replace {called} by a point on a line: a {self.instead} with value 0 keeps "
-                f"{kept}, a RevoluteTranslational or a Distance does as well"
-            )
         if self.instead:
-            return f"replace {called} by a {self.instead}, which keeps {kept}"
+            return f"replace {called} by {self.advice.format(simpler=self.instead, kept=kept)}"
         return f"replace {called} by a constraint that demands {kept} alone, such as an Equation"
 
 
@@ -157,11 +145,14 @@ def _surplus(
     repeats: tuple[str, ...],
     others: tuple[str, ...],
 ) -> Surplus:
-    kind = item.template.type_name if isinstance(item, Joint) else "Equation"
-    lost = tuple(name.removeprefix(f"{item.name}.") for name in equations)
-    instead = SIMPLER.get((kind, lost), "")
+    kind, instead, advice = "Equation", "", ""
+    if isinstance(item, Joint):
+        kind, advice = item.template.type_name, item.written.replaced_by
+        lost = [name.removeprefix(f"{item.name}.") for name in equations]
+        rest = [other.__name__ for row, other in item.written.simpler if [row] == lost]
+        instead = rest[0] if rest else ""
     return Surplus(
-        item.name, kind, item.is_driver, equations, conflicting, repeats, others, instead
+        item.name, kind, item.is_driver, equations, conflicting, repeats, others, instead, advice
     )
 
 

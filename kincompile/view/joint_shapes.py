@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
+from kincompile.errors import UnsupportedError
 from kincompile.model.absolute import AbsoluteAngle, AbsoluteDistance, AbsoluteX, AbsoluteY
 from kincompile.model.cams import CamFlatFollower, CamFollower, PointFollower
 from kincompile.model.gears import Gear, RackAndPinion
@@ -170,7 +171,7 @@ DRAWINGS: Mapping[type[Constraint], Drawing] = {
 
 
 def marks_of(constraint: Constraint, placed: Placed) -> list[Mark]:
-    """Return the marks of a constraint; a type without a drawing of its own has none.
+    """Return the marks of a constraint; a type without a drawing is drawn as the one it extends.
 
     Parameters
     ----------
@@ -178,7 +179,17 @@ def marks_of(constraint: Constraint, placed: Placed) -> list[Mark]:
         The constraint as written: its type decides.
     placed
         Its attributes as numbers, and the motion that its marks must fit.
+
+    Raises
+    ------
+    UnsupportedError
+        If there is no drawing for the type.
     """
-    known = (DRAWINGS[kind] for kind in type(constraint).__mro__ if kind in DRAWINGS)
-    draw = next(known, None)
-    return [] if draw is None else draw(placed)
+    for kind in type(constraint).__mro__:
+        if kind in DRAWINGS:
+            return DRAWINGS[kind](placed)
+    name = type(constraint).__name__
+    raise UnsupportedError(
+        f"there is no drawing for the type {name} of {constraint.name!r}; add a function to "
+        "DRAWINGS in kincompile/view/joint_shapes.py"
+    )

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+from kincompile import criteria
 from kincompile.compiler import emit
 from kincompile.errors import StructuralError, UnsupportedError
+from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
@@ -14,6 +16,15 @@ if TYPE_CHECKING:
 
 MOST_COORDINATES = 60
 """Coordinates up to which every entry of Phi_q can be looked at."""
+
+
+CRITERIA = ("TOLERANCE", "RESIDUAL_FACTOR", "ROUNDING", "MAX_ITERATIONS", "NO_SIZE")
+"""The numbers of `criteria` that the page's method judges by."""
+
+
+def newton_method() -> str:
+    """Return the script of Newton's method, which judges as the runtime does."""
+    return fill("view/newton.js.jinja", {name: getattr(criteria, name) for name in CRITERIA})
 
 
 def newton_script(model: Mechanism | ConstraintSystem) -> str:

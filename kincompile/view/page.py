@@ -15,7 +15,7 @@ from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.newton import newton_script
+from kincompile.view.newton import newton_method, newton_script
 from kincompile.view.page_data import as_json, page_data
 from kincompile.writing import write_atomically
 
@@ -32,10 +32,10 @@ STYLES = ("vendor/uplot.css", "style.css", "newton.css")
 """Style sheets, in order."""
 
 SCRIPTS = (
-    "vendor/uplot.js", "player.js", "draw.js", "stage.js", "plots.js", "tables.js", "newton.js",
+    "vendor/uplot.js", "player.js", "draw.js", "stage.js", "plots.js", "tables.js",
     "newton_tables.js", "newton_stage.js", "newton_panel.js", "start.js",
 )  # fmt: skip
-"""Scripts, in order: each uses those before it."""
+"""Scripts, in order: each uses those before it, and the method of Newton's panel."""
 
 FRAME_HEIGHT = 720
 """Height of a page inside a notebook [pixels]."""
@@ -136,7 +136,11 @@ def page(
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "licence": read("view/vendor/uplot.LICENSE.txt"),
-        "scripts": [newton_script(system), *(read(f"view/{name}") for name in SCRIPTS)],
+        "scripts": [
+            newton_script(system),
+            newton_method(),
+            *(read(f"view/{name}") for name in SCRIPTS),
+        ],
         "data": as_json(shown),
     }
     return Page(system.name, fill("view/page.html.jinja", slots), shown)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.model.arguments import Kind
+from kincompile.model.bodies import GROUND
 from kincompile.model.expressions import alpha, as_expression, depends_on, evaluate
 from kincompile.view.marks import GROUND_FRAME, Pin, Place, Point, Profile, Rail, Span, Wheel
 
@@ -24,9 +26,6 @@ if TYPE_CHECKING:
 
 PROFILE_POINTS = 180
 """Points of a cam profile: its chords are within 1.5e-4 of its radius."""
-
-OWNERS = {"s_i": 0, "s_P": 0, "s_Q": 0, "s_j": 1}
-"""The body that a point is fixed in, by the point's symbol; all others are of the ground."""
 
 
 def world(q: Array, place: Place) -> Array:
@@ -188,9 +187,12 @@ def number_pair(pair: tuple[Scalar, Scalar], values: Mapping[str, float]) -> Poi
 
 def frame_of(joint: Joint, symbol: str, frames: Mapping[str, int]) -> int:
     """Return the frame that a point of a joint is fixed in."""
-    if symbol not in OWNERS:
+    owner = joint.written.owners()[symbol]
+    if owner == GROUND.name:
         return GROUND_FRAME
-    return frames.get(joint.bodies[OWNERS[symbol]].name, GROUND_FRAME)
+    arguments = joint.written.arguments().values()
+    symbols = [item.symbol for item in arguments if item.kind is Kind.BODY]
+    return frames.get(joint.bodies[symbols.index(owner)].name, GROUND_FRAME)
 
 
 def _along(q: Array, base: Place, axis: Point, follower: Place) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.model.constraint import Kind
+from kincompile.model.arguments import Kind
 from kincompile.model.joints import Revolute
 from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint

@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kincompile as kc
-from kincompile.model.safe_expressions import ExpressionError, parse_expression
+from kincompile.files.safe_expressions import ExpressionError, parse_expression
 
 CORPUS = runpy.run_path(str(Path(__file__).with_name("corpus.py")))
 NAMES = {"t": sympy.Symbol("t"), "x": sympy.Symbol("x")}

@@ -14,15 +14,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import kincompile as kc
-from kincompile.model.constraint import CamConstraint, Constraint, Kind
+from kincompile.model.arguments import Kind
+from kincompile.model.catalogue import CONSTRAINTS
 
 t, x = kc.t, sympy.Symbol("x")
 f = sympy.Function("f")
-TYPES = [
-    item
-    for item in (*Constraint.__subclasses__(), *CamConstraint.__subclasses__())
-    if item is not CamConstraint
-]
+TYPES = list(CONSTRAINTS.values())
 GOOD: dict[Kind, Any] = {
     Kind.POINT: (0.1, 0.2),
     Kind.AXIS: (1, 0),

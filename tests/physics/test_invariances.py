@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kincompile as kc
+from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Body
-from kincompile.model.constraint import Kind
 
 MECHANISMS = (
     "simple_pendulum", "slider_crank", "double_pendulum", "four_bar", "inverted_slider_crank",

@@ -18,6 +18,7 @@ PACKAGE = "kincompile"
 
 # A module imports from lower floors or from its own folder.
 FLOORS = {
+    "criteria": 0,
     "errors": 0,
     "names": 0,
     "pictures": 0,

@@ -144,7 +144,7 @@ def test_the_wheel_holds_the_package_and_its_templates_alone(distributions: Path
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
     modules = {path.relative_to(ROOT).as_posix() for path in (ROOT / "kincompile").rglob("*.py")}
     templates = {f"kincompile/_templates/{name}" for name in template_files()}
-    data = {"kincompile/py.typed", "kincompile/__init__.pyi", "kincompile/files/model.schema.json"}
+    data = {"kincompile/py.typed", "kincompile/__init__.pyi"}
     assert names == modules | templates | data
 
 

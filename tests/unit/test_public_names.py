@@ -1,6 +1,5 @@
 """The public names of the package, whatever is imported first."""
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import kincompile as kc
+from kincompile.model.catalogue import CONSTRAINTS
 
 
 @pytest.mark.parametrize(
@@ -21,14 +21,28 @@ def test_that_emit_is_the_function_and_not_the_subpackage(first: str) -> None:
     assert result.stdout.strip() == "kincompile.compiler"
 
 
-def test_that_type_checkers_see_the_same_names_from_the_same_modules() -> None:
-    stub = Path(str(kc.__file__)).with_suffix(".pyi")
-    imports = [
-        node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)
-    ]
-    found = {alias.asname: (node.module, alias.name) for node in imports for alias in node.names}
-    table = vars(kc)["_HOME"]
-    assert found == {name: (module, name) for name, module in table.items()}, (
-        "kincompile/__init__.pyi is not what the table in kincompile/__init__.py says: add or "
-        "remove the names there too"
+def test_that_type_checkers_see_the_constraint_types_of_the_catalogue() -> None:
+    stub = Path(str(kc.__file__)).with_suffix(".pyi").read_text()
+    assert "from kincompile.model.catalogue import *" in stub
+    assert all(getattr(kc, name) is kind for name, kind in CONSTRAINTS.items())
+
+
+def test_that_all_public_names_are_listed_and_can_be_had() -> None:
+    assert set(kc.__dir__()) == {*kc.__all__, "__version__"}
+    assert set(CONSTRAINTS) < set(kc.__all__)
+    assert all(hasattr(kc, name) for name in kc.__all__)
+
+
+@pytest.mark.parametrize("wrong", ["Revolut", "solv", "Mechansim"])
+def test_that_a_misspelt_name_is_answered_with_the_right_one(wrong: str) -> None:
+    with pytest.raises(AttributeError, match=r"did you mean '\w+'\?"):
+        getattr(kc, wrong)
+
+
+@pytest.mark.parametrize("name", ["solve", "Solution", "InputError", "nonsense", "_private"])
+def test_that_names_of_the_runtime_do_not_load_sympy(name: str) -> None:
+    code = f"import kincompile as kc, sys; hasattr(kc, {name!r}); print('sympy' in sys.modules)"
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
+    assert result.stdout.strip() == "False"

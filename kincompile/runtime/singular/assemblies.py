@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import RESIDUAL_FACTOR
 from kincompile.errors import InputError
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.newton import RESIDUAL_FACTOR, iterate, safeguarded_step
+from kincompile.runtime.newton import iterate, safeguarded_step
 from kincompile.runtime.problem import problem
 from kincompile.runtime.status import Status
 

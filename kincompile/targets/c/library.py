@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
+from kincompile import criteria
 from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
 from kincompile.names import rate
 from kincompile.targets.c.functions import evaluator, solve_functions
@@ -26,6 +26,12 @@ if TYPE_CHECKING:
 
 LANES = 32
 """Points in a block: enough for the widest registers, few enough for the nearest cache."""
+
+CRITERIA = (
+    "KINK", "MAX_CORRECTIONS", "MAX_SUBSTEPS", "NEARLY_SINGULAR", "NO_SIZE", "RESIDUAL_FACTOR",
+    "ROUNDING", "SMALL_ERROR", "SMALLEST_PART", "SMOOTH", "TOO_NEAR",
+)  # fmt: skip
+"""The numbers of `criteria` that the march judges by."""
 
 KEYWORDS = (
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else",
@@ -186,9 +192,8 @@ def _splines(program: Program) -> Iterable[str]:
 
 
 def _scales(program: Program) -> dict[str, str]:
-    """Return what tells large from small in a march."""
+    """Return what tells large from small in a march: kinds of coordinates, and the criteria."""
     angular = [str(int(item.unit == "rad")) for item in program.coordinates]
-    golden = (math.sqrt(5) - 1) / 2
-    sequence = [k * golden % 1 for k in range(1, len(angular) + 1)]
-    probe = [f"{(1 if x * 64 % 2 < 1 else -1) * (1 + x) / 2!r}" for x in sequence]
-    return {"angular": _array_lines(angular), "probe": _array_lines(probe)}
+    probe = [repr(value) for value in criteria.probe_of(len(angular)).tolist()]
+    numbers = {name: repr(getattr(criteria, name)) for name in CRITERIA}
+    return {"angular": _array_lines(angular), "probe": _array_lines(probe), **numbers}

@@ -18,15 +18,11 @@ from kincompile.calculus.symbols import i, j, s_i, s_j
 from kincompile.derive.derivation import derive
 from kincompile.model.absolute import AbsoluteDistance
 from kincompile.model.cams import PointFollower
-from kincompile.model.constraint import CamConstraint, Constraint
+from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.model.joints import Revolute, Translational
 from kincompile.model.relative import RelativeAngle
 
-TYPES = [
-    item
-    for item in (*Constraint.__subclasses__(), *CamConstraint.__subclasses__())
-    if item is not CamConstraint
-]
+TYPES = list(CONSTRAINTS.values())
 
 
 def test_that_a_revolute_joint_reads_like_the_book() -> None:

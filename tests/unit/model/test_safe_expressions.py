@@ -8,8 +8,7 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kincompile.model.expressions import SMOOTH
-from kincompile.model.safe_expressions import (
+from kincompile.files.safe_expressions import (
     FUNCTIONS,
     MAX_DEPTH,
     MAX_LENGTH,
@@ -18,6 +17,7 @@ from kincompile.model.safe_expressions import (
     Place,
     parse_expression,
 )
+from kincompile.model.expressions import SMOOTH
 from kincompile.model.spline import PeriodicSpline
 
 x, y, phi3 = sympy.symbols("x y phi3")

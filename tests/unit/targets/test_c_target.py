@@ -12,7 +12,6 @@ from sympy import Piecewise
 
 import kincompile as kc
 from kincompile.ir import from_sympy
-from kincompile.runtime import march, newton, problem
 from kincompile.runtime.status import Status
 from kincompile.targets.naming import NameTable
 from kincompile.targets.printers import C_ANGLE_FUNCTIONS, C_FUNCTIONS, CPrinter
@@ -69,25 +68,6 @@ def test_the_text_says_what_the_numpy_module_says(example):
     source = next(iter(example.files("c").values()))
     for section in re.findall(r"^ *# (\d[-\d]*  .*)$", example.source, re.MULTILINE):
         assert f"// {section}" in source
-
-
-def test_the_march_judges_by_the_numbers_of_the_runtime(example_named):
-    source = next(iter(example_named("four_bar").files("c").values()))
-    wanted = {
-        "LARGEST_ERROR": march.SMALL_ERROR,
-        "SMALLEST_PART": march.SMALLEST_PART,
-        "NEARLY_SINGULAR": march.NEARLY_SINGULAR,
-        "KINK": march.KINK,
-        "SMOOTH": march.SMOOTH,
-        "TOO_NEAR": march.TOO_NEAR,
-        "RESIDUAL_FACTOR": newton.RESIDUAL_FACTOR,
-        "ROUNDING": problem.ROUNDING,
-    }
-    for name, value in wanted.items():
-        (text,) = re.findall(rf"\b{name} = ([^,;]+)", source)
-        assert eval(text) == value, name
-    assert f"MAX_SUBSTEPS = {march.MAX_SUBSTEPS} " in source
-    assert f"<= {problem.NO_SIZE!r} ? 1" in source
 
 
 def test_the_statuses_are_those_of_the_runtime(example_named):

@@ -16,15 +16,12 @@ import kincompile as kc
 from kincompile.ir.inline import inline
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
-from kincompile.model.constraint import CamConstraint, Constraint, Kind
+from kincompile.model.arguments import Kind
+from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.runtime.staged import StagedSolver
 from kincompile.structure.counting import unmatched
 
-TYPES = [
-    item
-    for item in (*Constraint.__subclasses__(), *CamConstraint.__subclasses__())
-    if item is not CamConstraint
-]
+TYPES = list(CONSTRAINTS.values())
 L, h = sympy.symbols("L h")
 numbers = st.sampled_from([0, 1, -1, 0.3, -0.7, L, -L / 2, h])
 profiles = [1 + 0.1 * sympy.cos(kc.alpha), 2, L + h * sympy.sin(3 * kc.alpha) / 9]

@@ -11,8 +11,7 @@ import sympy
 import kincompile as kc
 from kincompile.runtime.newton import iterate
 from kincompile.runtime.problem import problem
-from kincompile.targets.templates import read
-from kincompile.view.newton import MOST_COORDINATES, newton_script
+from kincompile.view.newton import MOST_COORDINATES, newton_method, newton_script
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 STATUSES = {
@@ -25,7 +24,7 @@ node = pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: n
 
 def run(tmp_path, script, expression):
     """Return what an expression of `newton` and of a script's declarations gives."""
-    text = f"{script}\n{read('view/newton.js')}\nconsole.log(JSON.stringify({expression}))"
+    text = f"{script}\n{newton_method()}\nconsole.log(JSON.stringify({expression}))"
     (tmp_path / "all.js").write_text(text, encoding="utf-8")
     done = subprocess.run(
         [str(NODE), "all.js"], cwd=tmp_path, capture_output=True, text=True, check=False

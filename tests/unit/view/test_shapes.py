@@ -1,6 +1,5 @@
 """`drawing`: every type of constraint has its marks, in the right frame, at the right place."""
 
-import inspect
 import itertools
 import json
 
@@ -9,7 +8,10 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.model.constraint import CamConstraint, Constraint
+from kincompile.model import arguments as argument
+from kincompile.model.arguments import BodyLike
+from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.model.constraint import Constraint, constraint_type
 from kincompile.model.joints import Revolute
 from kincompile.view.joint_shapes import DRAWINGS
 from kincompile.view.marks import (
@@ -46,9 +48,21 @@ def marks(m, kind, **options):
 
 
 def test_that_every_type_of_constraint_is_drawn():
-    public = [getattr(kc, name) for name in kc.__all__]
-    types = {item for item in public if inspect.isclass(item) and issubclass(item, Constraint)}
-    assert types - {Constraint, CamConstraint} == set(DRAWINGS)
+    assert set(DRAWINGS) == set(CONSTRAINTS.values())
+
+
+def test_that_a_type_without_a_drawing_is_refused():
+    @constraint_type
+    class Strange(Constraint):
+        body: BodyLike = argument.body("i")
+
+        @staticmethod
+        def Phi():
+            return (kc.AbsoluteAngle.Phi()[0],)
+
+    m = two_bodies(lambda m, i, j, a: Strange("A", i))
+    with pytest.raises(kc.UnsupportedError, match=r"no drawing for the type Strange of 'A'"):
+        drawing(m)
 
 
 def test_that_a_type_of_ones_own_is_drawn_as_the_type_it_is_made_from():

@@ -5,20 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from kincompile.model.absolute import AbsoluteAngle, AbsoluteDistance, AbsoluteX, AbsoluteY
-from kincompile.model.cams import CamFlatFollower, CamFollower, PointFollower
-from kincompile.model.constraint import CamConstraint, Constraint, Kind
-from kincompile.model.gears import Gear, RackAndPinion
-from kincompile.model.joints import (
-    Revolute,
-    RevoluteTranslational,
-    Translational,
-    TranslationalDistance,
-)
-from kincompile.model.relative import Distance, RelativeAngle, RelativeX, RelativeY
+from kincompile.model.arguments import Kind
+from kincompile.model.catalogue import CONSTRAINTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from kincompile.model.constraint import Constraint
 
 VERSION = 1
 """Version of the format, the value of the key `kincompile`."""
@@ -26,16 +19,6 @@ MOST_POINTS = 10_000_000
 """Largest time grid that a file may ask for."""
 SMOOTHNESS = 4
 """Continuous derivatives of a profile given by a table: it is a periodic quintic spline."""
-
-CONSTRAINTS: Mapping[str, type[Constraint]] = {
-    item.__name__: item
-    for item in (
-        AbsoluteX, AbsoluteY, AbsoluteAngle, AbsoluteDistance, RelativeX, RelativeY, RelativeAngle,
-        Distance, Revolute, Translational, RevoluteTranslational, TranslationalDistance, Gear,
-        RackAndPinion, CamFollower, CamFlatFollower, PointFollower,
-    )
-}  # fmt: skip
-"""Constraint types by the name a file gives them; `Equation` is one more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +108,7 @@ def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
     fields = {"type": Field({"const": constraint.__name__}), "name": Field(_NAME)}
     for name, item in constraint.arguments().items():
         fields[name] = Field(_KINDS.get(item.kind, _EXPRESSION))
-    if issubclass(constraint, CamConstraint):
+    if constraint.contacts:
         guesses = {"type": "array", "items": _EXPRESSION, "minItems": len(constraint.contacts)}
         fields["guess"] = Field({"anyOf": [_EXPRESSION, guesses]}, is_required=False)
     return fields

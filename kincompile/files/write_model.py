@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import sympy
 from sympy.printing.str import StrPrinter
 
 from kincompile.errors import ModelError
-from kincompile.model.constraint import CamConstraint, Constraint, Kind
+from kincompile.files.file_format import SMOOTHNESS, VERSION
+from kincompile.model.arguments import Kind
+from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.expressions import as_expression
-from kincompile.model.file_format import SMOOTHNESS, VERSION
 from kincompile.model.resolve import Joint
+from kincompile.model.system import ConstraintSystem
+from kincompile.model.text_views import model_text
 from kincompile.names import body_coordinates
 
 if TYPE_CHECKING:
@@ -22,42 +25,16 @@ if TYPE_CHECKING:
     from kincompile.model.resolve import FreeEquation
 
 
-class CheckedModel(Protocol):
-    """What is written: a system, seen from below."""
-
-    name: str
-    length_unit: str
-    end: float
-    points: int
-    parameters: tuple[Parameter, ...]
-    bodies: tuple[Body, ...]
-    coordinates: tuple[Coordinate, ...]
-    constraints: tuple[Joint | FreeEquation, ...]
+@model_text.register(ConstraintSystem)
+def _model_text(system: ConstraintSystem, form: str) -> str:
+    """Return a system as the text of a file."""
+    data = model_data(system)
+    if form == "toml":
+        return toml_text(data)
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
 
 
-class TextViews:
-    """The model as text, shared by `Mechanism` and `ConstraintSystem`."""
-
-    def system(self) -> Any:
-        """Return the checked system."""
-        raise NotImplementedError
-
-    def to_toml(self) -> str:
-        """Return the model as TOML, as `kincompile.read` reads it.
-
-        Raises
-        ------
-        ModelError
-            If the model cannot be used as written, or has an expression that a file cannot hold.
-        """
-        return toml_text(model_data(self.system()))
-
-    def to_json(self) -> str:
-        """Return the model as JSON; otherwise as `to_toml`."""
-        return json.dumps(model_data(self.system()), indent=2, ensure_ascii=False) + "\n"
-
-
-def model_data(system: CheckedModel) -> dict[str, Any]:
+def model_data(system: ConstraintSystem) -> dict[str, Any]:
     """Return a system as the values of a model file."""
     sections = {
         "parameters": [_parameter(item) for item in system.parameters],
@@ -87,7 +64,7 @@ def _body(item: Body) -> dict[str, Any]:
     return {**row, "outline": corners} if corners else row
 
 
-def _free_coordinates(system: CheckedModel) -> Iterable[Coordinate]:
+def _free_coordinates(system: ConstraintSystem) -> Iterable[Coordinate]:
     """Return the coordinates that neither a body nor a cam has brought along."""
     others = {name for body in system.bodies for name in body_coordinates(body.name)}
     for item in system.constraints:
@@ -128,8 +105,9 @@ def _guess(written: Constraint) -> dict[str, Any]:
     if not isinstance(written, CamConstraint) or written.guess is None:
         return {}
     guess = written.guess
-    several = isinstance(guess, tuple | list)
-    return {"guess": [value(item) for item in guess] if several else value(guess)}
+    if isinstance(guess, tuple | list):
+        return {"guess": [value(item) for item in guess]}
+    return {"guess": value(guess)}
 
 
 def value(given: Any) -> int | float | str:

@@ -1,0 +1,128 @@
+"""The arguments of constraint types: kinds, types for editors, and how a type declares them.
+
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+
+declares a field, its symbol in the textbook's formula, and the line that documents it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, TypeAlias
+
+import numpy as np
+import sympy
+from numpy.typing import NDArray
+
+from kincompile.model.bodies import GROUND, Body
+
+BodyLike: TypeAlias = Body | str
+"""A body or its name; `Mechanism.ground`, or ``"ground"``, is the fixed frame."""
+
+ValueLike: TypeAlias = float | sympy.Expr
+"""A number, or an expression of parameters; of `t` too, where it is the value of a driver."""
+
+PointLike: TypeAlias = Sequence[ValueLike] | NDArray[np.float64]
+"""A pair (xi, eta)."""
+
+ProfileLike: TypeAlias = (
+    ValueLike
+    | Callable[[sympy.Symbol], ValueLike]
+    | tuple[Sequence[float] | NDArray[np.float64], Sequence[float] | NDArray[np.float64]]
+)
+"""A polar radius: an expression of `alpha`, a function of alpha, or a table (angles, radii)."""
+
+
+class Kind(Enum):
+    """What an argument of a constraint is."""
+
+    BODY = "a body"
+    POINT = "a point (xi, eta) in the body's frame"
+    AXIS = "a direction (xi, eta) in the body's frame, not zero"
+    SCALAR = "a number or an expression of parameters"
+    RADIUS = "a radius, not zero"
+    VALUE = "a number or an expression of parameters and t"
+    DISTANCE = "a positive distance, or an expression of parameters and t"
+    PROFILE = "a radius rho(alpha) or a table (angles, radii)"
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """One argument of a constraint type.
+
+    Attributes
+    ----------
+    kind
+        What may be given.
+    symbol
+        Its symbol in the textbook's formula.
+    text
+        What it means, for the docstring; ``{on}`` stands for the argument that names its body,
+        ``{ground}`` for a remark on the ground.
+    on
+        The symbol of the body whose frame a point or a direction is given in, ``"ground"`` for the
+        fixed frame; "" for what belongs to no frame.
+    """
+
+    kind: Kind
+    symbol: str
+    text: str
+    on: str = ""
+
+
+_DRIVEN = "a number or an expression of parameters; with `t` in it, a driver."
+
+
+def _declared(kind: Kind, symbol: str, text: str, on: str = "") -> Any:
+    """Return a field of a constraint type."""
+    return field(metadata={"argument": Argument(kind, symbol, text, on)})
+
+
+def body(symbol: str) -> Any:
+    """Declare a body; its symbol is the index of its coordinates, ``"i"`` or ``"j"``."""
+    return _declared(Kind.BODY, symbol, "Body, or its name{ground}.")
+
+
+def point(symbol: str, on: str, what: str = "Point") -> Any:
+    """Declare a point in the frame of a body, or of the ground."""
+    where = "(x, y) of the ground" if on == GROUND.name else "(xi, eta) in the frame of {on}"
+    return _declared(Kind.POINT, symbol, f"{what} {where} [length].", on)
+
+
+def axis(symbol: str, on: str) -> Any:
+    """Declare a direction in the frame of a body."""
+    text = "Direction (xi, eta) in the frame of {on}, of any length but zero."
+    return _declared(Kind.AXIS, symbol, text, on)
+
+
+def value(unit: str = "length") -> Any:
+    """Declare the value C of a constraint, which may be a function of time."""
+    return _declared(Kind.VALUE, "C", f"C [{unit}], {_DRIVEN}")
+
+
+def distance() -> Any:
+    """Declare a distance C > 0, which may be a function of time."""
+    return _declared(Kind.DISTANCE, "C", f"C > 0 [length], {_DRIVEN}")
+
+
+def radius(symbol: str) -> Any:
+    """Declare the radius of a pitch circle."""
+    text = "Pitch radius [length], a number or an expression of parameters, not zero."
+    return _declared(Kind.RADIUS, symbol, text)
+
+
+def angle(symbol: str, on: str, what: str) -> Any:
+    """Declare a direction in the frame of a body, given by its angle."""
+    return _declared(Kind.SCALAR, symbol, f"Direction [rad] {what}, in the frame of {{on}}.", on)
+
+
+def profile(symbol: str) -> Any:
+    """Declare the profile of a cam."""
+    text = (
+        "Polar radius [length] about the centre: an expression of `alpha`, a function of alpha, or "
+        "a table (angles [rad], radii) over one revolution."
+    )
+    return _declared(Kind.PROFILE, symbol, text)
