@@ -115,6 +115,11 @@ def kernel_of(names: tuple[str, ...]) -> str:
     return next(kernel for kernel, given in kernels().items() if set(names) <= set(given))
 
 
+def nonzeros_of(quantity: Quantity) -> str:
+    """Return what compiled code calls the entries of a matrix in the order of its pattern."""
+    return "nonzeros" if quantity.name == "Phi_q" else f"{quantity.name}_nonzeros"
+
+
 def is_moving(names: tuple[str, ...]) -> bool:
     """Return whether any of the quantities depends on the rates q_dot."""
     return any(quantity_named(name).is_moving for name in names)

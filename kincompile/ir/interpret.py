@@ -78,10 +78,11 @@ def interpret(
             for row, column, node in kernel.outputs.get(quantity.name, ()):
                 moving, index = placed.index(quantity, row, column)
                 entries = np.broadcast_to(results[node], (*shape, len(instances)))[..., moving]
+                at: Any = (..., *index)
                 if quantity.adds:
-                    np.add.at(array, (..., *index), entries)
+                    np.add.at(array, at, entries)
                 else:
-                    array[(..., *index)] = entries
+                    array[at] = entries
     return tuple(found)
 
 

@@ -6,9 +6,9 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kincompile import quantities
 from kincompile.ir.graph import operands_of
 from kincompile.names import rate
-from kincompile.quantities import quantity_named
 from kincompile.targets.naming import NameTable, content_name
 
 if TYPE_CHECKING:
@@ -69,14 +69,14 @@ class Listing:
 def varying(inline: InlineProgram, section: Section, quantity: str) -> tuple[Entry, ...]:
     """Return the entries a function computes: of a matrix those that are not plain numbers."""
     entries = section.entries[quantity]
-    if not quantity_named(quantity).is_matrix:
+    if all(item.name != quantity or not item.is_matrix for item in quantities.QUANTITIES):
         return entries
     return tuple(entry for entry in entries if inline.number(entry.node) is None)
 
 
 def schedule(
     inline: InlineProgram,
-    quantities: Sequence[str],
+    computed: Sequence[str],
     input_names: Mapping[str, str],
     table: NameTable,
 ) -> Listing:
@@ -84,8 +84,8 @@ def schedule(
 
     Parameters
     ----------
-    quantities
-        What it returns.
+    computed
+        The quantities that it returns.
     input_names
         Names of coordinates, rates and parameters in the target.
     table
@@ -94,7 +94,7 @@ def schedule(
     table = table.copy()
     results = tuple(
         (name, tuple((section, varying(inline, section, name)) for section in inline.sections))
-        for name in quantities
+        for name in computed
     )
     outputs = [entry.node for _, rows in results for _, entries in rows for entry in entries]
     uses = _count_uses(inline, outputs)

@@ -26,7 +26,6 @@ from kincompile.targets.numpy.grouped_solve import (
 from kincompile.targets.numpy.module import (
     RESERVED,
     array_functions,
-    bodies_text,
     function_body,
     public_functions,
     scalar_functions,
@@ -61,6 +60,7 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
     for name, spline in program.tables.items():
         arrays[f"{name}.breaks"] = np.array(spline.breaks)
         arrays[f"{name}.coefficients"] = np.array(spline.coefficients)
+    arrays["bodies"] = _text([name for name, _ in program.frames])
     arrays["guess"] = np.array([item.guess for item in program.coordinates])
     code: list[str] = []
     called: set[str] = set()
@@ -222,7 +222,6 @@ def _data(
         "nonzeros": nonzeros,
         "k": len(program.parameters),
         "redundant": indented(quoted(program.redundant)),
-        "bodies": bodies_text(program),
         "is_planned": bool(solving),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "parameter_units": indented(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from typing import TYPE_CHECKING, Any, Literal
 
 from kincompile import quantities
@@ -90,7 +91,8 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
     """Return what the head of the module says."""
     program = code.program
     names = [item.name for item in program.coordinates]
-    units = {item.name: item.unit for item in (*program.coordinates, *program.parameters)}
+    units = {item.name: item.unit for item in program.coordinates}
+    units |= {item.name: item.unit for item in program.parameters}
     return {
         "title": program.name,
         "header": "\n".join(header(code)),
@@ -119,7 +121,7 @@ def tuple_text(items: Iterable[str]) -> str:
     """Return a tuple as text: on one line, or its elements on lines of their own."""
     items = list(items)
     text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
-    return text if len(text) <= WIDTH - 36 else f"(\n{indented(wrapped(items))}\n)"
+    return text if len(text) <= WIDTH - 15 else f"(\n{indented(wrapped(items))}\n)"
 
 
 def bodies_text(program: Program) -> str:
@@ -155,17 +157,20 @@ def _results() -> Iterator[str]:
         "outputs": "N_OUTPUTS",
         "parameters": "len(PARAMETERS)",
     }
+    results: dict[str, list[str]] = {}
     for quantity in quantities.QUANTITIES:
         rows, name = sizes[quantity.rows], f"_{quantity.name.upper()}"
         if not quantity.is_matrix:
-            yield f"{name} = _Quantity(({rows},), range({rows}))"
+            results.setdefault(f"({rows},), range({rows})", []).append(name)
             continue
         columns, pattern = sizes[quantity.columns], _pattern_name(quantity)
         constants = f"_CONSTANTS{pattern.removeprefix('PATTERN')}"
         places = f"{pattern} @ ({columns}, 1)"
-        yield f"{name} = _Quantity(({rows}, {columns}), {places}, {constants})"
+        results[f"({rows}, {columns}), {places}, {constants}"] = [name]
         size = f"len({pattern})"
-        yield f"{name}_NONZEROS = _Quantity(({size},), range({size}), {constants})"
+        results[f"({size},), range({size}), {constants}"] = [f"{name}_NONZEROS"]
+    for arguments, names in results.items():
+        yield f"{' = '.join(names)} = _Quantity({arguments})"
 
 
 def _functions(code: InlineProgram) -> Iterator[str]:
@@ -177,7 +182,7 @@ def _functions(code: InlineProgram) -> Iterator[str]:
         skip = sum(len(varying(code, part, item)) for item in before for part in code.sections)
         result = f"_{name.upper()}"
         yield from lines
-        yield f"    return _evaluate(_{kernel}, {skip}, ({result},), t, p, {states})[0]\n\n"
+        yield f"    return _evaluate(_{kernel}, {skip}, {result}, t, p, {states})\n\n"
 
 
 def public_functions(
@@ -261,8 +266,8 @@ def function_body(code: InlineProgram, listing: Listing, *, style: Style) -> lis
     body += _frames(listing, printer)
     for section, assignments in listing.steps:
         body += [f"# {short_title(section)}"] if style == "titled" else []
-        for item in assignments:
-            body += _assignment(item.name, printer.text(item.node, own=True))
+        texts = [(item.name, printer.text(item.node, own=True)) for item in assignments]
+        body += _pairs(texts) if style == "packed" else _assignments(texts)
     body.append("return (")
     for name, rows in listing.results:
         body += [f"    # {name}"] if len(listing.results) > 1 else []
@@ -292,7 +297,8 @@ def _section(
     is_own = quantity_named(name).rows == "equations"
     if is_own and all(code.number(entry.node) == 0 for entry in entries):
         return [f"    {', '.join(texts)},  # {short_title(section)}"]
-    lines = [f"    {line}" for line in commented(title(section))] if is_own else []
+    is_titled = is_own and not quantity_named(name).is_matrix  # of a matrix each entry is named
+    lines = [f"    {line}" for line in commented(title(section))] if is_titled else []
     for entry, text in zip(entries, texts, strict=True):
         lines += _element(text, place(name, entry, code))
     return lines
@@ -323,12 +329,32 @@ def _matrix(code: InlineProgram, listing: Listing) -> list[str]:
     return []
 
 
-def _assignment(name: str, text: str) -> list[str]:
-    """Return a value with its name, a long one in parentheses."""
-    lines = broken(text)
-    if len(lines) == 1:
-        return [f"{name} = {text}"]
-    return [f"{name} = (", *(f"    {line}" for line in lines), ")"]
+def _assignments(texts: Iterable[tuple[str, str]]) -> list[str]:
+    """Return values with their names, long ones in parentheses."""
+    lines: list[str] = []
+    for name, text in texts:
+        parts = broken(text)
+        if len(parts) == 1:
+            lines.append(f"{name} = {text}")
+        else:
+            lines += [f"{name} = (", *(f"    {line}" for line in parts), ")"]
+    return lines
+
+
+def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
+    """Return values with their names, two on a line where the second does not need the first."""
+    lines: list[str] = []
+    rest = list(texts)
+    while rest:
+        (name, text), *rest = rest
+        if rest and name not in re.findall(r"\w+", rest[0][1]):
+            pair = f"{name}, {rest[0][0]} = {text}, {rest[0][1]}"
+            if len(pair) <= WIDTH - 4:
+                lines.append(pair)
+                del rest[0]
+                continue
+        lines += _assignments([(name, text)])
+    return lines
 
 
 def _element(text: str, comment: str) -> list[str]:

@@ -94,6 +94,8 @@ def _unpack(names: list[str], vector: str) -> list[str]:
     if not names:
         return []
     lines = wrapped(names)
+    if len(lines) == 1:
+        return [f"{lines[0] if len(names) == 1 else lines[0].rstrip(',')} = {vector}"]
     return ["(", *(f"    {line}" for line in lines), f") = {vector}"]
 
 
