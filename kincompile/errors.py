@@ -7,10 +7,11 @@ accept one message or a sequence of them.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
 
 class KincompileError(Exception):
@@ -57,11 +58,21 @@ class UnsupportedError(KincompileError, NotImplementedError):
     """A target cannot print this expression or this kind of constraint."""
 
 
-def missing_package(package: str, extra: str) -> UnsupportedError:
-    """Return the error of a package that is installed on request only, by an extra."""
-    return UnsupportedError(
-        f"{package} is not installed; pip install 'kincompile[{extra}]' brings it"
-    )
+@contextmanager
+def package_of_extra(package: str, extra: str) -> Iterator[None]:
+    """Import, inside the `with` statement, a package that is installed by an extra only.
+
+    Raises
+    ------
+    UnsupportedError
+        If the package is not installed; the message names the extra.
+    """
+    try:
+        yield
+    except ImportError:
+        raise UnsupportedError(
+            f"{package} is not installed; pip install 'kincompile[{extra}]' brings it"
+        ) from None
 
 
 class TemplateError(KincompileError):

@@ -53,8 +53,8 @@ def unit_problem(unit: object, what: str) -> str | None:
 
 
 def rate(name: str, order: int = 1) -> str:
-    """Return the name of a coordinate's first or second time derivative."""
-    return f"{name}_{'d' * order}ot"
+    """Return the name of a coordinate's first or second time derivative; of order 0, its own."""
+    return f"{name}_{'d' * order}ot" if order else name
 
 
 def column_name(name: str) -> str:

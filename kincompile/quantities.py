@@ -94,9 +94,14 @@ def quantity_named(name: str) -> Quantity:
     return next(item for item in QUANTITIES if item.name == name)
 
 
+def singles() -> dict[str, tuple[str, ...]]:
+    """Return a function for each quantity."""
+    return {item.name: (item.name,) for item in QUANTITIES}
+
+
 def functions() -> dict[str, tuple[str, ...]]:
     """Return the functions of an emitted module, and the quantities that each gives."""
-    return {**{item.name: (item.name,) for item in QUANTITIES}, **TOGETHER}
+    return {**singles(), **TOGETHER}
 
 
 def kernels() -> dict[str, tuple[str, ...]]:
@@ -106,7 +111,7 @@ def kernels() -> dict[str, tuple[str, ...]]:
     of the work of a batch is shared.
     """
     position = TOGETHER["position"]
-    single = {item.name: (item.name,) for item in QUANTITIES if item.name not in position}
+    single = {name: given for name, given in singles().items() if name not in position}
     return {"position": position, **single, "kinematics": TOGETHER["kinematics"]}
 
 

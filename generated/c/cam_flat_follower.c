@@ -38,7 +38,7 @@ enum {
     BLOCKS = 3,  // blocks of the planned solve
 };
 
-const char cam_flat_follower_fingerprint[] = "dc70f608d91330ad121079edfe1d311f";
+const char cam_flat_follower_fingerprint[] = "1873cd6622df32759a29baf955016efb";
 const double cam_flat_follower_defaults[] = {
     0.04, 0.02, 6.283185307179586,
 };

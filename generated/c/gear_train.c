@@ -40,7 +40,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char gear_train_fingerprint[] = "4910772a429407101af0743b99c93c90";
+const char gear_train_fingerprint[] = "40c55a3d90bf6516d6f5a2effd08e56f";
 const double gear_train_defaults[] = {
     0.02, 0.03, 6.283185307179586,
 };

@@ -35,7 +35,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char problem_3_5_6_fingerprint[] = "fb5595fbe7015ee6230db8cd9b070b75";
+const char problem_3_5_6_fingerprint[] = "cf1b67c63b4e96bb294dd9e63b1ad407";
 const double problem_3_5_6_defaults[] = {
     0,
 };
@@ -201,7 +201,7 @@ INLINE void nu_at(block *at, size_t lane)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->nu[1][lane] = 0.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->nu[2][lane] = t / 50.0 + 2.0 / 25.0;
+    at->nu[2][lane] = (t / 10.0 + 2.0 / 5.0) / 5.0;
 }
 
 static void nu_of_block(block *at, size_t count)
@@ -225,7 +225,7 @@ INLINE int64_t gamma_at(block *at, size_t lane, int exact)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->gamma[1][lane] = -phi3_dot_sq * cosine(phi3, exact, &far) / 4.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * square(x2_dot) - 2.0 * square(y2_dot);
+    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
     return far;
 }
 
@@ -294,7 +294,7 @@ INLINE int64_t velocity_at(block *at, size_t lane, int exact)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->nu[1][lane] = 0.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->nu[2][lane] = t / 50.0 + 2.0 / 25.0;
+    at->nu[2][lane] = (t / 10.0 + 2.0 / 5.0) / 5.0;
     return far;
 }
 
@@ -333,7 +333,7 @@ INLINE int64_t acceleration_at(block *at, size_t lane, int exact)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->gamma[1][lane] = -phi3_dot_sq * cos_phi3 / 4.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * square(x2_dot) - 2.0 * square(y2_dot);
+    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
     return far;
 }
 
@@ -363,12 +363,14 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     const double cos_phi3 = cosine(phi3, exact, &far);
     const double cos_phi3_4 = cos_phi3 / 4.0;
     const double phi3_dot_sq = square(phi3_dot);
+    // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
+    const double equation_3_1 = t / 10.0 + 2.0 / 5.0;
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
     at->Phi[0][lane] = x2 + sin_phi3_4 - 3.0 / 5.0;
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->Phi[1][lane] = y2 - cos_phi3_4;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->Phi[2][lane] = square(x2) + square(y2) - square(t / 10.0 + 2.0 / 5.0);
+    at->Phi[2][lane] = square(x2) + square(y2) - square(equation_3_1);
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
     at->Phi_q[1][lane] = cos_phi3_4;  // equation_1 by phi3
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
@@ -381,13 +383,13 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->nu[1][lane] = 0.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->nu[2][lane] = t / 50.0 + 2.0 / 25.0;
+    at->nu[2][lane] = equation_3_1 / 5.0;
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
     at->gamma[0][lane] = phi3_dot_sq * sin_phi3 / 4.0;
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->gamma[1][lane] = -phi3_dot_sq * cos_phi3 / 4.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * square(x2_dot) - 2.0 * square(y2_dot);
+    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
     return far;
 }
 
@@ -409,13 +411,14 @@ INLINE void factor_at(block *at, size_t lane)
     const double equation_2_phi3 = at->Phi_q[3][lane];
     const double equation_3_x2 = at->Phi_q[4][lane];
     const double equation_3_y2 = at->Phi_q[5][lane];
-    const double determinant = -(equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3);
-    const double k_2 = 1.0 / (equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3);
+    const double k_1 = equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3;
+    const double determinant = -k_1;
+    const double k_3 = 1.0 / k_1;
     at->F[0][lane] = equation_1_phi3;
     at->F[1][lane] = equation_2_phi3;
     at->F[2][lane] = equation_3_x2;
     at->F[3][lane] = equation_3_y2;
-    at->F[4][lane] = k_2;
+    at->F[4][lane] = k_3;
     at->determinants[0][lane] = determinant;
 }
 
@@ -433,11 +436,11 @@ INLINE void solve_at(const double (*restrict F)[LANES],
     const double equation_2_phi3 = F[1][lane];
     const double equation_3_x2 = F[2][lane];
     const double equation_3_y2 = F[3][lane];
-    const double k_2 = F[4][lane];
+    const double k_3 = F[4][lane];
     const double equation_1 = right[0][lane];
     const double equation_2 = right[1][lane];
     const double equation_3 = right[2][lane];
-    const double b_1 = (equation_3 - equation_3_x2 * equation_1 - equation_3_y2 * equation_2) * k_2;
+    const double b_1 = (equation_3 - equation_3_x2 * equation_1 - equation_3_y2 * equation_2) * k_3;
     const double phi3 = -b_1;
     const double y2 = equation_2 + equation_2_phi3 * b_1;
     const double x2 = equation_1 + equation_1_phi3 * b_1;

@@ -37,7 +37,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char rack_and_pinion_fingerprint[] = "be41ae4b0a3414a68fb2075524bc5c90";
+const char rack_and_pinion_fingerprint[] = "4e5b72acd3f29228c4564add5537bb78";
 const double rack_and_pinion_defaults[] = {
     0.05, 2.0,
 };
@@ -160,17 +160,17 @@ INLINE int64_t Phi_at(block *at, size_t lane, int exact)
     double c_rack, s_rack;
     far |= cos_sin(phi_rack, exact, &c_rack, &s_rack);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    const double mesh_1 = 0.2 * R;
     const double mesh_d_x = x_pinion - x_rack;
-    const double mesh_3 = 0.2 * c_rack;
+    const double mesh_2 = 0.2 * c_rack;
     const double mesh_d_y = y_pinion - y_rack;
-    const double mesh_5 = 0.2 * s_rack;
+    const double mesh_4 = 0.2 * s_rack;
+    const double mesh_5 = 0.2 * R;
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
     at->Phi[0][lane] = x_pinion;
     at->Phi[1][lane] = y_pinion;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5));
-    at->Phi[3][lane] = (mesh_d_y + mesh_5) * mesh_3 - (mesh_d_x + mesh_3) * mesh_5 - mesh_1;
+    at->Phi[2][lane] = mesh_d_x * mesh_2 + mesh_d_y * mesh_4 - mesh_5 * (phi_rack - phi_pinion);
+    at->Phi[3][lane] = (mesh_d_y + mesh_4) * mesh_2 - (mesh_d_x + mesh_2) * mesh_4 - mesh_5;
     // 4  AbsoluteAngle "guide": rack angle 0
     at->Phi[4][lane] = phi_rack;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -215,8 +215,8 @@ INLINE int64_t Phi_q_at(block *at, size_t lane, int exact)
     at->Phi_q[7][lane] = mesh_5;  // mesh.roll by phi_pinion
     at->Phi_q[8][lane] = mesh_2;  // mesh.pitch by x_rack
     at->Phi_q[9][lane] = -mesh_1;  // mesh.pitch by y_rack
-    at->Phi_q[10][lane] = square(mesh_2) + square(mesh_1)
-        - ((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2);  // mesh.pitch by phi_rack
+    at->Phi_q[10][lane] = -((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2
+            - (square(mesh_2) + square(mesh_1)));  // mesh.pitch by phi_rack
     at->Phi_q[11][lane] = -mesh_2;  // mesh.pitch by x_pinion
     at->Phi_q[12][lane] = mesh_1;  // mesh.pitch by y_pinion
     return far;
@@ -279,26 +279,26 @@ INLINE int64_t gamma_at(block *at, size_t lane, int exact)
     double c_rack, s_rack;
     far |= cos_sin(phi_rack, exact, &c_rack, &s_rack);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+    const double mesh_d_dot_y = y_pinion_dot - y_rack_dot;
+    const double mesh_2 = 0.2 * c_rack;
+    const double mesh_3 = phi_rack_dot * mesh_2;
+    const double mesh_d_dot_x = x_pinion_dot - x_rack_dot;
+    const double mesh_5 = 0.2 * s_rack;
+    const double mesh_6 = phi_rack_dot * mesh_5;
     const double mesh_d_x = x_pinion - x_rack;
     const double phi_rack_dot_sq = square(phi_rack_dot);
-    const double mesh_3 = 0.2 * c_rack;
-    const double mesh_4 = phi_rack_dot_sq * mesh_3;
+    const double mesh_9 = phi_rack_dot_sq * mesh_2;
     const double mesh_d_y = y_pinion - y_rack;
-    const double mesh_6 = 0.2 * s_rack;
-    const double mesh_7 = phi_rack_dot_sq * mesh_6;
-    const double mesh_d_dot_y = y_pinion_dot - y_rack_dot;
-    const double mesh_9 = phi_rack_dot * mesh_3;
-    const double mesh_d_dot_x = x_pinion_dot - x_rack_dot;
-    const double mesh_11 = phi_rack_dot * mesh_6;
+    const double mesh_11 = phi_rack_dot_sq * mesh_5;
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
     at->gamma[0][lane] = 0.0;
     at->gamma[1][lane] = 0.0;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->gamma[2][lane] = mesh_d_x * mesh_4 + mesh_d_y * mesh_7
-        - 2.0 * (mesh_d_dot_y * mesh_9 - mesh_d_dot_x * mesh_11);
-    at->gamma[3][lane] = -(mesh_4 * mesh_6 - mesh_7 * mesh_3
-            - 2.0 * ((mesh_d_dot_y + mesh_9) * mesh_11 + (mesh_d_dot_x - mesh_11) * mesh_9)
-            + ((mesh_d_x + mesh_3) * mesh_7 - (mesh_d_y + mesh_6) * mesh_4));
+    at->gamma[2][lane] = -(2.0 * (mesh_d_dot_y * mesh_3 - mesh_d_dot_x * mesh_6)
+            - (mesh_d_x * mesh_9 + mesh_d_y * mesh_11));
+    at->gamma[3][lane] = -(mesh_9 * mesh_5 - mesh_11 * mesh_2
+            - 2.0 * ((mesh_d_dot_y + mesh_3) * mesh_6 + (mesh_d_dot_x - mesh_6) * mesh_3)
+            + ((mesh_d_x + mesh_2) * mesh_11 - (mesh_d_y + mesh_5) * mesh_9));
     // 4  AbsoluteAngle "guide": rack angle 0
     at->gamma[4][lane] = 0.0;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -332,35 +332,35 @@ INLINE int64_t position_at(block *at, size_t lane, int exact)
     double c_rack, s_rack;
     far |= cos_sin(phi_rack, exact, &c_rack, &s_rack);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    const double mesh_1 = 0.2 * R;
     const double mesh_d_x = x_pinion - x_rack;
-    const double mesh_3 = 0.2 * c_rack;
+    const double mesh_2 = 0.2 * c_rack;
     const double mesh_d_y = y_pinion - y_rack;
-    const double mesh_5 = 0.2 * s_rack;
-    const double mesh_d_y_ = mesh_d_y + mesh_5;
-    const double mesh_d_x_ = mesh_d_x + mesh_3;
+    const double mesh_4 = 0.2 * s_rack;
+    const double mesh_5 = 0.2 * R;
+    const double mesh_d_y_ = mesh_d_y + mesh_4;
+    const double mesh_d_x_ = mesh_d_x + mesh_2;
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
     at->Phi[0][lane] = x_pinion;
     at->Phi[1][lane] = y_pinion;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5));
-    at->Phi[3][lane] = mesh_d_y_ * mesh_3 - mesh_d_x_ * mesh_5 - mesh_1;
+    at->Phi[2][lane] = mesh_d_x * mesh_2 + mesh_d_y * mesh_4 - mesh_5 * (phi_rack - phi_pinion);
+    at->Phi[3][lane] = mesh_d_y_ * mesh_2 - mesh_d_x_ * mesh_4 - mesh_5;
     // 4  AbsoluteAngle "guide": rack angle 0
     at->Phi[4][lane] = phi_rack;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
     at->Phi[5][lane] = phi_pinion - swing * sine(PI * t, exact, &far);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi_q[2][lane] = -mesh_3;  // mesh.roll by x_rack
-    at->Phi_q[3][lane] = -mesh_5;  // mesh.roll by y_rack
-    at->Phi_q[4][lane] = mesh_d_y * mesh_3 - mesh_d_x * mesh_5 - mesh_1;  // mesh.roll by phi_rack
-    at->Phi_q[5][lane] = mesh_3;  // mesh.roll by x_pinion
-    at->Phi_q[6][lane] = mesh_5;  // mesh.roll by y_pinion
-    at->Phi_q[7][lane] = mesh_1;  // mesh.roll by phi_pinion
-    at->Phi_q[8][lane] = mesh_5;  // mesh.pitch by x_rack
-    at->Phi_q[9][lane] = -mesh_3;  // mesh.pitch by y_rack
-    at->Phi_q[10][lane] = square(mesh_5) + square(mesh_3) - (mesh_d_x_ * mesh_3 + mesh_d_y_ * mesh_5);  // mesh.pitch by phi_rack
-    at->Phi_q[11][lane] = -mesh_5;  // mesh.pitch by x_pinion
-    at->Phi_q[12][lane] = mesh_3;  // mesh.pitch by y_pinion
+    at->Phi_q[2][lane] = -mesh_2;  // mesh.roll by x_rack
+    at->Phi_q[3][lane] = -mesh_4;  // mesh.roll by y_rack
+    at->Phi_q[4][lane] = mesh_d_y * mesh_2 - mesh_d_x * mesh_4 - mesh_5;  // mesh.roll by phi_rack
+    at->Phi_q[5][lane] = mesh_2;  // mesh.roll by x_pinion
+    at->Phi_q[6][lane] = mesh_4;  // mesh.roll by y_pinion
+    at->Phi_q[7][lane] = mesh_5;  // mesh.roll by phi_pinion
+    at->Phi_q[8][lane] = mesh_4;  // mesh.pitch by x_rack
+    at->Phi_q[9][lane] = -mesh_2;  // mesh.pitch by y_rack
+    at->Phi_q[10][lane] = -(mesh_d_x_ * mesh_2 + mesh_d_y_ * mesh_4 - (square(mesh_4) + square(mesh_2)));  // mesh.pitch by phi_rack
+    at->Phi_q[11][lane] = -mesh_4;  // mesh.pitch by x_pinion
+    at->Phi_q[12][lane] = mesh_2;  // mesh.pitch by y_pinion
     return far;
 }
 
@@ -403,8 +403,8 @@ INLINE int64_t velocity_at(block *at, size_t lane, int exact)
     at->Phi_q[7][lane] = mesh_5;  // mesh.roll by phi_pinion
     at->Phi_q[8][lane] = mesh_2;  // mesh.pitch by x_rack
     at->Phi_q[9][lane] = -mesh_1;  // mesh.pitch by y_rack
-    at->Phi_q[10][lane] = square(mesh_2) + square(mesh_1)
-        - ((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2);  // mesh.pitch by phi_rack
+    at->Phi_q[10][lane] = -((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2
+            - (square(mesh_2) + square(mesh_1)));  // mesh.pitch by phi_rack
     at->Phi_q[11][lane] = -mesh_2;  // mesh.pitch by x_pinion
     at->Phi_q[12][lane] = mesh_1;  // mesh.pitch by y_pinion
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
@@ -457,13 +457,13 @@ INLINE int64_t acceleration_at(block *at, size_t lane, int exact)
     const double mesh_5 = 0.2 * R;
     const double mesh_d_x_ = mesh_d_x + mesh_1;
     const double mesh_d_y_ = mesh_d_y + mesh_2;
-    const double phi_rack_dot_sq = square(phi_rack_dot);
-    const double mesh_9 = phi_rack_dot_sq * mesh_1;
-    const double mesh_10 = phi_rack_dot_sq * mesh_2;
     const double mesh_d_dot_y = y_pinion_dot - y_rack_dot;
-    const double mesh_12 = phi_rack_dot * mesh_1;
+    const double mesh_9 = phi_rack_dot * mesh_1;
     const double mesh_d_dot_x = x_pinion_dot - x_rack_dot;
-    const double mesh_14 = phi_rack_dot * mesh_2;
+    const double mesh_11 = phi_rack_dot * mesh_2;
+    const double phi_rack_dot_sq = square(phi_rack_dot);
+    const double mesh_13 = phi_rack_dot_sq * mesh_1;
+    const double mesh_14 = phi_rack_dot_sq * mesh_2;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
     at->Phi_q[2][lane] = -mesh_1;  // mesh.roll by x_rack
     at->Phi_q[3][lane] = -mesh_2;  // mesh.roll by y_rack
@@ -473,18 +473,18 @@ INLINE int64_t acceleration_at(block *at, size_t lane, int exact)
     at->Phi_q[7][lane] = mesh_5;  // mesh.roll by phi_pinion
     at->Phi_q[8][lane] = mesh_2;  // mesh.pitch by x_rack
     at->Phi_q[9][lane] = -mesh_1;  // mesh.pitch by y_rack
-    at->Phi_q[10][lane] = square(mesh_2) + square(mesh_1) - (mesh_d_x_ * mesh_1 + mesh_d_y_ * mesh_2);  // mesh.pitch by phi_rack
+    at->Phi_q[10][lane] = -(mesh_d_x_ * mesh_1 + mesh_d_y_ * mesh_2 - (square(mesh_2) + square(mesh_1)));  // mesh.pitch by phi_rack
     at->Phi_q[11][lane] = -mesh_2;  // mesh.pitch by x_pinion
     at->Phi_q[12][lane] = mesh_1;  // mesh.pitch by y_pinion
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
     at->gamma[0][lane] = 0.0;
     at->gamma[1][lane] = 0.0;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->gamma[2][lane] = mesh_d_x * mesh_9 + mesh_d_y * mesh_10
-        - 2.0 * (mesh_d_dot_y * mesh_12 - mesh_d_dot_x * mesh_14);
-    at->gamma[3][lane] = -(mesh_9 * mesh_2 - mesh_10 * mesh_1
-            - 2.0 * ((mesh_d_dot_y + mesh_12) * mesh_14 + (mesh_d_dot_x - mesh_14) * mesh_12)
-            + (mesh_d_x_ * mesh_10 - mesh_d_y_ * mesh_9));
+    at->gamma[2][lane] = -(2.0 * (mesh_d_dot_y * mesh_9 - mesh_d_dot_x * mesh_11)
+            - (mesh_d_x * mesh_13 + mesh_d_y * mesh_14));
+    at->gamma[3][lane] = -(mesh_13 * mesh_2 - mesh_14 * mesh_1
+            - 2.0 * ((mesh_d_dot_y + mesh_9) * mesh_11 + (mesh_d_dot_x - mesh_11) * mesh_9)
+            + (mesh_d_x_ * mesh_14 - mesh_d_y_ * mesh_13));
     // 4  AbsoluteAngle "guide": rack angle 0
     at->gamma[4][lane] = 0.0;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -523,20 +523,20 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     double c_rack, s_rack;
     far |= cos_sin(phi_rack, exact, &c_rack, &s_rack);
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    const double mesh_1 = 0.2 * R;
     const double mesh_d_x = x_pinion - x_rack;
-    const double mesh_3 = 0.2 * c_rack;
+    const double mesh_2 = 0.2 * c_rack;
     const double mesh_d_y = y_pinion - y_rack;
-    const double mesh_5 = 0.2 * s_rack;
-    const double mesh_d_y_ = mesh_d_y + mesh_5;
-    const double mesh_d_x_ = mesh_d_x + mesh_3;
-    const double phi_rack_dot_sq = square(phi_rack_dot);
-    const double mesh_9 = phi_rack_dot_sq * mesh_3;
-    const double mesh_10 = phi_rack_dot_sq * mesh_5;
+    const double mesh_4 = 0.2 * s_rack;
+    const double mesh_5 = 0.2 * R;
+    const double mesh_d_y_ = mesh_d_y + mesh_4;
+    const double mesh_d_x_ = mesh_d_x + mesh_2;
     const double mesh_d_dot_y = y_pinion_dot - y_rack_dot;
-    const double mesh_12 = phi_rack_dot * mesh_3;
+    const double mesh_9 = phi_rack_dot * mesh_2;
     const double mesh_d_dot_x = x_pinion_dot - x_rack_dot;
-    const double mesh_14 = phi_rack_dot * mesh_5;
+    const double mesh_11 = phi_rack_dot * mesh_4;
+    const double phi_rack_dot_sq = square(phi_rack_dot);
+    const double mesh_13 = phi_rack_dot_sq * mesh_2;
+    const double mesh_14 = phi_rack_dot_sq * mesh_4;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
     const double motor_1 = PI * t;
     const double sin_motor_1 = sine(motor_1, exact, &far);
@@ -544,24 +544,24 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     at->Phi[0][lane] = x_pinion;
     at->Phi[1][lane] = y_pinion;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi[2][lane] = -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5));
-    at->Phi[3][lane] = mesh_d_y_ * mesh_3 - mesh_d_x_ * mesh_5 - mesh_1;
+    at->Phi[2][lane] = mesh_d_x * mesh_2 + mesh_d_y * mesh_4 - mesh_5 * (phi_rack - phi_pinion);
+    at->Phi[3][lane] = mesh_d_y_ * mesh_2 - mesh_d_x_ * mesh_4 - mesh_5;
     // 4  AbsoluteAngle "guide": rack angle 0
     at->Phi[4][lane] = phi_rack;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
     at->Phi[5][lane] = phi_pinion - swing * sin_motor_1;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->Phi_q[2][lane] = -mesh_3;  // mesh.roll by x_rack
-    at->Phi_q[3][lane] = -mesh_5;  // mesh.roll by y_rack
-    at->Phi_q[4][lane] = mesh_d_y * mesh_3 - mesh_d_x * mesh_5 - mesh_1;  // mesh.roll by phi_rack
-    at->Phi_q[5][lane] = mesh_3;  // mesh.roll by x_pinion
-    at->Phi_q[6][lane] = mesh_5;  // mesh.roll by y_pinion
-    at->Phi_q[7][lane] = mesh_1;  // mesh.roll by phi_pinion
-    at->Phi_q[8][lane] = mesh_5;  // mesh.pitch by x_rack
-    at->Phi_q[9][lane] = -mesh_3;  // mesh.pitch by y_rack
-    at->Phi_q[10][lane] = square(mesh_5) + square(mesh_3) - (mesh_d_x_ * mesh_3 + mesh_d_y_ * mesh_5);  // mesh.pitch by phi_rack
-    at->Phi_q[11][lane] = -mesh_5;  // mesh.pitch by x_pinion
-    at->Phi_q[12][lane] = mesh_3;  // mesh.pitch by y_pinion
+    at->Phi_q[2][lane] = -mesh_2;  // mesh.roll by x_rack
+    at->Phi_q[3][lane] = -mesh_4;  // mesh.roll by y_rack
+    at->Phi_q[4][lane] = mesh_d_y * mesh_2 - mesh_d_x * mesh_4 - mesh_5;  // mesh.roll by phi_rack
+    at->Phi_q[5][lane] = mesh_2;  // mesh.roll by x_pinion
+    at->Phi_q[6][lane] = mesh_4;  // mesh.roll by y_pinion
+    at->Phi_q[7][lane] = mesh_5;  // mesh.roll by phi_pinion
+    at->Phi_q[8][lane] = mesh_4;  // mesh.pitch by x_rack
+    at->Phi_q[9][lane] = -mesh_2;  // mesh.pitch by y_rack
+    at->Phi_q[10][lane] = -(mesh_d_x_ * mesh_2 + mesh_d_y_ * mesh_4 - (square(mesh_4) + square(mesh_2)));  // mesh.pitch by phi_rack
+    at->Phi_q[11][lane] = -mesh_4;  // mesh.pitch by x_pinion
+    at->Phi_q[12][lane] = mesh_2;  // mesh.pitch by y_pinion
     // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
     at->nu[0][lane] = 0.0;
     at->nu[1][lane] = 0.0;
@@ -576,11 +576,11 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     at->gamma[0][lane] = 0.0;
     at->gamma[1][lane] = 0.0;
     // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-    at->gamma[2][lane] = mesh_d_x * mesh_9 + mesh_d_y * mesh_10
-        - 2.0 * (mesh_d_dot_y * mesh_12 - mesh_d_dot_x * mesh_14);
-    at->gamma[3][lane] = -(mesh_9 * mesh_5 - mesh_10 * mesh_3
-            - 2.0 * ((mesh_d_dot_y + mesh_12) * mesh_14 + (mesh_d_dot_x - mesh_14) * mesh_12)
-            + (mesh_d_x_ * mesh_10 - mesh_d_y_ * mesh_9));
+    at->gamma[2][lane] = -(2.0 * (mesh_d_dot_y * mesh_9 - mesh_d_dot_x * mesh_11)
+            - (mesh_d_x * mesh_13 + mesh_d_y * mesh_14));
+    at->gamma[3][lane] = -(mesh_13 * mesh_4 - mesh_14 * mesh_2
+            - 2.0 * ((mesh_d_dot_y + mesh_9) * mesh_11 + (mesh_d_dot_x - mesh_11) * mesh_9)
+            + (mesh_d_x_ * mesh_14 - mesh_d_y_ * mesh_13));
     // 4  AbsoluteAngle "guide": rack angle 0
     at->gamma[4][lane] = 0.0;
     // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)

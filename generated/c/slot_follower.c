@@ -38,7 +38,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char slot_follower_fingerprint[] = "367e36de90eba0a903b4b1f776fcce6a";
+const char slot_follower_fingerprint[] = "2078c57d7cdee5b4001ac79029f642f7";
 const double slot_follower_defaults[] = {
     0.05, 0.01, 0.085, 6.283185307179586,
 };

@@ -21,7 +21,7 @@ const cam_flat_follower = (() => {
 
     const NAME = "cam_flat_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "dc70f608d91330ad121079edfe1d311f";
+    const FINGERPRINT = "1873cd6622df32759a29baf955016efb";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

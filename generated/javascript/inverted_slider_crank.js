@@ -21,7 +21,7 @@ const inverted_slider_crank = (() => {
 
     const NAME = "inverted_slider_crank";
     const FORMAT = 1;
-    const FINGERPRINT = "d6357080bf2fb32a30ee1b0957d182c2";
+    const FINGERPRINT = "cc6e4566f6d44daf153512b3f82c1d39";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

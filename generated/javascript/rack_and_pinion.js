@@ -20,7 +20,7 @@ const rack_and_pinion = (() => {
 
     const NAME = "rack_and_pinion";
     const FORMAT = 1;
-    const FINGERPRINT = "be41ae4b0a3414a68fb2075524bc5c90";
+    const FINGERPRINT = "4e5b72acd3f29228c4564add5537bb78";
     const N_COORDINATES = 6;
     const N_EQUATIONS = 6;
     const COORDINATES = [
@@ -75,18 +75,18 @@ const rack_and_pinion = (() => {
         const c_rack = Math.cos(phi_rack);
         const s_rack = Math.sin(phi_rack);
         // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        const mesh_1 = 0.2 * R;
         const mesh_d_x = x_pinion - x_rack;
-        const mesh_3 = 0.2 * c_rack;
+        const mesh_2 = 0.2 * c_rack;
         const mesh_d_y = y_pinion - y_rack;
-        const mesh_5 = 0.2 * s_rack;
+        const mesh_4 = 0.2 * s_rack;
+        const mesh_5 = 0.2 * R;
         const Phi = new Array(6).fill(0);
         // 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         Phi[0] = x_pinion;
         Phi[1] = y_pinion;
         // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        Phi[2] = -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5));
-        Phi[3] = (mesh_d_y + mesh_5) * mesh_3 - (mesh_d_x + mesh_3) * mesh_5 - mesh_1;
+        Phi[2] = mesh_d_x * mesh_2 + mesh_d_y * mesh_4 - mesh_5 * (phi_rack - phi_pinion);
+        Phi[3] = (mesh_d_y + mesh_4) * mesh_2 - (mesh_d_x + mesh_2) * mesh_4 - mesh_5;
         // 4  AbsoluteAngle "guide": rack angle 0
         Phi[4] = phi_rack;
         // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -126,8 +126,8 @@ const rack_and_pinion = (() => {
         Phi_q[2][5] = mesh_5;  // mesh.roll by phi_pinion
         Phi_q[3][0] = mesh_2;  // mesh.pitch by x_rack
         Phi_q[3][1] = -mesh_1;  // mesh.pitch by y_rack
-        Phi_q[3][2] = square(mesh_2) + square(mesh_1)
-            - ((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2);  // mesh.pitch by phi_rack
+        Phi_q[3][2] = -((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2
+                - (square(mesh_2) + square(mesh_1)));  // mesh.pitch by phi_rack
         Phi_q[3][3] = -mesh_2;  // mesh.pitch by x_pinion
         Phi_q[3][4] = mesh_1;  // mesh.pitch by y_pinion
         // 4  AbsoluteAngle "guide": rack angle 0
@@ -168,24 +168,24 @@ const rack_and_pinion = (() => {
         const c_rack = Math.cos(phi_rack);
         const s_rack = Math.sin(phi_rack);
         // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
+        const mesh_d_dot_y = y_pinion_dot - y_rack_dot;
+        const mesh_2 = 0.2 * c_rack;
+        const mesh_3 = phi_rack_dot * mesh_2;
+        const mesh_d_dot_x = x_pinion_dot - x_rack_dot;
+        const mesh_5 = 0.2 * s_rack;
+        const mesh_6 = phi_rack_dot * mesh_5;
         const mesh_d_x = x_pinion - x_rack;
         const phi_rack_dot_sq = square(phi_rack_dot);
-        const mesh_3 = 0.2 * c_rack;
-        const mesh_4 = phi_rack_dot_sq * mesh_3;
+        const mesh_9 = phi_rack_dot_sq * mesh_2;
         const mesh_d_y = y_pinion - y_rack;
-        const mesh_6 = 0.2 * s_rack;
-        const mesh_7 = phi_rack_dot_sq * mesh_6;
-        const mesh_d_dot_y = y_pinion_dot - y_rack_dot;
-        const mesh_9 = phi_rack_dot * mesh_3;
-        const mesh_d_dot_x = x_pinion_dot - x_rack_dot;
-        const mesh_11 = phi_rack_dot * mesh_6;
+        const mesh_11 = phi_rack_dot_sq * mesh_5;
         const gamma = new Array(6).fill(0);
         // 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R theta_pinion 3*pi/2
-        gamma[2] = mesh_d_x * mesh_4 + mesh_d_y * mesh_7
-            - 2 * (mesh_d_dot_y * mesh_9 - mesh_d_dot_x * mesh_11);
-        gamma[3] = -(mesh_4 * mesh_6 - mesh_7 * mesh_3
-                - 2 * ((mesh_d_dot_y + mesh_9) * mesh_11 + (mesh_d_dot_x - mesh_11) * mesh_9)
-                + ((mesh_d_x + mesh_3) * mesh_7 - (mesh_d_y + mesh_6) * mesh_4));
+        gamma[2] = -(2 * (mesh_d_dot_y * mesh_3 - mesh_d_dot_x * mesh_6)
+                - (mesh_d_x * mesh_9 + mesh_d_y * mesh_11));
+        gamma[3] = -(mesh_9 * mesh_5 - mesh_11 * mesh_2
+                - 2 * ((mesh_d_dot_y + mesh_3) * mesh_6 + (mesh_d_dot_x - mesh_6) * mesh_3)
+                + ((mesh_d_x + mesh_2) * mesh_11 - (mesh_d_y + mesh_5) * mesh_9));
         // 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
         gamma[5] = -square(Math.PI) * swing * Math.sin(Math.PI * t);
         return gamma;

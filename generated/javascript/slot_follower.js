@@ -21,7 +21,7 @@ const slot_follower = (() => {
 
     const NAME = "slot_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "367e36de90eba0a903b4b1f776fcce6a";
+    const FINGERPRINT = "2078c57d7cdee5b4001ac79029f642f7";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

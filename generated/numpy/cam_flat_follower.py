@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "cam_flat_follower"
 FORMAT = 1
-FINGERPRINT = "dc70f608d91330ad121079edfe1d311f"
+FINGERPRINT = "1873cd6622df32759a29baf955016efb"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (

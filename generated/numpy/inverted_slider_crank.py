@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "inverted_slider_crank"
 FORMAT = 1
-FINGERPRINT = "d6357080bf2fb32a30ee1b0957d182c2"
+FINGERPRINT = "cc6e4566f6d44daf153512b3f82c1d39"
 N_COORDINATES = 9
 N_EQUATIONS = 9
 COORDINATES = (

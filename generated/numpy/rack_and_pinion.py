@@ -25,7 +25,7 @@ import numpy as np
 
 NAME = "rack_and_pinion"
 FORMAT = 1
-FINGERPRINT = "be41ae4b0a3414a68fb2075524bc5c90"
+FINGERPRINT = "4e5b72acd3f29228c4564add5537bb78"
 N_COORDINATES = 6
 N_EQUATIONS = 6
 COORDINATES = (
@@ -78,19 +78,19 @@ def _Phi(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
-    mesh_1 = 0.2 * R
     mesh_d_x = x_pinion - x_rack
-    mesh_3 = 0.2 * c_rack
+    mesh_2 = 0.2 * c_rack
     mesh_d_y = y_pinion - y_rack
-    mesh_5 = 0.2 * s_rack
+    mesh_4 = 0.2 * s_rack
+    mesh_5 = 0.2 * R
     return (
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         x_pinion,
         y_pinion,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5)),
-        (mesh_d_y + mesh_5) * mesh_3 - (mesh_d_x + mesh_3) * mesh_5 - mesh_1,
+        mesh_d_x * mesh_2 + mesh_d_y * mesh_4 - mesh_5 * (phi_rack - phi_pinion),
+        (mesh_d_y + mesh_4) * mesh_2 - (mesh_d_x + mesh_2) * mesh_4 - mesh_5,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -121,7 +121,7 @@ def _Phi_q(f, q, t, p):
         mesh_5,  # mesh.roll by phi_pinion
         mesh_2,  # mesh.pitch by x_rack
         -mesh_1,  # mesh.pitch by y_rack
-        mesh_2**2 + mesh_1**2 - ((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2),  # mesh.pitch by phi_rack
+        -((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2 - (mesh_2**2 + mesh_1**2)),  # mesh.pitch by phi_rack
         -mesh_2,  # mesh.pitch by x_pinion
         mesh_1,  # mesh.pitch by y_pinion
     )
@@ -153,28 +153,28 @@ def _gamma(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
+    mesh_d_dot_y = y_pinion_dot - y_rack_dot
+    mesh_2 = 0.2 * c_rack
+    mesh_3 = phi_rack_dot * mesh_2
+    mesh_d_dot_x = x_pinion_dot - x_rack_dot
+    mesh_5 = 0.2 * s_rack
+    mesh_6 = phi_rack_dot * mesh_5
     mesh_d_x = x_pinion - x_rack
     phi_rack_dot_sq = phi_rack_dot**2
-    mesh_3 = 0.2 * c_rack
-    mesh_4 = phi_rack_dot_sq * mesh_3
+    mesh_9 = phi_rack_dot_sq * mesh_2
     mesh_d_y = y_pinion - y_rack
-    mesh_6 = 0.2 * s_rack
-    mesh_7 = phi_rack_dot_sq * mesh_6
-    mesh_d_dot_y = y_pinion_dot - y_rack_dot
-    mesh_9 = phi_rack_dot * mesh_3
-    mesh_d_dot_x = x_pinion_dot - x_rack_dot
-    mesh_11 = phi_rack_dot * mesh_6
+    mesh_11 = phi_rack_dot_sq * mesh_5
     return (
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
         0,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        mesh_d_x * mesh_4 + mesh_d_y * mesh_7
-            - 2 * (mesh_d_dot_y * mesh_9 - mesh_d_dot_x * mesh_11),
-        -(mesh_4 * mesh_6 - mesh_7 * mesh_3
-                - 2 * ((mesh_d_dot_y + mesh_9) * mesh_11 + (mesh_d_dot_x - mesh_11) * mesh_9)
-                + ((mesh_d_x + mesh_3) * mesh_7 - (mesh_d_y + mesh_6) * mesh_4)),
+        -(2 * (mesh_d_dot_y * mesh_3 - mesh_d_dot_x * mesh_6)
+                - (mesh_d_x * mesh_9 + mesh_d_y * mesh_11)),
+        -(mesh_9 * mesh_5 - mesh_11 * mesh_2
+                - 2 * ((mesh_d_dot_y + mesh_3) * mesh_6 + (mesh_d_dot_x - mesh_6) * mesh_3)
+                + ((mesh_d_x + mesh_2) * mesh_11 - (mesh_d_y + mesh_5) * mesh_9)),
         # 4  AbsoluteAngle "guide": rack angle 0
         0,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -189,13 +189,13 @@ def _position(f, q, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
-    mesh_1 = 0.2 * R
     mesh_d_x = x_pinion - x_rack
-    mesh_3 = 0.2 * c_rack
+    mesh_2 = 0.2 * c_rack
     mesh_d_y = y_pinion - y_rack
-    mesh_5 = 0.2 * s_rack
-    mesh_d_y_ = mesh_d_y + mesh_5
-    mesh_d_x_ = mesh_d_x + mesh_3
+    mesh_4 = 0.2 * s_rack
+    mesh_5 = 0.2 * R
+    mesh_d_y_ = mesh_d_y + mesh_4
+    mesh_d_x_ = mesh_d_x + mesh_2
     return (
         # Phi
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
@@ -203,8 +203,8 @@ def _position(f, q, t, p):
         y_pinion,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5)),
-        mesh_d_y_ * mesh_3 - mesh_d_x_ * mesh_5 - mesh_1,
+        mesh_d_x * mesh_2 + mesh_d_y * mesh_4 - mesh_5 * (phi_rack - phi_pinion),
+        mesh_d_y_ * mesh_2 - mesh_d_x_ * mesh_4 - mesh_5,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -212,17 +212,17 @@ def _position(f, q, t, p):
         # Phi_q
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -mesh_3,  # mesh.roll by x_rack
-        -mesh_5,  # mesh.roll by y_rack
-        mesh_d_y * mesh_3 - mesh_d_x * mesh_5 - mesh_1,  # mesh.roll by phi_rack
-        mesh_3,  # mesh.roll by x_pinion
-        mesh_5,  # mesh.roll by y_pinion
-        mesh_1,  # mesh.roll by phi_pinion
-        mesh_5,  # mesh.pitch by x_rack
-        -mesh_3,  # mesh.pitch by y_rack
-        mesh_5**2 + mesh_3**2 - (mesh_d_x_ * mesh_3 + mesh_d_y_ * mesh_5),  # mesh.pitch by phi_rack
-        -mesh_5,  # mesh.pitch by x_pinion
-        mesh_3,  # mesh.pitch by y_pinion
+        -mesh_2,  # mesh.roll by x_rack
+        -mesh_4,  # mesh.roll by y_rack
+        mesh_d_y * mesh_2 - mesh_d_x * mesh_4 - mesh_5,  # mesh.roll by phi_rack
+        mesh_2,  # mesh.roll by x_pinion
+        mesh_4,  # mesh.roll by y_pinion
+        mesh_5,  # mesh.roll by phi_pinion
+        mesh_4,  # mesh.pitch by x_rack
+        -mesh_2,  # mesh.pitch by y_rack
+        -(mesh_d_x_ * mesh_2 + mesh_d_y_ * mesh_4 - (mesh_4**2 + mesh_2**2)),  # mesh.pitch by phi_rack
+        -mesh_4,  # mesh.pitch by x_pinion
+        mesh_2,  # mesh.pitch by y_pinion
     )
 
 
@@ -250,7 +250,7 @@ def _velocity(f, q, t, p):
         mesh_5,  # mesh.roll by phi_pinion
         mesh_2,  # mesh.pitch by x_rack
         -mesh_1,  # mesh.pitch by y_rack
-        mesh_2**2 + mesh_1**2 - ((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2),  # mesh.pitch by phi_rack
+        -((mesh_d_x + mesh_1) * mesh_1 + (mesh_d_y + mesh_2) * mesh_2 - (mesh_2**2 + mesh_1**2)),  # mesh.pitch by phi_rack
         -mesh_2,  # mesh.pitch by x_pinion
         mesh_1,  # mesh.pitch by y_pinion
         # nu
@@ -283,13 +283,13 @@ def _acceleration(f, q, q_dot, t, p):
     mesh_5 = 0.2 * R
     mesh_d_x_ = mesh_d_x + mesh_1
     mesh_d_y_ = mesh_d_y + mesh_2
-    phi_rack_dot_sq = phi_rack_dot**2
-    mesh_9 = phi_rack_dot_sq * mesh_1
-    mesh_10 = phi_rack_dot_sq * mesh_2
     mesh_d_dot_y = y_pinion_dot - y_rack_dot
-    mesh_12 = phi_rack_dot * mesh_1
+    mesh_9 = phi_rack_dot * mesh_1
     mesh_d_dot_x = x_pinion_dot - x_rack_dot
-    mesh_14 = phi_rack_dot * mesh_2
+    mesh_11 = phi_rack_dot * mesh_2
+    phi_rack_dot_sq = phi_rack_dot**2
+    mesh_13 = phi_rack_dot_sq * mesh_1
+    mesh_14 = phi_rack_dot_sq * mesh_2
     return (
         # Phi_q
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
@@ -302,7 +302,7 @@ def _acceleration(f, q, q_dot, t, p):
         mesh_5,  # mesh.roll by phi_pinion
         mesh_2,  # mesh.pitch by x_rack
         -mesh_1,  # mesh.pitch by y_rack
-        mesh_2**2 + mesh_1**2 - (mesh_d_x_ * mesh_1 + mesh_d_y_ * mesh_2),  # mesh.pitch by phi_rack
+        -(mesh_d_x_ * mesh_1 + mesh_d_y_ * mesh_2 - (mesh_2**2 + mesh_1**2)),  # mesh.pitch by phi_rack
         -mesh_2,  # mesh.pitch by x_pinion
         mesh_1,  # mesh.pitch by y_pinion
         # gamma
@@ -311,11 +311,11 @@ def _acceleration(f, q, q_dot, t, p):
         0,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        mesh_d_x * mesh_9 + mesh_d_y * mesh_10
-            - 2 * (mesh_d_dot_y * mesh_12 - mesh_d_dot_x * mesh_14),
-        -(mesh_9 * mesh_2 - mesh_10 * mesh_1
-                - 2 * ((mesh_d_dot_y + mesh_12) * mesh_14 + (mesh_d_dot_x - mesh_14) * mesh_12)
-                + (mesh_d_x_ * mesh_10 - mesh_d_y_ * mesh_9)),
+        -(2 * (mesh_d_dot_y * mesh_9 - mesh_d_dot_x * mesh_11)
+                - (mesh_d_x * mesh_13 + mesh_d_y * mesh_14)),
+        -(mesh_13 * mesh_2 - mesh_14 * mesh_1
+                - 2 * ((mesh_d_dot_y + mesh_9) * mesh_11 + (mesh_d_dot_x - mesh_11) * mesh_9)
+                + (mesh_d_x_ * mesh_14 - mesh_d_y_ * mesh_13)),
         # 4  AbsoluteAngle "guide": rack angle 0
         0,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -331,20 +331,20 @@ def _kinematics(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_rack, s_rack = cos_sin(phi_rack)
     # 2-3  RackAndPinion "mesh"
-    mesh_1 = 0.2 * R
     mesh_d_x = x_pinion - x_rack
-    mesh_3 = 0.2 * c_rack
+    mesh_2 = 0.2 * c_rack
     mesh_d_y = y_pinion - y_rack
-    mesh_5 = 0.2 * s_rack
-    mesh_d_y_ = mesh_d_y + mesh_5
-    mesh_d_x_ = mesh_d_x + mesh_3
-    phi_rack_dot_sq = phi_rack_dot**2
-    mesh_9 = phi_rack_dot_sq * mesh_3
-    mesh_10 = phi_rack_dot_sq * mesh_5
+    mesh_4 = 0.2 * s_rack
+    mesh_5 = 0.2 * R
+    mesh_d_y_ = mesh_d_y + mesh_4
+    mesh_d_x_ = mesh_d_x + mesh_2
     mesh_d_dot_y = y_pinion_dot - y_rack_dot
-    mesh_12 = phi_rack_dot * mesh_3
+    mesh_9 = phi_rack_dot * mesh_2
     mesh_d_dot_x = x_pinion_dot - x_rack_dot
-    mesh_14 = phi_rack_dot * mesh_5
+    mesh_11 = phi_rack_dot * mesh_4
+    phi_rack_dot_sq = phi_rack_dot**2
+    mesh_13 = phi_rack_dot_sq * mesh_2
+    mesh_14 = phi_rack_dot_sq * mesh_4
     # 5  AbsoluteAngle "motor"
     motor_1 = pi * t
     sin_motor_1 = sin(motor_1)
@@ -355,8 +355,8 @@ def _kinematics(f, q, q_dot, t, p):
         y_pinion,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -(mesh_1 * (phi_rack - phi_pinion) - (mesh_d_x * mesh_3 + mesh_d_y * mesh_5)),
-        mesh_d_y_ * mesh_3 - mesh_d_x_ * mesh_5 - mesh_1,
+        mesh_d_x * mesh_2 + mesh_d_y * mesh_4 - mesh_5 * (phi_rack - phi_pinion),
+        mesh_d_y_ * mesh_2 - mesh_d_x_ * mesh_4 - mesh_5,
         # 4  AbsoluteAngle "guide": rack angle 0
         phi_rack,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)
@@ -364,17 +364,17 @@ def _kinematics(f, q, q_dot, t, p):
         # Phi_q
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        -mesh_3,  # mesh.roll by x_rack
-        -mesh_5,  # mesh.roll by y_rack
-        mesh_d_y * mesh_3 - mesh_d_x * mesh_5 - mesh_1,  # mesh.roll by phi_rack
-        mesh_3,  # mesh.roll by x_pinion
-        mesh_5,  # mesh.roll by y_pinion
-        mesh_1,  # mesh.roll by phi_pinion
-        mesh_5,  # mesh.pitch by x_rack
-        -mesh_3,  # mesh.pitch by y_rack
-        mesh_5**2 + mesh_3**2 - (mesh_d_x_ * mesh_3 + mesh_d_y_ * mesh_5),  # mesh.pitch by phi_rack
-        -mesh_5,  # mesh.pitch by x_pinion
-        mesh_3,  # mesh.pitch by y_pinion
+        -mesh_2,  # mesh.roll by x_rack
+        -mesh_4,  # mesh.roll by y_rack
+        mesh_d_y * mesh_2 - mesh_d_x * mesh_4 - mesh_5,  # mesh.roll by phi_rack
+        mesh_2,  # mesh.roll by x_pinion
+        mesh_4,  # mesh.roll by y_pinion
+        mesh_5,  # mesh.roll by phi_pinion
+        mesh_4,  # mesh.pitch by x_rack
+        -mesh_2,  # mesh.pitch by y_rack
+        -(mesh_d_x_ * mesh_2 + mesh_d_y_ * mesh_4 - (mesh_4**2 + mesh_2**2)),  # mesh.pitch by phi_rack
+        -mesh_4,  # mesh.pitch by x_pinion
+        mesh_2,  # mesh.pitch by y_pinion
         # nu
         # 0-1  Revolute "bearing": pinion (0, 0) - ground (0, 0)
         0,
@@ -393,11 +393,11 @@ def _kinematics(f, q, q_dot, t, p):
         0,
         # 2-3  RackAndPinion "mesh": rack (-0.2, 0) (0, 0) theta_rack 0 - pinion (0, 0) radius R
         #      theta_pinion 3*pi/2
-        mesh_d_x * mesh_9 + mesh_d_y * mesh_10
-            - 2 * (mesh_d_dot_y * mesh_12 - mesh_d_dot_x * mesh_14),
-        -(mesh_9 * mesh_5 - mesh_10 * mesh_3
-                - 2 * ((mesh_d_dot_y + mesh_12) * mesh_14 + (mesh_d_dot_x - mesh_14) * mesh_12)
-                + (mesh_d_x_ * mesh_10 - mesh_d_y_ * mesh_9)),
+        -(2 * (mesh_d_dot_y * mesh_9 - mesh_d_dot_x * mesh_11)
+                - (mesh_d_x * mesh_13 + mesh_d_y * mesh_14)),
+        -(mesh_13 * mesh_4 - mesh_14 * mesh_2
+                - 2 * ((mesh_d_dot_y + mesh_9) * mesh_11 + (mesh_d_dot_x - mesh_11) * mesh_9)
+                + (mesh_d_x_ * mesh_14 - mesh_d_y_ * mesh_13)),
         # 4  AbsoluteAngle "guide": rack angle 0
         0,
         # 5  AbsoluteAngle "motor": pinion angle swing*sin(pi*t)

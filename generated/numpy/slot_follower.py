@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "slot_follower"
 FORMAT = 1
-FINGERPRINT = "367e36de90eba0a903b4b1f776fcce6a"
+FINGERPRINT = "2078c57d7cdee5b4001ac79029f642f7"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar, dataclass_transform
 
 import sympy
 
-from kincompile.calculus.symbols import Contact, Frame
 from kincompile.calculus.template import Template
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
+from kincompile.model.bodies import PLANAR, BodyKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from kincompile.calculus.expressions import Expression
+    from kincompile.calculus.symbols import Contact
 
     Numbers = Callable[[str], tuple[float | None, ...]]
     """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
@@ -41,6 +42,8 @@ class Constraint:
     """Where the textbook has it."""
     row_names: ClassVar[tuple[str, ...]] = ()
     """Names of the equations where there is more than one."""
+    bodies: ClassVar[BodyKind] = PLANAR
+    """The kind of bodies that it connects."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
     """Contact parameters: coordinates that the constraint brings along."""
     simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
@@ -79,9 +82,8 @@ class Constraint:
     @cache
     def template(cls) -> Template:
         """Return the template of this type, made once."""
-        frames = tuple(
-            Frame(item.symbol) for item in cls.arguments().values() if item.kind is Kind.BODY
-        )
+        bodies = [item.symbol for item in cls.arguments().values() if item.kind is Kind.BODY]
+        frames = tuple(cls.bodies.frame(symbol) for symbol in bodies)
         return Template(cls.__name__, frames, cls.contacts, cls.Phi())
 
     @property

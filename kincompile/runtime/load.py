@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from kincompile.errors import ContractError, InputError
 from kincompile.runtime.contract import REMEDY, check
 from kincompile.runtime.memory import empty
-from kincompile.runtime.results.display import module_html
+from kincompile.runtime.results.html import module_html
 
 if TYPE_CHECKING:
     import os

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.quantities import quantity_named
-from kincompile.targets.layout import labelled, table
+from kincompile.targets.lines import labelled, table
 
 if TYPE_CHECKING:
     from kincompile.ir.inline import Entry, InlineProgram, Section

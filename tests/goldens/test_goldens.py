@@ -17,7 +17,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compiler import TARGETS
+from kincompile.targets.registry import TARGETS
 
 ROOT = Path(__file__).resolve().parents[2]
 GENERATED = ROOT / "generated"

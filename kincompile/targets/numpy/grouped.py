@@ -14,16 +14,17 @@ from kincompile import quantities
 from kincompile.errors import UnsupportedError
 from kincompile.ir.inline import Entry, InlineProgram, Section
 from kincompile.quantities import FORMAT, kernels
-from kincompile.targets.functions import schedule
-from kincompile.targets.layout import indented, quoted, wrapped
+from kincompile.targets.evaluators import input_names, inputs_read, schedule
+from kincompile.targets.lines import indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
+from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.grouped_solve import (
     plan_solving,
     solving_arrays,
     solving_code,
     solving_table,
 )
-from kincompile.targets.numpy.module import (
+from kincompile.targets.numpy.target import (
     RESERVED,
     array_functions,
     function_body,
@@ -32,6 +33,7 @@ from kincompile.targets.numpy.module import (
     shared_text,
     tuple_text,
 )
+from kincompile.targets.printer import Printer
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 
@@ -148,7 +150,8 @@ def _group_code(
         listing = schedule(inline, computed, names, table)
         called |= set(listing.functions)
         read = [names[name] for name in item.inputs if name in listing.inputs]
-        body = function_body(inline, listing, style="plain")
+        printer = Printer(NUMPY, inline.nodes, listing.names)
+        body = function_body(inline, listing, printer, "plain")
         code += ["", "", f"def _{item.name}_{function}({', '.join(('f', *read))}):"]
         code += [f'    """{function} of {item.rows.size} constraints like "{item.sample.name}"."""']
         code += [f"    {line}" for line in body]
@@ -185,21 +188,15 @@ def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
     """Return the function of the values that depend on t, p and contact parameters."""
     program = grouped.program
     table = NameTable((*RESERVED, *program.tables))
-    coordinates = [item.name for item in program.coordinates]
-    parameters = [item.name for item in program.parameters]
-    names = {"t": "t", **{name: table.take(name) for name in (*parameters, *coordinates)}}
+    names = input_names(program, table)
     sample = program.instances[0]
     entries = tuple(Entry(k, 0, node) for k, node in enumerate(grouped.values))
     inline = InlineProgram(program, program.values, (Section(sample, "", {"values": entries}),), {})
     listing = schedule(inline, ("values",), names, table)
     called |= set(listing.functions)
-    unpack = [
-        f"{names[name]} = p[{k}]" for k, name in enumerate(parameters) if name in listing.inputs
-    ]
-    unpack += [
-        f"{names[name]} = q[{k}]" for k, name in enumerate(coordinates) if name in listing.inputs
-    ]
-    body = function_body(inline, listing, style="plain")
+    unpack = [f"{name} = {vector}[{k}]" for vector, k, name in inputs_read(program, listing)]
+    printer = Printer(NUMPY, inline.nodes, listing.names)
+    body = function_body(inline, listing, printer, "plain")
     return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
 
 
