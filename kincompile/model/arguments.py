@@ -108,9 +108,9 @@ def distance() -> Any:
     return _declared(Kind.DISTANCE, "C", f"C > 0 [length], {_DRIVEN}")
 
 
-def radius(symbol: str) -> Any:
-    """Declare the radius of a pitch circle."""
-    text = "Pitch radius [length], a number or an expression of parameters, not zero."
+def radius(symbol: str, what: str = "Pitch radius") -> Any:
+    """Declare a length that is not zero, fixed in its body: a radius, a semi-axis."""
+    text = f"{what} [length], a number or an expression of parameters, not zero."
     return _declared(Kind.RADIUS, symbol, text)
 
 
