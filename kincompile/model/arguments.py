@@ -18,14 +18,15 @@ import sympy
 from numpy.typing import NDArray
 
 from kincompile.model.bodies import GROUND, Body
+from kincompile.model.expressions import Scalar, Scalars
 
 BodyLike: TypeAlias = Body | str
 """A body or its name; `Mechanism.ground`, or ``"ground"``, is the fixed frame."""
 
-ValueLike: TypeAlias = float | sympy.Expr
+ValueLike: TypeAlias = Scalar
 """A number, or an expression of parameters; of `t` too, where it is the value of a driver."""
 
-PointLike: TypeAlias = Sequence[ValueLike] | NDArray[np.float64]
+PointLike: TypeAlias = Scalars
 """A pair (xi, eta)."""
 
 ProfileLike: TypeAlias = (

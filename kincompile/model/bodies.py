@@ -10,7 +10,9 @@ import sympy
 from kincompile.names import body_coordinates, rate
 
 if TYPE_CHECKING:
-    from kincompile.model.expressions import Scalar
+    from collections.abc import Sequence
+
+    from kincompile.model.expressions import Scalars
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +24,8 @@ class Body:
     """
 
     name: str
-    guess: tuple[Scalar, Scalar, Scalar] = (0, 0, 0)
-    outline: tuple[tuple[Scalar, Scalar], ...] = ()
+    guess: Scalars = (0, 0, 0)
+    outline: Sequence[Scalars] = ()
     is_ground: bool = field(default=False, kw_only=True)
 
     def _coordinate(self, index: int) -> sympy.Expr:

@@ -43,7 +43,7 @@ class Constraint:
     row_names: ClassVar[tuple[str, ...]] = ()
     """Names of the equations where there is more than one."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
-    """Contact parameters: coordinates that the constraint brings along."""
+    """Contact parameters: coordinates that belong to the constraint."""
     simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
     """Pairs: where this one of two equations depends on others, the type that keeps the other."""
     replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"

@@ -3,6 +3,7 @@
 import re
 import textwrap
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
 def test_that_the_joint_of_the_page_works():
-    names = {"__name__": "elliptic_slot"}
+    names: dict[str, Any] = {"__name__": "elliptic_slot"}
     (code,) = re.findall(r"^ *```python\n(.*?)^ *```", PAGE, re.MULTILINE | re.DOTALL)
     exec(textwrap.dedent(code), names)
     slot = names["EllipticSlot"]
