@@ -38,7 +38,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char inverted_slider_crank_fingerprint[] = "21a4f6133a501417c90e882101d84d6c";
+const char inverted_slider_crank_fingerprint[] = "cc6e4566f6d44daf153512b3f82c1d39";
 const double inverted_slider_crank_defaults[] = {
     0,
 };

@@ -38,7 +38,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char slot_follower_fingerprint[] = "6e1e26f39b987127200b8e8b72dd3127";
+const char slot_follower_fingerprint[] = "2078c57d7cdee5b4001ac79029f642f7";
 const double slot_follower_defaults[] = {
     0.05, 0.01, 0.085, 6.283185307179586,
 };

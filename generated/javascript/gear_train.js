@@ -23,7 +23,7 @@ const gear_train = (() => {
 
     const NAME = "gear_train";
     const FORMAT = 1;
-    const FINGERPRINT = "4a2cd9881a27e06446b7e4089f3548b7";
+    const FINGERPRINT = "40c55a3d90bf6516d6f5a2effd08e56f";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

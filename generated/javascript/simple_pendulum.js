@@ -17,7 +17,7 @@ const simple_pendulum = (() => {
 
     const NAME = "simple_pendulum";
     const FORMAT = 1;
-    const FINGERPRINT = "b15d21b3af8442402c20a2c9a3b07124";
+    const FINGERPRINT = "129ec6a71d99482b9bd6467d1f31e208";
     const N_COORDINATES = 3;
     const N_EQUATIONS = 3;
     const COORDINATES = [

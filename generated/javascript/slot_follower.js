@@ -21,7 +21,7 @@ const slot_follower = (() => {
 
     const NAME = "slot_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "6e1e26f39b987127200b8e8b72dd3127";
+    const FINGERPRINT = "2078c57d7cdee5b4001ac79029f642f7";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

@@ -28,7 +28,7 @@ const wrecker_boom = (() => {
 
     const NAME = "wrecker_boom";
     const FORMAT = 1;
-    const FINGERPRINT = "415d188a386864830f7d3b0a57941100";
+    const FINGERPRINT = "b567cc20bf36e08925ddd1e25a1b50b2";
     const N_COORDINATES = 15;
     const N_EQUATIONS = 15;
     const COORDINATES = [

@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "inverted_slider_crank"
 FORMAT = 1
-FINGERPRINT = "21a4f6133a501417c90e882101d84d6c"
+FINGERPRINT = "cc6e4566f6d44daf153512b3f82c1d39"
 N_COORDINATES = 9
 N_EQUATIONS = 9
 COORDINATES = (

@@ -25,7 +25,7 @@ import numpy as np
 
 NAME = "rack_and_pinion"
 FORMAT = 1
-FINGERPRINT = "5acad5b15e178c3db8b55081e6d076d8"
+FINGERPRINT = "4e5b72acd3f29228c4564add5537bb78"
 N_COORDINATES = 6
 N_EQUATIONS = 6
 COORDINATES = (

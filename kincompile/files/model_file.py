@@ -40,7 +40,7 @@ from kincompile.model.equation import Equation
 from kincompile.model.expressions import alpha, t
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.system import ConstraintSystem
-from kincompile.names import body_coordinates, listed, suggestion
+from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -221,11 +221,12 @@ class _ModelReader(FieldReader):
             self.problem((*address, "name"), f"{name!r} is the name {whose} already")
             return None
         self._bodies[name] = address
-        for coordinate in body_coordinates(name):
+        body = Body(name, (start[0], start[1], start[2]), outline)
+        for coordinate in body.coordinates:
             self._names[coordinate] = sympy.Symbol(coordinate)
             self.remember(f"guess of {coordinate}", (*address, "guess"))
         self.remember(f"outline of {name}", (*address, "outline"))
-        return Body(name, (start[0], start[1], start[2]), outline)
+        return body
 
     def _outline(
         self, given: Any, address: Address

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar, dataclass_transform
 
 import sympy
 
-from kincompile.calculus.symbols import Contact, Frame
 from kincompile.calculus.template import Template
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
-from kincompile.model.bodies import GROUND
+from kincompile.model.bodies import GROUND, PLANAR, BodyKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from kincompile.calculus.expressions import Expression
+    from kincompile.calculus.symbols import Contact
 
     Numbers = Callable[[str], tuple[float | None, ...]]
     """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
@@ -42,6 +42,8 @@ class Constraint:
     """Where the textbook has it."""
     row_names: ClassVar[tuple[str, ...]] = ()
     """Names of the equations where there is more than one."""
+    bodies: ClassVar[BodyKind] = PLANAR
+    """The kind of bodies that it connects."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
     """Contact parameters: coordinates that belong to the constraint."""
     simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
@@ -99,9 +101,8 @@ class Constraint:
     @cache
     def template(cls) -> Template:
         """Return the template of this type, made once."""
-        frames = tuple(
-            Frame(item.symbol) for item in cls.arguments().values() if item.kind is Kind.BODY
-        )
+        bodies = [item.symbol for item in cls.arguments().values() if item.kind is Kind.BODY]
+        frames = tuple(cls.bodies.frame(symbol) for symbol in bodies)
         return Template(cls.__name__, frames, cls.contacts, cls.Phi())
 
     @property

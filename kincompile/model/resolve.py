@@ -28,7 +28,7 @@ from kincompile.model.expressions import (
     unknown_problem,
 )
 from kincompile.model.spline import PeriodicSpline, fit
-from kincompile.names import body_coordinates, listed, suggestion
+from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -213,7 +213,7 @@ def _title(constraint: Constraint) -> str:
 
 
 def _columns(body: Body) -> tuple[str | None, ...]:
-    return (None, None, None) if body.is_ground else body_coordinates(body.name)
+    return (None,) * len(body.coordinates) if body.is_ground else body.coordinates
 
 
 def _body(given: Any, where: str, scope: Scope) -> Body | None:
