@@ -67,8 +67,9 @@ def entry_faults(
     right, wrong = values[:, :1], values[:, :1] - values[:, replaced] + values[:, len(parts) :]
     sizes = sizes[:, :1] + np.abs(values[:, replaced]) + sizes[:, len(parts) :]
     equal = np.all(agrees(wrong, sizes, right), axis=(0, 2))
-    for k in np.flatnonzero(~equal):
-        yield replace(faults[k], result={(row, column): wrong[:, k, 0]})
+    for k, fault in enumerate(faults):
+        if not equal[k]:
+            yield replace(fault, result={(row, column): wrong[:, k, 0]})
 
 
 def _faults_of_term(

@@ -53,28 +53,31 @@ from kincompile.compare.plain_text import described
 from kincompile.compare.vectors import Exchanged
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
 _MINUS_ONE = Number(Fraction(-1))
-_PARTNERS = {"s_i": "s_j", "s_j": "s_i", "s_P": "s_Q", "s_Q": "s_P", "v_i": "v_j", "v_j": "v_i"}
 
 
 @dataclass(frozen=True, slots=True)
 class Symbols:
-    """The names of a joint's angles and of its body-fixed vectors."""
+    """The names of a joint's angles and of its body-fixed vectors.
+
+    Attributes
+    ----------
+    angles, vectors
+        The names.
+    partners
+        The vector that each vector is easily mistaken for, by name.
+    """
 
     angles: frozenset[str]
     vectors: frozenset[str]
+    partners: Mapping[str, str]
 
     def other_angle(self, name: str) -> str | None:
         """Return the angle of the other body."""
         others = self.angles - {name} if name in self.angles else ()
         return next(iter(others), None)
-
-    def partner(self, name: str) -> str | None:
-        """Return the vector that a vector is easily mistaken for."""
-        partner = _PARTNERS.get(name)
-        return partner if partner in self.vectors else None
 
 
 def times(factor: Fraction | int, expression: Expression) -> Expression:
@@ -165,7 +168,7 @@ def swaps(node: Expression, symbols: Symbols) -> Iterator[Fault[Expression]]:
     if isinstance(node, VectorSymbol) and node.name in symbols.vectors:
         swapped = Exchanged(node.name, node.size)
         yield Fault(XI_ETA, f"xi and eta of {node.name} are swapped", swapped)
-        partner = symbols.partner(node.name)
+        partner = symbols.partners.get(node.name)
         if partner is not None:
             text = f"{partner} stands where {node.name} belongs"
             yield Fault(MIXED_POINTS, text, VectorSymbol(partner))

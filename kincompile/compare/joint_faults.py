@@ -98,7 +98,8 @@ class JointFaults:
         self._partials = partials(joint.template)
         self._expansion = numeric_expansion(joint, reference, states)
         angles = frozenset(frame.phi.name for frame in joint.template.frames)
-        self._symbols = Symbols(angles, frozenset(joint.points))
+        partners = joint.written.partners()
+        self._symbols = Symbols(angles, frozenset(joint.points), partners)
         self._parts = self._right_formulas()
         self._right = {place: self._values(place, item) for place, item in self._parts.items()}
 
@@ -245,7 +246,7 @@ def _exchanged_names(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
         return None
 
     def points(node: Expression) -> Expression | None:
-        if isinstance(node, VectorSymbol) and (partner := symbols.partner(node.name)):
+        if isinstance(node, VectorSymbol) and (partner := symbols.partners.get(node.name)):
             return VectorSymbol(partner)
         return None
 

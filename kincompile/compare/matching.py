@@ -187,7 +187,7 @@ class Matcher:
         Phi_q = np.zeros((len(states), len(block.rows), len(self._reference.coordinates)))
         for k, name in enumerate(other.columns):
             if name is not None:
-                Phi_q[:, :, self._reference.coordinates.index(name)] = found.Phi_q[:, :, k]
+                Phi_q[:, :, self._reference.coordinates.index(name)] = found["Phi_q"][:, :, k]
         return {**values, "Phi_q": Phi_q}
 
     def _usual_layout(self) -> Layout:
@@ -207,7 +207,7 @@ class Matcher:
         layouts = list(other_layouts(self._reference, usual, len(self._subject.rows)))
         values, _ = self._quantities["Phi_q"].evaluate(self._subject.states)
         written = _directions(np.nan_to_num(values))
-        Phi_q = self._reference.values(self._subject.states).Phi_q[:, list(self._subject.rows)]
+        Phi_q = self._reference.values(self._subject.states)["Phi_q"][:, list(self._subject.rows)]
         scores = []
         for layout in layouts:
             generated = layout.arranged(Phi_q)

@@ -16,6 +16,7 @@ from kincompile.calculus.expressions import VectorSymbol
 from kincompile.compare.reference import Values
 from kincompile.derive.derivation import derive
 from kincompile.model.matrices import SymbolicEnvironment
+from kincompile.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -108,15 +109,12 @@ def column_values(columns: Iterable[Expression], expansion: Expansion) -> Array:
 def joint_values(joint: Joint, reference: Reference, states: States) -> Values:
     """Evaluate a joint by itself."""
     expansion = numeric_expansion(joint, reference, states)
-    blocks = derive(joint.template)
-    Phi_q = [column_values(block.Phi_q, expansion) for block in blocks]
-    Phi, nu, gamma = (
-        np.concatenate(
-            [component_values(getattr(block, name), expansion) for block in blocks], axis=-1
-        )
-        for name in ("Phi", "nu", "gamma")
-    )
-    return Values(Phi, np.concatenate(Phi_q, axis=1), nu, gamma)
+    arrays = {}
+    for quantity in QUANTITIES:
+        formulas = [getattr(block, quantity.name) for block in derive(joint.template)]
+        values = column_values if quantity.is_matrix else component_values
+        arrays[quantity.name] = np.concatenate([values(item, expansion) for item in formulas], 1)
+    return Values(arrays)
 
 
 def with_roles_exchanged(joint: Joint) -> Joint | None:
