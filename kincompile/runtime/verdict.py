@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.engine import Array, Point
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.march import Outcome
-    from kincompile.runtime.problem import Point, Vector
     from kincompile.runtime.singular.events import Event
 
 NAMED_EQUATIONS = 3
@@ -44,7 +44,7 @@ MET = 1e-9
 def verdict(
     inputs: Inputs,
     status: NDArray[np.int64],
-    residual: Vector,
+    residual: Array,
     outcome: Outcome,
     events: Sequence[Event],
 ) -> str:
@@ -132,7 +132,7 @@ def _unmet(module: ModuleType, point: Point) -> str:
     )
 
 
-def _places(module: ModuleType, q: Vector) -> Iterator[str]:
+def _places(module: ModuleType, q: Array) -> Iterator[str]:
     """Yield where each body is, and the values of coordinates that belong to none."""
     values = dict(zip(module.COORDINATES, q.tolist(), strict=True))
     for owner in dict.fromkeys(owner_of_coordinates(module.COORDINATES).values()):
