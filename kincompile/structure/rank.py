@@ -14,8 +14,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, eye_array
-from scipy.sparse.linalg import splu
 
 from kincompile.criteria import ASSEMBLED, size_of
 from kincompile.errors import InputError
@@ -261,6 +259,8 @@ def _damped(matrix: Array, Phi: Array, damping: float) -> Array:
     if n <= SMALL:
         normal = matrix.T @ matrix + damping * np.eye(n)
         return np.asarray(np.linalg.solve(normal, matrix.T @ Phi), dtype=np.float64)
+    from scipy.sparse import csc_array, eye_array
+    from scipy.sparse.linalg import splu
 
     sparse = csc_array(matrix)
     factors = splu(csc_array(sparse.T @ sparse + damping * eye_array(n)))
