@@ -13,7 +13,7 @@ from kincompile.ir.lower import lower
 from kincompile.runtime.engine import stages as staged
 from kincompile.runtime.engine.code import code_of
 from kincompile.structure import stages
-from kincompile.structure.stages import Chain, Lanes, Sparse, plan_stages
+from kincompile.structure.stages import Batch, Chain, Sparse, plan_stages
 
 FUNCTIONS = ("Phi", "Phi_q", "nu", "Phi_q_nonzeros")
 
@@ -318,16 +318,16 @@ def stages_of(link, count=12):
 
 def test_independent_loops_are_solved_side_by_side():
     found = stages_of("angle")
-    widest = max(stage.rows.shape[1] for stage in found if isinstance(stage, Lanes))
+    widest = max(stage.rows.shape[1] for stage in found if isinstance(stage, Batch))
     assert widest >= 12
-    assert {type(stage) for stage in found} == {Lanes, Chain}  # the cranks hang together
+    assert {type(stage) for stage in found} == {Batch, Chain}  # the cranks hang together
 
 
 def test_a_chain_of_loops_hands_on_few_numbers():
     chains = [stage for stage in stages_of("rocker") if isinstance(stage, Chain)]
     assert len(chains) == 1
-    assert sum(part.rows.size for part in chains[0].parts) > 9 * 10
-    assert chains[0].links.size <= 5 * 12
+    assert sum(part.rows.size for part in chains[0].batches) > 9 * 10
+    assert chains[0].interface.size <= 5 * 12
 
 
 def test_a_large_block_is_left_to_a_sparse_factorization():
