@@ -1,4 +1,4 @@
-"""Where the emitted module computes each number: read off its syntax tree, in order of emission."""
+"""The lines of the emitted module that compute each entry, found in its syntax tree."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
     from kincompile.ir.inline import Entry, InlineProgram
 
-Place = tuple[str, int, int]
+EntryKey = tuple[str, int, int]
 """A quantity, a row and a column; the column of a vector is 0."""
 
 
-def emitted_lines(code: InlineProgram, source: str) -> dict[Place, SourceLine]:
+def emitted_lines(code: InlineProgram, source: str) -> dict[EntryKey, SourceLine]:
     """Return the lines of the emitted module that compute each entry of Phi, Phi_q, nu and gamma.
 
-    Entries whose line cannot be told, in code that treats many constraints at once, are absent.
+    Entries without a line of their own, in code that treats many constraints at once, are absent.
     """
     tree = ast.parse(source)
     lines = source.splitlines()
     functions = {item.name: item for item in tree.body if isinstance(item, ast.FunctionDef)}
-    found: dict[Place, SourceLine] = {}
+    found: dict[EntryKey, SourceLine] = {}
     for quantity in ("Phi", "Phi_q", "nu", "gamma"):
         entries = [entry for section in code.sections for entry in section.entries[quantity]]
         if quantity == "Phi_q":
@@ -39,7 +39,7 @@ def emitted_lines(code: InlineProgram, source: str) -> dict[Place, SourceLine]:
 
 def _lines(
     quantity: str, function: ast.FunctionDef, entries: Sequence[Entry], lines: Sequence[str]
-) -> dict[Place, SourceLine]:
+) -> dict[EntryKey, SourceLine]:
     returned = function.body[-1]
     if not (isinstance(returned, ast.Return) and isinstance(returned.value, ast.Tuple)):
         return {}
@@ -86,8 +86,8 @@ def _text(node: ast.stmt | ast.expr, lines: Sequence[str]) -> str:
     return " ".join(line.strip() for line in lines[node.lineno - 1 : last])
 
 
-def _constant_lines(tree: ast.Module, entries: Sequence[Entry]) -> dict[Place, SourceLine]:
-    """Return where the constant entries of Phi_q stand: the numbers of `_CONSTANTS`."""
+def _constant_lines(tree: ast.Module, entries: Sequence[Entry]) -> dict[EntryKey, SourceLine]:
+    """Return the lines of the constant entries of Phi_q: the numbers of `_CONSTANTS`."""
     for node in tree.body:
         match node:
             case ast.Assign([ast.Name("_CONSTANTS")], ast.Call(args=[ast.Tuple(numbers)])):

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.derivation.derivation_page import table
-from kincompile.derivation.document import Display, Math, Section, Verbatim, text
+from kincompile.derivation.document import Display, Math, Section, Verbatim, table, text
 from kincompile.derivation.formulas import GAMMA_TERMS, PHI_T, VELOCITY_TERM, Equated, Partial, Row
 from kincompile.derivation.rows_steps import (
     expansion_step,
@@ -21,15 +20,15 @@ from kincompile.derive.equations import derive_equation
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.derivation.derivation_page import Page
     from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.derivation.evaluation import Evaluation
     from kincompile.derivation.formulas import Formula
     from kincompile.derive.equations import EquationDerivatives
     from kincompile.ir.inline import Section as Rows
     from kincompile.model.resolve import FreeEquation
 
 
-def equation_section(page: Page, equation: FreeEquation, rows: Rows) -> Section:
+def equation_section(evaluation: Evaluation, equation: FreeEquation, rows: Rows) -> Section:
     """Return the derivation of a free equation."""
     name = equation.name
     found = [derive_equation(item, equation.columns) for item in equation.expressions]
@@ -40,21 +39,21 @@ def equation_section(page: Page, equation: FreeEquation, rows: Rows) -> Section:
         (kind, Verbatim(name)),
         (),
         (
-            _coordinates_step(page, equation),
-            _constraint_step(page, name, found, first),
-            _rules_step(page, equation, found, first),
-            _rows_step(page, equation, found, first),
-            _nu_step(page, name, found, first),
-            _gamma_step(page, name, found, first),
-            expansion_step(page, name, rows),
-            placement_step(page, name, rows),
-            _numbers_step(page, equation, rows),
+            _coordinates_step(evaluation, equation),
+            _constraint_step(evaluation, name, found, first),
+            _rules_step(evaluation, equation, found, first),
+            _rows_step(evaluation, equation, found, first),
+            _nu_step(evaluation, name, found, first),
+            _gamma_step(evaluation, name, found, first),
+            expansion_step(evaluation, name, rows),
+            placement_step(evaluation, name, rows),
+            _numbers_step(evaluation, equation, rows),
         ),
     )
 
 
-def _coordinates_step(page: Page, equation: FreeEquation) -> Section:
-    parameters = {item.name for item in page.system.parameters}
+def _coordinates_step(evaluation: Evaluation, equation: FreeEquation) -> Section:
+    parameters = {item.name for item in evaluation.system.parameters}
     occurring = {str(symbol) for item in equation.expressions for symbol in item.free_symbols}
     names: list[Run] = []
     for name in (*equation.columns, *sorted(parameters & occurring)):
@@ -64,22 +63,22 @@ def _coordinates_step(page: Page, equation: FreeEquation) -> Section:
 
 
 def _constraint_step(
-    page: Page, name: str, found: list[EquationDerivatives], first: int
+    evaluation: Evaluation, name: str, found: list[EquationDerivatives], first: int
 ) -> Section:
     lines = [
-        Display(Equated((page.symbol("Phi", first + k), item.Phi, sympy.Integer(0))))
+        Display(Equated((evaluation.symbol("Phi", first + k), item.Phi, sympy.Integer(0))))
         for k, item in enumerate(found)
     ]
     return step(name, 2, "The constraint", "expanded", *lines)
 
 
 def _rules_step(
-    page: Page, equation: FreeEquation, found: list[EquationDerivatives], first: int
+    evaluation: Evaluation, equation: FreeEquation, found: list[EquationDerivatives], first: int
 ) -> Section:
     rows: list[tuple[Run | Runs, ...]] = []
     for k, item in enumerate(found):
         for name in equation.columns:
-            label = Math(Partial(page.symbol("Phi", first + k), sympy.Symbol(name)))
+            label = Math(Partial(evaluation.symbol("Phi", first + k), sympy.Symbol(name)))
             rows += [(label, *line) for line in _term_lines(item.Phi, name)]
     note = text("The sum rule first: each term by itself, with the product and chain rule in it.")
     header = ("derivative", "of the term", "gives")
@@ -94,42 +93,46 @@ def _term_lines(expression: sympy.Expr, name: str) -> Iterator[tuple[Run, Run]]:
 
 
 def _rows_step(
-    page: Page, equation: FreeEquation, found: list[EquationDerivatives], first: int
+    evaluation: Evaluation, equation: FreeEquation, found: list[EquationDerivatives], first: int
 ) -> Section:
     blocks: list[Block] = []
     for k, item in enumerate(found):
         for name, entry in zip(equation.columns, item.Phi_q, strict=True):
-            symbol = Partial(page.symbol("Phi", first + k), sympy.Symbol(name))
+            symbol = Partial(evaluation.symbol("Phi", first + k), sympy.Symbol(name))
             blocks.append(Display(Equated((symbol, entry))))
     return step(equation.name, 4, "The rows of the Jacobian", "expanded", *blocks)
 
 
-def _nu_step(page: Page, name: str, found: list[EquationDerivatives], first: int) -> Section:
+def _nu_step(
+    evaluation: Evaluation, name: str, found: list[EquationDerivatives], first: int
+) -> Section:
     lines = [
-        Display(Equated((page.symbol("nu", first + k), Row(("-", PHI_T)), item.nu)))
+        Display(Equated((evaluation.symbol("nu", first + k), Row(("-", PHI_T)), item.nu)))
         for k, item in enumerate(found)
     ]
     return step(name, 5, "The right side of the velocity equation", "expanded", *lines)
 
 
-def _gamma_step(page: Page, name: str, found: list[EquationDerivatives], first: int) -> Section:
+def _gamma_step(
+    evaluation: Evaluation, name: str, found: list[EquationDerivatives], first: int
+) -> Section:
     blocks: list[Block] = []
     for k, item in enumerate(found):
         terms: list[tuple[Formula, Formula]] = [(VELOCITY_TERM, item.velocity)]
         terms += zip(GAMMA_TERMS, item.gamma_terms, strict=True)
-        terms.append((page.symbol("gamma", first + k), item.gamma))
+        terms.append((evaluation.symbol("gamma", first + k), item.gamma))
         blocks += [Display(Equated(pair)) for pair in terms]
     title = "The right side of the acceleration equation, term by term"
     return step(name, 6, title, "expanded", *blocks)
 
 
-def _numbers_step(page: Page, equation: FreeEquation, rows: Rows) -> Section:
+def _numbers_step(evaluation: Evaluation, equation: FreeEquation, rows: Rows) -> Section:
     return step(
         equation.name,
         9,
         "In numbers",
         "numeric",
-        text(f"At {page.situation.origin}:"),
-        state_table(page, list(equation.columns)),
-        *result_blocks(page, equation.name, rows),
+        text(f"At {evaluation.origin}:"),
+        state_table(evaluation, list(equation.columns)),
+        *result_blocks(evaluation, equation.name, rows),
     )

@@ -18,8 +18,8 @@ from kincompile.model.matrices import SymbolicEnvironment
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from kincompile.derivation.derivation_page import Page
     from kincompile.derivation.document import Block, Run
+    from kincompile.derivation.evaluation import Evaluation
     from kincompile.derivation.formulas import Formula
     from kincompile.ir.inline import Section as Rows
     from kincompile.model.resolve import Joint
@@ -36,18 +36,18 @@ def values_of(joint: Joint, symbol: str, values: Mapping[str, float]) -> Run:
     return ""
 
 
-def numbers_step(page: Page, joint: Joint, rows: Rows) -> Section:
+def numbers_step(evaluation: Evaluation, joint: Joint, rows: Rows) -> Section:
     """Return the step in numbers, at the chosen state."""
-    shown: list[Block] = [text(f"At {page.situation.origin}:")]
-    shown.append(state_table(page, [name for name in joint.columns if name is not None]))
-    shown += _matrices(page, joint)
-    shown += _vectors(page, joint)
-    shown += result_blocks(page, joint.name, rows)
+    shown: list[Block] = [text(f"At {evaluation.origin}:")]
+    shown.append(state_table(evaluation, [name for name in joint.columns if name is not None]))
+    shown += _matrices(evaluation, joint)
+    shown += _vectors(evaluation, joint)
+    shown += result_blocks(evaluation, joint.name, rows)
     return step(joint.name, 9, "In numbers", "numeric", *shown)
 
 
-def _matrices(page: Page, joint: Joint) -> Iterator[Block]:
-    values = page.situation.values
+def _matrices(evaluation: Evaluation, joint: Joint) -> Iterator[Block]:
+    values = evaluation.values
     for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
         angle = evaluate(body.phi, values) or 0.0
         c, s = np.cos(angle), np.sin(angle)
@@ -57,9 +57,9 @@ def _matrices(page: Page, joint: Joint) -> Iterator[Block]:
         yield Display(Equated((Glyph("B", frame.index), derivative)))
 
 
-def _vectors(page: Page, joint: Joint) -> Iterator[Block]:
+def _vectors(evaluation: Evaluation, joint: Joint) -> Iterator[Block]:
     expansion = Expansion(SymbolicEnvironment(joint))
-    values = page.situation.values
+    values = evaluation.values
     named: list[tuple[Formula, Vector]] = [(item, item) for item in known_vectors(joint.template)]
     for item, glyph in abbreviations(joint.template).items():
         if isinstance(item, Vector):

@@ -9,8 +9,7 @@ import sympy
 
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
-from kincompile.derivation.derivation_page import table
-from kincompile.derivation.document import Display, Math, Section, Text, Verbatim, text
+from kincompile.derivation.document import Display, Math, Section, Text, Verbatim, table, text
 from kincompile.derivation.formulas import (
     GAMMA_TERMS,
     PHI_T,
@@ -43,8 +42,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from kincompile.calculus.expressions import Expression
-    from kincompile.derivation.derivation_page import Page
     from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.derivation.evaluation import Evaluation
     from kincompile.derivation.formulas import Formula
     from kincompile.derive.derivation import RowBlock
     from kincompile.derive.rules import Step
@@ -56,7 +55,7 @@ if TYPE_CHECKING:
 class _JointPage:
     """A joint, its derivation, and the page it is on."""
 
-    page: Page
+    evaluation: Evaluation
     joint: Joint
     rows: Rows
     blocks: tuple[RowBlock, ...]
@@ -72,9 +71,9 @@ class _JointPage:
         return Glyph(letter, index, exponent=self.name)
 
 
-def joint_section(page: Page, joint: Joint, rows: Rows) -> Section:
+def joint_section(evaluation: Evaluation, joint: Joint, rows: Rows) -> Section:
     """Return the derivation of a joint: nine steps, each in its place."""
-    on_page = _JointPage(page, joint, rows, derive(joint.template))
+    on_page = _JointPage(evaluation, joint, rows, derive(joint.template))
     kind = f"{joint.template.type_name} (driver)" if joint.is_driver else joint.template.type_name
     return Section(
         f"constraint-{joint.name}",
@@ -87,9 +86,9 @@ def joint_section(page: Page, joint: Joint, rows: Rows) -> Section:
             _blocks_step(on_page),
             _nu_step(on_page),
             _gamma_step(on_page),
-            expansion_step(page, joint.name, rows),
-            placement_step(page, joint.name, rows),
-            numbers_step(page, joint, rows),
+            expansion_step(evaluation, joint.name, rows),
+            placement_step(evaluation, joint.name, rows),
+            numbers_step(evaluation, joint, rows),
         ),
     )
 
@@ -99,7 +98,7 @@ def _attributes_step(on_page: _JointPage) -> Section:
     written = type(joint.written)
     meaning = (written.__doc__ or "").strip().splitlines()[0]
     rows: list[tuple[Run | Runs, ...]] = []
-    values = on_page.page.situation.values
+    values = on_page.evaluation.values
     for name, argument in written.arguments().items():
         symbol = _attribute_symbol(argument.symbol, argument.kind)
         if argument.kind is Kind.BODY:

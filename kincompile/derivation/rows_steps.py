@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.derivation.derivation_page import counted, row_range, table
-from kincompile.derivation.document import Code, Display, Math, Section, Verbatim, text
+from kincompile.derivation.document import (
+    Code,
+    Display,
+    Math,
+    Section,
+    Verbatim,
+    row_range,
+    table,
+    text,
+)
 from kincompile.derivation.formulas import Decimal, Equated, Glyph, decimals
+from kincompile.tables import counted
 
 if TYPE_CHECKING:
-    from kincompile.derivation.derivation_page import Page
     from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.derivation.evaluation import Evaluation
     from kincompile.ir.inline import Section as Rows
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
@@ -21,17 +30,17 @@ def step(name: str, number: int, title: str, level: str, *blocks: Block) -> Sect
     return Section(f"{name}-step-{number}", (f"{number}. {title}",), blocks, (), level)
 
 
-def expansion_step(page: Page, name: str, rows: Rows) -> Section:
+def expansion_step(evaluation: Evaluation, name: str, rows: Rows) -> Section:
     """Return the step in which everything becomes sines and cosines: the emitted code."""
     note = text(
         "This is what the emitted module computes, with its intermediate values written out. "
         "Entries of the Jacobian that are not listed are zero."
     )
-    lines = page.expansion(rows, QUANTITIES)
+    lines = evaluation.expansion(rows, QUANTITIES)
     return step(name, 7, "Expanded to sines and cosines", "expanded", note, *lines)
 
 
-def placement_step(page: Page, name: str, rows: Rows) -> Section:
+def placement_step(evaluation: Evaluation, name: str, rows: Rows) -> Section:
     """Return the step that says where the rows and columns of a constraint are."""
     first, count = rows.instance.first_row, len(rows.entries["Phi"])
     note = text(
@@ -41,22 +50,22 @@ def placement_step(page: Page, name: str, rows: Rows) -> Section:
     )
     lines: list[tuple[Run | Runs, ...]] = []
     for column in sorted({entry.column for entry in rows.entries["Phi_q"]}):
-        lines.append((Verbatim(page.coordinates[column]), str(column), str(column + 1)))
+        lines.append((Verbatim(evaluation.coordinates[column]), str(column), str(column + 1)))
     header = ("coordinate", "column from 0", "from 1")
     return step(
         name, 8, "Placement by row and column offset", "expanded", note, table(header, lines)
     )
 
 
-def result_blocks(page: Page, name: str, rows: Rows) -> tuple[Block, ...]:
+def result_blocks(evaluation: Evaluation, name: str, rows: Rows) -> tuple[Block, ...]:
     """Return the numbers of a constraint's rows: Phi, its columns of Phi_q, nu and gamma."""
     first, count = rows.instance.first_row, len(rows.entries["Phi"])
     chosen = slice(first, first + count)
     columns = sorted({entry.column for entry in rows.entries["Phi_q"]})
-    shown = page.shown
+    shown = evaluation.shown
     names: list[Run] = []
     for column in columns:
-        names += [", " if names else "", Verbatim(page.coordinates[column])]
+        names += [", " if names else "", Verbatim(evaluation.coordinates[column])]
     return (
         Display(Equated((Glyph("Phi", exponent=name), decimals(shown["Phi"][chosen])))),
         text("In the columns of ", *names, ":"),
@@ -71,11 +80,11 @@ def result_blocks(page: Page, name: str, rows: Rows) -> tuple[Block, ...]:
     )
 
 
-def state_table(page: Page, names: list[str]) -> Block:
+def state_table(evaluation: Evaluation, names: list[str]) -> Block:
     """Return coordinates and rates at the chosen state."""
     rows: list[tuple[Run | Runs, ...]] = []
     for name in names:
-        column = page.coordinates.index(name)
-        numbers = (Math(Decimal(page.shown[key][column])) for key in ("q", "q_dot"))
+        column = evaluation.coordinates.index(name)
+        numbers = (Math(Decimal(evaluation.shown[key][column])) for key in ("q", "q_dot"))
         rows.append((Verbatim(name), *numbers))
     return table(("coordinate", "value", "rate"), rows)
