@@ -117,11 +117,7 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
         return self._row([*minus, self._numeral(str(abs(expr)))])
 
     def _print_Function(self, expr: Any) -> Element:
-        parts: list[Element] = []
-        for k, item in enumerate(expr.args):
-            parts += [self._operator(",")] if k else []
-            parts.append(self._print(item))
-        return self._row([self._function(expr.func.__name__), self._fenced(self._row(parts))])
+        return self._row([self._function(expr.func.__name__), self._listed(expr.args)])
 
     def _print_exp(self, expr: Any) -> Element:
         return self._scripts(self._print_Exp1(expr), None, self._print(expr.args[0]))
@@ -129,13 +125,6 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
     def _print_Exp1(self, expr: Any) -> Element:
         del expr
         return self._element("mi", "e", class_="u", mathvariant="normal")
-
-    def _print_PeriodicSpline(self, expr: Any) -> Element:
-        name = self._letter(expr.table_name)
-        primes = self._operator("\N{PRIME}" * expr.order) if expr.order else None
-        return self._row(
-            [self._scripts(name, None, primes), self._fenced(self._print(expr.args[0]))]
-        )
 
 
 def _xml(element: Element) -> str:

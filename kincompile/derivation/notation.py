@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
 Printed = Any
-"""What a language makes of a formula: text, or an element of a document."""
+"""A printed formula: text, or an element of a document."""
 
 GREEK = frozenset(
     (
@@ -64,7 +64,7 @@ _NAME = re.compile(r"([A-Za-z]+?)(\d*)(?:_(\w+))?")
 _RATE = re.compile(r"(\w+?)_(d+)ot")
 CONNECTIVES = {"&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}"}
 LONGEST_NUMERATOR = 24
-"""Nodes above a fraction bar: within a fraction no line can be broken."""
+"""Most nodes above a fraction bar, since no line can be broken within a fraction."""
 
 _BODY_FIXED = ("s", "v")
 
@@ -164,9 +164,7 @@ class Notation:
 
     def _print_Profile(self, expr: Profile) -> Printed:
         letter, index, _ = split_name(expr.name)
-        primes = self._operator("\N{PRIME}" * expr.order) if expr.order else None
-        base = self._letter(letter)
-        return self._scripts(base, self._index_text(index), primes)
+        return self._primed(self._letter(letter), self._index_text(index), expr.order)
 
     def _print_Pi(self, expr: Any) -> Printed:
         del expr
@@ -256,8 +254,7 @@ class Notation:
     def _print_Sum(self, expr: Any) -> Printed:
         return self._sum(expr.terms)
 
-    def _print_VectorSum(self, expr: VectorSum) -> Printed:
-        return self._sum(expr.terms)
+    _print_VectorSum = _print_Sum
 
     def _sum(self, terms: Sequence[Any]) -> Printed:
         if not terms:
@@ -285,7 +282,7 @@ class Notation:
         return self._product((*factors, expr.vector))
 
     def _product(self, factors: Sequence[Any]) -> Printed:
-        """Return a product: numbers in front, rates behind, reciprocals below the line."""
+        """Return a product: numbers first, rates last, reciprocals below the fraction bar."""
         below = [item.base for item in factors if _is_reciprocal(item)]
         above = [item for item in factors if not _is_reciprocal(item)]
         above.sort(key=_place)
@@ -333,11 +330,24 @@ class Notation:
         simple = len(expr.arguments) == 1 and isinstance(expr.arguments[0], Symbol)
         if simple and expr.function in ("sin", "cos", "tan"):
             return self._print(expr.arguments[0])
-        parts: list[Printed] = []
-        for k, item in enumerate(expr.arguments):
-            parts += [self._operator(",")] if k else []
-            parts.append(self._print(item))
-        return self._fenced(self._row(parts))
+        return self._listed(expr.arguments)
+
+    def _listed(self, items: Sequence[Any]) -> Printed:
+        """Return things in brackets, with commas between them."""
+        return self._fenced(self._joined(",", items))
+
+    def _joined(self, operator: str, items: Sequence[Any]) -> Printed:
+        """Return things side by side, with an operator between them."""
+        parts = [part for item in items for part in (self._operator(operator), self._print(item))]
+        return self._row(parts[1:])
+
+    def _print_PeriodicSpline(self, expr: Any) -> Printed:
+        name = self._letter(expr.table_name)
+        return self._row([self._primed(name, None, expr.order), self._listed(expr.args[:1])])
+
+    def _primed(self, base: Printed, index: Printed | None, order: int) -> Printed:
+        """Return something with as many primes as it is differentiated."""
+        return self._scripts(base, index, self._operator("\N{PRIME}" * order) if order else None)
 
     def _print_Choice(self, expr: Choice) -> Printed:
         rows = [
@@ -375,22 +385,16 @@ class Notation:
         return self._scripts(self._print(expr.base), index, None)
 
     def _print_Partial(self, expr: Partial) -> Printed:
-        parts = (
-            [self._sign(expr.sign), self._print(item)]
-            for item in (expr.numerator, expr.denominator)
+        top = self._row([self._sign(expr.sign), self._print(expr.numerator)])
+        return self._fraction(
+            top, self._row([self._sign(expr.sign), self._print(expr.denominator)])
         )
-        top, bottom = (self._row(part) for part in parts)
-        return self._fraction(top, bottom)
 
     def _sign(self, sign: str) -> Printed:
         return self._letter("d") if sign == "d" else self._operator(sign)
 
     def _print_Equated(self, expr: Equated) -> Printed:
-        parts: list[Printed] = []
-        for k, part in enumerate(expr.parts):
-            parts += [self._operator("=")] if k else []
-            parts.append(self._print(part))
-        return self._row(parts)
+        return self._joined("=", expr.parts)
 
     def pieces(self, formula: Any) -> list[Printed]:
         """Return a formula in pieces between which a line may be broken: at = and at + and -."""

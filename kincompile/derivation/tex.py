@@ -113,10 +113,3 @@ class TexPrinter(Notation, LatexPrinter):
 
     def _print_Integer(self, expr: Any) -> str:
         return str(expr)
-
-    def _print_PeriodicSpline(self, expr: Any) -> str:
-        name = self._letter(expr.table_name)
-        primes = self._operator("\N{PRIME}" * expr.order) if expr.order else None
-        return self._row(
-            [self._scripts(name, None, primes), self._fenced(self._print(expr.args[0]))]
-        )
