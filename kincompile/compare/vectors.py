@@ -135,7 +135,7 @@ def with_roles_exchanged(joint: Joint) -> Joint | None:
         return None
     if any(name in joint.points for name in ("s_P", "s_Q")):
         return None
-    width = 3
+    width = sum(item.size for item in joint.template.frames[0].coordinates)
     bodies, contacts = joint.columns[: 2 * width], joint.columns[2 * width :]
     return replace(
         joint,

@@ -95,6 +95,7 @@ def _math(value: float, digits: int = 6) -> Math:
 
 
 def _offsets(evaluation: Evaluation) -> Section:
+    system = evaluation.system
     rows: Rows = []
     for item, first in zip(
         evaluation.system.constraints, evaluation.system.row_offsets, strict=True
@@ -109,8 +110,8 @@ def _offsets(evaluation: Evaluation) -> Section:
     )
     header = ("constraint", "equations", "row offset", "rows from 0", "first row from 1")
     columns: Rows = [
-        (Verbatim(body.name), str(3 * k), row_range(3 * k, 3))
-        for k, body in enumerate(evaluation.system.bodies)
+        (Verbatim(body.name), str(own[0]), row_range(own[0], len(own)))
+        for body, own in zip(system.bodies, system.body_columns, strict=True)
     ]
     blocks: list[Block] = [note, table(header, rows)]
     if columns:

@@ -18,12 +18,14 @@ from kincompile.calculus.expressions import (
     VectorSymbol,
 )
 from kincompile.derive.derivation import derive
-from kincompile.derive.equations import derive_equation
+from kincompile.ir.differentiate import negated_tangents, tangents
 from kincompile.ir.from_sympy import Converter
-from kincompile.ir.graph import Graph
+from kincompile.ir.graph import Graph, pruned
 from kincompile.ir.program import Kernel
+from kincompile.names import rate
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from fractions import Fraction
 
     from kincompile.calculus.expressions import Components, Profile, Rotation, TimeFunction, Value
@@ -112,29 +114,27 @@ def constraint_kernel(template: Template) -> Kernel:
     """Return the kernel of a constraint type."""
     environment = KernelEnvironment(template)
     expansion = Expansion(environment)
-    Phi: list[int] = []
-    nu: list[int] = []
-    gamma: list[int] = []
-    entries: list[tuple[int, int, int]] = []
+    outputs: dict[str, list[tuple[int, int, int]]] = {}
+    first = 0
     for block in derive(template):
         columns = [expansion.components(column) for column in block.Phi_q]
-        entries += [
-            (len(Phi) + row, column, item.node)
+        outputs.setdefault("Phi_q", []).extend(
+            (first + row, column, item.node)
             for column, items in enumerate(columns)
             for row, item in enumerate(items)
             if environment.graph.value_of(item.node) != 0
-        ]
-        Phi += [item.node for item in expansion.components(block.Phi)]
-        nu += [item.node for item in expansion.components(block.nu)]
-        gamma += [item.node for item in expansion.components(block.gamma)]
+        )
+        vectors = {"Phi": block.Phi, "nu": block.nu, "gamma": block.gamma}
+        for name, vector in vectors.items():
+            outputs.setdefault(name, []).extend(
+                (first + row, 0, item.node) for row, item in enumerate(expansion.components(vector))
+            )
+        first = len(outputs["Phi"])
     return Kernel(
         template.type_name,
         tuple(environment.inputs),
         tuple(environment.graph.nodes),
-        tuple(Phi),
-        tuple(sorted(entries)),
-        tuple(nu),
-        tuple(gamma),
+        {name: tuple(sorted(entries)) for name, entries in outputs.items()},
         _hints(template, expansion),
     )
 
@@ -177,22 +177,40 @@ def _separation(template: Template, vector: VectorSum) -> str | None:
 def equation_kernel(equation: FreeEquation) -> Kernel:
     """Return the kernel of a free equation; its inputs are the names that occur in it."""
     graph = Graph()
-    inputs: dict[str, int] = {}
+    convert = Converter(graph, graph.input).convert
+    return differentiated(graph, [convert(item) for item in equation.expressions], equation.columns)
 
-    def leaf(name: str) -> int:
-        inputs[name] = graph.input(name)
-        return inputs[name]
 
-    convert = Converter(graph, leaf).convert
-    found = [derive_equation(item, equation.columns) for item in equation.expressions]
+def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> Kernel:
+    r"""Return the kernel of equations given as nodes, in the coordinates that are named.
+
+    With :math:`\dot q` constant and :math:`\dot t = 1`, the second derivative of Phi along the
+    motion is :math:`-\gamma`.
+    """
+    one, t = graph.const(1), graph.input("t")
+    motion = {graph.input(name): graph.input(rate(name)) for name in columns} | {t: one}
+    by_column = [tangents(graph, Phi, {graph.input(name): one}) for name in columns]
+    nu = negated_tangents(graph, Phi, {t: one})
+    gamma = negated_tangents(graph, tangents(graph, Phi, motion), motion)
     entries = [
-        (row, column, convert(entry))
-        for row, item in enumerate(found)
-        for column, entry in enumerate(item.Phi_q)
+        (row, column, node)
+        for row in range(len(Phi))
+        for column, node in enumerate(found[row] for found in by_column)
+        if graph.value_of(node) != 0
     ]
-    Phi, nu, gamma = (
-        tuple(convert(getattr(item, quantity)) for item in found)
-        for quantity in ("Phi", "nu", "gamma")
+    vectors = {"Phi": Phi, "nu": nu, "gamma": gamma}
+    outputs = {
+        name: [(row, 0, node) for row, node in enumerate(found)] for name, found in vectors.items()
+    }
+    outputs["Phi_q"] = entries
+    nodes, new = pruned(graph.nodes, [node for found in outputs.values() for _, _, node in found])
+    return Kernel(
+        "Equation",
+        tuple(node[1] for node in nodes if node[0] == "input"),
+        tuple(nodes),
+        {
+            name: tuple((row, column, new[node]) for row, column, node in found)
+            for name, found in outputs.items()
+        },
+        (),
     )
-    kept = tuple(entry for entry in entries if graph.value_of(entry[2]) != 0)
-    return Kernel("Equation", tuple(inputs), tuple(graph.nodes), Phi, kept, nu, gamma, ())

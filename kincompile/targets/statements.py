@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kincompile.quantities import quantity_named
 from kincompile.targets.evaluators import inputs_read
 from kincompile.targets.headings import header, place, title
 from kincompile.targets.lines import broken
@@ -32,8 +33,8 @@ class Layout:
         The matrix A of a body frame, for a comment.
     first
         Number of the first row.
-    continued
-        What ends a line of a statement that goes on.
+    continued, ending
+        What ends a line of a statement that goes on, and its last line.
     """
 
     comment: str
@@ -43,6 +44,7 @@ class Layout:
     rotation: str = "[[c, -s], [s, c]]"
     first: int = 0
     continued: str = ""
+    ending: str = ";"
 
     def header(self, code: InlineProgram) -> str:
         """Return the comment at the top of a file: coordinates, parameters, rows."""
@@ -54,13 +56,16 @@ class Layout:
         first, *rest = broken(text)
         *lines, last = f"{left} = {first}", *(f"    {line}" for line in rest)
         comment = f"  {self.comment} {about}" if about else ""
-        return [*(f"{line}{self.continued}" for line in lines), f"{last};{comment}"]
+        return [*(f"{line}{self.continued}" for line in lines), f"{last}{self.ending}{comment}"]
 
     def inputs(self, program: Program, listing: Listing) -> list[str]:
         """Return the statements that name the inputs that are read."""
         return [
-            f"{self.value.format(name)} = {self.element.format(vector, k + self.first)};"
+            line
             for vector, k, name in inputs_read(program, listing)
+            for line in self.assigned(
+                self.value.format(name), self.element.format(vector, k + self.first)
+            )
         ]
 
     def frames(self, listing: Listing, printer: Printer) -> list[str]:
@@ -90,7 +95,7 @@ class Layout:
             lines += [f"{self.comment} {title(section, self.first)}"] if entries else []
             for item in entries:
                 row, column = item.row + self.first, item.column + self.first
-                form = self.entry if quantity == "Phi_q" else self.element
+                form = self.entry if quantity_named(quantity).is_matrix else self.element
                 left = form.format(quantity, row, column)
                 lines += self.assigned(left, printer.text(item.node), place(quantity, item, code))
         return lines
