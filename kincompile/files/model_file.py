@@ -35,7 +35,6 @@ from kincompile.files.file_format import (
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.catalogue import CONSTRAINTS
-from kincompile.model.constraint import CamConstraint
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import alpha, t
 from kincompile.model.mechanism import Mechanism
@@ -251,16 +250,11 @@ class _ModelReader(FieldReader):
         return (name, guess) if self._is_free(name, address) else None
 
     def _declare_contacts(self, row: Row) -> None:
-        """Make the contact parameters of a cam known, which any equation may name."""
-        kind = CONSTRAINTS.get(row["type"]) if isinstance(row.get("type"), str) else None
-        if (
-            kind is not None
-            and issubclass(kind, CamConstraint)
-            and isinstance(row.get("name"), str)
-        ):
-            count = len(kind.arguments())
-            for name in kind(row["name"], *[None] * count).contact_names:
-                self._names[name] = sympy.Symbol(name)
+        """Declare the contact parameters of a cam, which any equation may name."""
+        kind, name = row.get("type"), row.get("name")
+        if isinstance(kind, str) and kind in CONSTRAINTS and isinstance(name, str):
+            contacts = CONSTRAINTS[kind].contacts_of(name)
+            self._names |= {contact: sympy.Symbol(contact) for contact in contacts}
 
     def _constraint(self, address: Address, row: Row) -> Constraint | Equation | None:
         """Return a joint, a driver or a free equation, None where something is wrong with it."""
@@ -298,7 +292,9 @@ class _ModelReader(FieldReader):
             name, *self.expressions(given, place, self._names, "a list of formulas", count)
         )
 
-    def _joint(self, address: Address, row: Row, kind: type[Constraint], name: str) -> Constraint:
+    def _joint(
+        self, address: Address, row: Row, kind: type[Constraint], name: str
+    ) -> Constraint | None:
         fields = constraint_fields(kind)
         self.has_fields(address, row, fields)
         arguments = {
@@ -309,7 +305,7 @@ class _ModelReader(FieldReader):
         for key in arguments:
             self.remember(f"{kind.__name__} {name!r}, {key}", (*address, key))
         if len(arguments) < len(kind.arguments()):
-            return kind(name, *[None] * len(kind.arguments()))
+            return None
         if "guess" in row and "guess" in fields:
             arguments["guess"] = self._contact_guess(kind, row["guess"], (*address, "guess"))
         return kind(name, **arguments)
