@@ -20,8 +20,8 @@ const cam_flat_follower = (() => {
     "use strict";
 
     const NAME = "cam_flat_follower";
-    const FORMAT = 1;
-    const FINGERPRINT = "1873cd6622df32759a29baf955016efb";
+    const FORMAT = 2;
+    const FINGERPRINT = "c5e9cdbff59840a5fae4eadaef840be0";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

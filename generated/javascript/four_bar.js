@@ -21,8 +21,8 @@ const four_bar = (() => {
     "use strict";
 
     const NAME = "four_bar";
-    const FORMAT = 1;
-    const FINGERPRINT = "73c002003578fdd69da37cc6780d7150";
+    const FORMAT = 2;
+    const FINGERPRINT = "bc8de2babb8ff908c92211c262b22615";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

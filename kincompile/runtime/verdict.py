@@ -135,7 +135,7 @@ def _unmet(module: ModuleType, point: Point) -> str:
 def _places(module: ModuleType, q: Vector) -> Iterator[str]:
     """Yield where each body is, and the values of coordinates that belong to none."""
     values = dict(zip(module.COORDINATES, q.tolist(), strict=True))
-    for owner in dict.fromkeys(owner_of_coordinates(module.COORDINATES).values()):
+    for owner in dict.fromkeys(owner_of_coordinates(module).values()):
         if owner in values:
             yield f"{owner} = {values[owner]:.4g}"
         else:
