@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar, dataclass_transform
 
 import sympy
 
+from kincompile.calculus.symbols import Contact  # noqa: TC001 - type hints are there at run time
 from kincompile.calculus.template import Template
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from kincompile.calculus.expressions import Expression
-    from kincompile.calculus.symbols import Contact
 
     Numbers = Callable[[str], tuple[float | None, ...]]
     """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
