@@ -37,7 +37,7 @@ def title(section: Section, first: int = 0) -> str:
     return f"{short_title(section, first)}: {section.text}"
 
 
-def place(quantity: str, entry: Entry, code: InlineProgram) -> str:
+def entry_title(quantity: str, entry: Entry, code: InlineProgram) -> str:
     """Return which entry of a matrix a line is; nothing for rows of equations, which are titled."""
     found = quantity_named(quantity)
     row = code.program.names_of(found.rows)[entry.row]

@@ -11,11 +11,11 @@ from kincompile.ir.elimination import plan_solve
 from kincompile.names import rate
 from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
 from kincompile.targets.evaluators import varying
-from kincompile.targets.headings import header, place, short_title, title
+from kincompile.targets.headings import entry_title, header, short_title, title
 from kincompile.targets.lines import WIDTH, broken, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
-from kincompile.targets.numpy.solve import solve_functions
+from kincompile.targets.numpy.solve import assigned, solve_functions
 from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
@@ -294,7 +294,7 @@ def _section(
     is_titled = is_own and not quantity_named(name).is_matrix  # of a matrix each entry is named
     lines = [f"    {line}" for line in commented(title(section))] if is_titled else []
     for entry, text in zip(entries, texts, strict=True):
-        lines += _element(text, place(name, entry, code))
+        lines += _element(text, entry_title(name, entry, code))
     return lines
 
 
@@ -324,14 +324,7 @@ def _matrix(code: InlineProgram, printer: Printer) -> list[str]:
 
 def _assignments(texts: Iterable[tuple[str, str]]) -> list[str]:
     """Return values with their names, long ones in parentheses."""
-    lines: list[str] = []
-    for name, text in texts:
-        parts = broken(text)
-        if len(parts) == 1:
-            lines.append(f"{name} = {text}")
-        else:
-            lines += [f"{name} = (", *(f"    {line}" for line in parts), ")"]
-    return lines
+    return [line for name, text in texts for line in assigned(name, text)]
 
 
 def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
@@ -346,7 +339,7 @@ def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
                 lines.append(pair)
                 del rest[0]
                 continue
-        lines += _assignments([(name, text)])
+        lines += assigned(name, text)
     return lines
 
 
