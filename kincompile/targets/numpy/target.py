@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from kincompile import quantities
 from kincompile.ir.elimination import plan_solve
-from kincompile.names import rate
 from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
-from kincompile.targets.evaluators import varying
+from kincompile.targets.evaluators import varying, vectors
 from kincompile.targets.headings import entry_title, header, short_title, title
 from kincompile.targets.lines import WIDTH, broken, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
@@ -353,14 +352,8 @@ def _element(text: str, comment: str) -> list[str]:
 
 def _unpack(program: Program, listing: Listing) -> list[str]:
     """Return the lines that name the inputs: all of a vector, or the few that are read."""
-    coordinates = [item.name for item in program.coordinates]
-    vectors = {
-        "q": coordinates,
-        "q_dot": [rate(name) for name in coordinates],
-        "p": [item.name for item in program.parameters],
-    }
     lines, names = [], listing.input_names
-    for vector, members in vectors.items():
+    for vector, members in vectors(program).items():
         read = [k for k, name in enumerate(members) if name in listing.inputs]
         if 2 * len(read) > len(members):
             lines += _targets([names[name] for name in members], vector)
