@@ -55,6 +55,8 @@ class Code:
         Rows and columns of Phi_q's entries.
     angular : ndarray of bool, shape (n,)
         Which coordinates are angles.
+    lengths : ndarray, shape (n,)
+        Zero for angles, one for the others.
     position, nu, gamma, Phi_q, nonzeros
         Functions of the contract; `nonzeros` is ``Phi_q_nonzeros``.
     redundant
@@ -80,6 +82,7 @@ class Code:
     guess: Array
     pattern: NDArray[np.signedinteger[Any]]
     angular: NDArray[np.bool_]
+    lengths: Array
     position: Callable[..., tuple[Array, Array]]
     nu: Callable[..., Array]
     gamma: Callable[..., Array]
@@ -105,6 +108,7 @@ def attach(module: ModuleType) -> Code:
     names = vars(module)
     lanes = names.get("LANES", {})
     coordinates = names["COORDINATES"]
+    angular = np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool)
     code = Code(
         module=module,
         name=names["NAME"],
@@ -114,7 +118,8 @@ def attach(module: ModuleType) -> Code:
         units=names["UNITS"],
         guess=names["GUESS"],
         pattern=names["PATTERN"],
-        angular=np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool),
+        angular=angular,
+        lengths=np.where(angular, 0.0, 1.0),
         position=names["position"],
         nu=names["nu"],
         gamma=names["gamma"],
