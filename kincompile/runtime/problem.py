@@ -165,6 +165,14 @@ def within(values: Array | Iterable[Array], limits: Array) -> Any:
     return good
 
 
+def largest(rows: Iterable[Any], count: int) -> Array:
+    """Return the largest size in the rows of a batch, for each of it."""
+    result = np.zeros(count)
+    for row in rows:
+        np.maximum(result, np.abs(row), out=result)
+    return result
+
+
 def column(values: Array, q: Array) -> Array:
     """Return a number for each coordinate or equation in the shape that fits positions."""
     return values if q.ndim == 1 else values[:, np.newaxis]
