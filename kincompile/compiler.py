@@ -4,9 +4,12 @@ mechanism -> system()        ConstraintSystem  names and attributes checked, all
 system    -> lower           Program           kernels x instances; each type derived once
 program   -> inline          InlineProgram     written out in one graph, where equal values meet
 pattern   -> redundant_equations               as many equations as coordinates, matched one to one
-program   -> emit_...        Emitted           the files of a target
+program   -> emit_program    Emitted           the files of a target
 emitted   -> from_source     module            loaded, its contract checked
 module    -> make_native     module            its functions replaced by compiled C, for target="c"
+
+Stages that not every model needs are imported where they begin: the grouped form, redundancy, the
+runtime, its compiled functions, the report. A process that emits a four-bar loads none of them.
 """
 
 from __future__ import annotations
@@ -26,46 +29,28 @@ from kincompile.errors import (
     RedundantConstraintWarning,
     UnsupportedError,
 )
-from kincompile.ir.grouping import GroupedProgram, group
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
-from kincompile.ir.redundancy import rank_report, redundancy_warning, redundant_equations
 from kincompile.model.mechanism import Mechanism, system_of
 from kincompile.model.origins import remember_model
 from kincompile.names import listed
-from kincompile.runtime.load import from_source
-from kincompile.runtime.native.module import make_native
-from kincompile.runtime.solve import solve
 from kincompile.structure.counting import require_square
-from kincompile.structure.report import inspect_system
-from kincompile.targets.c.library import emit_c
-from kincompile.targets.javascript.script import emit_javascript
-from kincompile.targets.numpy.grouped import emit_grouped
-from kincompile.targets.numpy.module import emit_numpy
-from kincompile.targets.octave.script import emit_octave
+from kincompile.targets.emission import emit_program
+from kincompile.targets.registry import TARGETS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
     from types import ModuleType
 
     from numpy.typing import NDArray
 
+    from kincompile.ir.grouping import GroupedProgram
+    from kincompile.ir.program import Program
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.report import Inspection
-    from kincompile.targets.target import Emitted, Target
+    from kincompile.targets.target import Emitted
 
 LOG = logging.getLogger(__name__)
-
-TARGETS: Mapping[str, Target] = {
-    "numpy": emit_numpy,
-    "c": emit_c,
-    "octave": emit_octave,
-    "javascript": emit_javascript,
-}
-"""Languages to emit."""
-
-LOADABLE = ("numpy", "c")
-"""Targets whose code this process can call."""
 
 LARGEST_INLINE = 300
 """Coordinates up to which every constraint is written out."""
@@ -110,11 +95,11 @@ def emit(
     _check_target(target, form)
     with _without_collector():
         system = system_of(model)
-        if target != "numpy" and _is_grouped(system, form):
+        if _is_grouped(system, form) and not TARGETS[target].has_grouped_form:
             raise UnsupportedError(
                 f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
             )
-        return _emitted(_lowered(system, target, form), target)
+        return emit_program(target, _lowered(system, target, form))
 
 
 @contextmanager
@@ -150,27 +135,37 @@ def _lowered(
     """Return the program of a system in the form that a target is to print."""
     is_grouped = _is_grouped(system, form)
     program = lower(system, share_equations=is_grouped)
-    code = group(program) if is_grouped else inline(program)
-    if len(system.coordinates) > LARGEST_REDUNDANT:
+    code = _grouped(program) if is_grouped else inline(program)
+    n = len(system.coordinates)
+    if len(system.equations) <= n or n > LARGEST_REDUNDANT:
         require_square(system, code.pattern())
-    elif found := redundant_equations(system, program, code.pattern()):
-        redundant = tuple(name for item in found for name in item.equations)
-        if target != "numpy":
-            raise UnsupportedError(
-                f"the target {target!r} has no redundant equations, such as {listed(redundant)}; "
-                "use target='numpy', or replace their joint by one with fewer equations"
-            )
-        text = redundancy_warning(system, found)
-        warnings.warn(text, RedundantConstraintWarning, stacklevel=3)
-        code = replace(code, program=replace(program, redundant=redundant))
-    return code
+        return code
+    return _with_redundancy(system, code, target)
 
 
-def _emitted(code: InlineProgram | GroupedProgram, target: str) -> Emitted:
-    """Return the files of a target."""
-    if isinstance(code, GroupedProgram):
-        return emit_grouped(code)
-    return TARGETS[target](code)
+def _grouped(program: Program) -> GroupedProgram:
+    """Return the grouped form of a program."""
+    from kincompile.ir.grouping import group
+
+    return group(program)
+
+
+def _with_redundancy(
+    system: ConstraintSystem, code: InlineProgram | GroupedProgram, target: str
+) -> InlineProgram | GroupedProgram:
+    """Return a program that knows which of its equations repeat others, and warn of them."""
+    from kincompile.ir.redundancy import redundancy_warning, redundant_equations
+
+    found = redundant_equations(system, code.program, code.pattern())
+    redundant = tuple(name for item in found for name in item.equations)
+    if not TARGETS[target].has_redundancy:
+        raise UnsupportedError(
+            f"the target {target!r} has no redundant equations, such as {listed(redundant)}; "
+            "use target='numpy', or replace their joint by one with fewer equations"
+        )
+    text = redundancy_warning(system, found)
+    warnings.warn(text, RedundantConstraintWarning, stacklevel=4)
+    return replace(code, program=replace(code.program, redundant=redundant))
 
 
 def compile(  # noqa: A001 - the public name kc.compile
@@ -201,9 +196,12 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    if target not in LOADABLE:
+    from kincompile.runtime.load import from_source
+
+    loadable = [name for name, item in TARGETS.items() if item.is_loadable]
+    if target not in loadable:
         raise UnsupportedError(
-            f"only modules of the targets {listed(LOADABLE)} can be loaded, not {target!r}; "
+            f"only modules of the targets {listed(loadable)} can be loaded, not {target!r}; "
             f"kc.emit(model, {target!r}).write(folder) gives the files"
         )
     _check_target(target, form)
@@ -214,11 +212,18 @@ def compile(  # noqa: A001 - the public name kc.compile
             target = "numpy"
         code = _lowered(system, target, form)
         # The NumPy module has the constants, the checks and the careful march of the compiled one.
-        emitted = _emitted(code, "numpy")
+        emitted = emit_program("numpy", code)
         module = from_source(emitted.source, system.name, emitted.arrays)
         if isinstance(code, InlineProgram) and target == "c":
-            module = make_native(module, emit_c(code).files)
+            module = _native(module, code)
     return remember_model(module, system)
+
+
+def _native(module: ModuleType, code: InlineProgram) -> ModuleType:
+    """Replace the functions of a loaded NumPy module by compiled C."""
+    from kincompile.runtime.native.module import make_native
+
+    return make_native(module, emit_program("c", code).files)
 
 
 def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
@@ -240,17 +245,22 @@ def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
     ModelError
         If the model cannot be used as written; every problem is listed.
     """
+    from kincompile.ir.redundancy import rank_report
+    from kincompile.structure.report import inspect_system
+
     system = system_of(model)
     program = lower(system)
     ranks = rank_report(system, program)
     if not ranks.assembled:
         guess = _assembled(model)
         ranks = ranks if guess is None else rank_report(system, program, guess)
-    return inspect_system(system, group(program).pattern(), ranks)
+    return inspect_system(system, _grouped(program).pattern(), ranks)
 
 
 def _assembled(model: Mechanism | ConstraintSystem) -> NDArray[np.float64] | None:
     """Return the position at the start that the runtime finds, with its restarts, or None."""
+    from kincompile.runtime.solve import solve
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RedundantConstraintWarning)
         try:

@@ -7,10 +7,11 @@ accept one message or a sequence of them.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
 
 class KincompileError(Exception):
@@ -38,7 +39,7 @@ class _CollectedError(KincompileError):
         super().__init__(self.problems)
 
     def __str__(self) -> str:
-        """Give the message, or a count and one line per problem when there are several."""
+        """Return the message, or a count and one line per problem when there are several."""
         if len(self.problems) == 1:
             return self.problems[0]
         lines = "\n".join(f"  - {problem}" for problem in self.problems)
@@ -57,11 +58,21 @@ class UnsupportedError(KincompileError, NotImplementedError):
     """A target cannot print this expression or this kind of constraint."""
 
 
-def missing_package(package: str, extra: str) -> UnsupportedError:
-    """Return the error of a package that is installed on request only, by an extra."""
-    return UnsupportedError(
-        f"{package} is not installed; pip install 'kincompile[{extra}]' brings it"
-    )
+@contextmanager
+def package_of_extra(package: str, extra: str) -> Iterator[None]:
+    """Import, inside the `with` statement, a package that is installed by an extra only.
+
+    Raises
+    ------
+    UnsupportedError
+        If the package is not installed; the message names the extra.
+    """
+    try:
+        yield
+    except ImportError:
+        raise UnsupportedError(
+            f"{package} is not installed; pip install 'kincompile[{extra}]' brings it"
+        ) from None
 
 
 class TemplateError(KincompileError):
@@ -98,7 +109,7 @@ class SolveError(KincompileError, ArithmeticError):
         self.solution = solution
 
     def __str__(self) -> str:
-        """Give the message alone; the partial solution is in `solution`."""
+        """Return the message alone; the partial solution is in `solution`."""
         return str(self.args[0])
 
 
@@ -115,7 +126,7 @@ class InternalError(KincompileError):
         super().__init__(message)
 
     def __str__(self) -> str:
-        """Give the message and say that the fault is not the caller's."""
+        """Return the message, with the remark that the fault is not the caller's."""
         return f"{self.args[0]} This is a bug in kincompile: please report it with the model."
 
 

@@ -20,8 +20,8 @@ const cam_flat_follower = (() => {
     "use strict";
 
     const NAME = "cam_flat_follower";
-    const FORMAT = 1;
-    const FINGERPRINT = "dc70f608d91330ad121079edfe1d311f";
+    const FORMAT = 2;
+    const FINGERPRINT = "c5e9cdbff59840a5fae4eadaef840be0";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

@@ -21,8 +21,8 @@ const four_bar = (() => {
     "use strict";
 
     const NAME = "four_bar";
-    const FORMAT = 1;
-    const FINGERPRINT = "7778ada489011947922096359d2b8301";
+    const FORMAT = 2;
+    const FINGERPRINT = "bc8de2babb8ff908c92211c262b22615";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

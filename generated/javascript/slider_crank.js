@@ -21,8 +21,8 @@ const slider_crank = (() => {
     "use strict";
 
     const NAME = "slider_crank";
-    const FORMAT = 1;
-    const FINGERPRINT = "dc89d486a923428a708c425004a7283f";
+    const FORMAT = 2;
+    const FINGERPRINT = "1897065efe5e7c757d9c91fbb69e0ca0";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

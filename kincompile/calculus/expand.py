@@ -7,7 +7,9 @@ plain numbers: what the leaves are is the environment's business.
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any, Protocol
+from functools import reduce
+from operator import add, mul
+from typing import TYPE_CHECKING, Protocol
 
 from kincompile.calculus.expressions import (
     Basis,
@@ -20,19 +22,21 @@ from kincompile.calculus.expressions import (
     Power,
     Product,
     Profile,
+    Rotated,
     Scalar,
     Scaled,
     Sum,
     Symbol,
     TimeFunction,
-    Turned,
     Vector,
     VectorSum,
     VectorSymbol,
 )
 
-Value = Any
-Pair = tuple[Value, Value]
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.calculus.expressions import Components, Rotation, Value
 
 
 class Environment(Protocol):
@@ -44,35 +48,39 @@ class Environment(Protocol):
     def pi(self) -> Value:
         """Return pi."""
 
-    def symbol(self, name: str) -> Value:
+    def symbol(self, symbol: Symbol) -> Value:
         """Return a scalar symbol."""
 
-    def vector(self, name: str) -> Pair:
-        """Return the two components of a vector symbol."""
+    def vector(self, symbol: VectorSymbol) -> Components:
+        """Return the components of a vector symbol."""
 
-    def time_function(self, name: str, order: int) -> Value:
+    def time_function(self, function: TimeFunction) -> Value:
         """Return C(t) or one of its derivatives."""
 
-    def profile(self, name: str, order: int) -> Value:
+    def profile(self, profile: Profile) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
 
-    def cos_sin(self, angle: Scalar, expand: Expansion) -> Pair:
-        """Return cosine and sine of an angle."""
+    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
+        """Return the numbers that all vectors share that a rotation turns."""
 
-    def sqrt(self, value: Value) -> Value:
-        """Return a square root."""
+    def call(self, function: str, value: Value) -> Value:
+        """Return cosine (``"cos"``), sine or square root (``"sqrt"``)."""
 
 
 class Expansion:
-    """Components of expressions in one environment; a subexpression met twice is expanded once."""
+    """Components of expressions in one environment; a subexpression met twice is expanded once.
 
-    def __init__(self, environment: Environment) -> None:
-        self._environment = environment
+    `size` is the number of components of a vector of which nothing is left, zero.
+    """
+
+    def __init__(self, environment: Environment, size: int = 2) -> None:
+        self.environment = environment
+        self._size = size
         self._scalars: dict[Scalar, Value] = {}
-        self.vectors: dict[Vector, Pair] = {}
+        self.vectors: dict[Vector, Components] = {}
 
-    def components(self, expression: Expression) -> tuple[Value, ...]:
-        """Return the one component of a scalar or the two of a vector."""
+    def components(self, expression: Expression) -> Components:
+        """Return the one component of a scalar or those of a vector."""
         if isinstance(expression, Scalar):
             return (self.scalar(expression),)
         return self.vector(expression)
@@ -83,37 +91,41 @@ class Expansion:
             self._scalars[expression] = self._scalar(expression)
         return self._scalars[expression]
 
-    def vector(self, expression: Vector) -> Pair:
+    def vector(self, expression: Vector) -> Components:
         """Return the components of a vector expression."""
         if expression not in self.vectors:
             self.vectors[expression] = self._vector(expression)
         return self.vectors[expression]
 
+    def entries(self, rotation: Rotation) -> Components:
+        """Return the numbers that all vectors share that a rotation turns."""
+        coordinates = tuple(self.components(item) for item in rotation.coordinates)
+        return rotation.entries(coordinates, self.environment.call)
+
     def _scalar(self, expression: Scalar) -> Value:
-        environment = self._environment
+        environment = self.environment
         match expression:
             case Number(value):
                 return environment.number(value)
             case Pi():
                 return environment.pi()
-            case Symbol(name):
-                return environment.symbol(name)
-            case TimeFunction(name, order):
-                return environment.time_function(name, order)
-            case Profile(name, _, order):
-                return environment.profile(name, order)
+            case Symbol():
+                return environment.symbol(expression)
+            case TimeFunction():
+                return environment.time_function(expression)
+            case Profile():
+                return environment.profile(expression)
             case Sum(terms):
-                return _total([self.scalar(term) for term in terms], environment)
+                return self._total([self.scalar(term) for term in terms])
             case Product(factors):
                 return self._product(factors)
             case Power(base, exponent):
                 return self.scalar(base) ** exponent
             case Norm(vector):
-                x, y = self.vector(vector)
-                return environment.sqrt(x**2 + y**2)
+                squares = [item**2 for item in self.vector(vector)]
+                return environment.call("sqrt", reduce(add, squares))
             case Dot(left, right):
-                (a, b), (x, y) = self.vector(left), self.vector(right)
-                return a * x + b * y
+                return reduce(add, map(mul, self.vector(left), self.vector(right)))
         raise TypeError(f"not a scalar expression: {expression!r}")
 
     def _product(self, factors: tuple[Scalar, ...]) -> Value:
@@ -125,40 +137,33 @@ class Expansion:
             value = value * self.scalar(factor)
         return value
 
-    def _vector(self, expression: Vector) -> Pair:
-        environment = self._environment
+    def _vector(self, expression: Vector) -> Components:
+        environment = self.environment
         match expression:
-            case VectorSymbol(name):
-                return environment.vector(name)
-            case Basis():
-                return environment.number(Fraction(1)), environment.number(Fraction(0))
-            case Turned(angle, vector, 1):
-                x, y = self.vector(Turned(angle, vector))
-                return -y, x
-            case Turned(angle, vector, _):
-                cosine, sine = environment.cos_sin(angle, self)
-                x, y = self.vector(vector)
-                return x * cosine - y * sine, x * sine + y * cosine
+            case VectorSymbol():
+                return environment.vector(expression)
+            case Basis(axis, size):
+                return tuple(environment.number(Fraction(k == axis)) for k in range(size))
+            case Rotated(rotation, vector, along):
+                return rotation.components(
+                    environment.entries(rotation, self),
+                    self.vector(vector),
+                    tuple(self.components(item) for item in along),
+                )
             case Perpendicular(vector):
                 x, y = self.vector(vector)
                 return -y, x
+            case VectorSum(()):
+                return (environment.number(Fraction(0)),) * self._size
             case VectorSum(terms):
-                pairs = [self.vector(term) for term in terms]
-                xs, ys = [x for x, _ in pairs], [y for _, y in pairs]
-                return _total(xs, environment), _total(ys, environment)
+                parts = zip(*(self.vector(term) for term in terms), strict=True)
+                return tuple(self._total(part) for part in parts)
             case Scaled(Number(value), vector) if value == -1:
-                x, y = self.vector(vector)
-                return -x, -y
+                return tuple(-item for item in self.vector(vector))
             case Scaled(factor, vector):
-                value, (x, y) = self.scalar(factor), self.vector(vector)
-                return value * x, value * y
+                value, inner = self.scalar(factor), self.vector(vector)
+                return tuple(value * item for item in inner)
         raise TypeError(f"not a vector expression: {expression!r}")
 
-
-def _total(values: list[Value], environment: Environment) -> Value:
-    if not values:
-        return environment.number(Fraction(0))
-    total = values[0]
-    for value in values[1:]:
-        total = total + value
-    return total
+    def _total(self, values: Sequence[Value]) -> Value:
+        return reduce(add, values) if values else self.environment.number(Fraction(0))

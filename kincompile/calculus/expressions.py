@@ -1,17 +1,23 @@
-"""Scalars, planar vectors and rotations: the nodes of a constraint as the textbook writes it.
+"""Scalars, vectors and rotated vectors: the nodes of a constraint as the textbook writes it.
 
 An expression is a small immutable tree. The functions below build one and keep it tidy (flat sums,
 numeric coefficients in front, zeros dropped), so that a derivative reads like one written by hand.
-Rotations are the whole point: with R = [[0, -1], [1, 0]] and A(phi) the rotation matrix, every
-turned vector is ``R^k A(phi) v`` with k = 0 or 1, since R R = -I; ``A_i v`` has k = 0 and
-``B_i v = R A_i v`` has k = 1.
+How many components a vector has is the business of its leaves; how a frame turns a vector is that
+of its rotation.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import overload
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, overload
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Value = Any
+"""A number, a SymPy expression, a node of code: what adds and multiplies."""
+Components = tuple[Value, ...]
 
 
 class Scalar:
@@ -54,7 +60,7 @@ class Scalar:
 
 
 class Vector:
-    """An expression whose value is a planar vector."""
+    """An expression whose value is a vector."""
 
     __slots__ = ()
 
@@ -87,6 +93,7 @@ class Symbol(Scalar):
     """A named scalar: an angle, a contact parameter, a rate or a scalar attribute."""
 
     name: str
+    size: ClassVar[int] = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,25 +160,83 @@ class VectorSymbol(Vector):
     """A named vector: a position r_i, its rate, a body-fixed point s_i or direction v_i."""
 
     name: str
+    size: int = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Basis(Vector):
-    """The unit vector (1, 0); turned by an angle it is u(angle)."""
+    """The unit vector along an axis, e_x unless told otherwise."""
+
+    axis: int = 0
+    size: int = 2
+
+
+class Rotation(Protocol):
+    """How a frame turns vectors: its rotation matrix A as a function of orientation coordinates.
+
+    The calculus asks it for nothing else, so another description of an orientation (Euler
+    parameters, with a row ``p^T p - 1`` of their own) is another class beside
+    `kincompile.calculus.rotations.PlaneRotation`.
+    """
+
+    letters: ClassVar[str]
+    """How A and its derivatives are printed, by order."""
+
+    @property
+    def coordinates(self) -> tuple[Expression, ...]:
+        """What A depends on."""
+
+    @property
+    def constraints(self) -> tuple[Scalar, ...]:
+        """Equations among the coordinates themselves."""
+
+    def tidy(self, vector: Vector, along: tuple[Expression, ...]) -> Vector:
+        """Return the derivative of A v in some directions in its shortest form.
+
+        It is linear in every direction, and the vector is neither a sum nor a multiple.
+        """
+
+    def entries(
+        self, coordinates: tuple[Components, ...], call: Callable[[str, Value], Value]
+    ) -> Components:
+        """Return the numbers that all vectors turned by A share.
+
+        `call` gives an elementary function, ``"cos"`` for instance, of a number.
+        """
+
+    def components(
+        self, entries: Components, vector: Components, along: tuple[Components, ...]
+    ) -> Components:
+        """Return the components of a turned vector, all of them given as components."""
 
 
 @dataclass(frozen=True, slots=True)
-class Turned(Vector):
-    """R^quarter A(angle) vector, quarter 0 or 1."""
+class Rotated(Vector):
+    """A vector turned by a rotation matrix A, or by a directional derivative of A.
 
-    angle: Scalar
+    Attributes
+    ----------
+    rotation
+        What turns it.
+    vector
+        What is turned.
+    along
+        The directions in which A is differentiated: none for ``A v``.
+    """
+
+    rotation: Rotation
     vector: Vector
-    quarter: int = 0
+    along: tuple[Expression, ...] = ()
+
+    @property
+    def order(self) -> int:
+        """How many times A is differentiated."""
+        return len(self.along)
 
 
 @dataclass(frozen=True, slots=True)
 class Perpendicular(Vector):
-    """R vector: the vector turned by a right angle, counterclockwise."""
+    """R vector: a vector of the plane turned by a right angle, counterclockwise."""
 
     vector: Vector
 
@@ -292,16 +357,15 @@ def scaled(factor: Scalar, vector: Vector) -> Vector:
     return Scaled(factor, vector) if vector != ZERO_VECTOR else ZERO_VECTOR
 
 
-def turned(angle: Scalar, vector: Vector, quarter: int = 0) -> Vector:
-    """Return R^quarter A(angle) vector for any quarter; R commutes with A and R R = -I."""
+def rotated(rotation: Rotation, vector: Vector, along: tuple[Expression, ...] = ()) -> Vector:
+    """Return a vector turned by A, or by its derivative in some directions: linear in all."""
     factor, vector = split_factor(vector)
-    if isinstance(vector, Perpendicular):
-        quarter, vector = quarter + 1, vector.vector
-    sign = -1 if quarter % 4 in (2, 3) else 1
     if isinstance(vector, VectorSum):
-        parts = tuple(turned(angle, term, quarter) for term in vector.terms)
+        parts = tuple(rotated(rotation, term, along) for term in vector.terms)
         return scaled(factor, vector_sum(parts))
-    return scaled(sign * factor, Turned(angle, vector, quarter % 2))
+    if any(item in (ZERO, ZERO_VECTOR) for item in along):
+        return ZERO_VECTOR
+    return scaled(factor, rotation.tidy(vector, along))
 
 
 def perpendicular(vector: Vector) -> Vector:
@@ -311,8 +375,9 @@ def perpendicular(vector: Vector) -> Vector:
         return scaled(factor, vector_sum(tuple(perpendicular(term) for term in vector.terms)))
     if isinstance(vector, Perpendicular):
         return scaled(-factor, vector.vector)
-    if isinstance(vector, Turned):
-        return scaled(factor, turned(vector.angle, vector.vector, vector.quarter + 1))
+    if isinstance(vector, Rotated):
+        # In the plane R A is the derivative of A by its angle.
+        return scaled(factor, rotated(vector.rotation, vector.vector, (*vector.along, ONE)))
     return scaled(factor, Perpendicular(vector))
 
 

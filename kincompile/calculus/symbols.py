@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from kincompile.calculus.expressions import (
     Basis,
@@ -12,13 +13,19 @@ from kincompile.calculus.expressions import (
     TimeFunction,
     Vector,
     VectorSymbol,
-    turned,
+    rotated,
 )
+from kincompile.calculus.rotations import PlaneRotation, turned
+
+if TYPE_CHECKING:
+    from kincompile.calculus.expressions import Rotation
+
+CoordinateSymbol = VectorSymbol | Symbol
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """The frame of a body: position r, angle phi, and its rotation."""
+    """The frame of a body in the plane: position r, angle phi, and its rotation."""
 
     index: str
 
@@ -42,9 +49,24 @@ class Frame:
         """The angular velocity of the body."""
         return Symbol(f"phi_{self.index}_dot")
 
+    @property
+    def coordinates(self) -> tuple[CoordinateSymbol, ...]:
+        """Its generalised coordinates, in order."""
+        return self.r, self.phi
+
+    @property
+    def rates(self) -> tuple[CoordinateSymbol, ...]:
+        """Their rates, in the same order."""
+        return self.r_dot, self.phi_dot
+
+    @property
+    def rotation(self) -> Rotation:
+        """The rotation matrix A as a function of the coordinates."""
+        return PlaneRotation(self.phi)
+
     def A(self, vector: Vector) -> Vector:  # noqa: N802 - the rotation matrix of the textbook
         """Turn a body-fixed vector into the global frame."""
-        return turned(self.phi, vector)
+        return rotated(self.rotation, vector)
 
     def point(self, fixed: Vector) -> Vector:
         """Return the global position of a body-fixed point, r + A s."""
@@ -66,6 +88,21 @@ class Contact:
     def alpha_dot(self) -> Symbol:
         """The rate of the contact parameter."""
         return Symbol(f"alpha_{self.index}_dot")
+
+    @property
+    def coordinates(self) -> tuple[CoordinateSymbol, ...]:
+        """Its one generalised coordinate."""
+        return (self.alpha,)
+
+    @property
+    def rates(self) -> tuple[CoordinateSymbol, ...]:
+        """The rate of it."""
+        return (self.alpha_dot,)
+
+    @property
+    def rotation(self) -> Rotation:
+        """What turns e_x into the direction of the contact."""
+        return PlaneRotation(self.alpha)
 
     def rho(self, order: int = 0) -> Profile:
         """Return the polar radius, or its derivative of the given order."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from kincompile.calculus.expressions import Expression, Symbol, VectorSymbol
-    from kincompile.calculus.symbols import Contact, Frame
+    from kincompile.calculus.expressions import Expression
+    from kincompile.calculus.symbols import Contact, CoordinateSymbol, Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +36,16 @@ class Template:
         return hash(self.type_name)
 
     @property
-    def coordinates(self) -> tuple[VectorSymbol | Symbol, ...]:
-        """The generalised coordinates: r and phi of each body, then the contact parameters."""
-        bodies = [leaf for frame in self.frames for leaf in (frame.r, frame.phi)]
-        return (*bodies, *(contact.alpha for contact in self.contacts))
+    def owners(self) -> tuple[Frame | Contact, ...]:
+        """What has coordinates, in their order: the bodies, then the contacts."""
+        return *self.frames, *self.contacts
 
     @property
-    def rates(self) -> tuple[VectorSymbol | Symbol, ...]:
+    def coordinates(self) -> tuple[CoordinateSymbol, ...]:
+        """The generalised coordinates: r and phi of each body, then the contact parameters."""
+        return tuple(item for owner in self.owners for item in owner.coordinates)
+
+    @property
+    def rates(self) -> tuple[CoordinateSymbol, ...]:
         """The rates of the generalised coordinates, in the same order."""
-        bodies = [leaf for frame in self.frames for leaf in (frame.r_dot, frame.phi_dot)]
-        return (*bodies, *(contact.alpha_dot for contact in self.contacts))
+        return tuple(item for owner in self.owners for item in owner.rates)

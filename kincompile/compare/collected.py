@@ -17,11 +17,11 @@ from kincompile.calculus.expressions import (
     Number,
     Power,
     Product,
+    Rotated,
     Scalar,
     Scaled,
     Sum,
     Symbol,
-    Turned,
     Vector,
     VectorSum,
     dot,
@@ -29,8 +29,8 @@ from kincompile.calculus.expressions import (
     product_of,
     split_coefficient,
     sum_of,
-    turned,
 )
+from kincompile.calculus.rotations import PlaneRotation, turned
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -111,24 +111,23 @@ def _vector_terms(vector: Vector) -> Iterator[tuple[Scalar, Vector]]:
 def _paired(left: Vector, right: Vector) -> Scalar:
     """Return (R^a A_i u)^T R^b A_j v as u^T R^(b-a) A_ij v: the rotations drawn together."""
     left, right = sorted((left, right), key=_order)
-    if not isinstance(right, Turned):
-        return dot(left, right)
-    if not isinstance(left, Turned):
-        return dot(left, right)
-    quarter = right.quarter - left.quarter
-    if left.angle == right.angle:
-        inner = right.vector
-        for _ in range(quarter % 4):
-            inner = perpendicular(inner)
-        return dot(left.vector, inner)
-    return dot(left.vector, turned(right.angle - left.angle, right.vector, quarter))
+    match left, right:
+        case (Rotated(PlaneRotation(first), u), Rotated(PlaneRotation(second), v)):
+            quarters = (right.order - left.order) % 4
+            if first != second:
+                return dot(u, turned(second - first, v, quarters))
+            for _ in range(quarters):
+                v = perpendicular(v)
+            return dot(u, v)
+    return dot(left, right)
 
 
 def _order(vector: Vector) -> tuple[int, str]:
     """Sort what is not turned first, then by the angle, so that like products meet."""
-    if not isinstance(vector, Turned):
+    if not isinstance(vector, Rotated):
         return 0, repr(vector)
-    name = vector.angle.name if isinstance(vector.angle, Symbol) else "~"
+    (angle,) = vector.rotation.coordinates
+    name = angle.name if isinstance(angle, Symbol) else "~"
     return 1, f"{name} {vector!r}"
 
 

@@ -9,7 +9,7 @@ may show in several entries at once, and each entry written out in sines and cos
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,10 +20,10 @@ from kincompile.calculus.expressions import (
     ZERO_VECTOR,
     Expression,
     Power,
+    Rotated,
     Scalar,
     Sum,
     Symbol,
-    Turned,
     Vector,
     VectorSum,
     VectorSymbol,
@@ -31,6 +31,7 @@ from kincompile.calculus.expressions import (
     split_coefficient,
     sum_of,
 )
+from kincompile.calculus.rotations import PlaneRotation
 from kincompile.compare import mutations
 from kincompile.compare.agreement import agrees
 from kincompile.compare.collected import Group, collected, perfect_square
@@ -46,8 +47,9 @@ from kincompile.compare.mutations import (
     times,
 )
 from kincompile.compare.plain_text import described
-from kincompile.compare.vectors import component_values, entry_values, numeric_expansion
+from kincompile.compare.vectors import column_values, component_values, numeric_expansion
 from kincompile.derive.derivation import derive
+from kincompile.derive.partials import partials
 
 if TYPE_CHECKING:
     from kincompile.calculus.expand import Expansion
@@ -116,10 +118,13 @@ class VectorFaults:
         self._joint = joint
         self._quantity = quantity
         self._blocks = derive(joint.template)
+        self._partials = partials(joint.template)
         self._expansion: Expansion = numeric_expansion(joint, reference, states)
         frames = joint.template.frames
         self._symbols = Symbols(
-            frozenset(frame.phi.name for frame in frames), frozenset(joint.points)
+            frozenset(frame.phi.name for frame in frames),
+            frozenset(joint.points),
+            joint.written.partners(),
         )
         self._right = {place: self._values(place, item) for place, item in self._parts().items()}
 
@@ -139,7 +144,7 @@ class VectorFaults:
         parts: dict[Place, Expression] = {}
         for b, block in enumerate(self._blocks):
             if self._quantity == "Phi_q":
-                parts.update({(b, k): entry for k, entry in enumerate(block.Phi_q)})
+                parts.update({(b, k): item.entry for k, item in enumerate(self._partials[b])})
             else:
                 parts[b, 0] = getattr(block, self._quantity)
         return parts
@@ -150,17 +155,14 @@ class VectorFaults:
         with np.errstate(all="ignore"):
             if self._quantity != "Phi_q":
                 return component_values(expression, self._expansion)[..., None]
-            is_vector = isinstance(self._blocks[b].Phi, Vector)
-            coordinate = self._joint.template.coordinates[k]
-            is_position = isinstance(coordinate, Vector)
-            return entry_values(expression, is_vector, is_position, self._expansion)
+            return column_values(self._partials[b][k].columns(expression), self._expansion)
 
     def _corner(self, place: Place) -> Place:
         """Return row and column of the first entry of a part."""
         b, k = place
         rows = sum(2 if isinstance(block.Phi, Vector) else 1 for block in self._blocks[:b])
         coordinates = self._joint.template.coordinates[:k] if self._quantity == "Phi_q" else ()
-        return rows, sum(2 if isinstance(item, Vector) else 1 for item in coordinates)
+        return rows, sum(item.size for item in coordinates)
 
     def _differing(self, place: Place, values: Array) -> dict[Place, Array]:
         """Return the entries of a part in which values are wrong."""
@@ -249,13 +251,11 @@ def _global_variants(parts: Mapping[Place, Expression], symbols: Symbols) -> Ite
     leaves: dict[Expression, None] = {}
 
     def collect(node: Expression) -> None:
-        if isinstance(node, VectorSymbol) or (
-            isinstance(node, Turned) and isinstance(node.angle, Symbol)
-        ):
-            leaf = (
-                node if isinstance(node, VectorSymbol) else Turned(node.angle, _ANY, node.quarter)
-            )
-            leaves[leaf] = None
+        match node:
+            case VectorSymbol():
+                leaves[node] = None
+            case Rotated(PlaneRotation(Symbol())):
+                leaves[replace(node, vector=_ANY)] = None
 
     for expression in parts.values():
         everywhere(expression, collect)
@@ -275,9 +275,9 @@ def _replacing(leaf: Expression, new: Expression) -> Callable[[Expression], Expr
     """Return what replaces a vector, or a rotation whatever it turns."""
 
     def change(node: Expression) -> Expression | None:
-        if not isinstance(leaf, Turned):
+        if not isinstance(leaf, Rotated):
             return new if node == leaf else None
-        if isinstance(node, Turned) and (node.angle, node.quarter) == (leaf.angle, leaf.quarter):
+        if isinstance(node, Rotated) and replace(node, vector=_ANY) == leaf:
             turned = node.vector
             return everywhere(new, lambda inner: turned if inner == _ANY else None)
         return None
@@ -291,16 +291,16 @@ def _exchanged_names(parts: Mapping[Place, Expression], symbols: Symbols) -> Ite
         other = {"phi_i": Symbol("phi_j"), "phi_j": Symbol("phi_i")}
 
         def angles(node: Expression) -> Expression | None:
-            if isinstance(node, Turned) and isinstance(node.angle, Symbol):
-                angle = other.get(node.angle.name, node.angle)
-                return Turned(angle, node.vector, node.quarter)
+            match node:
+                case Rotated(PlaneRotation(Symbol(name) as angle)):
+                    return replace(node, rotation=PlaneRotation(other.get(name, angle)))
             return None
 
         changed = {place: everywhere(item, angles) for place, item in parts.items()}
         yield mutations.MIXED_ANGLES, "phi_i and phi_j are exchanged throughout", changed
 
     def points(node: Expression) -> Expression | None:
-        if isinstance(node, VectorSymbol) and (partner := symbols.partner(node.name)):
+        if isinstance(node, VectorSymbol) and (partner := symbols.partners.get(node.name)):
             return VectorSymbol(partner)
         return None
 

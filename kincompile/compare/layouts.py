@@ -39,9 +39,15 @@ def usual_layout(reference: Reference, block: Block | None, width: int) -> Layou
             return Layout(own)
         if width == len(block.columns):
             return Layout(block.columns, _GROUND)
-    if width == len(every) + 3 and reference.system.bodies:
-        return Layout((None, None, None, *every), _GROUND)
+    ground = _ground(reference)
+    if width == len(every) + len(ground) and ground:
+        return Layout((*ground, *every), _GROUND)
     return None
+
+
+def _ground(reference: Reference) -> Columns:
+    """Return the columns of the ground, as many as a body has."""
+    return (None,) * len(next(iter(reference.system.body_columns), ()))
 
 
 _GROUND = "columns of the ground are present (they are not checked)"
@@ -61,12 +67,12 @@ def expected_widths(reference: Reference, block: Block | None) -> str:
 def other_layouts(reference: Reference, usual: Layout, row_count: int) -> Iterator[Layout]:
     """Yield layouts in other orders: of the bodies, of their coordinates, of the ground."""
     groups, rest = _groups(reference, usual.columns)
-    ground = [group for group in groups if group == (None, None, None)]
+    ground = [group for group in groups if None in group]
     bodies = [group for group in groups if group not in ground]
     seen = {usual.columns}
     for order in _orders(bodies):
         for layout in _arranged(order, rest, moved=list(order) != bodies):
-            for columns in _with_ground(layout.columns, bool(ground)):
+            for columns in _with_ground(layout.columns, ground):
                 if columns not in seen:
                     seen.add(columns)
                     words = [layout.convention] if layout.convention else []
@@ -79,20 +85,16 @@ def other_layouts(reference: Reference, usual: Layout, row_count: int) -> Iterat
 
 
 def _groups(reference: Reference, columns: Columns) -> tuple[list[Columns], Columns]:
-    """Return the triples of the bodies, ground included, and the other columns."""
-    body_columns = 3 * len(reference.system.bodies)
+    """Return the columns of each body, ground included, and the other columns."""
+    of_bodies = reference.system.body_columns
+    starts: dict[int | None, int] = {own[0]: len(own) for own in of_bodies}
+    starts[None] = len(_ground(reference))
     groups: list[Columns] = []
-    rest: list[int | None] = []
     k = 0
-    while k < len(columns):
-        first = columns[k]
-        if first is None or first < body_columns:
-            groups.append(columns[k : k + 3])
-            k += 3
-        else:
-            rest.append(first)
-            k += 1
-    return groups, tuple(rest)
+    while k < len(columns) and (width := starts.get(columns[k], 0)):
+        groups.append(columns[k : k + width])
+        k += width
+    return groups, columns[k:]
 
 
 def _orders(bodies: list[Columns]) -> Iterator[tuple[Columns, ...]]:
@@ -120,10 +122,10 @@ def _arranged(order: tuple[Columns, ...], rest: Columns, moved: bool) -> Iterato
         yield Layout((*columns, *rest), "; ".join([*words, *([text] if text else [])]))
 
 
-def _with_ground(columns: Columns, has_ground: bool) -> Iterator[Columns]:
+def _with_ground(columns: Columns, ground: list[Columns]) -> Iterator[Columns]:
     """Yield the columns with those of the ground at every place between two bodies."""
-    if not has_ground:
+    if not ground:
         yield columns
         return
-    for k in range(0, len(columns) + 1, 3):
-        yield (*columns[:k], None, None, None, *columns[k:])
+    for k in range(0, len(columns) + 1, len(ground[0])):
+        yield (*columns[:k], *ground[0], *columns[k:])

@@ -11,6 +11,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from kincompile.calculus.expressions import (
+    ONE,
     ZERO,
     Dot,
     Expression,
@@ -19,21 +20,22 @@ from kincompile.calculus.expressions import (
     Pi,
     Power,
     Product,
+    Rotated,
     Scalar,
     Scaled,
     Sum,
     Symbol,
     TimeFunction,
-    Turned,
     Vector,
     VectorSum,
     VectorSymbol,
 )
+from kincompile.calculus.rotations import PlaneRotation
 from kincompile.compare.plain_text import described
-from kincompile.compare.vectors import EXCHANGED
+from kincompile.compare.vectors import Exchanged
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
 SIGN = "sign"
 FACTOR = "factor 2 or 1/2"
@@ -54,7 +56,6 @@ DRIVER_RATE = "driver's rate forgotten"
 HALF = Number(Fraction(1, 2))
 TWO = Number(Fraction(2))
 MINUS_ONE = Number(Fraction(-1))
-_PARTNERS = {"s_i": "s_j", "s_j": "s_i", "s_P": "s_Q", "s_Q": "s_P", "v_i": "v_j", "v_j": "v_i"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,20 +79,24 @@ class Mutation:
 
 @dataclass(frozen=True, slots=True)
 class Symbols:
-    """What a joint has: names of its bodies' angles and of its body-fixed vectors."""
+    """What a joint has: names of its bodies' angles and of its body-fixed vectors.
+
+    Attributes
+    ----------
+    angles, vectors
+        The names.
+    partners
+        By the name of a vector, the one that is easily taken for it.
+    """
 
     angles: frozenset[str]
     vectors: frozenset[str]
+    partners: Mapping[str, str]
 
     def other_angle(self, name: str) -> str | None:
         """Return the angle of the other body."""
         others = self.angles - {name} if name in self.angles else ()
         return next(iter(others), None)
-
-    def partner(self, name: str) -> str | None:
-        """Return the vector that is easily taken for another."""
-        partner = _PARTNERS.get(name)
-        return partner if partner in self.vectors else None
 
 
 def times(factor: Number, expression: Any) -> Expression:
@@ -135,7 +140,7 @@ def _here(node: Expression, symbols: Symbols) -> Iterator[Mutation]:
         case TimeFunction(name, order) if order:
             kind = SECOND_DERIVATIVE if order == 2 else DRIVER_RATE
             yield Mutation(kind, f"{name}{chr(39) * order} is taken as zero", ZERO)
-        case Turned() | VectorSymbol():
+        case Rotated() | VectorSymbol():
             for kind, text, new in swaps(node, symbols):
                 yield Mutation(kind, text, new)
 
@@ -179,37 +184,39 @@ def _is_rate(node: Scalar) -> bool:
 
 def swaps(node: Expression, symbols: Symbols) -> Iterator[tuple[str, str, Expression]]:
     """Yield what may stand in the place of a rotation or of a body-fixed vector by mistake."""
-    if isinstance(node, Turned):
+    if isinstance(node, Rotated):
         yield from _wrong_rotations(node, symbols)
     if isinstance(node, VectorSymbol) and node.name in symbols.vectors:
-        swapped = VectorSymbol(node.name + EXCHANGED)
+        swapped = Exchanged(node.name, node.size)
         yield XI_ETA, f"xi and eta of {node.name} are swapped", swapped
-        partner = symbols.partner(node.name)
+        partner = symbols.partners.get(node.name)
         if partner is not None:
             text = f"{partner} stands where {node.name} belongs"
             yield MIXED_POINTS, text, VectorSymbol(partner)
 
 
-def _wrong_rotations(node: Turned, symbols: Symbols) -> Iterator[tuple[str, str, Expression]]:
-    angle, vector, quarter = node.angle, node.vector, node.quarter
-    letter, other_letter = "AB"[quarter], "BA"[quarter]
+def _wrong_rotations(node: Rotated, symbols: Symbols) -> Iterator[tuple[str, str, Expression]]:
+    if not isinstance(node.rotation, PlaneRotation):
+        return
+    angle, vector, along = node.rotation.angle, node.vector, node.along
+    letter, other_letter = tuple(node.rotation.letters)[:: -1 if along else 1]
     index = described(angle).removeprefix("phi_") if isinstance(angle, Symbol) else "(theta)"
     name = f"{letter}_{index}"
-    other_quarter = Turned(angle, vector, 1 - quarter)
-    yield A_FOR_B, f"{other_letter}_{index} stands where {name} belongs", other_quarter
+    other = Rotated(node.rotation, vector, () if along else (ONE,))
+    yield A_FOR_B, f"{other_letter}_{index} stands where {name} belongs", other
     # (R^k A)^T = R^-k A(-phi), and R^-1 = -R.
-    back = Turned(Product((MINUS_ONE, angle)), vector, quarter)
-    transposed = times(MINUS_ONE, back) if quarter else back
+    back = Rotated(PlaneRotation(Product((MINUS_ONE, angle))), vector, along)
+    transposed = times(MINUS_ONE, back) if along else back
     yield TRANSPOSED, f"{name} is transposed", transposed
-    if quarter:
+    if along:
         yield TRANSPOSED, f"the angle has the wrong sign in {name}", back
     complement = Sum((Product((HALF, Pi())), Product((MINUS_ONE, angle))))
-    exchanged = Turned(complement, vector, quarter)
+    exchanged = Rotated(PlaneRotation(complement), vector, along)
     yield SINE_COSINE, f"sine and cosine are swapped in {name}", exchanged
-    other = symbols.other_angle(angle.name) if isinstance(angle, Symbol) else None
-    if other is not None:
-        text = f"{other} stands where phi_{index} belongs, in {name}"
-        yield MIXED_ANGLES, text, Turned(Symbol(other), vector, quarter)
+    mixed = symbols.other_angle(angle.name) if isinstance(angle, Symbol) else None
+    if mixed is not None:
+        text = f"{mixed} stands where phi_{index} belongs, in {name}"
+        yield MIXED_ANGLES, text, Rotated(PlaneRotation(Symbol(mixed)), vector, along)
 
 
 def everywhere(
@@ -245,8 +252,8 @@ def _children(node: Expression) -> Iterator[tuple[Any, Callable[[Any], Expressio
         case Scaled(factor, vector):
             yield factor, lambda new: Scaled(new, vector)
             yield vector, lambda new: Scaled(factor, new)
-        case Turned(angle, vector, quarter):
-            yield vector, lambda new: Turned(angle, new, quarter)
+        case Rotated(rotation, vector, along):
+            yield vector, lambda new: Rotated(rotation, new, along)
         case Perpendicular(vector):
             yield vector, Perpendicular
 

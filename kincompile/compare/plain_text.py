@@ -15,17 +15,18 @@ from kincompile.calculus.expressions import (
     Power,
     Product,
     Profile,
+    Rotated,
     Scalar,
     Scaled,
     Sum,
     Symbol,
     TimeFunction,
-    Turned,
     Vector,
     VectorSum,
     VectorSymbol,
     split_coefficient,
 )
+from kincompile.calculus.rotations import PlaneRotation
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -67,10 +68,11 @@ def _vector(expression: Vector) -> str:
             return name
         case Basis():
             return "e_x"
-        case Turned(Symbol(name), vector, quarter) if name.startswith("phi_"):
-            return f"{'AB'[quarter]}_{name[-1]} {_bracketed(_vector(vector))}"
-        case Turned(angle, vector, quarter):
-            return f"{'AB'[quarter]}({_scalar(angle)}) {_bracketed(_vector(vector))}"
+        case Rotated(PlaneRotation(angle) as rotation, vector):
+            letter = rotation.letters[expression.order]
+            of_body = isinstance(angle, Symbol) and angle.name.startswith("phi_")
+            index = _scalar(angle).removeprefix("phi") if of_body else f"({_scalar(angle)})"
+            return f"{letter}{index} {_bracketed(_vector(vector))}"
         case Perpendicular(vector):
             return f"R {_bracketed(_vector(vector))}"
         case VectorSum(terms):

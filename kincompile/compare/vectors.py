@@ -7,51 +7,50 @@ with a fault in it, written in vectors, gets its numbers in the same way as the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import sympy
 
-from kincompile.calculus.expand import Expansion, Pair, Value
-from kincompile.calculus.expressions import Expression, Scalar, Vector
+from kincompile.calculus.expand import Expansion
+from kincompile.calculus.expressions import VectorSymbol
 from kincompile.derive.derivation import derive
-from kincompile.model.expressions import alpha, t
-from kincompile.model.matrices import entry_columns
-from kincompile.names import rate
+from kincompile.model.matrices import SymbolicEnvironment
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from fractions import Fraction
 
+    import sympy
+
+    from kincompile.calculus.expressions import (
+        Components,
+        Expression,
+        Profile,
+        Symbol,
+        TimeFunction,
+        Value,
+    )
     from kincompile.compare.reference import Reference
     from kincompile.compare.states import Array, States
     from kincompile.model.resolve import Joint
 
-EXCHANGED = "~"
-"""At the end of a vector's name: its components xi and eta are exchanged (a fault)."""
+
+class Exchanged(VectorSymbol):
+    """A body-fixed vector whose components xi and eta are exchanged: a fault."""
+
+    __slots__ = ()
 
 
-class NumericEnvironment:
+class NumericEnvironment(SymbolicEnvironment):
     """The leaves of a joint's template as arrays over states."""
 
     def __init__(self, joint: Joint, reference: Reference, states: States) -> None:
-        self._joint = joint
+        super().__init__(joint)
         self._reference = reference
         self._states = states
-        self._known: dict[str, Any] = {}
-        self._contacts: dict[str, sympy.Symbol] = {}
-        for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
-            self._known[frame.r.name] = (body.x, body.y)
-            self._known[frame.r_dot.name] = (body.x_dot, body.y_dot)
-            self._known[frame.phi.name] = body.phi
-            self._known[frame.phi_dot.name] = body.phi_dot
-        names = joint.columns[3 * len(joint.bodies) :]
-        for contact, name in zip(joint.template.contacts, names, strict=True):
-            self._contacts[contact.rho().name] = sympy.Symbol(str(name))
-            self._known[contact.alpha.name] = sympy.Symbol(str(name))
-            self._known[contact.alpha_dot.name] = sympy.Symbol(rate(str(name)))
 
-    def _number(self, expression: Any) -> Value:
-        values, _ = self._reference.evaluate([sympy.sympify(expression)], self._states)
+    def _number(self, expression: sympy.Expr) -> Value:
+        values, _ = self._reference.evaluate([expression], self._states)
         return values[:, 0]
 
     def number(self, value: Fraction) -> Value:
@@ -62,34 +61,27 @@ class NumericEnvironment:
         """Return pi."""
         return np.full(len(self._states), np.pi)
 
-    def symbol(self, name: str) -> Value:
+    def symbol(self, symbol: Symbol) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
-        return self._number(self._known[name] if name in self._known else self._joint.scalars[name])
+        return self._number(super().symbol(symbol))
 
-    def vector(self, name: str) -> Pair:
+    def vector(self, symbol: VectorSymbol) -> Components:
         """Return a position, a velocity or a body-fixed vector; its components may be exchanged."""
-        plain = name.removesuffix(EXCHANGED)
-        x, y = self._known[plain] if plain in self._known else self._joint.points[plain]
-        pair = self._number(x), self._number(y)
-        return pair if plain == name else (pair[1], pair[0])
+        plain = VectorSymbol(symbol.name, symbol.size)
+        components = tuple(self._number(item) for item in super().vector(plain))
+        return components[::-1] if isinstance(symbol, Exchanged) else components
 
-    def time_function(self, name: str, order: int) -> Value:
+    def time_function(self, function: TimeFunction) -> Value:
         """Return C(t) or one of its derivatives."""
-        return self._number(sympy.sympify(self._joint.scalars[name]).diff(t, order))
+        return self._number(super().time_function(function))
 
-    def profile(self, name: str, order: int) -> Value:
+    def profile(self, profile: Profile) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
-        rho = self._joint.profiles[name].diff(alpha, order)
-        return self._number(rho.subs(alpha, self._contacts[name]))
+        return self._number(super().profile(profile))
 
-    def cos_sin(self, angle: Scalar, expand: Expansion) -> Pair:
-        """Return cosine and sine of an angle."""
-        value = expand.scalar(angle)
-        return np.cos(value), np.sin(value)
-
-    def sqrt(self, value: Value) -> Value:
-        """Return a square root."""
-        return np.sqrt(value)
+    def call(self, function: str, value: Value) -> Value:
+        """Return an elementary function."""
+        return getattr(np, function)(value)
 
 
 def numeric_expansion(joint: Joint, reference: Reference, states: States) -> Expansion:
@@ -102,12 +94,9 @@ def component_values(expression: Expression, expansion: Expansion) -> Array:
     return np.stack(expansion.components(expression), axis=-1)
 
 
-def entry_values(
-    entry: Expression, is_vector_row: bool, is_position: bool, expansion: Expansion
-) -> Array:
-    """Return a block of Phi_q, shape (N, rows, columns)."""
-    columns = entry_columns(entry, is_vector_row, is_position, expansion)
-    return np.stack([np.stack(column, axis=-1) for column in columns], axis=-1)
+def column_values(columns: Iterable[Expression], expansion: Expansion) -> Array:
+    """Return columns of Phi_q side by side, shape (N, rows, columns)."""
+    return np.stack([component_values(column, expansion) for column in columns], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,20 +112,8 @@ class JointValues:
 def joint_values(joint: Joint, reference: Reference, states: States) -> JointValues:
     """Evaluate a joint by itself."""
     expansion = numeric_expansion(joint, reference, states)
-    coordinates = joint.template.coordinates
     blocks = derive(joint.template)
-    Phi_q = [
-        np.concatenate(
-            [
-                entry_values(
-                    entry, isinstance(block.Phi, Vector), isinstance(item, Vector), expansion
-                )
-                for item, entry in zip(coordinates, block.Phi_q, strict=True)
-            ],
-            axis=-1,
-        )
-        for block in blocks
-    ]
+    Phi_q = [column_values(block.Phi_q, expansion) for block in blocks]
     Phi, nu, gamma = (
         np.concatenate(
             [component_values(getattr(block, name), expansion) for block in blocks], axis=-1
@@ -158,7 +135,7 @@ def with_roles_exchanged(joint: Joint) -> Joint | None:
         return None
     if any(name in joint.points for name in ("s_P", "s_Q")):
         return None
-    width = 3
+    width = sum(item.size for item in joint.template.frames[0].coordinates)
     bodies, contacts = joint.columns[: 2 * width], joint.columns[2 * width :]
     return replace(
         joint,

@@ -104,8 +104,8 @@ def _offsets(page: Page) -> Section:
     )
     header = ("constraint", "equations", "row offset", "rows from 0", "first row from 1")
     columns: Rows = [
-        (Verbatim(body.name), str(3 * k), row_range(3 * k, 3))
-        for k, body in enumerate(page.system.bodies)
+        (Verbatim(body.name), str(own[0]), row_range(own[0], len(own)))
+        for body, own in zip(page.system.bodies, page.system.body_columns, strict=True)
     ]
     blocks: list[Block] = [note, table(header, rows)]
     if columns:

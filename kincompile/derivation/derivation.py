@@ -11,21 +11,21 @@ page      -> to_...       text              HTML, LaTeX, Markdown, a notebook
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.assembled import assembled_section, unknowns_section
-from kincompile.derivation.derivation_html import as_html
-from kincompile.derivation.derivation_markdown import as_markdown
-from kincompile.derivation.derivation_notebook import as_notebook
 from kincompile.derivation.derivation_page import Page, counted
-from kincompile.derivation.derivation_tex import as_tex
 from kincompile.derivation.document import Document, Section
 from kincompile.derivation.equation_section import equation_section
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
 from kincompile.derivation.situation import Situation, situation
+from kincompile.derivation.to_html import as_html
+from kincompile.derivation.to_latex import as_tex
+from kincompile.derivation.to_markdown import as_markdown
+from kincompile.derivation.to_notebook import as_notebook
 from kincompile.errors import InputError
+from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
 from kincompile.names import listed
@@ -88,9 +88,7 @@ class Derivation(Document):
         return f"<Derivation of {self.name!r}: {self.summary}>"
 
     def _repr_html_(self) -> str:
-        # In a frame, so that the page's style sheet leaves the notebook alone.
-        page = escape(self.to_html(), quote=True)
-        return f'<iframe srcdoc="{page}" style="width: 100%; height: 40em; border: 0"></iframe>'
+        return framed_html(self.to_html(), f"Derivation of {self.name}", "40em")
 
 
 FORMATS: Mapping[str, Callable[[Derivation], str]] = {

@@ -16,12 +16,11 @@ from kincompile.model.expressions import evaluate
 from kincompile.model.matrices import SymbolicEnvironment
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from kincompile.derivation.derivation_page import Page
     from kincompile.derivation.document import Block, Run
     from kincompile.derivation.formulas import Formula
-    from kincompile.derive.derivation import RowBlock
     from kincompile.ir.inline import Section as Rows
     from kincompile.model.resolve import Joint
 
@@ -37,12 +36,12 @@ def values_of(joint: Joint, symbol: str, values: Mapping[str, float]) -> Run:
     return ""
 
 
-def numbers_step(page: Page, joint: Joint, rows: Rows, blocks: Sequence[RowBlock]) -> Section:
+def numbers_step(page: Page, joint: Joint, rows: Rows) -> Section:
     """Return the step in numbers, at the chosen state."""
     shown: list[Block] = [text(f"At {page.situation.origin}:")]
     shown.append(state_table(page, [name for name in joint.columns if name is not None]))
     shown += _matrices(page, joint)
-    shown += _vectors(page, joint, blocks)
+    shown += _vectors(page, joint)
     shown += result_blocks(page, joint.name, rows)
     return step(joint.name, 9, "In numbers", "numeric", *shown)
 
@@ -58,10 +57,10 @@ def _matrices(page: Page, joint: Joint) -> Iterator[Block]:
         yield Display(Equated((Glyph("B", frame.index), derivative)))
 
 
-def _vectors(page: Page, joint: Joint, blocks: Sequence[RowBlock]) -> Iterator[Block]:
+def _vectors(page: Page, joint: Joint) -> Iterator[Block]:
     expansion = Expansion(SymbolicEnvironment(joint))
     values = page.situation.values
-    named: list[tuple[Formula, Vector]] = [(item, item) for item in known_vectors(blocks)]
+    named: list[tuple[Formula, Vector]] = [(item, item) for item in known_vectors(joint.template)]
     for item, glyph in abbreviations(joint.template).items():
         if isinstance(item, Vector):
             named.append((glyph, item))

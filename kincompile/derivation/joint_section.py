@@ -35,6 +35,7 @@ from kincompile.derivation.joint_terms import (
 )
 from kincompile.derivation.rows_steps import expansion_step, placement_step, step
 from kincompile.derive.derivation import derive
+from kincompile.derive.partials import partials
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import depends_on
 
@@ -88,7 +89,7 @@ def joint_section(page: Page, joint: Joint, rows: Rows) -> Section:
             _gamma_step(on_page),
             expansion_step(page, joint.name, rows),
             placement_step(page, joint.name, rows),
-            numbers_step(page, joint, rows, on_page.blocks),
+            numbers_step(page, joint, rows),
         ),
     )
 
@@ -149,12 +150,10 @@ def _constraint_step(on_page: _JointPage) -> Section:
 
 def _rules_step(on_page: _JointPage) -> Section:
     rows = []
-    for k, block in enumerate(on_page.blocks):
-        for coordinate, steps in zip(
-            on_page.joint.template.coordinates, block.steps.Phi_q, strict=True
-        ):
-            label = Math(Partial(on_page.symbol("Phi", k), coordinate))
-            rows += [(label, *line) for line in _rule_lines(steps, coordinate)]
+    for k, row in enumerate(partials(on_page.joint.template)):
+        for item in row:
+            label = Math(Partial(on_page.symbol("Phi", k), item.coordinate))
+            rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
     note = text(
         "Every rule that fired while ", Math(_phi_q()), " was derived, from the inside out. "
         "Whatever the coordinate does not occur in is constant."
@@ -184,7 +183,7 @@ def _blocks_step(on_page: _JointPage) -> Section:
     template = on_page.joint.template
     blocks: list[Block] = []
     for index, columns in block_columns(template):
-        shown = Matrix(block_rows(template, on_page.blocks, columns))
+        shown = Matrix(block_rows(template, columns))
         variable = Glyph("q", index) if len(index) == 1 else Letter(index)
         symbol = Sub(Glyph("Phi", exponent=on_page.name), variable)
         blocks.append(Display(Equated((symbol, shown))))

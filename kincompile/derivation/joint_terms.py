@@ -14,15 +14,16 @@ from kincompile.calculus.expressions import (
     Number,
     Power,
     Product,
+    Rotated,
     Scalar,
     Scaled,
     Sum,
     Symbol,
-    Turned,
     Vector,
     VectorSum,
     VectorSymbol,
 )
+from kincompile.calculus.rotations import PlaneRotation
 from kincompile.derivation.document import Math
 from kincompile.derivation.formulas import (
     IDENTITY,
@@ -33,7 +34,8 @@ from kincompile.derivation.formulas import (
     Row,
     Transposed,
 )
-from kincompile.derive.rules import Rule, vector_derivative
+from kincompile.derive.partials import partials
+from kincompile.derive.rules import Rule, along
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +43,6 @@ if TYPE_CHECKING:
     from kincompile.calculus.template import Template
     from kincompile.derivation.document import Runs
     from kincompile.derivation.formulas import Formula
-    from kincompile.derive.derivation import RowBlock
     from kincompile.derive.rules import Step
 
 _PHI = Symbol("phi")
@@ -69,8 +70,8 @@ def parts(expression: Any) -> Iterator[Expression]:
             inner = (left, right)
         case Power(base, _):
             inner = (base,)
-        case Turned(angle, vector, _):
-            inner = (angle, vector)
+        case Rotated(rotation, vector):
+            inner = (*rotation.coordinates, vector)
         case other:
             inner = (other.vector,) if hasattr(other, "vector") else ()
     for item in inner:
@@ -81,17 +82,17 @@ def abbreviations(template: Template) -> dict[Expression, Glyph]:
     """Name what occurs again and again: the distance vector d, its rate, the angle of a gear."""
     found = [item for Phi in template.Phi for item in parts(Phi)]
     separations = list(dict.fromkeys(v for item in found for v in _separations(item)))
-    along: dict[Expression, Expression] = dict(
+    q_dot: dict[Expression, Expression] = dict(
         zip(template.coordinates, template.rates, strict=True)
     )
     names: dict[Expression, Glyph] = {}
     for k, vector in enumerate(separations, 1):
         index = str(k) if len(separations) > 1 else ""
         names[vector] = Glyph("d", index)
-        names[vector_derivative(vector, along)] = Glyph("d", index, dots=1)
+        names[along(vector, q_dot)] = Glyph("d", index, dots=1)
     for item in found:
         match item:
-            case Turned(angle, Basis(), _) if not isinstance(angle, Symbol):
+            case Rotated(PlaneRotation(angle), Basis()) if not isinstance(angle, Symbol):
                 names[angle] = Glyph("vartheta", bold=False)
     return names
 
@@ -142,17 +143,11 @@ def block_columns(template: Template) -> list[tuple[str, slice]]:
     ]
 
 
-def block_rows(
-    template: Template, blocks: Sequence[RowBlock], columns: slice
-) -> tuple[tuple[Formula, ...], ...]:
-    """Return the block of Phi_q in some columns, a row for each row block."""
-    coordinates = template.coordinates[columns]
+def block_rows(template: Template, coordinates: slice) -> tuple[tuple[Formula, ...], ...]:
+    """Return the block of Phi_q by some coordinates, a row for each row block."""
     return tuple(
-        tuple(
-            block_entry(entry, coordinate, block.Phi)
-            for entry, coordinate in zip(block.Phi_q[columns], coordinates, strict=True)
-        )
-        for block in blocks
+        tuple(block_entry(item.entry, item.coordinate, Phi) for item in row[coordinates])
+        for Phi, row in zip(template.Phi, partials(template), strict=True)
     )
 
 
@@ -174,13 +169,13 @@ def _is_multiple(expression: Expression) -> bool:
     return False
 
 
-def known_vectors(blocks: Sequence[RowBlock]) -> list[Vector]:
+def known_vectors(template: Template) -> list[Vector]:
     """Return the turned points and directions that occur, A_i s_i before B_i s_i."""
-    found: dict[Vector, None] = {}
-    for block in blocks:
-        for expression in (block.Phi, *block.Phi_q):
+    found: dict[Rotated, None] = {}
+    for Phi, row in zip(template.Phi, partials(template), strict=True):
+        for expression in (Phi, *(partial.entry for partial in row)):
             for item in parts(expression):
                 match item:
-                    case Turned(Symbol(), VectorSymbol(), _):
+                    case Rotated(PlaneRotation(Symbol()), VectorSymbol()):
                         found[item] = None
-    return sorted(found, key=lambda item: item.quarter if isinstance(item, Turned) else 0)
+    return [*sorted(found, key=lambda item: item.order)]

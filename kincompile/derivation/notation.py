@@ -22,11 +22,11 @@ from kincompile.calculus.expressions import (
     Power,
     Product,
     Profile,
+    Rotated,
     Scaled,
     Sum,
     Symbol,
     TimeFunction,
-    Turned,
     VectorSum,
     VectorSymbol,
 )
@@ -199,13 +199,14 @@ class Notation:
         turn = self.letter("R", bold=True)
         return self.row([turn, self._factor(expr.vector)])
 
-    def _print_Turned(self, expr: Turned) -> Printed:
+    def _print_Rotated(self, expr: Rotated) -> Printed:
+        (angle,) = expr.rotation.coordinates
         if isinstance(expr.vector, Basis):
-            unit = self.row([self.letter("u", bold=True), self._fenced(self._short(expr.angle))])
-            turn = [self.letter("R", bold=True)] if expr.quarter else []
+            unit = self.row([self.letter("u", bold=True), self._fenced(self._short(angle))])
+            turn = [self.letter("R", bold=True)] if expr.along else []
             return self.row([*turn, unit])
-        index = split_name(expr.angle.name)[1] if isinstance(expr.angle, Symbol) else ""
-        base = self.letter("AB"[expr.quarter], bold=True)
+        index = split_name(angle.name)[1] if isinstance(angle, Symbol) else ""
+        base = self.letter(expr.rotation.letters[expr.order], bold=True)
         matrix = self.scripts(base, self.index_text(index), None)
         return self.row([matrix, self._factor(expr.vector)])
 

@@ -17,7 +17,7 @@ from kincompile.runtime.load import from_source
 from kincompile.runtime.newton import NewtonResult, newton
 from kincompile.runtime.status import Status
 from kincompile.structure.counting import require_square
-from kincompile.targets.numpy.module import emit_numpy
+from kincompile.targets.emission import emit_program
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -98,7 +98,7 @@ def situation(system: ConstraintSystem, state: Mapping[str, float] | float | Non
         If a name is unknown or a number not finite, or the formulas have no finite values there.
     """
     code = inline(lower(system))
-    source = emit_numpy(code).source
+    source = emit_program("numpy", code).source
     module = from_source(source, system.name)
     problem = _problem(system, code)
     if isinstance(state, int | float) or state is None:

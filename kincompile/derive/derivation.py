@@ -8,25 +8,18 @@ from typing import TYPE_CHECKING
 
 from kincompile.calculus.expressions import (
     ONE,
+    Basis,
     Scalar,
-    Symbol,
     Vector,
     VectorSymbol,
     sum_of,
     vector_sum,
 )
-from kincompile.derive.rules import (
-    TIME,
-    Direction,
-    Step,
-    coefficient,
-    derivative,
-    gradient,
-    vector_derivative,
-)
+from kincompile.derive.rules import TIME, Direction, Step, along
 
 if TYPE_CHECKING:
     from kincompile.calculus.expressions import Expression
+    from kincompile.calculus.symbols import CoordinateSymbol
     from kincompile.calculus.template import Template
 
 
@@ -36,15 +29,12 @@ class Steps:
 
     Attributes
     ----------
-    Phi_q
-        Of each coordinate of the template.
     velocity, Phi_t
         Of Phi along q_dot, and by time.
     gamma_terms
         Of the three terms of gamma.
     """
 
-    Phi_q: tuple[tuple[Step, ...], ...]
     velocity: tuple[Step, ...]
     Phi_t: tuple[Step, ...]
     gamma_terms: tuple[tuple[Step, ...], ...]
@@ -59,9 +49,8 @@ class RowBlock:
     Phi
         The constraint.
     Phi_q
-        Its derivative by each coordinate of the template. By a position r: the number k of the
-        block k I where Phi is a vector, the row (d/dx, d/dy) as a vector where Phi is a scalar. By
-        an angle: a vector or a scalar, as Phi is.
+        Its columns: Phi_q q_dot with each rate one in turn, by component of the coordinates of the
+        template, and each a vector or a scalar, as Phi is.
     velocity
         :math:`\Phi_q \dot q`.
     nu
@@ -92,49 +81,39 @@ def derive(template: Template) -> tuple[RowBlock, ...]:
 def _row_block(template: Template, Phi: Expression) -> RowBlock:
     along_q_dot: Direction = dict(zip(template.coordinates, template.rates, strict=True))
     along_t: Direction = {TIME: ONE}
-    Phi_q, Phi_q_steps = zip(*(_by(Phi, item) for item in template.coordinates), strict=True)
-    Phi_t, Phi_t_steps = _along(Phi, along_t)
-    velocity, velocity_steps = _along(Phi, along_q_dot)
+    Phi_t, Phi_t_steps = recorded(Phi, along_t)
+    velocity, velocity_steps = recorded(Phi, along_q_dot)
     second = (
-        (-1, *_along(velocity, along_q_dot)),
-        (-2, *_along(velocity, along_t)),
-        (-1, *_along(Phi_t, along_t)),
+        (-1, *recorded(velocity, along_q_dot)),
+        (-2, *recorded(velocity, along_t)),
+        (-1, *recorded(Phi_t, along_t)),
     )
     first_term, second_term, third_term = (factor * found for factor, found, _ in second)
     gamma_terms = first_term, second_term, third_term
     return RowBlock(
         Phi=Phi,
-        Phi_q=Phi_q,
+        Phi_q=tuple(
+            along(Phi, {item: unit}) for item in template.coordinates for unit in units(item)
+        ),
         velocity=velocity,
         nu=-Phi_t,
         gamma_terms=gamma_terms,
         gamma=_total(gamma_terms),
-        steps=Steps(
-            Phi_q_steps, velocity_steps, Phi_t_steps, tuple(steps for _, _, steps in second)
-        ),
+        steps=Steps(velocity_steps, Phi_t_steps, tuple(steps for _, _, steps in second)),
     )
 
 
-def _along(expression: Expression, direction: Direction) -> tuple[Expression, tuple[Step, ...]]:
-    record: list[Step] = []
-    if isinstance(expression, Vector):
-        found: Expression = vector_derivative(expression, direction, record)
-    else:
-        found = derivative(expression, direction, record)
-    return found, tuple(record)
+def units(coordinate: CoordinateSymbol) -> tuple[Expression, ...]:
+    """Return the unit rates of a coordinate: 1 of a scalar, e_x, e_y, ... of a vector."""
+    if isinstance(coordinate, VectorSymbol):
+        return tuple(Basis(axis, coordinate.size) for axis in range(coordinate.size))
+    return (ONE,)
 
 
-def _by(
-    expression: Expression, coordinate: VectorSymbol | Symbol
-) -> tuple[Expression, tuple[Step, ...]]:
-    if isinstance(coordinate, Symbol):
-        return _along(expression, {coordinate: ONE})
+def recorded(expression: Expression, direction: Direction) -> tuple[Expression, tuple[Step, ...]]:
+    """Differentiate along a direction, and return the steps too."""
     record: list[Step] = []
-    if isinstance(expression, Vector):
-        found: Expression = coefficient(expression, coordinate, record)
-    else:
-        found = gradient(expression, coordinate, record)
-    return found, tuple(record)
+    return along(expression, direction, record), tuple(record)
 
 
 def _total(terms: tuple[Expression, ...]) -> Expression:

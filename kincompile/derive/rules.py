@@ -1,4 +1,4 @@
-"""The rules of differentiation, on scalars and vectors.
+"""The rules of differentiation: one directional derivative of scalars and vectors.
 
 They are dA/dphi = B = R A, dB/dphi = -A, and the sum, product and chain rule. Whoever wants to see
 which of them fired, and on what, hands in a list that records it.
@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import overload
 
 from kincompile.calculus.expressions import (
-    ONE,
     ZERO,
     ZERO_VECTOR,
     Dot,
@@ -20,27 +20,26 @@ from kincompile.calculus.expressions import (
     Power,
     Product,
     Profile,
+    Rotated,
     Scalar,
     Scaled,
     Sum,
     Symbol,
     TimeFunction,
-    Turned,
     Vector,
     VectorSum,
-    VectorSymbol,
     dot,
     perpendicular,
     power_of,
     product_of,
+    rotated,
     scaled,
     sum_of,
-    turned,
     vector_sum,
 )
 
 Direction = Mapping[Expression, Expression]
-"""What each leaf becomes when differentiated; a leaf that is absent is held constant."""
+"""How each leaf changes; a leaf that is absent is held constant."""
 
 TIME = Symbol("t")
 """The key that stands for time in a direction."""
@@ -70,17 +69,24 @@ class Step:
 
 
 Record = list[Step] | None
-"""Steps as they happen, inside out; None where nobody looks."""
+"""Recorded steps, innermost first; None disables recording."""
 
 
-def derivative(expression: Scalar, direction: Direction, record: Record = None) -> Scalar:
-    """Differentiate a scalar along a direction.
+@overload
+def along(expression: Scalar, direction: Direction, record: Record = None) -> Scalar: ...
+@overload
+def along(expression: Vector, direction: Direction, record: Record = None) -> Vector: ...
+@overload
+def along(expression: Expression, direction: Direction, record: Record = None) -> Expression: ...
+def along(expression: Expression, direction: Direction, record: Record = None) -> Expression:
+    """Differentiate an expression along a direction.
 
-    With ``{phi_i: 1}`` it is the partial derivative by phi_i; with the rates,
-    ``{r_i: r_i_dot, phi_i: phi_i_dot, ...}``, it is Phi_q q_dot; a driver C(t) differentiates to
+    With ``{phi_i: 1}`` it is the partial derivative by phi_i, with ``{r_i: e_x}`` that by x_i; with
+    the rates, ``{r_i: r_i_dot, phi_i: phi_i_dot, ...}``, it is Phi_q q_dot; a driver C(t) gives
     its next order where the direction holds the time.
     """
-    rule, result = _scalar(expression, direction, record)
+    differentiate = _scalar if isinstance(expression, Scalar) else _vector
+    rule, result = differentiate(expression, direction, record)  # type: ignore[arg-type]
     if record is not None:
         record.append(Step(rule, expression, result))
     return result
@@ -89,27 +95,25 @@ def derivative(expression: Scalar, direction: Direction, record: Record = None) 
 def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[Rule, Scalar]:
     match expression:
         case Sum(terms):
-            return Rule.SUM, sum_of(tuple(derivative(term, direction, record) for term in terms))
+            return Rule.SUM, sum_of(tuple(along(term, direction, record) for term in terms))
         case Product(factors):
             return Rule.PRODUCT, sum_of(
                 tuple(
-                    product_of(
-                        (*factors[:k], derivative(factor, direction, record), *factors[k + 1 :])
-                    )
+                    product_of((*factors[:k], along(factor, direction, record), *factors[k + 1 :]))
                     for k, factor in enumerate(factors)
                 )
             )
         case Power(base, exponent):
             outer = exponent * power_of(base, exponent - 1)
-            return Rule.CHAIN, outer * derivative(base, direction, record)
+            return Rule.CHAIN, outer * along(base, direction, record)
         case Dot(left, right) if left == right:
-            return Rule.PRODUCT, 2 * dot(left, vector_derivative(right, direction, record))
+            return Rule.PRODUCT, 2 * dot(left, along(right, direction, record))
         case Dot(left, right):
-            return Rule.PRODUCT, dot(vector_derivative(left, direction, record), right) + dot(
-                left, vector_derivative(right, direction, record)
+            return Rule.PRODUCT, dot(along(left, direction, record), right) + dot(
+                left, along(right, direction, record)
             )
         case Profile(name, argument, order):
-            inner = derivative(argument, direction, record)
+            inner = along(argument, direction, record)
             return Rule.PROFILE, Profile(name, argument, order + 1) * inner
         case TimeFunction(name, order) if TIME in direction:
             return Rule.DRIVER, TimeFunction(name, order + 1)
@@ -120,37 +124,28 @@ def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[R
     return Rule.COORDINATE, change
 
 
-def vector_derivative(expression: Vector, direction: Direction, record: Record = None) -> Vector:
-    """Differentiate a vector along a direction."""
-    rule, result = _vector(expression, direction, record)
-    if record is not None:
-        record.append(Step(rule, expression, result))
-    return result
-
-
 def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[Rule, Vector]:
     match expression:
         case VectorSum(terms):
-            parts = tuple(vector_derivative(term, direction, record) for term in terms)
-            return Rule.SUM, vector_sum(parts)
+            return Rule.SUM, vector_sum(tuple(along(term, direction, record) for term in terms))
         case Scaled(factor, vector):
             return Rule.PRODUCT, vector_sum(
                 (
-                    scaled(derivative(factor, direction, record), vector),
-                    scaled(factor, vector_derivative(vector, direction, record)),
+                    scaled(along(factor, direction, record), vector),
+                    scaled(factor, along(vector, direction, record)),
                 )
             )
-        case Turned(angle, vector, quarter):
-            return _ROTATION[quarter], vector_sum(
+        case Rotated(rotation, vector, directions):
+            changes = [along(item, direction, record) for item in rotation.coordinates]
+            moved = along(vector, direction, record)
+            return _ROTATION[len(directions)], vector_sum(
                 (
-                    scaled(
-                        derivative(angle, direction, record), turned(angle, vector, quarter + 1)
-                    ),
-                    turned(angle, vector_derivative(vector, direction, record), quarter),
+                    *(rotated(rotation, vector, (*directions, change)) for change in changes),
+                    rotated(rotation, moved, directions),
                 )
             )
         case Perpendicular(vector):
-            return Rule.CONSTANT, perpendicular(vector_derivative(vector, direction, record))
+            return Rule.CONSTANT, perpendicular(along(vector, direction, record))
     change = direction.get(expression)
     if change is None:
         return Rule.CONSTANT, ZERO_VECTOR
@@ -159,60 +154,4 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
 
 
 _ROTATION = (Rule.A_TO_B, Rule.B_TO_A)
-"""What differentiating R^k A(phi) by phi is called, for k = 0 and k = 1."""
-
-
-def gradient(expression: Scalar, position: VectorSymbol, record: Record = None) -> Vector:
-    """Differentiate a scalar by a position r: the row (d/dx, d/dy), as a vector."""
-    rule, result = _gradient(expression, position, record)
-    if record is not None:
-        record.append(Step(rule, expression, result))
-    return result
-
-
-def _gradient(expression: Scalar, position: VectorSymbol, record: Record) -> tuple[Rule, Vector]:
-    match expression:
-        case Sum(terms):
-            parts = tuple(gradient(term, position, record) for term in terms)
-            return Rule.SUM, vector_sum(parts)
-        case Product(factors):
-            return Rule.PRODUCT, vector_sum(
-                tuple(
-                    scaled(
-                        product_of((*factors[:k], *factors[k + 1 :])),
-                        gradient(factor, position, record),
-                    )
-                    for k, factor in enumerate(factors)
-                )
-            )
-        case Power(base, exponent):
-            outer = exponent * power_of(base, exponent - 1)
-            return Rule.CHAIN, scaled(outer, gradient(base, position, record))
-        case Dot(left, right) if left == right:
-            return Rule.PRODUCT, scaled(2 * coefficient(right, position, record), left)
-        case Dot(left, right):
-            return Rule.PRODUCT, vector_sum(
-                (
-                    scaled(coefficient(left, position, record), right),
-                    scaled(coefficient(right, position, record), left),
-                )
-            )
-    return Rule.CONSTANT, ZERO_VECTOR
-
-
-def coefficient(expression: Vector, position: VectorSymbol, record: Record = None) -> Scalar:
-    """Return k where the derivative of a vector by a position r is k I."""
-    rule, result = _coefficient(expression, position, record)
-    if record is not None:
-        record.append(Step(rule, expression, result))
-    return result
-
-
-def _coefficient(expression: Vector, position: VectorSymbol, record: Record) -> tuple[Rule, Scalar]:
-    match expression:
-        case VectorSum(terms):
-            parts = tuple(coefficient(term, position, record) for term in terms)
-            return Rule.SUM, sum_of(parts)
-        case Scaled(factor, vector):
-            return Rule.PRODUCT, factor * coefficient(vector, position, record)
-    return (Rule.COORDINATE, ONE) if expression == position else (Rule.CONSTANT, ZERO)
+"""What the derivative of A is called, and that of B."""

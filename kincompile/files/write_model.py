@@ -16,7 +16,6 @@ from kincompile.model.expressions import as_expression
 from kincompile.model.resolve import Joint
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
-from kincompile.names import body_coordinates
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -66,7 +65,7 @@ def _body(item: Body) -> dict[str, Any]:
 
 def _free_coordinates(system: ConstraintSystem) -> Iterable[Coordinate]:
     """Return the coordinates that neither a body nor a cam has brought along."""
-    others = {name for body in system.bodies for name in body_coordinates(body.name)}
+    others = {name for body in system.bodies for name in body.coordinates}
     for item in system.constraints:
         if isinstance(item, Joint):
             others.update(item.written.contact_names if item.written.contacts else ())

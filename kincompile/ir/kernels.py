@@ -6,28 +6,29 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-from kincompile.calculus.expand import Expansion, Pair, Value
+from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import (
     Basis,
     Power,
-    Scalar,
+    Rotated,
     Scaled,
     Symbol,
-    Turned,
     Vector,
     VectorSum,
     VectorSymbol,
 )
 from kincompile.derive.derivation import derive
-from kincompile.derive.equations import derive_equation
+from kincompile.ir.differentiate import negated_tangents, tangents
 from kincompile.ir.from_sympy import Converter
-from kincompile.ir.graph import Graph
+from kincompile.ir.graph import Graph, pruned
 from kincompile.ir.program import Kernel
-from kincompile.model.matrices import entry_columns
+from kincompile.names import rate
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from fractions import Fraction
 
+    from kincompile.calculus.expressions import Components, Profile, Rotation, TimeFunction, Value
     from kincompile.calculus.template import Template
     from kincompile.model.resolve import FreeEquation
 
@@ -61,7 +62,7 @@ class KernelEnvironment:
     def __init__(self, template: Template) -> None:
         self.graph = Graph()
         self.inputs: dict[str, int] = {}
-        self._frame_angles = {frame.phi for frame in template.frames}
+        self._frames = {frame.rotation: frame for frame in template.frames}
 
     def _input(self, name: str) -> Code:
         node = self.inputs[name] = self.graph.input(name)
@@ -75,35 +76,32 @@ class KernelEnvironment:
         """Return pi."""
         return Code(self.graph, self.graph.pi())
 
-    def symbol(self, name: str) -> Value:
+    def symbol(self, symbol: Symbol) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
-        return self._input(name)
+        return self._input(symbol.name)
 
-    def vector(self, name: str) -> Pair:
-        """Return the components of a vector as two inputs."""
-        return self._input(f"{name}.x"), self._input(f"{name}.y")
+    def vector(self, symbol: VectorSymbol) -> Components:
+        """Return the components of a vector as inputs."""
+        return tuple(self._input(f"{symbol.name}.{axis}") for axis in "xy"[: symbol.size])
 
-    def time_function(self, name: str, order: int) -> Value:
+    def time_function(self, function: TimeFunction) -> Value:
         """Return C(t) or one of its derivatives."""
-        return self._input(derivative_name(name, order))
+        return self._input(derivative_name(function.name, function.order))
 
-    def profile(self, name: str, order: int) -> Value:
+    def profile(self, profile: Profile) -> Value:
         """Return rho(alpha) or one of its derivatives."""
-        return self._input(derivative_name(name, order))
+        return self._input(derivative_name(profile.name, profile.order))
 
-    def cos_sin(self, angle: Scalar, expand: Expansion) -> Pair:
+    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
         """Return cosine and sine: inputs for a body's angle, whose frame is shared, else code."""
-        if angle in self._frame_angles:
-            assert isinstance(angle, Symbol)
-            return self._input(f"cos {angle.name}"), self._input(f"sin {angle.name}")
-        node = expand.scalar(angle).node
-        return Code(self.graph, self.graph.call("cos", node)), Code(
-            self.graph, self.graph.call("sin", node)
-        )
+        frame = self._frames.get(rotation)
+        if frame is None:
+            return expand.entries(rotation)
+        return tuple(self._input(f"{name} {frame.phi.name}") for name in ("cos", "sin"))
 
-    def sqrt(self, value: Value) -> Value:
-        """Return a square root."""
-        return Code(self.graph, self.graph.call("sqrt", value.node))
+    def call(self, function: str, value: Value) -> Value:
+        """Return an elementary function."""
+        return Code(self.graph, self.graph.call(function, value.node))
 
 
 def derivative_name(name: str, order: int) -> str:
@@ -116,84 +114,103 @@ def constraint_kernel(template: Template) -> Kernel:
     """Return the kernel of a constraint type."""
     environment = KernelEnvironment(template)
     expansion = Expansion(environment)
-    Phi: list[int] = []
-    nu: list[int] = []
-    gamma: list[int] = []
-    entries: list[tuple[int, int, int]] = []
+    outputs: dict[str, list[tuple[int, int, int]]] = {}
+    first = 0
     for block in derive(template):
-        columns: list[tuple[Code, ...]] = []
-        is_vector = isinstance(block.Phi, Vector)
-        for coordinate, entry in zip(template.coordinates, block.Phi_q, strict=True):
-            columns += entry_columns(entry, is_vector, isinstance(coordinate, Vector), expansion)
-        entries += [
-            (len(Phi) + row, column, item.node)
+        columns = [expansion.components(column) for column in block.Phi_q]
+        outputs.setdefault("Phi_q", []).extend(
+            (first + row, column, item.node)
             for column, items in enumerate(columns)
             for row, item in enumerate(items)
             if environment.graph.value_of(item.node) != 0
-        ]
-        Phi += [item.node for item in expansion.components(block.Phi)]
-        nu += [item.node for item in expansion.components(block.nu)]
-        gamma += [item.node for item in expansion.components(block.gamma)]
+        )
+        vectors = {"Phi": block.Phi, "nu": block.nu, "gamma": block.gamma}
+        for name, vector in vectors.items():
+            outputs.setdefault(name, []).extend(
+                (first + row, 0, item.node) for row, item in enumerate(expansion.components(vector))
+            )
+        first = len(outputs["Phi"])
     return Kernel(
         template.type_name,
         tuple(environment.inputs),
         tuple(environment.graph.nodes),
-        tuple(Phi),
-        tuple(sorted(entries)),
-        tuple(nu),
-        tuple(gamma),
-        _hints(expansion),
+        {name: tuple(sorted(entries)) for name, entries in outputs.items()},
+        _hints(template, expansion),
     )
 
 
-def _hints(expansion: Expansion) -> tuple[tuple[int, str], ...]:
+def _hints(template: Template, expansion: Expansion) -> tuple[tuple[int, str], ...]:
     """Name the components of vectors that a reader knows from the textbook.
 
     They are A_i s_i, the centripetal A_i s_i w_i^2, d and its rate, and A_i u(alpha_i) of a cam.
     """
     found = []
     for vector, pair in expansion.vectors.items():
-        stem = _stem(vector)
+        stem = _stem(template, vector)
         if stem is not None:
             found += [(item.node, f"{stem}.{axis}") for axis, item in zip("xy", pair, strict=True)]
     return tuple(found)
 
 
-def _stem(vector: Vector) -> str | None:
+def _stem(template: Template, vector: Vector) -> str | None:
     match vector:
-        case Turned(Symbol(), VectorSymbol(name), 0):
+        case Rotated(_, VectorSymbol(name), ()):
             return name
-        case Scaled(Power(Symbol(), 2), Turned(Symbol(), VectorSymbol(name), 0)):
+        case Scaled(Power(Symbol(), 2), Rotated(_, VectorSymbol(name), ())):
             return f"{name} w2"
-        case Turned(Symbol(), Turned(Symbol(name), Basis(), 0), 0):
-            return name.replace("alpha", "u")
-        case VectorSum(terms):
-            names = {term.name for term in terms if isinstance(term, VectorSymbol)}
-            if "r_j" in names or names == {"r_i", "c"}:
-                return "d"
-            return "d_dot" if "r_j_dot" in names or names == {"r_i_dot"} else None
+        case Rotated(_, Rotated(inner, Basis(), ()), ()):
+            indices = [item.index for item in template.contacts if inner == item.rotation]
+            return f"u_{indices[0]}" if indices else None
+        case VectorSum():
+            return _separation(template, vector)
     return None
+
+
+def _separation(template: Template, vector: VectorSum) -> str | None:
+    """Return whether a sum is a distance vector d, which leads to body j, or the rate of one."""
+    *others, last = template.frames
+    if last.r_dot in vector.terms:
+        return "d_dot"
+    return "d" if others and last.r in vector.terms else None
 
 
 def equation_kernel(equation: FreeEquation) -> Kernel:
     """Return the kernel of a free equation; its inputs are the names that occur in it."""
     graph = Graph()
-    inputs: dict[str, int] = {}
+    convert = Converter(graph, graph.input).convert
+    return differentiated(graph, [convert(item) for item in equation.expressions], equation.columns)
 
-    def leaf(name: str) -> int:
-        inputs[name] = graph.input(name)
-        return inputs[name]
 
-    convert = Converter(graph, leaf).convert
-    found = [derive_equation(item, equation.columns) for item in equation.expressions]
+def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> Kernel:
+    r"""Return the kernel of equations given as nodes, in the coordinates that are named.
+
+    With :math:`\dot q` constant and :math:`\dot t = 1`, the second derivative of Phi along the
+    motion is :math:`-\gamma`.
+    """
+    one, t = graph.const(1), graph.input("t")
+    motion = {graph.input(name): graph.input(rate(name)) for name in columns} | {t: one}
+    by_column = [tangents(graph, Phi, {graph.input(name): one}) for name in columns]
+    nu = negated_tangents(graph, Phi, {t: one})
+    gamma = negated_tangents(graph, tangents(graph, Phi, motion), motion)
     entries = [
-        (row, column, convert(entry))
-        for row, item in enumerate(found)
-        for column, entry in enumerate(item.Phi_q)
+        (row, column, node)
+        for row in range(len(Phi))
+        for column, node in enumerate(found[row] for found in by_column)
+        if graph.value_of(node) != 0
     ]
-    Phi, nu, gamma = (
-        tuple(convert(getattr(item, quantity)) for item in found)
-        for quantity in ("Phi", "nu", "gamma")
+    vectors = {"Phi": Phi, "nu": nu, "gamma": gamma}
+    outputs = {
+        name: [(row, 0, node) for row, node in enumerate(found)] for name, found in vectors.items()
+    }
+    outputs["Phi_q"] = entries
+    nodes, new = pruned(graph.nodes, [node for found in outputs.values() for _, _, node in found])
+    return Kernel(
+        "Equation",
+        tuple(node[1] for node in nodes if node[0] == "input"),
+        tuple(nodes),
+        {
+            name: tuple((row, column, new[node]) for row, column, node in found)
+            for name, found in outputs.items()
+        },
+        (),
     )
-    kept = tuple(entry for entry in entries if graph.value_of(entry[2]) != 0)
-    return Kernel("Equation", tuple(inputs), tuple(graph.nodes), Phi, kept, nu, gamma, ())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import sympy
 
 from kincompile.errors import ModelError
+from kincompile.ir.differentiate import derivative_code
 from kincompile.ir.equation_shapes import EquationShapes
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
@@ -99,7 +100,7 @@ def _kernel_mark(instance: Instance, first: str) -> Kernel | str:
 
 
 def _too_deep(constraint: Joint | FreeEquation) -> str:
-    """Return what to do about an expression that SymPy cannot differentiate."""
+    """Return what to do about an expression that Python cannot walk through by recursion."""
     return (
         f"{constraint.name!r}: its expressions are nested too deeply, functions of functions of "
         "functions; give an inner part u a coordinate of its own, with the equation u - (inner "
@@ -133,8 +134,8 @@ class _Binder:
         if isinstance(constraint, Joint):
             kernel = constraint_kernel(constraint.template)
             return kernel, constraint.columns, self.bind(constraint, kernel)
-        shared = self._shapes and self._shapes.shared(constraint)
-        if shared:
+        if self._shapes:
+            shared = self._shapes.shared(constraint)
             return shared.kernel, shared.columns, self.bind_equation(shared)
         kernel = equation_kernel(constraint)
         return kernel, constraint.columns, tuple(self._graph.input(name) for name in kernel.inputs)
@@ -151,26 +152,26 @@ class _Binder:
         symbol, order = name.rstrip("'"), name.count("'")
         assert derivative_name(symbol, order) == name
         if symbol in joint.profiles:
-            contact = _contact_symbols(joint.template, joint.columns)[symbol]
-            return self._derivative(joint.profiles[symbol], alpha, order, contact)
+            contact = _contact_names(joint.template, joint.columns)[symbol]
+            return self._derivative(joint.profiles[symbol], alpha.name, order, contact)
         value = joint.scalars[symbol]
         if not isinstance(value, sympy.Expr):
             return self._value(0.0 if order else value)
-        return self._derivative(value, t, order, t)
+        return self._derivative(value, t.name, order, t.name)
 
-    def _derivative(
-        self, value: sympy.Expr, variable: sympy.Symbol, order: int, at: sympy.Symbol
-    ) -> int:
-        """Return the node of a derivative by a variable that stands for another symbol."""
-        shared = self._shapes and self._shapes.derivative(value, variable.name, order)
-        if not shared:
-            found = value.diff(variable, order) if order else value
-            return self._convert(found if at == variable else found.subs(variable, at))
+    def _derivative(self, value: sympy.Expr, variable: str, order: int, at: str) -> int:
+        """Return the node of a derivative by a variable that stands for the input `at`."""
+        if self._shapes:
+            nodes, values = self._shapes.derivative(value, variable, order)
+        else:
+            graph = Graph()
+            node = Converter(graph, graph.input).convert(value)
+            nodes = derivative_code(graph, node, variable, order)
+            values = {item[1]: item[1] for item in nodes if item[0] == "input"}
         inputs = {
-            name: self._named(at.name if named == variable.name else named)
-            for name, named in shared.values.items()
+            name: self._named(at if named == variable else named) for name, named in values.items()
         }
-        return self._graph.instantiate(shared.nodes, inputs)[-1]
+        return self._graph.instantiate(nodes, inputs)[-1]
 
     def _named(self, value: str | sympy.Number) -> int:
         """Return the node of a symbol by name, or of a number."""
@@ -235,11 +236,11 @@ def _frame_inputs(index: str) -> tuple[str, ...]:
     return *coordinates, *rates, f"cos phi_{index}", f"sin phi_{index}"
 
 
-def _contact_symbols(
-    template: Template, columns: tuple[str | None, ...]
-) -> dict[str, sympy.Symbol]:
+def _contact_names(template: Template, columns: tuple[str | None, ...]) -> dict[str, str]:
+    """Return the coordinate at which each profile is taken."""
     names = columns[3 * len(template.frames) :]
     return {
-        contact.rho().name: sympy.Symbol(name)
+        contact.rho().name: name
         for contact, name in zip(template.contacts, names, strict=True)
+        if name is not None
     }

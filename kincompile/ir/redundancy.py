@@ -9,7 +9,7 @@ import numpy as np
 from kincompile.errors import StructuralError
 from kincompile.ir.interpret import interpret
 from kincompile.names import listed
-from kincompile.structure.counting import counting_problem, require_square
+from kincompile.structure.counting import counting_problem
 from kincompile.structure.rank import RankReport, generic_rank
 from kincompile.structure.remedies import least_squares_will_do, surpluses
 
@@ -61,23 +61,19 @@ def driver_rows(system: ConstraintSystem) -> list[int]:
 def redundant_equations(
     system: ConstraintSystem, program: Program, pattern: Pattern
 ) -> tuple[Surplus, ...]:
-    """Check that the equations determine the coordinates; return those that are redundant.
+    """Return the redundant ones of more equations than coordinates.
 
     Returns
     -------
     tuple of Surplus
-        Nothing where there are as many equations as coordinates. Where there are more: the
-        constraints with equations that depend on others at every assembled position, and agree
+        The constraints with equations that depend on others at every assembled position, and agree
         with them.
 
     Raises
     ------
     StructuralError
-        Where there are too few equations, or too many that do not agree.
+        Where those that are too many do not agree.
     """
-    if len(system.equations) <= len(system.coordinates):
-        require_square(system, pattern)
-        return ()
     report = rank_report(system, program)
     found = surpluses(system, report)
     if least_squares_will_do(system, report):

@@ -3,14 +3,52 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.names import body_coordinates, rate
+from kincompile.calculus.symbols import Frame
+from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from kincompile.model.expressions import Scalar
+    from collections.abc import Callable, Sequence
+
+    from kincompile.model.expressions import Scalars
+
+
+@dataclass(frozen=True, slots=True)
+class BodyKind:
+    """A kind of body: what its coordinates are.
+
+    Attributes
+    ----------
+    letters
+        Letter of each coordinate; its name is the letter and the body's.
+    units
+        Unit of each, None for that of lengths.
+    ground
+        Values of the ground's.
+    drivers
+        Name of the constraint type that drives each.
+    frame
+        The frame of a body i or j in the calculus, by its index.
+    """
+
+    letters: tuple[str, ...]
+    units: tuple[str | None, ...]
+    ground: tuple[int, ...]
+    drivers: tuple[str, ...]
+    frame: Callable[[str], Frame]
+
+
+PLANAR = BodyKind(
+    letters=("x", "y", "phi"),
+    units=(None, None, "rad"),
+    ground=(0, 0, 0),
+    drivers=("AbsoluteX", "AbsoluteY", "AbsoluteAngle"),
+    frame=Frame,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,19 +60,22 @@ class Body:
     """
 
     name: str
-    guess: tuple[Scalar, Scalar, Scalar] = (0, 0, 0)
-    outline: tuple[tuple[Scalar, Scalar], ...] = ()
+    guess: Scalars = (0, 0, 0)
+    outline: Sequence[Scalars] = ()
     is_ground: bool = field(default=False, kw_only=True)
+    kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates that a body of this name has, in order."""
+        return tuple(f"{letter}_{self.name}" for letter in self.kind.letters)
 
     def _coordinate(self, index: int) -> sympy.Expr:
-        if self.is_ground:
-            return sympy.S.Zero
-        return sympy.Symbol(body_coordinates(self.name)[index])
+        ground: sympy.Expr = sympy.Integer(self.kind.ground[index])
+        return ground if self.is_ground else sympy.Symbol(self.coordinates[index])
 
     def _rate(self, index: int) -> sympy.Expr:
-        if self.is_ground:
-            return sympy.S.Zero
-        return sympy.Symbol(rate(body_coordinates(self.name)[index]))
+        return sympy.S.Zero if self.is_ground else sympy.Symbol(rate(self.coordinates[index]))
 
     @property
     def x(self) -> sympy.Expr:
@@ -68,6 +109,12 @@ class Body:
 
 
 GROUND = Body("ground", is_ground=True)
+
+
+def body_columns(bodies: Sequence[Body]) -> tuple[range, ...]:
+    """Return the columns of each body's coordinates: bodies come first, in order."""
+    ends = accumulate((len(body.kind.letters) for body in bodies), initial=0)
+    return tuple(range(first, end) for first, end in pairwise(ends))
 
 
 @dataclass(frozen=True, slots=True)

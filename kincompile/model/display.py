@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import sympy
 
+from kincompile.html import table_html
 from kincompile.model.resolve import FreeEquation
 
 if TYPE_CHECKING:
@@ -26,14 +27,9 @@ def constraints_html(
     """Return the constraints of a system as an HTML table."""
     rows, first = [], 0
     for item in constraints:
-        cells = (str(first), item.name, _kind(item), item.text, item.source)
-        rows.append(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>")
+        rows.append((str(first), item.name, _kind(item), item.text, item.source))
         first += len(item.equation_names)
-    header = "".join(f"<th>{cell}</th>" for cell in _HEADER)
-    return (
-        f"<p><b>{escape(name)}</b>: {coordinates} coordinates, {first} equations</p>"
-        f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
-    )
+    return table_html(name, f"{coordinates} coordinates, {first} equations", _HEADER, rows)
 
 
 def problems_html(name: str, problems: str) -> str:

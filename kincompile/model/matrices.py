@@ -7,21 +7,30 @@ from typing import TYPE_CHECKING, Protocol
 
 import sympy
 
-from kincompile.calculus.expand import Expansion, Pair, Value
-from kincompile.calculus.expressions import Expression, Scalar, Vector
+from kincompile.calculus.expand import Expansion
 from kincompile.derive.derivation import derive
 from kincompile.derive.equations import derive_equation
 from kincompile.errors import ModelError
+from kincompile.html import picture_html
 from kincompile.model.display import constraints_html, equations_latex, problems_html
 from kincompile.model.expressions import alpha, as_sympy, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.names import rate
-from kincompile.pictures import picture_html
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from fractions import Fraction
 
+    from kincompile.calculus.expressions import (
+        Components,
+        Profile,
+        Rotation,
+        Symbol,
+        TimeFunction,
+        Value,
+        VectorSymbol,
+    )
+    from kincompile.calculus.symbols import CoordinateSymbol
     from kincompile.model.bodies import Coordinate
 
 
@@ -137,37 +146,13 @@ def _joint_rows(joint: Joint) -> list[Row]:
     expansion = Expansion(SymbolicEnvironment(joint))
     rows = []
     for block in derive(joint.template):
-        columns: list[tuple[sympy.Expr, ...]] = []
-        is_vector = isinstance(block.Phi, Vector)
-        for coordinate, entry in zip(joint.template.coordinates, block.Phi_q, strict=True):
-            columns += entry_columns(entry, is_vector, isinstance(coordinate, Vector), expansion)
+        columns = [expansion.components(column) for column in block.Phi_q]
         parts = [expansion.components(item) for item in (block.Phi, block.nu, block.gamma)]
-        for k, (Phi, nu, gamma) in enumerate(zip(*parts, strict=True)):
-            entries = {
-                name: column[k]
-                for name, column in zip(joint.columns, columns, strict=True)
-                if name is not None
-            }
-            rows.append(Row(Phi, entries, nu, gamma))
+        for Phi, nu, gamma, *entries in zip(*parts, *columns, strict=True):
+            by_name = zip(joint.columns, entries, strict=True)
+            known = {name: entry for name, entry in by_name if name is not None}
+            rows.append(Row(Phi, known, nu, gamma))
     return rows
-
-
-def entry_columns(
-    entry: Expression, is_vector_row: bool, is_position: bool, expansion: Expansion
-) -> list[tuple[Value, ...]]:
-    """Expand a block of Phi_q to its columns, each with one value a row.
-
-    By a position r a vector constraint has the block k I, and a scalar one the row (d/dx, d/dy).
-    """
-    if is_vector_row and is_position:
-        assert isinstance(entry, Scalar)
-        k, zero = expansion.scalar(entry), expansion.scalar(entry * 0)
-        return [(k, zero), (zero, k)]
-    if is_position:
-        assert isinstance(entry, Vector)
-        x, y = expansion.vector(entry)
-        return [(x,), (y,)]
-    return [expansion.components(entry)]
 
 
 class SymbolicEnvironment:
@@ -175,18 +160,12 @@ class SymbolicEnvironment:
 
     def __init__(self, joint: Joint) -> None:
         self._joint = joint
-        self._symbols: dict[str, sympy.Expr] = {}
-        self._vectors: dict[str, Pair] = {}
-        for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
-            self._vectors[frame.r.name] = (body.x, body.y)
-            self._vectors[frame.r_dot.name] = (body.x_dot, body.y_dot)
-            self._symbols[frame.phi.name] = body.phi
-            self._symbols[frame.phi_dot.name] = body.phi_dot
-        names = joint.columns[3 * len(joint.bodies) :]
-        for contact, name in zip(joint.template.contacts, names, strict=True):
-            assert name is not None
-            self._symbols[contact.alpha.name] = sympy.Symbol(name)
-            self._symbols[contact.alpha_dot.name] = sympy.Symbol(rate(name))
+        self._motion: dict[CoordinateSymbol, tuple[sympy.Expr, ...]] = {}
+        names = iter(joint.columns)
+        for item, item_rate in zip(joint.template.coordinates, joint.template.rates, strict=True):
+            own = [next(names) for _ in range(item.size)]
+            self._motion[item] = tuple(_symbol(name) for name in own)
+            self._motion[item_rate] = tuple(_symbol(name and rate(name)) for name in own)
 
     def number(self, value: Fraction) -> Value:
         """Return an exact number."""
@@ -196,33 +175,35 @@ class SymbolicEnvironment:
         """Return pi."""
         return sympy.pi
 
-    def symbol(self, name: str) -> Value:
+    def symbol(self, symbol: Symbol) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
-        found = self._symbols.get(name)
-        return as_sympy(self._joint.scalars[name]) if found is None else found
+        if symbol in self._motion:
+            return self._motion[symbol][0]
+        return as_sympy(self._joint.scalars[symbol.name])
 
-    def vector(self, name: str) -> Pair:
+    def vector(self, symbol: VectorSymbol) -> Components:
         """Return a position, a velocity or a body-fixed point."""
-        found = self._vectors.get(name)
-        if found is not None:
-            return found
-        x, y = self._joint.points[name]
-        return as_sympy(x), as_sympy(y)
+        if symbol in self._motion:
+            return self._motion[symbol]
+        return tuple(as_sympy(value) for value in self._joint.points[symbol.name])
 
-    def time_function(self, name: str, order: int) -> Value:
+    def time_function(self, function: TimeFunction) -> Value:
         """Return C(t) or one of its derivatives."""
-        return as_sympy(self._joint.scalars[name]).diff(t, order)
+        return as_sympy(self._joint.scalars[function.name]).diff(t, function.order)
 
-    def profile(self, name: str, order: int) -> Value:
+    def profile(self, profile: Profile) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
-        contact = self._symbols[name.replace("rho", "alpha")]
-        return self._joint.profiles[name].diff(alpha, order).subs(alpha, contact)
+        rho = self._joint.profiles[profile.name].diff(alpha, profile.order)
+        return rho.subs(alpha, self.symbol(profile.argument))
 
-    def cos_sin(self, angle: Scalar, expand: Expansion) -> Pair:
-        """Return cosine and sine of an angle."""
-        value = expand.scalar(angle)
-        return sympy.cos(value), sympy.sin(value)
+    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
+        """Return the numbers that all vectors share that a rotation turns."""
+        return expand.entries(rotation)
 
-    def sqrt(self, value: Value) -> Value:
-        """Return a square root."""
-        return sympy.sqrt(value)
+    def call(self, function: str, value: Value) -> Value:
+        """Return an elementary function."""
+        return getattr(sympy, function)(value)
+
+
+def _symbol(name: str | None) -> sympy.Expr:
+    return sympy.S.Zero if name is None else sympy.Symbol(name)

@@ -28,7 +28,7 @@ from kincompile.model.expressions import (
     unknown_problem,
 )
 from kincompile.model.spline import PeriodicSpline, fit
-from kincompile.names import body_coordinates, listed, suggestion
+from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -213,11 +213,11 @@ def _title(constraint: Constraint) -> str:
 
 
 def _columns(body: Body) -> tuple[str | None, ...]:
-    return (None, None, None) if body.is_ground else body_coordinates(body.name)
+    return (None,) * len(body.coordinates) if body.is_ground else body.coordinates
 
 
 def _body(given: Any, where: str, scope: Scope) -> Body | None:
-    """Return the body that is meant, None where there is none."""
+    """Return the body with the given name, None where there is none."""
     name = given.name if isinstance(given, Body) else given
     if isinstance(name, str) and name == GROUND.name:
         return GROUND

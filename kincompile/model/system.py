@@ -10,14 +10,14 @@ from typing import Any
 import sympy
 
 from kincompile.errors import ModelError
-from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter
+from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter, body_columns
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
 from kincompile.model.text_views import TextViews
-from kincompile.names import body_coordinates, listed, name_problem, rate, unit_problem
+from kincompile.names import listed, name_problem, rate, unit_problem
 
 
 class ConstraintSystem(MatrixViews, TextViews):
@@ -44,7 +44,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     Attributes
     ----------
     coordinates : tuple of Coordinate
-        Three for each body in order, the free ones, then the contact parameters of cams: the
+        Those of each body in order, the free ones, then the contact parameters of cams: the
         columns of Phi_q.
     parameters : tuple of Parameter
         In the order of declaration: the entries of p.
@@ -143,6 +143,11 @@ class ConstraintSystem(MatrixViews, TextViews):
             total += len(item.equation_names)
         return tuple(offsets)
 
+    @property
+    def body_columns(self) -> tuple[range, ...]:
+        """Columns of each body's coordinates."""
+        return body_columns(self.bodies)
+
     def __repr__(self) -> str:
         """Return name and sizes."""
         sizes = f"{len(self.coordinates)} coordinates, {len(self.equations)} equations"
@@ -158,7 +163,7 @@ def _written(equations: Iterable[Any], problems: list[str]) -> list[Constraint |
 
 
 def _bodies(given: Iterable[Any], problems: list[str]) -> tuple[Body, ...]:
-    """Return the bodies among what was given as such."""
+    """Return the valid bodies; report everything else as a problem."""
     found = _items(given, "bodies", problems)
     problems += [
         f"{item!r} is not a body; make one with Mechanism.body"
@@ -235,15 +240,14 @@ def _body_coordinates(
             guess = tuple(body.guess)
         except TypeError:
             guess = ()
-        if len(guess) != 3:
-            problems.append(f"body {body.name!r}: the guess {body.guess!r} is not (x, y, phi)")
-            guess = (0, 0, 0)
-        for name, value, kind in zip(
-            body_coordinates(body.name), guess, (unit, unit, "rad"), strict=True
-        ):
-            found.append(
-                Coordinate(name, _number(value, f"guess of {name}", values, problems), kind)
-            )
+        kind = body.kind
+        if len(guess) != len(kind.letters):
+            expected = ", ".join(kind.letters)
+            problems.append(f"body {body.name!r}: the guess {body.guess!r} is not ({expected})")
+            guess = kind.ground
+        for name, value, own in zip(body.coordinates, guess, kind.units, strict=True):
+            number = _number(value, f"guess of {name}", values, problems)
+            found.append(Coordinate(name, number, unit if own is None else own))
     return found
 
 
@@ -341,7 +345,7 @@ def _check_names(
     named += [("a constraint", item.name) for item in constraints]
     problems += [problem for what, text in named if (problem := name_problem(text, what))]
     if not all(isinstance(text, str) for _, text in named):
-        raise ModelError(problems)  # without names nothing more can be said
+        raise ModelError(problems)  # further checks need names
     problems += [
         f"body {body.name!r}: this is the name of the fixed frame; use m.ground, or another name"
         for body in bodies

@@ -17,7 +17,7 @@ from kincompile.errors import ContractError, InputError
 from kincompile.runtime.contract import REMEDY, check
 from kincompile.runtime.engine.code import attach
 from kincompile.runtime.memory import empty
-from kincompile.runtime.results.display import module_html
+from kincompile.runtime.results.html import module_html
 
 if TYPE_CHECKING:
     import os

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from kincompile.names import body_coordinates
+from kincompile.model.bodies import body_columns
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -54,8 +54,10 @@ class Mobility(int):
     ----------
     bodies
         Number of bodies, the ground not counted.
+    coordinates
+        Number of coordinates.
     others
-        Coordinates that belong to no body: contact parameters of cams, and free ones.
+        How many of them belong to no body: contact parameters of cams, and free ones.
     joint_equations
         Equations that do not depend on time.
     driver_equations
@@ -63,21 +65,19 @@ class Mobility(int):
     """
 
     bodies: int
+    coordinates: int
     others: int
     joint_equations: int
     driver_equations: int
 
-    def __new__(cls, bodies: int, others: int, joint_equations: int, driver_equations: int) -> Self:
+    def __new__(
+        cls, bodies: int, coordinates: int, others: int, joint_equations: int, driver_equations: int
+    ) -> Self:
         """Count."""
-        self = super().__new__(cls, 3 * bodies + others - joint_equations)
-        self.bodies, self.others = bodies, others
+        self = super().__new__(cls, coordinates - joint_equations)
+        self.bodies, self.coordinates, self.others = bodies, coordinates, others
         self.joint_equations, self.driver_equations = joint_equations, driver_equations
         return self
-
-    @property
-    def coordinates(self) -> int:
-        """Number of coordinates, three for each body and the others."""
-        return 3 * self.bodies + self.others
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -196,7 +196,12 @@ class Findings:
         wanted = set(equations)
         return tuple(item.name for item in self.constraints if wanted & set(item.equations))
 
+    @property
+    def body_columns(self) -> tuple[range, ...]:
+        """Columns of each body's coordinates."""
+        return body_columns(self.bodies)
+
     def owners_of(self, coordinates: Collection[str]) -> tuple[str, ...]:
         """Return the bodies of coordinates, and the names of those that belong to none."""
-        owner = {name: body.name for body in self.bodies for name in body_coordinates(body.name)}
+        owner = {name: body.name for body in self.bodies for name in body.coordinates}
         return tuple(dict.fromkeys(owner.get(name, name) for name in coordinates))

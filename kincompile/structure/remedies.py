@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.rank import RankReport
 
-DRIVEN_BY = ("AbsoluteX", "AbsoluteY", "AbsoluteAngle")
-"""The driver of each coordinate of a body."""
-
 
 @dataclass(frozen=True, slots=True)
 class Surplus:
@@ -158,13 +155,12 @@ def _surplus(
 
 def missing_drivers(system: ConstraintSystem, ranks: RankReport) -> tuple[MissingDriver, ...]:
     """Return a driver for each degree of freedom: with all of them, nothing may move by itself."""
-    count = 3 * len(system.bodies)
-    return tuple(
-        MissingDriver(DRIVEN_BY[column % 3], system.bodies[column // 3].name)
-        if column < count
-        else MissingDriver("Equation", system.coordinates[column].name)
-        for column in ranks.drive
-    )
+    driven = [
+        MissingDriver(kind, body.name) for body in system.bodies for kind in body.kind.drivers
+    ]
+    others = system.coordinates[len(driven) :]
+    driven += [MissingDriver("Equation", item.name) for item in others]
+    return tuple(driven[column] for column in ranks.drive)
 
 
 def least_squares_will_do(system: ConstraintSystem, ranks: RankReport) -> bool:

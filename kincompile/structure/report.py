@@ -95,9 +95,9 @@ def _entry(item: Joint | FreeEquation, first_row: int) -> ConstraintEntry:
 def gruebler(system: ConstraintSystem) -> Mobility:
     """Count coordinates and equations as Gruebler does."""
     drivers = sum(len(item.equation_names) for item in system.constraints if item.is_driver)
-    bodies = len(system.bodies)
-    others = len(system.coordinates) - 3 * bodies
-    return Mobility(bodies, others, len(system.equations) - drivers, drivers)
+    n = len(system.coordinates)
+    others = n - sum(map(len, system.body_columns))
+    return Mobility(len(system.bodies), n, others, len(system.equations) - drivers, drivers)
 
 
 def _problem(system: ConstraintSystem, pattern: Pattern, ranks: RankReport) -> str:

@@ -54,10 +54,10 @@ def _bodies(found: Findings) -> list[str]:
     rows = [
         [
             body.name,
-            f"{3 * k}-{3 * k + 2}",
-            *_names_and_guesses(found.coordinates[3 * k : 3 * k + 3]),
+            f"{columns[0]}-{columns[-1]}",
+            *_names_and_guesses([found.coordinates[k] for k in columns]),
         ]
-        for k, body in enumerate(found.bodies)
+        for body, columns in zip(found.bodies, found.body_columns, strict=True)
     ]
     return table(("body", "columns", "coordinates", "guess"), rows) if rows else []
 
@@ -72,7 +72,7 @@ def _with_unit(name: str, unit: str) -> str:
 
 
 def _others(found: Findings) -> list[str]:
-    first = 3 * len(found.bodies)
+    first = sum(map(len, found.body_columns))
     rows = [
         [str(column), *_names_and_guesses([item])]
         for column, item in enumerate(found.coordinates[first:], first)
@@ -228,8 +228,8 @@ def _coordinates_of(found: Findings, equations: Collection[str]) -> list[str]:
 
 def _places(found: Findings, owners: Collection[str]) -> Iterator[str]:
     """Yield where some bodies are at the nearest position, and other coordinates' values."""
-    for k, body in enumerate(found.bodies):
-        x, y, phi = found.nearest[3 * k : 3 * k + 3]
+    for body, columns in zip(found.bodies, found.body_columns, strict=True):
+        x, y, phi = (found.nearest[k] for k in columns)
         if body.name in owners:
             yield f"{body.name} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
     for item, value in zip(found.coordinates, found.nearest, strict=True):
@@ -265,10 +265,10 @@ def _pattern(found: Findings) -> list[str]:
 
 def _groups(found: Findings) -> Iterator[tuple[str, int, tuple[str, ...]]]:
     """Yield title, first column and labels of the columns that stand together."""
-    bodies = len(found.bodies)
-    for k, body in enumerate(found.bodies):
-        yield body.name, 3 * k, ("x", "y", "phi")
-    for column, item in enumerate(found.coordinates[3 * bodies :], 3 * bodies):
+    for body, columns in zip(found.bodies, found.body_columns, strict=True):
+        yield body.name, columns[0], body.kind.letters
+    first = sum(map(len, found.body_columns))
+    for column, item in enumerate(found.coordinates[first:], first):
         yield item.name, column, ("",)
 
 

@@ -6,9 +6,7 @@ import keyword
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from kincompile.ir.graph import Constant
+    from collections.abc import Iterable
 
 
 class NameTable:
@@ -37,27 +35,3 @@ class NameTable:
     def copy(self) -> NameTable:
         """Return a table in which the same names are taken."""
         return NameTable(self._taken)
-
-
-def content_name(
-    node: tuple[object, ...], names: Mapping[int, str], numbers: Mapping[int, Constant]
-) -> str | None:
-    """Return a name that says what a small node is.
-
-    It is `a_2` for a/2, `sin_theta`, `a_c_crank` for a c_crank; None for a larger node.
-    """
-    match node:
-        case ("div", int(a), int(b)) if a in names and isinstance(numbers.get(b), int):
-            return f"{names[a]}_{numbers[b]}"
-        case ("square", int(a)) if a in names:
-            return f"{names[a]}_sq"
-        case ("call", str(function), int(a)) if a in names:
-            return f"{function}_{names[a]}"
-        case ("mul", int(a), int(b)) if a in names and b in names:
-            name = f"{names[a]}_{names[b]}"
-            spoken = not (names[a][-1].isdigit() or names[b][-1].isdigit())
-            return name if spoken and len(name) <= MOST_CHARACTERS else None
-    return None
-
-
-MOST_CHARACTERS = 24

@@ -13,11 +13,13 @@ import numpy as np
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from numpy.typing import NDArray
 
     from kincompile.ir.inline import InlineProgram
+    from kincompile.targets.evaluators import Listing
+    from kincompile.targets.printer import Dialect, Printer
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +89,36 @@ def _packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:
 
 
 class Target(Protocol):
-    """A language to emit."""
+    """A language to emit: what the module `target` of its folder has.
 
-    def __call__(self, code: InlineProgram) -> Emitted:
-        """Return the files of a program."""
+    Loops, names and schedules are not its concern: `emission` calls `function` for each evaluator,
+    then `files`.
+    """
+
+    DIALECT: Dialect
+    """How it writes expressions."""
+    RESERVED: tuple[str, ...]
+    """Words of the language, and names that its functions use."""
+
+    def evaluators(self) -> Mapping[str, tuple[str, ...]]:
+        """Return its functions, and the quantities that each gives."""
+
+    def function(
+        self, name: str, code: InlineProgram, listing: Listing, printer: Printer
+    ) -> list[str]:
+        """Return the lines of a function."""
+
+    def files(
+        self, code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+    ) -> Mapping[str, str]:
+        """Return the files, the main one first.
+
+        Parameters
+        ----------
+        code
+            The program, for constants and whatever else the files say of it.
+        functions
+            Lines of the functions, by name.
+        called
+            Elementary functions that they call.
+        """

@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.errors import InputError, UnsupportedError, missing_package
+from kincompile.errors import InputError, UnsupportedError, package_of_extra
 from kincompile.model.mechanism import system_of
 from kincompile.model.origins import model_of
 from kincompile.names import listed, suggestion
-from kincompile.runtime.results.labelled import TIME_UNIT
+from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.solution import Solution, require_solution
-from kincompile.view.marks import Place
+from kincompile.view.drawing import drawing
+from kincompile.view.marks import BodyPoint
 from kincompile.view.mechanism_plot import draw, move, require_bodies
-from kincompile.view.placed import world
-from kincompile.view.shapes import drawing
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -26,23 +25,24 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from matplotlib.animation import FuncAnimation
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
-    from kincompile.view.shapes import Drawing
+    from kincompile.view.drawing import Drawing
 
 WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
 """Matplotlib's writer for each kind of file."""
 
 FRAME_RATE = 25
-"""Most frames a second."""
+"""Largest number of frames a second."""
 
 TICK = 10
-"""What GIF counts the time of a frame in [ms]."""
+"""Unit in which GIF counts the time of a frame [ms]."""
 
 SHORTEST, LONGEST = 2.0, 20.0
-"""Between these the animation takes as long as the motion [s]."""
+"""Limits of the playing time, which otherwise is that of the motion [s]."""
 
 
 def animate(
@@ -60,20 +60,19 @@ def animate(
     solution
         The motion of one set of parameters. Points without a solution are left out.
     path : path-like, optional
-        File to write, ``.gif`` or ``.mp4``; it appears whole or not at all. MP4 needs ffmpeg.
+        File to write, whole or not at all: ``.gif``, or ``.mp4``, which needs ffmpeg.
     model
-        What moves; needed only where `solution` was solved with a module from a file, as a module
-        from ``kc.compile`` knows its model.
+        The mechanism; needed only for a solution of a module that was loaded from a file.
     seconds
-        How long it plays; without, as long as the motion lasts, but at least 2 s and at most 20 s.
+        Playing time; without, that of the motion, but at least 2 s and at most 20 s.
     trace
-        Names of bodies, whose origins, and of constraints, whose points leave a line.
+        Names of bodies and constraints, whose origins and points leave a line.
 
     Returns
     -------
     matplotlib.animation.FuncAnimation or pathlib.Path
-        The animation, to be kept as long as it plays; in a notebook
-        ``IPython.display.HTML(animation.to_jshtml())`` plays it. With `path`, the file written.
+        The animation, to be kept as long as it plays (in a notebook, by
+        ``IPython.display.HTML(animation.to_jshtml())``); with `path`, the file written.
 
     Raises
     ------
@@ -82,31 +81,19 @@ def animate(
     UnsupportedError
         If matplotlib, or for MP4 ffmpeg, is not installed.
     """
-    try:
+    with package_of_extra("matplotlib", "plot"):
         from matplotlib import animation
         from matplotlib import pyplot as plt
-    except ImportError:
-        raise missing_package("matplotlib", "plot") from None
     if path is not None:
         _require_writer(Path(path), animation.writers.is_available)
     system = _moving(solution, model)
     rows, interval = frame_rows(solution, seconds)
-    good = solution.q[solution.status == 0]
-    drawn = drawing(system, solution.parameters, good)
+    drawn = drawing(system, solution.parameters, solution.q[solution.status == 0])
     traced = _traced(drawn, trace)
     figure, ax = plt.subplots(layout="constrained")
-    artists = draw(ax, system, drawn, good)
-    for place in traced:
-        ax.plot(*world(good, place).T, color="0.5", linewidth=1, zorder=1)
-    times = _time_texts(solution, rows)
-    ax.set_title(times[0], loc="left")
+    show = _first_frame(ax, system, drawn, solution, rows, traced)
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # what is laid out once need not be for every frame
-
-    def show(frame: int) -> None:
-        move(artists, solution.q[rows[frame]])
-        ax.set_title(times[frame], loc="left")
-
+    figure.set_layout_engine("none")  # one layout serves all frames
     # Half a millisecond more, as the writer of GIF rounds down.
     moving = animation.FuncAnimation(figure, show, frames=len(rows), interval=interval + 0.5)
     if path is None:
@@ -117,8 +104,31 @@ def animate(
         plt.close(figure)
 
 
+def _first_frame(
+    ax: Axes,
+    system: ConstraintSystem,
+    drawn: Drawing,
+    solution: Solution,
+    rows: NDArray[np.intp],
+    traced: Iterable[BodyPoint],
+) -> Callable[[int], None]:
+    """Draw the first frame, and return what shows another one."""
+    positions = solution.q[solution.status == 0]
+    artists = draw(ax, system, drawn, positions)
+    for point in traced:
+        ax.plot(*point.at(positions).T, color="0.5", linewidth=1, zorder=1)
+    captions = _captions(solution, rows)
+    ax.set_title(captions[0], loc="left")
+
+    def show(frame: int) -> None:
+        move(artists, solution.q[rows[frame]])
+        ax.set_title(captions[frame], loc="left")
+
+    return show
+
+
 def frame_rows(solution: Solution, seconds: float | None) -> tuple[NDArray[np.intp], int]:
-    """Choose the points that are shown: those next to equally spaced times.
+    """Return the points that are shown: those nearest to equally spaced times.
 
     Returns
     -------
@@ -140,20 +150,16 @@ def frame_rows(solution: Solution, seconds: float | None) -> tuple[NDArray[np.in
 
 
 def _moving(solution: Solution, model: Mechanism | ConstraintSystem | None) -> ConstraintSystem:
-    """Return the system whose motion it is, if that can be shown."""
+    """Return the system that moves in a solution, after checking that it can be shown."""
     require_solution(solution)
     name = solution.name
-    if solution.q.ndim != 2:
-        raise InputError(
-            f"{name}: an animation shows one motion, and these are {len(solution.q)} variants; "
-            "solve with one of the parameter sets"
-        )
+    solution.require_one_motion("an animation shows", "solve with one of the parameter sets")
     if not (solution.status == 0).any():
         raise InputError(f"{name} has no position that could be shown. {solution.message}")
     found = model_of(solution.module) if model is None else system_of(model)
     if found is None:
         raise InputError(
-            f"the shapes of {name} are not known, because its module was loaded from a file; give "
+            f"the shapes of {name} are unknown, because its module was loaded from a file; give "
             "its mechanism too: kc.animate(solution, path, model=m)"
         )
     names = tuple(item.name for item in found.coordinates)
@@ -165,7 +171,7 @@ def _moving(solution: Solution, model: Mechanism | ConstraintSystem | None) -> C
 
 
 def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
-    """Refuse a file that cannot be written, before the frames are drawn."""
+    """Check that the file can be written, before the frames are drawn."""
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
         raise InputError(f"cannot write {path}: end its name in {' or '.join(WRITERS)}.")
@@ -177,9 +183,9 @@ def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
     require_writable(path)
 
 
-def _traced(drawn: Drawing, names: Iterable[str]) -> list[Place]:
-    """Return the points that leave a line."""
-    places = {body: Place(k, (0.0, 0.0)) for k, body in enumerate(drawn.bodies)}
+def _traced(drawn: Drawing, names: Iterable[str]) -> list[BodyPoint]:
+    """Return the points to be traced."""
+    places = {body: BodyPoint(k, (0.0, 0.0)) for k, body in enumerate(drawn.bodies)}
     places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
     for name in (chosen := list(names)):
         if name not in places:
@@ -190,8 +196,8 @@ def _traced(drawn: Drawing, names: Iterable[str]) -> list[Place]:
     return [places[name] for name in chosen]
 
 
-def _time_texts(solution: Solution, rows: NDArray[np.intp]) -> list[str]:
-    """Return name and time of each frame, and how many points there are no frames of."""
+def _captions(solution: Solution, rows: NDArray[np.intp]) -> list[str]:
+    """Return the caption of each frame; points without a solution are counted in it."""
     duration = float(np.ptp(solution.t)) or 1.0
     digits = max(0, 2 - math.floor(math.log10(duration)))
     failed = np.count_nonzero(solution.status)
@@ -200,7 +206,7 @@ def _time_texts(solution: Solution, rows: NDArray[np.intp]) -> list[str]:
 
 
 def _written(moving: FuncAnimation, path: Path) -> Path:
-    """Write all frames to a temporary file, and that to its place."""
+    """Write all frames to a temporary file, and move that to its path."""
     with tempfile.TemporaryDirectory() as folder:
         draft = Path(folder, f"animation{path.suffix.lower()}")
         moving.save(draft, writer=WRITERS[draft.suffix])

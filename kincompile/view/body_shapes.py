@@ -1,4 +1,4 @@
-"""What bodies look like: the outline that was given, or the hull of their joint points."""
+"""The marks of bodies: the given outline, or the hull of the joint points."""
 
 from __future__ import annotations
 
@@ -6,32 +6,32 @@ import itertools
 from typing import TYPE_CHECKING
 
 from kincompile.view.marks import Link, Outline, moves_with
-from kincompile.view.placed import number_pair
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from kincompile.model.bodies import Body
-    from kincompile.view.marks import Mark, Place, Point
+    from kincompile.view.geometry import Geometry
+    from kincompile.view.marks import BodyPoint, Mark, Point
 
 SAME_POINT = 1e-9
 """Distance, relative to the coordinates, up to which two points of a body are one."""
 
 
-def outlines(bodies: Iterable[Body], values: Mapping[str, float]) -> list[Outline]:
-    """Return the outlines of those bodies that have one, with the values of parameters.
+def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Outline]:
+    """Return the outlines of those bodies that have one.
 
     From back to front: the first body hides what slides in it.
     """
     found = [
-        Outline(frame, tuple(number_pair(corner, values) for corner in body.outline))
+        Outline(frame, tuple(geometry.pair(corner) for corner in body.outline))
         for frame, body in enumerate(bodies)
         if len(body.outline)
     ]
     return found[::-1]
 
 
-def links(count: int, attached: Iterable[Place], marks: Sequence[Mark]) -> list[Link]:
+def links(count: int, attached: Iterable[BodyPoint], marks: Sequence[Mark]) -> list[Link]:
     """Return the hulls of bodies without an outline; of one point only where no mark shows it.
 
     Parameters
@@ -41,7 +41,7 @@ def links(count: int, attached: Iterable[Place], marks: Sequence[Mark]) -> list[
     attached
         Points that joints hold.
     marks
-        What is drawn besides, outlines among it.
+        All other marks, outlines included.
     """
     outlined = {mark.frame for mark in marks if isinstance(mark, Outline)}
     shown = {frame for mark in marks for frame in moves_with(mark)}

@@ -1,4 +1,4 @@
-"""A gallery: a page of each mechanism, and one that shows and links them all."""
+"""A gallery: the pages of several mechanisms, and one that shows and links them all."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kincompile.view.page import Page
 
 FRAMES = 120
-"""Times of a motion that its picture in the gallery has, about."""
+"""Approximate number of points of a motion in the gallery."""
 
 SCRIPTS = ("player.js", "draw.js", "gallery.js")
 """Scripts of the gallery, in order."""
@@ -77,12 +77,12 @@ class Gallery:
 
 
 def gallery(pages: Iterable[Page]) -> Gallery:
-    """Collect pages, to be written together with one that links them.
+    """Return a gallery of pages, to be written with a page that links them.
 
     Raises
     ------
     InputError
-        If two pages have one name, or a page has that of the gallery.
+        If two pages have the same name, or a page has that of the gallery.
     """
     found = tuple(pages)
     names = ["index", *(item.name for item in found)]
@@ -96,15 +96,14 @@ def gallery(pages: Iterable[Page]) -> Gallery:
 
 
 def _sizes(data: Mapping[str, Any]) -> str:
-    """Return in words how large a mechanism is."""
+    """Return the sizes of a mechanism in words."""
     bodies = len(data["drawing"]["bodies"])
     sizes = f"{len(data['coordinates'])} coordinates, {len(data['equations'])} equations"
-    counted = "1 body" if bodies == 1 else f"{bodies} bodies"
-    return f"{counted}, {sizes}" if bodies else sizes
+    return f"{'1 body' if bodies == 1 else f'{bodies} bodies'}, {sizes}" if bodies else sizes
 
 
 def _thinned(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return of a page's data what a small moving picture needs."""
+    """Return the part of a page's data that a small moving picture needs."""
     step = -(-len(data["arrays"]["t"]) // FRAMES)
     arrays = {name: data["arrays"][name][::step] for name in ("t", "q", "q_dot", "q_ddot")}
     kept = ("coordinates", "guess", "drawing", "extent")

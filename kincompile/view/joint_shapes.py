@@ -1,7 +1,7 @@
-"""What each type of constraint is drawn with: its marks.
+"""The marks of each type of constraint.
 
-A new type of constraint is drawn by one function here and its line in `DRAWINGS`; matplotlib and
-the page draw the marks.
+A new type needs one function here and its line in `DRAWINGS`; matplotlib and the page draw the
+marks.
 """
 
 from __future__ import annotations
@@ -21,140 +21,138 @@ from kincompile.model.joints import (
     TranslationalDistance,
 )
 from kincompile.model.relative import Distance, RelativeAngle, RelativeX, RelativeY
+from kincompile.view.geometry import JointGeometry
 from kincompile.view.marks import (
     GROUND_FRAME,
     Block,
+    BodyPoint,
     Drive,
     Mark,
     Pin,
-    Place,
     Point,
     Span,
 )
-from kincompile.view.placed import Placed
 
 if TYPE_CHECKING:
     from kincompile.model.constraint import Constraint
 
-Drawing: TypeAlias = Callable[[Placed], list[Mark]]
+DrawJoint: TypeAlias = Callable[[JointGeometry], list[Mark]]
 
 ALONG_X, ALONG_Y = (1.0, 0.0), (0.0, 1.0)
 
 
-def _revolute(placed: Placed) -> list[Mark]:
-    return [placed.pin(placed.place("s_i"), placed.place("s_j"))]
+def _revolute(joint: JointGeometry) -> list[Mark]:
+    return [joint.pin(joint.point("s_i"), joint.point("s_j"))]
 
 
-def _translational(placed: Placed) -> list[Mark]:
+def _translational(joint: JointGeometry) -> list[Mark]:
     """Draw a block on a rail of the ground; between moving bodies a sleeve and its slide.
 
     The sleeve is on body i, unless body j is the block of a crank that works in a slotted lever.
     """
-    i, j = placed.place("s_i"), placed.place("s_j")
-    v_i, v_j = placed.unit("v_i"), placed.unit("v_j")
+    i, j = joint.point("s_i"), joint.point("s_j")
+    v_i, v_j = joint.unit("v_i"), joint.unit("v_j")
     if i.frame == GROUND_FRAME:
-        return [placed.rail(i, v_i, j), Block(placed.name, j, v_j)]
+        return [joint.rail(i, v_i, j), Block(joint.name, j, v_j)]
     if j.frame == GROUND_FRAME:
-        return [placed.rail(j, v_j, i), Block(placed.name, i, v_i)]
-    if j.frame in placed.scene.blocks:
+        return [joint.rail(j, v_j, i), Block(joint.name, i, v_i)]
+    if j.frame in joint.mechanism.blocks:
         i, j, v_i = j, i, v_j
-    return [Span(placed.name, i, j, "slide"), Block(placed.name, i, v_i)]
+    return [Span(joint.name, i, j, "slide"), Block(joint.name, i, v_i)]
 
 
-def _revolute_translational(placed: Placed) -> list[Mark]:
+def _revolute_translational(joint: JointGeometry) -> list[Mark]:
     """Draw a pin in a straight slot; a driven distance is measured from the axis."""
-    i, j = placed.place("s_i"), placed.place("s_j")
-    distance = placed.constant("C")
-    track = placed.rail(i, placed.unit("v_i"), j, offset=distance or 0.0)
-    measure = [Span(placed.name, i, j, "dimension")] if distance is None else []
-    return [track, *measure, Pin(placed.name, j, j)]
+    i, j = joint.point("s_i"), joint.point("s_j")
+    distance = joint.constant("C")
+    track = joint.rail(i, joint.unit("v_i"), j, offset=distance or 0.0)
+    measure = [Span(joint.name, i, j, "dimension")] if distance is None else []
+    return [track, *measure, Pin(joint.name, j, j)]
 
 
-def _translational_distance(placed: Placed) -> list[Mark]:
-    return [placed.span("s_i", "s_j", "cylinder" if placed.is_driver else "dimension")]
+def _translational_distance(joint: JointGeometry) -> list[Mark]:
+    return [joint.span("s_i", "s_j", "cylinder" if joint.is_driver else "dimension")]
 
 
-def _distance(placed: Placed) -> list[Mark]:
-    i, j = placed.place("s_i"), placed.place("s_j")
-    length = placed.span("s_i", "s_j", "cylinder" if placed.is_driver else "rod")
-    return [length, placed.pin(i, i), placed.pin(j, j)]
+def _distance(first: str, second: str) -> DrawJoint:
+    """Return the drawing of a length between two points."""
+
+    def drawing(joint: JointGeometry) -> list[Mark]:
+        length = joint.span(first, second, "cylinder" if joint.is_driver else "rod")
+        return [length, *(Pin(joint.name, end, end) for end in (length.first, length.second))]
+
+    return drawing
 
 
-def _absolute_distance(placed: Placed) -> list[Mark]:
-    fixed, moving = placed.place("c"), placed.place("s_i")
-    length = placed.span("c", "s_i", "cylinder" if placed.is_driver else "rod")
-    return [length, placed.pin(fixed, fixed), placed.pin(moving, moving)]
-
-
-def _relative(axis: Point) -> Drawing:
+def _relative(axis: Point) -> DrawJoint:
     """Return the drawing of a component from point to point."""
 
-    def drawing(placed: Placed) -> list[Mark]:
-        drive = [Drive(placed.name, placed.place("s_j"), axis)] if placed.is_driver else []
-        return [placed.span("s_i", "s_j", "dimension"), *drive]
+    def drawing(joint: JointGeometry) -> list[Mark]:
+        drive = [Drive(joint.name, joint.point("s_j"), axis)] if joint.is_driver else []
+        return [joint.span("s_i", "s_j", "dimension"), *drive]
 
     return drawing
 
 
-def _absolute(axis: Point, across: Point) -> Drawing:
+def _absolute(axis: Point, across: Point) -> DrawJoint:
     """Return the drawing of a point at C along `axis`: on a rail of the ground, or driven."""
 
-    def drawing(placed: Placed) -> list[Mark]:
-        place, value = placed.place("s_i"), placed.constant("C")
+    def drawing(joint: JointGeometry) -> list[Mark]:
+        place, value = joint.point("s_i"), joint.constant("C")
         if value is None:
-            return [Drive(placed.name, place, axis)]
-        base = Place(GROUND_FRAME, (value * axis[0], value * axis[1]))
-        return [placed.rail(base, across, place), Pin(placed.name, place, place)]
+            return [Drive(joint.name, place, axis)]
+        base = BodyPoint(GROUND_FRAME, (value * axis[0], value * axis[1]))
+        return [joint.rail(base, across, place), Pin(joint.name, place, place)]
 
     return drawing
 
 
-def _angle(placed: Placed) -> list[Mark]:
+def _angle(joint: JointGeometry) -> list[Mark]:
     """Draw a turning arrow at the bearing; an angle that stays is not drawn."""
-    return [Drive(placed.name, placed.bearing(), None)] if placed.is_driver else []
+    return [Drive(joint.name, joint.bearing(), None)] if joint.is_driver else []
 
 
-def _gear(placed: Placed) -> list[Mark]:
-    return [placed.wheel("s_i", "R_i", "theta_i"), placed.wheel("s_j", "R_j", "theta_j")]
+def _gear(joint: JointGeometry) -> list[Mark]:
+    return [joint.wheel("s_i", "R_i", "theta_i"), joint.wheel("s_j", "R_j", "theta_j")]
 
 
-def _rack_and_pinion(placed: Placed) -> list[Mark]:
+def _rack_and_pinion(joint: JointGeometry) -> list[Mark]:
     """Draw the pitch line from P to Q, and on as far as the pinion rolls."""
-    p, q = placed.place("s_P"), placed.place("s_Q")
+    p, q = joint.point("s_P"), joint.point("s_Q")
     length = math.dist(p.point, q.point)
     along = ((q.point[0] - p.point[0]) / length, (q.point[1] - p.point[1]) / length)
-    pinion = placed.place("s_j")
-    line = placed.rail(p, along, pinion, style="rack", at_least=(0.0, length))
-    return [line, placed.wheel("s_j", "R_j", "theta_j")]
+    pinion = joint.point("s_j")
+    line = joint.rail(p, along, pinion, style="rack", at_least=(0.0, length))
+    return [line, joint.wheel("s_j", "R_j", "theta_j")]
 
 
-def _cam_follower(placed: Placed) -> list[Mark]:
-    return [placed.profile("s_i", "rho_i", "cam"), placed.profile("s_j", "rho_j", "cam")]
+def _cam_follower(joint: JointGeometry) -> list[Mark]:
+    return [joint.profile("s_i", "rho_i", "cam"), joint.profile("s_j", "rho_j", "cam")]
 
 
-def _cam_flat_follower(placed: Placed) -> list[Mark]:
+def _cam_flat_follower(joint: JointGeometry) -> list[Mark]:
     """Draw the cam, and a face as long as the cam is wide."""
-    cam = placed.profile("s_i", "rho_i", "cam")
-    centre = placed.place("s_i")
+    cam = joint.profile("s_i", "rho_i", "cam")
+    centre = joint.point("s_i")
     radius = max(math.dist(point, centre.point) for point in cam.points)
-    face = placed.rail(
-        placed.place("s_j"), placed.unit("v_j"), centre, style="face", at_least=(-radius, radius)
+    face = joint.rail(
+        joint.point("s_j"), joint.unit("v_j"), centre, style="face", at_least=(-radius, radius)
     )
     return [cam, face]
 
 
-def _point_follower(placed: Placed) -> list[Mark]:
-    pin = placed.place("s_i")
-    return [placed.profile("s_j", "rho_j", "slot"), Pin(placed.name, pin, pin)]
+def _point_follower(joint: JointGeometry) -> list[Mark]:
+    pin = joint.point("s_i")
+    return [joint.profile("s_j", "rho_j", "slot"), Pin(joint.name, pin, pin)]
 
 
-DRAWINGS: Mapping[type[Constraint], Drawing] = {
+DRAWINGS: Mapping[type[Constraint], DrawJoint] = {
     Revolute: _revolute,
     Translational: _translational,
     RevoluteTranslational: _revolute_translational,
     TranslationalDistance: _translational_distance,
-    Distance: _distance,
-    AbsoluteDistance: _absolute_distance,
+    Distance: _distance("s_i", "s_j"),
+    AbsoluteDistance: _distance("c", "s_i"),
     RelativeX: _relative(ALONG_X),
     RelativeY: _relative(ALONG_Y),
     AbsoluteX: _absolute(ALONG_X, ALONG_Y),
@@ -167,17 +165,17 @@ DRAWINGS: Mapping[type[Constraint], Drawing] = {
     CamFlatFollower: _cam_flat_follower,
     PointFollower: _point_follower,
 }
-"""What each type of constraint is drawn with."""
+"""The function that draws each type of constraint."""
 
 
-def marks_of(constraint: Constraint, placed: Placed) -> list[Mark]:
+def marks_of(constraint: Constraint, joint: JointGeometry) -> list[Mark]:
     """Return the marks of a constraint; a type without a drawing is drawn as the one it extends.
 
     Parameters
     ----------
     constraint
         The constraint as written: its type decides.
-    placed
+    joint
         Its attributes as numbers, and the motion that its marks must fit.
 
     Raises
@@ -187,7 +185,7 @@ def marks_of(constraint: Constraint, placed: Placed) -> list[Mark]:
     """
     for kind in type(constraint).__mro__:
         if kind in DRAWINGS:
-            return DRAWINGS[kind](placed)
+            return DRAWINGS[kind](joint)
     name = type(constraint).__name__
     raise UnsupportedError(
         f"there is no drawing for the type {name} of {constraint.name!r}; add a function to "

@@ -1,13 +1,18 @@
-"""The marks a drawing is made of: plain data, given to matplotlib and to the page alike.
+"""The marks that a drawing consists of: plain data, given to matplotlib and to the page alike.
 
 A frame is the index of a body, in the order of the mechanism, or `GROUND_FRAME`. Lengths are those
-of the model. What a mark looks like, its line widths and colours, is for each renderer to choose.
+of the model. Each renderer chooses line widths and colours.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
 
 GROUND_FRAME = -1
 """The frame of the ground."""
@@ -16,12 +21,42 @@ Point: TypeAlias = tuple[float, float]
 """Components (xi, eta) in a frame."""
 
 
+def in_ground(q: Array, frame: int, points: Array | Point) -> Array:
+    """Return where points of a frame are, in the axes of the ground.
+
+    Parameters
+    ----------
+    q : ndarray, shape (..., n)
+        Positions.
+    frame
+        Index of the body, or `GROUND_FRAME`.
+    points : array_like, shape (..., 2)
+        Components in the frame; the leading axes broadcast against those of `q`.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+    """
+    xi, eta = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
+    if frame == GROUND_FRAME:
+        x, y = np.zeros((2, *q.shape[:-1]))
+        c, s = np.ones_like(x), np.zeros_like(x)
+    else:
+        x, y, phi = np.moveaxis(q[..., 3 * frame : 3 * frame + 3], -1, 0)
+        c, s = np.cos(phi), np.sin(phi)
+    return np.stack((x + c * xi - s * eta, y + s * xi + c * eta), axis=-1)
+
+
 @dataclass(frozen=True, slots=True)
-class Place:
+class BodyPoint:
     """A point fixed in a frame."""
 
     frame: int
     point: Point
+
+    def at(self, q: Array) -> Array:
+        """Return where the point is, shape (N, 2), at positions q of shape (N, n)."""
+        return in_ground(q, self.frame, self.point)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +80,8 @@ class Pin:
     """Two points that a joint holds together; hatched where the first is on the ground."""
 
     joint: str
-    first: Place
-    second: Place
+    first: BodyPoint
+    second: BodyPoint
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +105,7 @@ class Block:
     """A slider: a block at a point, along an axis of unit length in the same frame."""
 
     joint: str
-    place: Place
+    place: BodyPoint
     axis: Point
 
 
@@ -78,13 +113,13 @@ class Block:
 class Span:
     """A line between points of two frames.
 
-    `style` is "rod" (a length that stays), "cylinder" (a length that is driven), "slide" (one body
-    telescopes in the other) or "dimension" (a measure without a body of its own).
+    `style` is "rod" (a constant length), "cylinder" (a driven length), "slide" (one body telescopes
+    in the other) or "dimension" (a measure without a body of its own).
     """
 
     joint: str
-    first: Place
-    second: Place
+    first: BodyPoint
+    second: BodyPoint
     style: str
 
 
@@ -93,7 +128,7 @@ class Wheel:
     """The pitch circle of a gear, with a tick in the direction `theta` [rad] that shows turning."""
 
     joint: str
-    place: Place
+    place: BodyPoint
     radius: float
     theta: float
     is_internal: bool
@@ -114,7 +149,7 @@ class Drive:
     """A driver at a point: along `axis`, a direction of the ground, or turning where it is None."""
 
     joint: str
-    place: Place
+    place: BodyPoint
     axis: Point | None
 
 
@@ -122,12 +157,12 @@ Mark: TypeAlias = Link | Outline | Pin | Rail | Block | Span | Wheel | Profile |
 
 
 def moves_with(mark: Mark) -> set[int]:
-    """Return the frames that a mark moves with."""
+    """Return the frames in which a mark is fixed."""
     return {place.frame for place, _ in reach(mark)}
 
 
-def reach(mark: Mark) -> list[tuple[Place, float]]:
-    """Return the points of a mark, each with how far it reaches beyond."""
+def reach(mark: Mark) -> list[tuple[BodyPoint, float]]:
+    """Return the points of a mark, each with the distance that the mark reaches beyond it."""
     match mark:
         case Wheel():
             return [(mark.place, mark.radius)]
@@ -139,4 +174,4 @@ def reach(mark: Mark) -> list[tuple[Place, float]]:
             return [(mark.first, 0.0), (mark.second, 0.0)]
         case Block() | Drive():
             return [(mark.place, 0.0)]
-    return [(Place(mark.frame, point), 0.0) for point in points]
+    return [(BodyPoint(mark.frame, point), 0.0) for point in points]

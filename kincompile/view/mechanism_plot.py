@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.errors import InputError, missing_package
+from kincompile.errors import InputError, package_of_extra
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed, suggestion
-from kincompile.view.placed import world
-from kincompile.view.shapes import drawing
-from kincompile.view.strokes import strokes
+from kincompile.runtime.results.columns import titled
+from kincompile.view.drawing import drawing
+from kincompile.view.polylines import polylines
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
-    from kincompile.view.shapes import Drawing
-    from kincompile.view.strokes import Stroke
+    from kincompile.view.drawing import Drawing
+    from kincompile.view.polylines import Polyline
 
 GROUND_COLOUR, DRIVER_COLOUR, GAP_COLOUR = "0.35", "0.1", "red"
-"""Colours of what stands still, of drivers, and of joints that are not assembled."""
+"""Colours of the ground, of drivers, and of joints that are not assembled."""
 
 FILL = 0.22
 """Opacity of the areas of bodies."""
@@ -51,7 +51,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "head": {"linewidth": 0, "edgecolor": DRIVER_COLOUR, "facecolor": DRIVER_COLOUR},
     "gap": {"linewidth": 2.0, "color": GAP_COLOUR, "linestyle": ":"},
 }
-"""What the strokes look like; those without a colour have that of their body."""
+"""Style of each kind of polyline; without a colour, it has that of its body."""
 
 NAME: dict[str, Any] = {
     "xytext": (9, 9),
@@ -60,7 +60,7 @@ NAME: dict[str, Any] = {
     "zorder": 10,
     "bbox": {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
 }
-"""How the name of a joint is written: beside it, on a pale ground."""
+"""Style of the name of a joint: beside it, on a pale ground."""
 
 
 def plot_mechanism(
@@ -102,10 +102,8 @@ def plot_mechanism(
     UnsupportedError
         If matplotlib is not installed.
     """
-    try:
+    with package_of_extra("matplotlib", "plot"):
         from matplotlib import pyplot as plt
-    except ImportError:
-        raise missing_package("matplotlib", "plot") from None
     position = position_of(model, q)
     drawn = drawing(model, checked_parameters(model, p), position)
     if ax is None:
@@ -118,12 +116,12 @@ def plot_mechanism(
 
 
 def position_of(model: Mechanism | ConstraintSystem, q: ArrayLike | None) -> NDArray[np.float64]:
-    """Return the position that is meant, shape (n,), of a model that can be drawn.
+    """Return a checked position, shape (n,), of a model that can be drawn.
 
     Raises
     ------
     InputError
-        If there is nothing to draw, or `q` is no finite position.
+        If there is nothing to draw, or `q` is not a finite position.
     """
     system = require_bodies(system_of(model))
     names = [item.name for item in system.coordinates]
@@ -145,7 +143,7 @@ def position_of(model: Mechanism | ConstraintSystem, q: ArrayLike | None) -> NDA
 
 
 def require_bodies(system: ConstraintSystem) -> ConstraintSystem:
-    """Return a system that has bodies.
+    """Return a system after checking that it has bodies.
 
     Raises
     ------
@@ -163,12 +161,12 @@ def require_bodies(system: ConstraintSystem) -> ConstraintSystem:
 def checked_parameters(
     model: Mechanism | ConstraintSystem, p: Mapping[str, float] | None
 ) -> dict[str, float]:
-    """Return the parameters that are given, all of which the model has.
+    """Return the given parameters after checking that the model has them.
 
     Raises
     ------
     InputError
-        If the model has none of such a name.
+        If the model has no parameter of such a name.
     """
     known = [item.name for item in model.system().parameters]
     for name in p or {}:
@@ -185,19 +183,15 @@ def draw(
     model: Mechanism | ConstraintSystem,
     drawn: Drawing,
     q: NDArray[np.float64],
-) -> list[tuple[Stroke, Any]]:
-    """Draw all strokes at the first of the positions, and return each with its artist.
+) -> list[tuple[Polyline, Any]]:
+    """Draw all polylines at the first of the positions q, and return each with its artist.
 
-    Parameters
-    ----------
-    ax, model, drawn
-        Where, of what, and its shapes.
-    q : ndarray, shape (N, n)
-        Positions that the limits of the plot must hold.
+    The limits of the plot hold all positions, shape (N, n).
     """
     x_low, x_high, y_low, y_high = drawn.extent(q)
     artists = [
-        (stroke, _artist(ax, stroke, q[0], order)) for order, stroke in enumerate(strokes(drawn))
+        (polyline, _artist(ax, polyline, q[0], order))
+        for order, polyline in enumerate(polylines(drawn))
     ]
     unit = model.system().length_unit
     ax.set_aspect("equal")
@@ -205,26 +199,26 @@ def draw(
     room = 2 * drawn.size
     ax.set_xlim(x_low - room, x_high + room)
     ax.set_ylim(y_low - room, y_high + room)
-    ax.set_xlabel(f"x [{unit}]" if unit else "x")
-    ax.set_ylabel(f"y [{unit}]" if unit else "y")
+    ax.set_xlabel(titled("x", unit))
+    ax.set_ylabel(titled("y", unit))
     return artists
 
 
-def move(artists: list[tuple[Stroke, Any]], q: NDArray[np.float64]) -> None:
-    """Move what `draw` returned to a position, shape (n,)."""
-    for stroke, artist in artists:
-        points = stroke.world(q)
-        if stroke.is_area:
+def move(artists: list[tuple[Polyline, Any]], q: NDArray[np.float64]) -> None:
+    """Move the artists that `draw` returned to a position, shape (n,)."""
+    for polyline, artist in artists:
+        points = polyline.at(q)
+        if polyline.is_area:
             artist.set_xy(points)
         else:
             artist.set_data(*points.T)
 
 
-def _artist(ax: Axes, stroke: Stroke, q: NDArray[np.float64], order: int) -> Any:
-    """Make the artist of a stroke."""
-    colour = f"C{stroke.frame % 10}" if stroke.frame >= 0 else GROUND_COLOUR
-    look, points, zorder = LOOKS[stroke.look], stroke.world(q), 2 + order * 1e-3
-    if not stroke.is_area:
+def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
+    """Return the artist of a polyline."""
+    colour = f"C{polyline.frame % 10}" if polyline.frame >= 0 else GROUND_COLOUR
+    look, points, zorder = LOOKS[polyline.look], polyline.at(q), 2 + order * 1e-3
+    if not polyline.is_area:
         (line,) = ax.plot(*points.T, **{"color": colour, "zorder": zorder, **look})
         return line
     style = {"edgecolor": colour, "facecolor": (colour, FILL), **look}
@@ -233,11 +227,11 @@ def _artist(ax: Axes, stroke: Stroke, q: NDArray[np.float64], order: int) -> Any
 
 
 def _write_names(ax: Axes, drawn: Drawing, q: NDArray[np.float64]) -> None:
-    """Write the names of constraints where they are; those of one place together."""
+    """Write the names of constraints at their places; those of one place together."""
     at: dict[tuple[float, float], list[str]] = {}
     for joint in drawn.joints:
         if joint.place is not None:
-            x, y = world(q[None], joint.place)[0]
+            x, y = joint.place.at(q)
             step = drawn.size * 1e-3
             at.setdefault((round(x / step) * step, round(y / step) * step), []).append(joint.name)
     for place, names in at.items():

@@ -1,4 +1,4 @@
-"""What a mechanism and its motion look like in a notebook; importing this registers it.
+"""Pictures of a mechanism and of its motion in a notebook; importing this registers them.
 
 A mechanism is drawn at its guess; a motion is played on its page, in a frame and without a server.
 """
@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile.html import picture_html
 from kincompile.model.origins import model_of
 from kincompile.model.system import ConstraintSystem
-from kincompile.pictures import picture_html
-from kincompile.runtime.results.figures import figure_html
+from kincompile.runtime.results.html import figure_html
 from kincompile.runtime.results.solution import Solution
+from kincompile.view.drawing import drawing
 from kincompile.view.mechanism_plot import draw, position_of
 from kincompile.view.page import page
-from kincompile.view.shapes import drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

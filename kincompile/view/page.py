@@ -11,11 +11,12 @@ import numpy as np
 
 from kincompile.compiler import compile as compile_model
 from kincompile.errors import InputError, StructuralError
+from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.newton import newton_method, newton_script
+from kincompile.view.newton_panel import newton_method, newton_script
 from kincompile.view.page_data import as_json, page_data
 from kincompile.writing import write_atomically
 
@@ -37,8 +38,8 @@ SCRIPTS = (
 )  # fmt: skip
 """Scripts, in order: each uses those before it, and the method of Newton's panel."""
 
-FRAME_HEIGHT = 720
-"""Height of a page inside a notebook [pixels]."""
+FRAME_HEIGHT = "720px"
+"""Height of a page inside a notebook."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +51,9 @@ class Page:
     name
         Name of the mechanism.
     html
-        The page with everything in it: data, style sheets, scripts. It asks for nothing.
+        The whole page: data, style sheets and scripts. It loads nothing else.
     data
-        What it shows, as `page_data` gives it.
+        The data it shows, as returned by `page_data`.
     """
 
     name: str
@@ -66,7 +67,7 @@ class Page:
 
     @property
     def message(self) -> str:
-        """What the solver, or the compiler, says."""
+        """The message of the solver or of the compiler."""
         return str(self.data["message"])
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -75,20 +76,17 @@ class Page:
         Raises
         ------
         InputError
-            When the name does not end in .html or .htm, or the file cannot be written; says why.
+            When the name does not end in .html or .htm, or the file cannot be written.
         """
         if Path(path).suffix not in (".html", ".htm"):
             raise InputError(f"cannot write {path}: end its name in .html")
         return write_atomically(path, self.html)
 
     def _repr_html_(self) -> str:
-        return (
-            f'<iframe srcdoc="{escape(self.html)}" title="{escape(self.name)}" '
-            f'style="width: 100%; height: {FRAME_HEIGHT}px; border: 0"></iframe>'
-        )
+        return framed_html(self.html, self.name, FRAME_HEIGHT)
 
     def __repr__(self) -> str:
-        """Return name and size."""
+        """Return the name and the size."""
         return f"<Page of {self.name!r}: {len(self.html) / 1e6:.2f} MB>"
 
 
@@ -147,7 +145,7 @@ def page(
 
 
 def _require_motion_of(system: ConstraintSystem, solution: Solution) -> None:
-    """Refuse what is not one motion of this system."""
+    """Check that a solution is one motion of this system."""
     require_solution(solution)
     if solution.coordinates != tuple(item.name for item in system.coordinates):
         raise InputError(
@@ -167,7 +165,7 @@ def _solved(
     p: Mapping[str, float] | None,
     through: str | None,
 ) -> tuple[Solution | None, str]:
-    """Compile and solve a system, as far as that goes, and say how far."""
+    """Compile and solve a system; return the solution, if there is one, and the message."""
     try:
         module = compile_model(system)
     except StructuralError as error:

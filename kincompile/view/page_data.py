@@ -1,4 +1,4 @@
-"""What the page of a motion shows, as plain data: the script of the page reads nothing else."""
+"""The data of a page: its scripts read nothing else."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.runtime.status import Status
-from kincompile.view.shapes import drawing
+from kincompile.view.drawing import drawing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,28 +22,28 @@ if TYPE_CHECKING:
 
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.results.solution import Solution
-    from kincompile.view.shapes import Drawing
+    from kincompile.view.drawing import Drawing
 
     Array: TypeAlias = NDArray[np.float64]
 
 VIOLATED = 1e-6
-"""Residual of a constraint, relative to the largest coordinate, from which on it does not hold."""
+"""Smallest residual of a violated constraint, relative to the largest coordinate."""
 
 LARGEST_DENSE = 300
-"""Coordinates up to which condition number and determinant of Phi_q are computed."""
+"""Coordinates up to which the condition number and determinant of Phi_q are computed."""
 
 
 def page_data(system: ConstraintSystem, solution: Solution | None, message: str) -> dict[str, Any]:
-    """Return what the page shows, as plain data and arrays.
+    """Return the data that a page shows, as plain values and arrays.
 
     Parameters
     ----------
     system
         The mechanism.
     solution
-        Its motion, None where its equations cannot determine one.
+        Its motion; None where the equations determine none.
     message
-        What the solver, or the compiler, says.
+        The message of the solver or of the compiler.
     """
     guess = np.array([item.guess for item in system.coordinates])
     values = {item.name: item.default or 0.0 for item in system.parameters}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.compiler import inspect
-from kincompile.errors import InputError, missing_package
+from kincompile.errors import InputError, package_of_extra
 from kincompile.tables import counted
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from kincompile.structure.report import Inspection
 
 MOST_LABELS = 60
-"""Rows or columns up to which each is named; of more, one in two is, or in three, ..."""
+"""Largest number of names along a side; of more rows, every second or third is named."""
 
 UNKNOWN, KNOWN, OUTLINE = "tab:blue", "lightsteelblue", "tab:orange"
-"""Colours of the entries that a step solves for, of the others, and of the blocks."""
+"""Colours of entries whose coordinate their step solves for, of other entries, of blocks."""
 
 
 def plot_sparsity(
@@ -59,45 +59,43 @@ def plot_sparsity(
     UnsupportedError
         If matplotlib is not installed.
     """
-    try:
+    with package_of_extra("matplotlib", "plot"):
         from matplotlib import pyplot as plt
         from matplotlib.collections import PolyCollection
-    except ImportError:
-        raise missing_package("matplotlib", "plot") from None
     if order not in ("solution", "written"):
         raise InputError(f"there is no order {order!r}; orders are: solution, written")
     found = inspect(model)
-    arranged = _arranged(found, in_blocks=order == "solution")
+    pattern = _ordered(found, by_step=order == "solution")
     if ax is None:
         # A fifth of an inch for each name, as far as a page goes.
-        sides = [min(3 + len(names) / 5, 14) for names in (arranged.columns, arranged.rows)]
+        sides = [min(3 + len(names) / 5, 14) for names in (pattern.columns, pattern.rows)]
         _, ax = plt.subplots(figsize=tuple(sides), layout="constrained")
     for chosen, colour, label in (
-        (arranged.is_unknown, UNKNOWN, "solved for in its step"),
-        (~arranged.is_unknown, KNOWN, "known by then"),
+        (pattern.is_unknown, UNKNOWN, "solved for in its step"),
+        (~pattern.is_unknown, KNOWN, "known by then"),
     ):
-        squares = list(_squares(arranged.entries[chosen]))
+        squares = list(_squares(pattern.entries[chosen]))
         ax.add_collection(PolyCollection(squares, color=colour, linewidth=0.4, label=label))
     if order == "solution":
         _outline_blocks(ax, found)
-    _name_sides(ax, arranged, set(found.redundant + found.conflicting))
-    sizes = f"{len(arranged.rows)} x {len(arranged.columns)}"
+    _name_sides(ax, pattern, set(found.redundant + found.conflicting))
+    sizes = f"{len(pattern.rows)} x {len(pattern.columns)}"
     ax.set_title(f"{found.name}: Phi_q, {sizes}, {len(found.pattern)} entries")
     return ax
 
 
 @dataclass(frozen=True, slots=True)
-class _Arranged:
-    """The pattern as it is drawn.
+class _Pattern:
+    """The pattern in the order in which it is drawn.
 
     Attributes
     ----------
     rows, columns
         Names, from top to bottom and from left to right.
     entries : ndarray of int, shape (nnz, 2)
-        Place of each entry: row and column.
+        Row and column of each entry.
     is_unknown : ndarray of bool, shape (nnz,)
-        Whether its coordinate is found in the step that its equation belongs to.
+        Whether the coordinate is solved for in the step of the equation.
     """
 
     rows: Sequence[str]
@@ -106,26 +104,27 @@ class _Arranged:
     is_unknown: NDArray[np.bool_]
 
 
-def _arranged(found: Inspection, *, in_blocks: bool) -> _Arranged:
-    """Arrange the pattern in the order of solution, or as it was written."""
+def _ordered(found: Inspection, *, by_step: bool) -> _Pattern:
+    """Return the pattern in the order of solution, or as it was written."""
     equations, coordinates = found.equations, [item.name for item in found.coordinates]
     row_step = {name: k for k, block in enumerate(found.blocks) for name in block.equations}
     column_step = {name: k for k, block in enumerate(found.blocks) for name in block.coordinates}
-    rows = _by_step(equations, row_step) if in_blocks else equations
-    columns = _by_step(coordinates, column_step) if in_blocks else coordinates
-    row_place = {name: k for k, name in enumerate(rows)}
-    column_place = {name: k for k, name in enumerate(columns)}
-    named = [(equations[row], coordinates[column]) for row, column in found.pattern]
-    return _Arranged(
+    rows = _sorted(equations, row_step) if by_step else equations
+    columns = _sorted(coordinates, column_step) if by_step else coordinates
+    pairs = [(equations[row], coordinates[column]) for row, column in found.pattern]
+    row_number = {name: k for k, name in enumerate(rows)}
+    column_number = {name: k for k, name in enumerate(columns)}
+    entries = [(row_number[row], column_number[column]) for row, column in pairs]
+    return _Pattern(
         rows,
         columns,
-        np.array([(row_place[row], column_place[column]) for row, column in named], dtype=np.intp),
-        np.array([row_step.get(row, -1) == column_step.get(column, -2) for row, column in named]),
+        np.array(entries, dtype=np.intp),
+        np.array([row_step.get(row, -1) == column_step.get(column, -2) for row, column in pairs]),
     )
 
 
-def _by_step(names: Sequence[str], step: Mapping[str, int]) -> list[str]:
-    """Return names in the order of their steps, those without one last."""
+def _sorted(names: Sequence[str], step: Mapping[str, int]) -> list[str]:
+    """Return names in the order of their steps, those without a step last."""
     return sorted(names, key=lambda name: step.get(name, len(names)))
 
 
@@ -147,9 +146,9 @@ def _outline_blocks(ax: Axes, found: Inspection) -> None:
         start = end
 
 
-def _name_sides(ax: Axes, arranged: _Arranged, dependent: set[str]) -> None:
+def _name_sides(ax: Axes, pattern: _Pattern, dependent: set[str]) -> None:
     """Write the names of rows and columns; those of dependent equations are red."""
-    for axis, names in ((ax.yaxis, arranged.rows), (ax.xaxis, arranged.columns)):
+    for axis, names in ((ax.yaxis, pattern.rows), (ax.xaxis, pattern.columns)):
         step = math.ceil(len(names) / MOST_LABELS)
         ticks = range(0, len(names), step)
         axis.set_ticks(ticks, [names[k] for k in ticks], fontsize=8)
@@ -158,6 +157,6 @@ def _name_sides(ax: Axes, arranged: _Arranged, dependent: set[str]) -> None:
     ax.xaxis.tick_top()
     ax.tick_params(axis="x", rotation=90)
     ax.set_aspect("equal")
-    ax.set_xlim(-0.7, len(arranged.columns) - 0.3)
-    ax.set_ylim(len(arranged.rows) - 0.3, -0.7)
+    ax.set_xlim(-0.7, len(pattern.columns) - 0.3)
+    ax.set_ylim(len(pattern.rows) - 0.3, -0.7)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")

@@ -53,6 +53,8 @@ class Code:
         Where Newton starts.
     pattern : ndarray of int, shape (nnz, 2)
         Rows and columns of Phi_q's entries.
+    bodies
+        Of each body its name, the number of its first coordinate, and how many it has.
     angular : ndarray of bool, shape (n,)
         Which coordinates are angles.
     lengths : ndarray, shape (n,)
@@ -81,6 +83,7 @@ class Code:
     units: Mapping[str, str]
     guess: Array
     pattern: NDArray[np.signedinteger[Any]]
+    bodies: tuple[tuple[str, int, int], ...]
     angular: NDArray[np.bool_]
     lengths: Array
     position: Callable[..., tuple[Array, Array]]
@@ -95,6 +98,13 @@ class Code:
     arrays: Any
     march: Callable[..., int] | None
     march_variants: Callable[..., int] | None
+
+    def owners(self) -> dict[str, str]:
+        """Return the body of each coordinate; one that belongs to none stands for itself."""
+        owners = {name: name for name in self.coordinates}
+        for body, first, count in self.bodies:
+            owners.update(dict.fromkeys(self.coordinates[first : first + count], body))
+        return owners
 
 
 def code_of(module: ModuleType) -> Code:
@@ -118,6 +128,7 @@ def attach(module: ModuleType) -> Code:
         units=names["UNITS"],
         guess=names["GUESS"],
         pattern=names["PATTERN"],
+        bodies=names.get("BODIES", ()),
         angular=angular,
         lengths=np.where(angular, 0.0, 1.0),
         position=names["position"],

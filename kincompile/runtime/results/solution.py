@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.pictures import picture_html
-from kincompile.runtime.results.display import table_html
-from kincompile.runtime.results.labelled import LabelledViews
-from kincompile.runtime.results.motion_plot import plot_columns, plot_html
+from kincompile.html import picture_html
+from kincompile.runtime.results.columns import MotionTable
+from kincompile.runtime.results.html import solution_html
+from kincompile.runtime.results.plot import plot_columns, plot_html
 from kincompile.runtime.singular.branches import counted_signatures, signatures
 from kincompile.runtime.singular.condition import conditions
-from kincompile.runtime.singular.events import BIFURCATION, Event
+from kincompile.runtime.singular.events import BIFURCATION
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Solution(LabelledViews):
+class Solution(MotionTable):
     """Position, velocity and acceleration over a time grid of N points, n coordinates.
 
     Where B variants were solved, all arrays but `t` have a leading axis of length B.
@@ -40,11 +40,11 @@ class Solution(LabelledViews):
         Coordinates and their first and second time derivatives, in the units of `units` per second
         and per second squared. NaN where they were not found: `status` then says why.
     status : ndarray of int, shape (N,)
-        A `Status` per point; 0 where everything converged.
+        A `Status` for each point; 0 where everything converged.
     residual : ndarray, shape (N,)
         Largest absolute value of Phi after the last correction; NaN where nothing was evaluated.
     iterations : ndarray of int, shape (N,)
-        Newton iterations spent on the way from the point before, sub-steps included.
+        Newton iterations since the previous point, sub-steps included.
     success : bool
         Whether every point converged.
     message : str
@@ -69,30 +69,19 @@ class Solution(LabelledViews):
         The emitted module; None in a copy from another process.
     """
 
-    t: NDArray[np.float64]
-    q: NDArray[np.float64]
-    q_dot: NDArray[np.float64]
-    q_ddot: NDArray[np.float64]
-    status: NDArray[np.int64]
-    residual: NDArray[np.float64]
     iterations: NDArray[np.int64]
     success: bool
-    message: str
-    name: str
-    coordinates: tuple[str, ...]
     equations: tuple[str, ...]
-    units: dict[str, str]
     parameters: dict[str, Any]
     statistics: dict[str, int]
-    events: list[Event]
     module: ModuleType | None
 
     @property
     def condition(self) -> NDArray[np.float64]:
         """Condition number of the scaled Phi_q at every point, shape (N,); NaN without a position.
 
-        Lengths count in sizes of the mechanism, angles in radians, so that it does not depend on
-        units. It is computed when it is asked for. 1e8 and more is a singular configuration.
+        Lengths are measured in sizes of the mechanism and angles in radians, so that it does not
+        depend on units. Computed on each access. 1e8 and more is a singular configuration.
         """
         return self._at_points(conditions)
 
@@ -101,7 +90,7 @@ class Solution(LabelledViews):
         """Branch signature of every point, shape (N, blocks); 0 without a position.
 
         The signs of the determinants of the structural blocks of Phi_q: as long as none changes,
-        the motion stays on its branch. It is computed when it is asked for.
+        the motion stays on its branch. Computed on each access.
         """
         if len(self.equations) > len(self.coordinates):
             passed = [event.t for event in self.events if event.kind == BIFURCATION]
@@ -109,11 +98,11 @@ class Solution(LabelledViews):
         return self._at_points(signatures)
 
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
-        """Apply a function of module, q, t and p to the motion, or to that of each variant."""
+        """Return a function of module, q, t and p for the motion, or for that of each variant."""
         if self.module is None:
             raise InputError(
-                f"this Solution of {self.name} was pickled, and the compiled module was not: take "
-                ".condition and .branch before, or solve again."
+                f"this Solution of {self.name} was pickled, and the compiled module was not: read "
+                ".condition and .branch before pickling, or solve again."
             )
         p = np.array(list(self.parameters.values()), dtype=np.float64)
         if self.q.ndim == 2:
@@ -123,11 +112,11 @@ class Solution(LabelledViews):
         return np.array([function(self.module, q, self.t, one) for q, one in variants])
 
     def __getstate__(self) -> list[Any]:
-        """Give everything but the module, which cannot be pickled."""
+        """Return everything but the module, which cannot be pickled."""
         return [getattr(self, item.name) for item in fields(self)[:-1]] + [None]
 
     def __setstate__(self, state: list[Any]) -> None:
-        """Take what `__getstate__` gave."""
+        """Restore the attributes that `__getstate__` returned."""
         for item, value in zip(fields(self), state, strict=True):
             object.__setattr__(self, item.name, value)
 
@@ -157,28 +146,10 @@ class Solution(LabelledViews):
         return plot_columns(self, names, ax)
 
     def _repr_html_(self) -> str:
-        title = f"{self.t.size} points from t = {self.t[0]:g} to {self.t[-1]:g}. {self.message}"
-        table = table_html(self.name, title, *self._extremes())
-        return table + (picture_html(self) or plot_html(self))
-
-    def _extremes(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return header and rows of a table: ends of the motion, if it is one, and extremes."""
-        columns = self.q.reshape(-1, len(self.coordinates)).T
-        values = [_range(column) for column in columns]
-        header: tuple[str, ...] = ("smallest", "largest")
-        if self.q.ndim == 2:
-            header = f"t = {self.t[0]:g}", f"t = {self.t[-1]:g}", *header
-            values = [
-                (column[0], column[-1], *both) for column, both in zip(columns, values, strict=True)
-            ]
-        rows = [
-            (name, self.units.get(name, ""), *(f"{x:.6g}" for x in row))
-            for name, row in zip(self.coordinates, values, strict=True)
-        ]
-        return ("coordinate", "unit", *header), rows
+        return solution_html(self) + (picture_html(self) or plot_html(self))
 
     def __repr__(self) -> str:
-        """Give the name, the grid and the outcome in one line."""
+        """Return the name, the grid and the outcome in one line."""
         ends = f"t = {self.t[0]:g}" + (f" to {self.t[-1]:g}" if self.t.size > 1 else "")
         points = f"{self.t.size} point" + ("s" if self.t.size > 1 else "")
         if self.q.ndim > 2:
@@ -186,26 +157,20 @@ class Solution(LabelledViews):
         return f"<Solution of {self.name}: {points}, {ends}; {self._outcome()}>"
 
     def _outcome(self) -> str:
-        """Say in a few words how it went."""
+        """Return the outcome in a few words."""
         if self.success:
             return f"converged, largest residual {np.max(self.residual):.1e}"
         good = np.count_nonzero(self.status == 0)
         return f"failed, {good} of {self.status.size} points converged; see .message"
 
 
-def _range(values: NDArray[np.float64]) -> tuple[float, ...]:
-    """Give the smallest and the largest of the values that were found."""
-    found = values[np.isfinite(values)]
-    return (float(found.min()), float(found.max())) if found.size else (np.nan, np.nan)
-
-
 def require_solution(value: object) -> None:
-    """Refuse what is no solution.
+    """Check that a value is a Solution.
 
     Raises
     ------
     InputError
-        Says what was given, and where solutions come from.
+        If it is not; says what was given, and how to get a solution.
     """
     if not isinstance(value, Solution):
         raise InputError(

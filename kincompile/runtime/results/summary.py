@@ -45,7 +45,7 @@ def summary(solution: Solution) -> str:
 
 
 def _without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the values with zero for those that are zero up to rounding, next to the largest."""
+    """Return the values, with zero for those that are rounding errors of the largest."""
     largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
     return np.where(np.abs(values) < NOISE * largest, 0.0, values)
 
@@ -89,6 +89,6 @@ def _verdict(solution: Solution) -> str:
 
 
 def _largest_residual(solution: Solution) -> str:
-    """Return the largest residual where the equations hold; of how it failed the message speaks."""
+    """Return the largest residual of the converged points; failures are in `.message`."""
     found = solution.residual[solution.status == Status.CONVERGED]
     return f"{found.max():.1e}" if found.size else "-"

@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.runtime.results.labelled import TIME_UNIT
-from kincompile.runtime.results.solution import Solution, require_solution
+from kincompile.runtime.results.columns import TIME_UNIT, titled
+from kincompile.runtime.results.solution import (
+    Solution,
+    require_solution,
+)
 from kincompile.runtime.status import Status
 from kincompile.writing import write_atomically
 
@@ -20,6 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+
+ARRAYS = ("t", "q", "q_dot", "q_ddot", "status", "residual", "iterations")
+"""Arrays of a solution that are written as such."""
 
 
 def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
@@ -43,7 +49,7 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        When the suffix is another, the file cannot be written, or a table is asked for of variants.
+        When the suffix is another, the file cannot be written, or variants are to be a .csv.
     """
     require_solution(solution)
     require_known_suffix(path)
@@ -51,7 +57,7 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
 
 
 def require_known_suffix(path: str | os.PathLike[str]) -> None:
-    """Refuse a name whose suffix says no format: to be called before work that takes long.
+    """Check that the suffix names a format; to be called before long work.
 
     Raises
     ------
@@ -63,17 +69,12 @@ def require_known_suffix(path: str | os.PathLike[str]) -> None:
 
 
 def _csv(solution: Solution) -> str:
-    """Give the table; every number with as many digits as it takes to read it back exactly."""
-    if solution.q.ndim > 2:
-        raise InputError(
-            f"{solution.name}: a .csv holds one motion, and these are {len(solution.q)} variants; "
-            "write .npz or .json"
-        )
-    titles = [f"t [{TIME_UNIT}]"]
-    for name, (unit, _) in solution.labelled_columns().items():
-        titles.append(f"{name} [{unit}]" if unit else name)
-    lines = [",".join((*titles, "status", "residual"))]
-    numbers = np.column_stack((solution.t, solution.q, solution.q_dot, solution.q_ddot)).tolist()
+    """Return the table; every number has as many digits as it takes to read it back exactly."""
+    solution.require_one_motion("a .csv holds", "write .npz or .json")
+    columns = solution.columns()
+    titles = [titled("t", TIME_UNIT), *(item.title for item in columns), "status", "residual"]
+    lines = [",".join(titles)]
+    numbers = np.column_stack([solution.t, *(item.values for item in columns)]).tolist()
     ends = zip(solution.status.tolist(), solution.residual.tolist(), strict=True)
     for row, (status, residual) in zip(numbers, ends, strict=True):
         lines.append(f"{','.join(map(repr, row))},{status},{residual!r}")
@@ -81,53 +82,36 @@ def _csv(solution: Solution) -> str:
 
 
 def _npz(solution: Solution) -> bytes:
-    """Give the arrays, with names as arrays of text, so that nothing needs to be unpickled."""
+    """Return the arrays, with names as arrays of text, so that nothing needs to be unpickled."""
+    text = {
+        "coordinates": solution.coordinates,
+        "equations": solution.equations,
+        "units": [solution.units[name] for name in solution.coordinates],
+        "parameters": list(solution.parameters),
+    }
+    arrays = {name: getattr(solution, name) for name in ARRAYS}
+    arrays |= {name: np.array(getattr(solution, name)) for name in ("success", "message", "name")}
+    arrays |= {name: np.array(names, dtype=np.str_) for name, names in text.items()}
+    arrays["parameter_values"] = np.array(list(solution.parameters.values()), dtype=np.float64)
     buffer = io.BytesIO()
-    np.savez(
-        buffer,
-        t=solution.t,
-        q=solution.q,
-        q_dot=solution.q_dot,
-        q_ddot=solution.q_ddot,
-        status=solution.status,
-        residual=solution.residual,
-        iterations=solution.iterations,
-        success=np.array(solution.success),
-        message=np.array(solution.message),
-        name=np.array(solution.name),
-        coordinates=np.array(solution.coordinates, dtype=np.str_),
-        equations=np.array(solution.equations, dtype=np.str_),
-        units=np.array([solution.units[name] for name in solution.coordinates], dtype=np.str_),
-        parameters=np.array(list(solution.parameters), dtype=np.str_),
-        parameter_values=np.array(list(solution.parameters.values()), dtype=np.float64),
-    )
+    np.savez(buffer, **arrays)
     return buffer.getvalue()
 
 
 def _json(solution: Solution) -> str:
-    """Give the document."""
-    document = {
-        "name": solution.name,
-        "success": solution.success,
-        "message": solution.message,
-        "coordinates": solution.coordinates,
-        "equations": solution.equations,
-        "units": solution.units,
+    """Return the document."""
+    names = ("name", "success", "message", "coordinates", "equations", "units")
+    document = {name: getattr(solution, name) for name in names}
+    document |= {
         "parameters": {k: np.asarray(v).tolist() for k, v in solution.parameters.items()},
         "statuses": {str(int(status)): status.sentence for status in Status},
-        "t": solution.t.tolist(),
-        "q": _nullable(solution.q),
-        "q_dot": _nullable(solution.q_dot),
-        "q_ddot": _nullable(solution.q_ddot),
-        "status": solution.status.tolist(),
-        "residual": _nullable(solution.residual),
-        "iterations": solution.iterations.tolist(),
     }
+    document |= {name: _nullable(getattr(solution, name)) for name in ARRAYS}
     return json.dumps(document, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def _nullable(values: NDArray[np.float64]) -> Any:
-    """Give nested lists with None for NaN, which JSON does not know."""
+def _nullable(values: NDArray[Any]) -> Any:
+    """Return nested lists with None for NaN, which JSON does not know."""
     return np.where(np.isfinite(values), values, np.array(None)).tolist()
 
 

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.names import body_coordinates, listed
+from kincompile.names import listed
 from kincompile.runtime.march import March, State
 from kincompile.runtime.singular.curve import Bracket, Curve
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from kincompile.runtime.engine.code import Code
     from kincompile.runtime.engine.engine import Array as Vector
@@ -242,20 +242,9 @@ def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
 def _involved(code: Code, movement: Vector) -> tuple[str, ...]:
     """Return the bodies that take part in a movement, and coordinates that belong to none."""
     large = np.abs(movement) > INVOLVED * np.max(np.abs(movement), initial=0.0)
-    owners = owner_of_coordinates(code.coordinates)
+    owners = code.owners()
     names = zip(code.coordinates, large.tolist(), strict=True)
     return tuple(dict.fromkeys(owners[name] for name, is_large in names if is_large))
-
-
-def owner_of_coordinates(coordinates: Sequence[str]) -> Mapping[str, str]:
-    """Return the body of each coordinate; one that belongs to none stands for itself."""
-    owners = {name: name for name in coordinates}
-    for k, name in enumerate(coordinates):
-        body = name.removeprefix("x_")
-        triple = body_coordinates(body)
-        if tuple(coordinates[k : k + 3]) == triple:
-            owners.update(dict.fromkeys(triple, body))
-    return owners
 
 
 def _passage(march: March, curve: Curve, bracket: Bracket, at: float) -> Passage | None:

@@ -5,64 +5,56 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import operands_of
-from kincompile.targets.functions import inputs_read
+from kincompile.quantities import quantity_named
+from kincompile.targets.c.dialect import C
 from kincompile.targets.headings import place, title
-from kincompile.targets.layout import assigned, wrapped
-from kincompile.targets.printers import CPrinter
-from kincompile.targets.solving import components, explained
+from kincompile.targets.lines import wrapped
+from kincompile.targets.planned_solve import components, explained
+from kincompile.targets.printer import Printer
+from kincompile.targets.statements import Layout
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     from kincompile.ir.inline import InlineProgram
-    from kincompile.ir.program import Program
-    from kincompile.targets.functions import Listing
-    from kincompile.targets.solving import SolveListing
+    from kincompile.targets.evaluators import Listing
+    from kincompile.targets.planned_solve import SolveListing
+
+LAYOUT = Layout("//", "const double {}", "at->{}[{}][lane]", "")
 
 ABOUT = {
-    "Phi": "Constraint vector Phi(q, t).",
-    "Phi_q": "Jacobian of Phi by q: the entries that vary.",
-    "nu": "Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.",
-    "gamma": "Right side of the acceleration equation Phi_q q_ddot = gamma.",
     "position": "Phi and Phi_q in one go: a step of Newton's method.",
-    "velocity": "Phi_q and nu in one go: the velocity equation.",
-    "acceleration": "Phi_q and gamma in one go: the acceleration equation.",
     "kinematics": "Phi, Phi_q, nu and gamma in one go.",
 }
-"""What each function gives."""
+"""What the kernels of several quantities give."""
 
 ANGLE_FUNCTIONS = frozenset({"cos", "sin", "cos_sin"})
 """Functions whose fast form does not reach all angles."""
 
 
-def evaluator(
-    name: str, code: InlineProgram, listing: Listing, names: Mapping[str, str]
-) -> list[str]:
+def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return a function that evaluates quantities at a point, and the one for a block."""
-    printer = CPrinter(code.nodes, listing.names)
     has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
     body = ["int64_t far = 0;"] if has_angles else []
-    body += _inputs(code.program, listing, names)
-    body += _frames(listing, printer)
-    for section, assignments in listing.steps:
-        body.append(f"// {title(section)}")
-        for item in assignments:
-            body += assigned(f"const double {item.name}", printer.text(item.node, own=True))
-    entry_numbers = {place: k for k, place in enumerate(code.pattern())}
+    body += LAYOUT.inputs(code.program, listing)
+    body += ["const double t = at->t[lane];"] if "t" in listing.inputs else []
+    body += _frames(listing, printer) + LAYOUT.steps(listing, printer)
+    numbers = {
+        quantity: {place: k for k, place in enumerate(code.pattern(quantity))}
+        for quantity, _ in listing.results
+    }
     for quantity, rows in listing.results:
         for section, entries in rows:
             if entries:
                 body.append(f"// {title(section)}")
             for entry in entries:
                 index = entry.row
-                if quantity == "Phi_q":
-                    index = entry_numbers[entry.row, entry.column]
-                lines = assigned(f"at->{quantity}[{index}][lane]", printer.text(entry.node))
-                comment = place(quantity, entry, code)
-                lines[-1] += f"  // {comment}" if comment else ""
-                body += lines
+                if quantity_named(quantity).is_matrix:
+                    index = numbers[quantity][entry.row, entry.column]
+                left, text = LAYOUT.element.format(quantity, index), printer.text(entry.node)
+                body += LAYOUT.assigned(left, text, place(quantity, entry, code))
     write = _with_angles if has_angles else _plain
-    return [f"// {ABOUT[name]}", *write(name, body)]
+    return [f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
 
 
 def _plain(name: str, body: list[str]) -> list[str]:
@@ -106,16 +98,7 @@ def _block_function(name: str) -> list[str]:
     ]
 
 
-def _inputs(program: Program, listing: Listing, names: Mapping[str, str]) -> list[str]:
-    """Return the lines that name the inputs that are read."""
-    lines = [
-        f"const double {names[member]} = at->{vector}[{k}][lane];"
-        for vector, k, member in inputs_read(program, listing)
-    ]
-    return [*lines, "const double t = at->t[lane];"] if "t" in listing.inputs else lines
-
-
-def _frames(listing: Listing, printer: CPrinter) -> list[str]:
+def _frames(listing: Listing, printer: Printer) -> list[str]:
     """Return the cosine and sine of each body's angle, a line a body."""
     if not listing.frames:
         return []
@@ -127,13 +110,14 @@ def _frames(listing: Listing, printer: CPrinter) -> list[str]:
             lines += [f"double {c}, {s};", f"far |= cos_sin({angle}, exact, &{c}, &{s});"]
         else:
             item = frame.values[0]
-            lines.append(f"const double {item.name} = {printer.text(item.node, own=True)};")
+            lines.append(f"const double {item.name} = {printer.definition(item.node)};")
     return lines
 
 
 def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
-    printer, plan, names = CPrinter(listing.plan.nodes, listing.names), listing.plan, listing.names
+    plan, names = listing.plan, listing.names
+    printer = Printer(C, plan.nodes, names)
     numbers = {place: k for k, place in enumerate(code.pattern())}
     read = _read(listing, (*listing.factor_steps, *listing.factors, *plan.determinants))
     factor = [
@@ -156,7 +140,7 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     ]
 
 
-def _solution(listing: SolveListing, printer: CPrinter) -> list[str]:
+def _solution(listing: SolveListing, printer: Printer) -> list[str]:
     """Return the function that solves for a right side."""
     plan, names = listing.plan, listing.names
     read = _read(listing, (*listing.solve_steps, *plan.solution))
@@ -196,14 +180,15 @@ def _operands(listing: SolveListing, node: int) -> tuple[int, ...]:
     return operands_of(listing.plan.nodes[node])
 
 
-def _steps(nodes: Iterable[int], listing: SolveListing, printer: CPrinter) -> list[str]:
+def _steps(nodes: Iterable[int], listing: SolveListing, printer: Printer) -> list[str]:
     """Return an assignment for each node; a larger block's solution comes from one call."""
     lines: list[str] = []
     done: set[int] = set()
     for node in nodes:
         operation, *content = listing.plan.nodes[node]
         if operation != "linear":
-            lines += assigned(f"const double {listing.names[node]}", printer.text(node, own=True))
+            left = LAYOUT.value.format(listing.names[node])
+            lines += LAYOUT.assigned(left, printer.definition(node))
         elif content[0] == "determinant":
             lines += _determinant(node, listing, printer)
         elif node not in done:
@@ -213,7 +198,7 @@ def _steps(nodes: Iterable[int], listing: SolveListing, printer: CPrinter) -> li
     return lines
 
 
-def _determinant(node: int, listing: SolveListing, printer: CPrinter) -> list[str]:
+def _determinant(node: int, listing: SolveListing, printer: Printer) -> list[str]:
     _, _, size, _, *matrix = listing.plan.nodes[node]
     return [
         f"const double {listing.names[node]} = block_determinant({size}, (const double[]){{",
@@ -222,7 +207,7 @@ def _determinant(node: int, listing: SolveListing, printer: CPrinter) -> list[st
     ]
 
 
-def _block_solution(same: list[int], listing: SolveListing, printer: CPrinter) -> list[str]:
+def _block_solution(same: list[int], listing: SolveListing, printer: Printer) -> list[str]:
     """Return the call that solves a block, and the names of the components."""
     _, _, size, _, *operands = listing.plan.nodes[same[0]]
     names = [listing.names[node] for node in same]
@@ -238,5 +223,5 @@ def _block_solution(same: list[int], listing: SolveListing, printer: CPrinter) -
     ]
 
 
-def _indented(nodes: list[int], printer: CPrinter) -> list[str]:
+def _indented(nodes: list[int], printer: Printer) -> list[str]:
     return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]

@@ -11,9 +11,9 @@ from kincompile.ir.elimination import plan_entries
 from kincompile.ir.inline import InlineProgram
 from kincompile.structure.stages import Chain, Lanes, Sparse, Stage, plan_stages
 from kincompile.targets.naming import NameTable
-from kincompile.targets.numpy.module import RESERVED_IN_SOLVE
 from kincompile.targets.numpy.solve import solve_functions
-from kincompile.targets.solving import schedule_solve
+from kincompile.targets.numpy.target import RESERVED_IN_SOLVE
+from kincompile.targets.planned_solve import schedule_solve
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.targets.layout import broken, wrapped
-from kincompile.targets.printers import PythonPrinter
-from kincompile.targets.solving import components, explained
+from kincompile.targets.lines import broken, wrapped
+from kincompile.targets.numpy.dialect import NUMPY
+from kincompile.targets.planned_solve import components, explained
+from kincompile.targets.printer import Printer
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from kincompile.ir.inline import InlineProgram
-    from kincompile.targets.solving import SolveListing
+    from kincompile.targets.planned_solve import SolveListing
 
 
 def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
     """Return the lines of `_factor` and `_solve`, with a prefix where there are several."""
-    printer, names = PythonPrinter(listing.plan.nodes, listing.names), listing.names
+    printer, names = Printer(NUMPY, listing.plan.nodes, listing.names), listing.names
     factor = [*_unpack([names[node] for node in listing.entries], "J")]
     factor += _steps(listing.factor_steps, listing, printer)
     factor += ["return (", *_tuple([names[node] for node in listing.factors]), "), ("]
@@ -41,7 +42,7 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
     ]
 
 
-def _steps(nodes: Iterable[int], listing: SolveListing, printer: PythonPrinter) -> list[str]:
+def _steps(nodes: Iterable[int], listing: SolveListing, printer: Printer) -> list[str]:
     """Return an assignment for each node; a larger block's solution comes from one call."""
     lines: list[str] = []
     done: set[tuple[int, ...]] = set()
@@ -54,7 +55,7 @@ def _steps(nodes: Iterable[int], listing: SolveListing, printer: PythonPrinter) 
             done.add((name, *operands))
             lines += _block_call(node, name, size, operands, listing, printer)
             continue
-        first, *rest = broken(printer.text(node, own=True))
+        first, *rest = broken(printer.definition(node))
         if rest:
             lines += [
                 f"{listing.names[node]} = (",
@@ -73,7 +74,7 @@ def _block_call(
     size: int,
     operands: list[int],
     listing: SolveListing,
-    printer: PythonPrinter,
+    printer: Printer,
 ) -> list[str]:
     """Return the call of LAPACK for a block: its solution, or its determinant."""
     left = [listing.names[node]]
@@ -86,7 +87,7 @@ def _block_call(
     return [*lines, "))"]
 
 
-def _indented(nodes: list[int], printer: PythonPrinter) -> list[str]:
+def _indented(nodes: list[int], printer: Printer) -> list[str]:
     return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]
 
 
@@ -94,8 +95,10 @@ def _unpack(names: list[str], vector: str) -> list[str]:
     if not names:
         return []
     lines = wrapped(names)
+    if len(lines) == 1:
+        return [f"{lines[0] if len(names) == 1 else lines[0].rstrip(',')} = {vector}"]
     return ["(", *(f"    {line}" for line in lines), f") = {vector}"]
 
 
 def _tuple(texts: list[str]) -> list[str]:
-    return [f"    {text}," for text in texts]
+    return [f"    {line}" for line in wrapped(texts)]

@@ -17,15 +17,17 @@ from kincompile.calculus.expressions import (
     Basis,
     Expression,
     Number,
-    Scalar,
+    Profile,
+    Rotation,
     Symbol,
+    TimeFunction,
     Vector,
     VectorSymbol,
     dot,
     perpendicular,
     scaled,
-    turned,
 )
+from kincompile.calculus.rotations import turned
 
 SCALARS = {"a": Fraction(2, 3), "b": Fraction(-5, 4), "c": Fraction(7)}
 VECTORS = {
@@ -125,24 +127,26 @@ class ExactEnvironment:
     def pi(self) -> Fraction:
         return Fraction(22, 7)
 
-    def symbol(self, name: str) -> Fraction:
-        return SCALARS[name]
+    def symbol(self, symbol: Symbol) -> Fraction:
+        return SCALARS[symbol.name]
 
-    def vector(self, name: str) -> tuple[Fraction, Fraction]:
-        return VECTORS[name]
+    def vector(self, symbol: VectorSymbol) -> tuple[Fraction, Fraction]:
+        return VECTORS[symbol.name]
 
-    def time_function(self, name: str, order: int) -> Fraction:
-        raise AssertionError(f"{name}{order} is not in these recipes")
+    def time_function(self, function: TimeFunction) -> Fraction:
+        raise AssertionError(f"{function} is not in these recipes")
 
-    profile = time_function
+    def profile(self, profile: Profile) -> Fraction:
+        raise AssertionError(f"{profile} is not in these recipes")
 
-    def cos_sin(self, angle: Scalar, expand: Expansion) -> tuple[Fraction, Fraction]:
+    def entries(self, rotation: Rotation, expand: Expansion) -> tuple[Fraction, Fraction]:
         del expand
+        (angle,) = rotation.coordinates
         assert isinstance(angle, Symbol)
         return ROTATIONS[angle.name]
 
-    def sqrt(self, value: Fraction) -> Fraction:
-        raise AssertionError(f"the root of {value} is not in these recipes")
+    def call(self, function: str, value: Fraction) -> Fraction:
+        raise AssertionError(f"{function} of {value} is not in these recipes")
 
 
 @dataclass(frozen=True)

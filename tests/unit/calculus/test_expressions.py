@@ -17,10 +17,10 @@ from kincompile.calculus.expressions import (
     Perpendicular,
     Power,
     Product,
+    Rotated,
     Scaled,
     Sum,
     Symbol,
-    Turned,
     Vector,
     VectorSum,
     VectorSymbol,
@@ -28,13 +28,15 @@ from kincompile.calculus.expressions import (
     dot,
     perpendicular,
     power_of,
+    rotated,
     scaled,
-    turned,
 )
+from kincompile.calculus.rotations import PlaneRotation, turned
 
 a, b = Symbol("a"), Symbol("b")
 phi = Symbol("phi")
 u, v = VectorSymbol("u"), VectorSymbol("v")
+A_u, B_u = Rotated(PlaneRotation(phi), u), Rotated(PlaneRotation(phi), u, (ONE,))
 
 
 @given(data=st.data())
@@ -77,12 +79,12 @@ def assert_tidy(expression: Any) -> None:
             assert factor not in (ZERO, ONE)
             assert not isinstance(vector, Scaled)
             children = (factor, vector)
-        case Turned(_, vector, quarter):
-            assert quarter in (0, 1)
+        case Rotated(_, vector, along):
+            assert along in ((), (ONE,))
             assert not isinstance(vector, Scaled | Perpendicular | VectorSum)
             children = (vector,)
         case Perpendicular(vector):
-            assert not isinstance(vector, Scaled | Perpendicular | VectorSum | Turned)
+            assert not isinstance(vector, Scaled | Perpendicular | VectorSum | Rotated)
             children = (vector,)
         case Dot(left, right):
             assert not isinstance(left, Scaled)
@@ -120,12 +122,14 @@ def assert_tidy(expression: Any) -> None:
         (dot(u, ZERO_VECTOR), ZERO),
         (dot(2 * u, a * v), 2 * a * Dot(u, v)),
         (perpendicular(perpendicular(u)), -u),
-        (perpendicular(turned(phi, u)), Turned(phi, u, 1)),
+        (perpendicular(turned(phi, u)), B_u),
         (perpendicular(u + v), Perpendicular(u) + Perpendicular(v)),
-        (turned(phi, u, 2), -Turned(phi, u)),
-        (turned(phi, u, 3), -Turned(phi, u, 1)),
-        (turned(phi, perpendicular(u)), Turned(phi, u, 1)),
-        (turned(phi, u + v), Turned(phi, u) + Turned(phi, v)),
+        (turned(phi, u, 2), -A_u),
+        (turned(phi, u, 3), -B_u),
+        (turned(phi, perpendicular(u)), B_u),
+        (turned(phi, u + v), A_u + turned(phi, v)),
+        (rotated(PlaneRotation(phi), 2 * u, (a,)), 2 * a * B_u),
+        (rotated(PlaneRotation(phi), u, (ZERO,)), ZERO_VECTOR),
         (scaled(Number(Fraction(2)), u + v), 2 * u + 2 * v),
     ],
 )

@@ -3,7 +3,8 @@
 import pytest
 
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.expressions import Basis, Profile, Symbol, Turned, VectorSymbol
+from kincompile.calculus.expressions import Basis, Profile, Symbol, VectorSymbol
+from kincompile.calculus.rotations import turned
 from kincompile.calculus.symbols import Contact, Frame, contact_i, i, j, s_i, unit
 from kincompile.calculus.template import Template
 
@@ -15,19 +16,19 @@ def test_that_a_frame_names_its_symbols_by_its_body() -> None:
 
 
 def test_that_a_point_is_position_plus_turned_vector() -> None:
-    assert i.point(s_i) == i.r + Turned(i.phi, s_i)
+    assert i.point(s_i) == i.r + turned(i.phi, s_i)
 
 
 def test_that_the_tangent_of_a_profile_is_its_derivative() -> None:
     contact = Contact("k")
     rho, rho_prime = (Profile("rho_k", contact.alpha, order) for order in (0, 1))
-    u, u_prime = Turned(contact.alpha, Basis()), Turned(contact.alpha, Basis(), 1)
+    u, u_prime = turned(contact.alpha, Basis()), turned(contact.alpha, Basis(), 1)
     assert contact.a == rho * u
     assert contact.g == rho_prime * u + rho * u_prime
 
 
 def test_that_a_unit_vector_is_a_turned_basis() -> None:
-    assert unit(i.phi) == Turned(i.phi, Basis())
+    assert unit(i.phi) == turned(i.phi, Basis())
 
 
 def test_that_a_template_lists_coordinates_and_rates_in_the_same_order() -> None:

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.cli import ENDINGS
-from kincompile.compiler import TARGETS
+from kincompile.cli.compile import ENDINGS
+from kincompile.targets.registry import TARGETS
 
 
 def test_that_the_module_written_is_the_one_that_emit_gives(kincompile, pendulum, tmp_path):

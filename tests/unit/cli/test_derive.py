@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from kincompile.cli import DERIVATIONS
+from kincompile.cli.derive import DERIVATIONS
 from kincompile.derivation.derivation import FORMATS
 
 

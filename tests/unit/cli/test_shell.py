@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import kincompile as kc
-from kincompile import cli
+from kincompile.cli import progress as cli
 
 
 def test_that_a_bug_is_a_message_that_asks_for_a_report(kincompile, pendulum, monkeypatch):

@@ -7,8 +7,8 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.calculus.expand import Expansion, Pair
-from kincompile.calculus.expressions import Vector
+from kincompile.calculus.expand import Expansion
+from kincompile.calculus.expressions import Components, Vector, VectorSymbol
 from kincompile.compare.compare import compare
 from kincompile.compare.entries import Verdict
 from kincompile.compare.faults import SQUARES, X_AND_Y, VectorFaults
@@ -21,8 +21,10 @@ from kincompile.compare.mutations import (
 )
 from kincompile.compare.reference import Reference
 from kincompile.compare.report import Report
+from kincompile.compare.vectors import Exchanged
 from kincompile.derive.derivation import derive
-from kincompile.model.matrices import SymbolicEnvironment, entry_columns
+from kincompile.derive.partials import partials
+from kincompile.model.matrices import SymbolicEnvironment
 from kincompile.model.resolve import Joint
 
 NUMBERS = {
@@ -130,9 +132,9 @@ def test_that_a_fault_typed_by_hand_is_named(
 class Misread(SymbolicEnvironment):
     """A joint's leaves in SymPy, with what the catalogue calls xi and eta swapped."""
 
-    def vector(self, name: str) -> Pair:
-        x, y = super().vector(name.rstrip("~"))
-        return (y, x) if name.endswith("~") else (x, y)
+    def vector(self, symbol: VectorSymbol) -> Components:
+        components = super().vector(VectorSymbol(symbol.name))
+        return components[::-1] if isinstance(symbol, Exchanged) else components
 
 
 def hypotheses(quantity: str) -> Iterator[tuple[str, dict[tuple[int, int], sympy.Expr]]]:
@@ -149,12 +151,11 @@ def hypotheses(quantity: str) -> Iterator[tuple[str, dict[tuple[int, int], sympy
             entries = {}
             for (b, k), expression in changed.items():
                 row = sum(2 if isinstance(item.Phi, Vector) else 1 for item in row_blocks[:b])
-                column = sum(2 if isinstance(item, Vector) else 1 for item in coordinates[:k])
-                is_vector = isinstance(row_blocks[b].Phi, Vector)
+                column = sum(item.size for item in coordinates[:k])
                 columns = [expansion.components(expression)]
                 if quantity == "Phi_q":
-                    is_position = isinstance(coordinates[k], Vector)
-                    columns = entry_columns(expression, is_vector, is_position, expansion)
+                    whole = partials(joint.template)[b][k].columns(expression)
+                    columns = [expansion.components(item) for item in whole]
                 for c, items in enumerate(columns):
                     for r, item in enumerate(items):
                         entries[block.rows[row + r], column * (quantity == "Phi_q") + c] = item

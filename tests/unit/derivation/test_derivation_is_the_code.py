@@ -19,7 +19,7 @@ from kincompile.ir.lower import lower
 from kincompile.model.resolve import Joint
 from kincompile.names import rate
 from kincompile.runtime.load import from_source
-from kincompile.targets.numpy.module import emit_numpy
+from kincompile.targets.emission import emit_program
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
@@ -111,7 +111,7 @@ def test_that_a_displayed_formula_is_the_very_node_that_is_emitted(model: Any) -
 def test_that_displayed_formulas_have_the_values_of_the_emitted_module(model: Any) -> None:
     system = model.system()
     code = inline(lower(system))
-    module = from_source(emit_numpy(code).source, system.name)
+    module = from_source(emit_program("numpy", code).source, system.name)
     writer, tables = Writer(code.nodes), code.program.tables
     random = np.random.default_rng(3)
     names = [item.name for item in system.coordinates]

@@ -5,10 +5,11 @@ from typing import Any
 import pytest
 
 import kincompile as kc
-from kincompile.calculus.expressions import ONE, Vector, VectorSymbol
+from kincompile.calculus.expressions import ONE, VectorSymbol
 from kincompile.derivation.document import Display, Link, Table
 from kincompile.derive.derivation import derive
-from kincompile.derive.rules import Rule, coefficient, derivative, gradient, vector_derivative
+from kincompile.derive.partials import coefficient, partials
+from kincompile.derive.rules import Rule, along
 from kincompile.model.resolve import Joint
 
 TITLES = (
@@ -21,9 +22,9 @@ TITLES = (
 
 def rules_of(kind: type[Any]) -> dict[str, set[Rule]]:
     """Return the rules that fired for Phi_q, for gamma and for Phi_t."""
-    blocks = derive(kind.template())
+    blocks, rows = derive(kind.template()), partials(kind.template())
     return {
-        "Phi_q": {s.rule for b in blocks for steps in b.steps.Phi_q for s in steps},
+        "Phi_q": {s.rule for row in rows for item in row for s in item.steps},
         "gamma": {s.rule for b in blocks for steps in b.steps.gamma_terms for s in steps},
         "Phi_t": {s.rule for b in blocks for s in b.steps.Phi_t},
     }
@@ -50,23 +51,20 @@ def test_that_a_profile_uses_its_own_rule() -> None:
 def test_that_every_recorded_step_is_right_and_the_last_is_the_result(gallery: Any) -> None:
     templates = {item.template for item in gallery.system().constraints if isinstance(item, Joint)}
     for template in templates:
-        for block in derive(template):
-            for coordinate, entry, steps in zip(
-                template.coordinates, block.Phi_q, block.steps.Phi_q, strict=True
-            ):
-                assert steps[-1].expression == block.Phi
-                assert steps[-1].derivative == entry
-                for step in steps:
-                    assert step.derivative == again(step.expression, coordinate)
+        for Phi, row in zip(template.Phi, partials(template), strict=True):
+            for item in row:
+                assert item.steps[-1].expression == Phi
+                assert item.steps[-1].derivative == item.entry
+                for step in item.steps:
+                    assert step.derivative == again(step.expression, item.coordinate)
 
 
 def again(expression: Any, coordinate: Any) -> Any:
     """Differentiate once more, with nobody looking."""
     if not isinstance(coordinate, VectorSymbol):
-        change = {coordinate: ONE}
-        differentiate = vector_derivative if isinstance(expression, Vector) else derivative
-        return differentiate(expression, change)
-    return (coefficient if isinstance(expression, Vector) else gradient)(expression, coordinate)
+        return along(expression, {coordinate: ONE})
+    change = VectorSymbol("change")
+    return coefficient(along(expression, {coordinate: change}), change)
 
 
 def test_that_every_joint_has_nine_steps_in_three_levels(gallery: Any, sections_of: Any) -> None:

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kincompile.targets.naming import NameTable, content_name
+from kincompile.targets.naming import NameTable
+from kincompile.targets.schedule import content_name
 
 names = st.sampled_from(["x", "x_", "x_2", "x_3", "lambda", "lambda_", "is", "q", "np", "a_b"])
 
@@ -34,7 +35,7 @@ def test_that_a_copy_goes_its_own_way() -> None:
 
 
 NAMED = {1: "a", 2: "c_crank", 4: "a_very_long_name_of_a_value"}
-NUMBERS = {3: 2, 5: 0.5}
+NODES = [("pi",), ("input", "a"), ("input", "c"), ("const", 2), ("input", "long"), ("const", 0.5)]
 
 
 @pytest.mark.parametrize(
@@ -53,4 +54,4 @@ NUMBERS = {3: 2, 5: 0.5}
 def test_that_a_small_node_is_named_by_what_it_is(
     node: tuple[object, ...], expected: str | None
 ) -> None:
-    assert content_name(node, NAMED, NUMBERS) == expected
+    assert content_name([*NODES, node], len(NODES), NAMED) == expected

@@ -11,7 +11,7 @@ import sympy
 import kincompile as kc
 from kincompile.runtime.newton import iterate
 from kincompile.runtime.problem import problem
-from kincompile.view.newton import MOST_COORDINATES, newton_method, newton_script
+from kincompile.view.newton_panel import MOST_COORDINATES, newton_method, newton_script
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 STATUSES = {

@@ -13,21 +13,20 @@ from kincompile.model.arguments import BodyLike
 from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.model.constraint import Constraint, constraint_type
 from kincompile.model.joints import Revolute
+from kincompile.view.drawing import drawing
 from kincompile.view.joint_shapes import DRAWINGS
 from kincompile.view.marks import (
     Block,
+    BodyPoint,
     Drive,
     Link,
     Outline,
     Pin,
-    Place,
     Profile,
     Rail,
     Span,
     Wheel,
 )
-from kincompile.view.placed import world
-from kincompile.view.shapes import drawing
 
 GROUND = -1
 
@@ -70,15 +69,15 @@ def test_that_a_type_of_ones_own_is_drawn_as_the_type_it_is_made_from():
         pass
 
     (pin,) = marks(two_bodies(lambda m, i, j, a: Bearing("A", i, (1, 2), j, (3, 4))), Pin)
-    assert pin == Pin("A", Place(0, (1, 2)), Place(1, (3, 4)))
+    assert pin == Pin("A", BodyPoint(0, (1, 2)), BodyPoint(1, (3, 4)))
 
 
 def test_that_a_pin_names_the_ground_first_and_parameters_have_their_values():
     m = two_bodies(lambda m, i, j, a: kc.Revolute("A", i, (2 * a, a**2), m.ground, (3, 0)))
     (pin,) = marks(m, Pin)
-    assert pin == Pin("A", Place(GROUND, (3, 0)), Place(0, (1, 0.25)))
+    assert pin == Pin("A", BodyPoint(GROUND, (3, 0)), BodyPoint(0, (1, 0.25)))
     (pin,) = marks(m, Pin, p={"a": 2.0})
-    assert pin.second == Place(0, (4, 4))
+    assert pin.second == BodyPoint(0, (4, 4))
 
 
 def test_that_a_slider_has_a_rail_on_the_ground_as_long_as_its_motion():
@@ -88,7 +87,7 @@ def test_that_a_slider_has_a_rail_on_the_ground_as_long_as_its_motion():
     q = np.zeros((3, 6))
     q[:, 3:] = [(0, 1, np.pi / 2), (0, 4, np.pi / 2), (0, 9, np.pi / 2)]
     (rail,), (block,) = marks(m, Rail, q=q), marks(m, Block, q=q)
-    assert block == Block("C", Place(1, (0.5, 0)), (1, 0))
+    assert block == Block("C", BodyPoint(1, (0.5, 0)), (1, 0))
     # The point (0.5, 0) is at y = 1.5, 4.5, 9.5; the rail goes on a little at both ends.
     over = rail.end[1] - 9.5
     assert over > 0
@@ -99,7 +98,7 @@ def test_that_a_slider_has_a_rail_on_the_ground_as_long_as_its_motion():
 def test_that_between_moving_bodies_there_are_a_sleeve_and_a_slide():
     m = two_bodies(lambda m, i, j, a: kc.Translational("C", i, (1, 0), (1, 0), j, (2, 0), (1, 0)))
     (slide,), (block,) = marks(m, Span), marks(m, Block)
-    assert slide == Span("C", Place(0, (1, 0)), Place(1, (2, 0)), "slide")
+    assert slide == Span("C", BodyPoint(0, (1, 0)), BodyPoint(1, (2, 0)), "slide")
     assert block.place == slide.first
 
 
@@ -115,8 +114,8 @@ def test_that_the_block_of_a_slotted_lever_is_the_body_at_the_crank_pin(is_lever
     m.add(kc.Translational("slot", *i, *j))
     m.add(kc.AbsoluteAngle("motor", crank, kc.t))
     (slide,), (sleeve,) = marks(m, Span), marks(m, Block)
-    assert (sleeve.place, sleeve.axis) == (Place(2, (0, 0)), (0, 1))
-    assert slide == Span("slot", Place(2, (0, 0)), Place(1, (0, 0)), "slide")
+    assert (sleeve.place, sleeve.axis) == (BodyPoint(2, (0, 0)), (0, 1))
+    assert slide == Span("slot", BodyPoint(2, (0, 0)), BodyPoint(1, (0, 0)), "slide")
 
 
 def test_that_a_cylinder_takes_the_place_of_its_slide():
@@ -132,10 +131,10 @@ def test_that_a_cylinder_takes_the_place_of_its_slide():
 def test_that_a_distance_is_a_rod_or_a_cylinder(length, style):
     m = two_bodies(lambda m, i, j, a: kc.Distance("D", i, (0, 0), j, (1, 0), length))
     (span,) = marks(m, Span)
-    assert span == Span("D", Place(0, (0, 0)), Place(1, (1, 0)), style)
+    assert span == Span("D", BodyPoint(0, (0, 0)), BodyPoint(1, (1, 0)), style)
     m = two_bodies(lambda m, i, j, a: kc.AbsoluteDistance("D", i, (1, 0), (5, 5), length))
     (span,) = marks(m, Span)
-    assert span == Span("D", Place(GROUND, (5, 5)), Place(0, (1, 0)), style)
+    assert span == Span("D", BodyPoint(GROUND, (5, 5)), BodyPoint(0, (1, 0)), style)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +146,7 @@ def test_that_a_held_coordinate_is_a_rail_and_a_driven_one_an_arrow(joint, acros
     assert rail.axis == across
     assert rail.start[held] == rail.end[held] == 4
     (drive,) = marks(two_bodies(lambda m, i, j, a: joint("X", j, (1, 0), kc.t)), Drive)
-    assert drive == Drive("X", Place(1, (1, 0)), (1, 0) if held == 0 else (0, 1))
+    assert drive == Drive("X", BodyPoint(1, (1, 0)), (1, 0) if held == 0 else (0, 1))
 
 
 def test_that_a_turning_drive_is_at_the_bearing():
@@ -159,15 +158,15 @@ def test_that_a_turning_drive_is_at_the_bearing():
         lambda m, i, j, a: kc.AbsoluteAngle("held", j, 1),
     )
     assert marks(m, Drive) == [
-        Drive("motor", Place(0, (-1, 0)), None), Drive("gear", Place(1, (2, 0)), None),
+        Drive("motor", BodyPoint(0, (-1, 0)), None), Drive("gear", BodyPoint(1, (2, 0)), None),
     ]  # fmt: skip
 
 
 def test_that_gears_are_wheels_and_a_negative_radius_is_an_internal_one():
     m = two_bodies(lambda m, i, j, a: kc.Gear("G", i, (0, 0), -4 * a, 0.1, j, (1, 0), a, kc.pi))
     ring, planet = marks(m, Wheel)
-    assert ring == Wheel("G", Place(0, (0, 0)), 2, 0.1, is_internal=True)
-    assert planet == Wheel("G", Place(1, (1, 0)), 0.5, np.pi, is_internal=False)
+    assert ring == Wheel("G", BodyPoint(0, (0, 0)), 2, 0.1, is_internal=True)
+    assert planet == Wheel("G", BodyPoint(1, (1, 0)), 0.5, np.pi, is_internal=False)
 
 
 def test_that_a_rack_goes_from_p_to_q_and_as_far_as_the_pinion_rolls():
@@ -199,7 +198,7 @@ def test_that_a_table_of_radii_is_a_profile():
     table = (angles.tolist(), (1 + 0.1 * np.cos(angles)).tolist())
     m = two_bodies(lambda m, i, j, a: kc.PointFollower("P", i, (0, 0), j, (0, 0), table))
     (slot,), (pin,) = marks(m, Profile), marks(m, Pin)
-    assert (slot.frame, slot.style, pin.second) == (1, "slot", Place(0, (0, 0)))
+    assert (slot.frame, slot.style, pin.second) == (1, "slot", BodyPoint(0, (0, 0)))
     radii = np.hypot(*np.array(slot.points).T)
     assert 0.899 < radii.min() < radii.max() < 1.101
 
@@ -224,9 +223,9 @@ def test_that_a_body_of_one_joint_goes_to_its_origin():
 
 def test_that_points_are_where_rotation_and_translation_put_them():
     q = np.array([[1.0, 2.0, np.pi / 2, 5.0, 6.0, np.pi]])
-    np.testing.assert_allclose(world(q, Place(0, (3, 4))), [(1 - 4, 2 + 3)], atol=1e-12)
-    np.testing.assert_allclose(world(q, Place(1, (3, 4))), [(5 - 3, 6 - 4)], atol=1e-12)
-    np.testing.assert_array_equal(world(q, Place(GROUND, (3, 4))), [(3, 4)])
+    np.testing.assert_allclose(BodyPoint(0, (3, 4)).at(q), [(1 - 4, 2 + 3)], atol=1e-12)
+    np.testing.assert_allclose(BodyPoint(1, (3, 4)).at(q), [(5 - 3, 6 - 4)], atol=1e-12)
+    np.testing.assert_array_equal(BodyPoint(GROUND, (3, 4)).at(q), [(3, 4)])
 
 
 def test_that_the_extent_holds_every_mark_and_leaves_out_what_is_not_finite(example):
@@ -238,7 +237,7 @@ def test_that_the_extent_holds_every_mark_and_leaves_out_what_is_not_finite(exam
     assert low < high
     for mark, q in itertools.product(drawn.marks, example.solution.q[::40]):
         if isinstance(mark, Pin) and np.isfinite(q).all():
-            x, y = world(q[np.newaxis], mark.second)[0]
+            x, y = mark.second.at(q)
             assert left < x < right
             assert low < y < high
 

@@ -1,0 +1,66 @@
+"""`kincompile compare`: formulas derived by hand, checked."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+import kincompile as kc
+from kincompile.cli.shared import DIFFERENT, print_data, read_model, require_output
+from kincompile.errors import InputError
+from kincompile.writing import write_atomically
+
+
+@click.command("compare")
+@click.argument("model")
+@click.argument("hand")
+@click.option("--constraint", metavar="NAME", help="Check this constraint alone.")
+@click.option("--reveal", is_flag=True, help="Show the right formulas.")
+@click.option("-o", "--output", metavar="FILE", help="Write the report: .html, .json or .txt.")
+@click.option("--gradescope", metavar="FILE", help="Write a results.json for Gradescope.")
+@click.pass_context
+def command(
+    context: click.Context,
+    model: str,
+    hand: str,
+    constraint: str | None,
+    reveal: bool,
+    output: str | None,
+    gradescope: str | None,
+) -> None:
+    """Compare the formulas in HAND with those derived from MODEL.
+
+    HAND is a TOML or JSON file, or lines such as "Phi_q = [[1, 0, cos(phi)], ...]", with any of
+    Phi, Phi_q, nu and gamma. Its formulas are parsed, never run. The exit code is 0 where all
+    entries are equal, up to a convention that is named or on the constraint manifold; 1 where one
+    is different.
+    """
+    writers = {".html": "to_html", ".json": "to_json", ".txt": "to_text"}
+    if output is not None and Path(output).suffix not in writers:
+        raise InputError(f"{output}: a report is written as .html, .json or .txt")
+    for path in filter(None, (output, gradescope)):
+        require_output(path, model, "the model itself")
+        require_output(path, hand, "the file to compare")
+    report = kc.compare_file(read_model(model), hand, constraint=constraint)
+    if output is not None:
+        write_atomically(output, getattr(report, writers[Path(output).suffix])(reveal))
+    if gradescope is not None:
+        write_atomically(gradescope, report.to_gradescope(reveal))
+    if output is None and sys.stdout.isatty():
+        _print_coloured(report.to_rich(reveal))
+    elif output is None:
+        print_data(report.to_text(reveal))
+    else:
+        click.echo(f"{report.summary}\nWrote {output}", err=True)
+    if not report.equal:
+        context.exit(DIFFERENT)
+
+
+def _print_coloured(table: Any) -> None:
+    """Print a table to the terminal."""
+    from rich.console import Console
+
+    Console().print(table)

@@ -1,0 +1,72 @@
+"""`kincompile compile`: a model as source files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+import kincompile as kc
+from kincompile.cli.shared import print_data, read_model, require_output
+from kincompile.errors import InputError
+from kincompile.names import listed
+from kincompile.targets.registry import TARGETS
+from kincompile.writing import require_writable
+
+if TYPE_CHECKING:
+    from kincompile.targets.target import Emitted
+
+ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.endings}
+"""The target whose files have an ending."""
+
+
+@click.command("compile")
+@click.argument("model")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="FILE",
+    help="File to write, or a folder, or - for stdout.",
+)
+@click.option(
+    "--target",
+    default="numpy",
+    metavar="NAME",
+    help=f"What to emit: {listed(TARGETS)}.",
+)
+def command(model: str, output: str, target: str) -> None:
+    """Write Phi, Phi_q, nu and gamma of MODEL as a module.
+
+    The module imports NumPy and nothing else: it runs where kincompile is not installed. Where a
+    target has several files, the others are written beside the one named.
+    """
+    emitted = kc.emit(read_model(model), target)
+    if output == "-":
+        print_data("\n".join(emitted.files.values()))
+        return
+    folder, main = _destination(output, emitted, target)
+    for path in (folder / name for name in (main, *emitted.companions)):
+        if path.parent.exists():
+            require_output(path, model, "the model itself")
+    for path in emitted.write(folder, main):
+        click.echo(f"Wrote {path}", err=True)
+
+
+def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]:
+    """Return the folder to write to, and the name there of the main file."""
+    path = Path(output)
+    usual = next(iter(emitted.files))
+    if path.is_dir() or (emitted.companions and not path.suffix):
+        return path, usual
+    other = ENDINGS.get(path.suffix, target)
+    if other != target:
+        raise InputError(
+            f"{path} is the name of a file for {other}, and the target is {target}; "
+            f"give --target {other}, or end the name as {usual}"
+        )
+    if path.name in emitted.companions:
+        raise InputError(f"{path} is the name of another file that is written; end it as {usual}")
+    require_writable(path)
+    return path.parent, path.name

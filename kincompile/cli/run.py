@@ -1,0 +1,57 @@
+"""`kincompile run`: the motion of a model over time, summarised and written."""
+
+from __future__ import annotations
+
+import click
+
+import kincompile as kc
+from kincompile.cli.motion import motion_options, time_grid
+from kincompile.cli.progress import progress_bar
+from kincompile.cli.shared import NOT_CONVERGED, assigned, print_data, read_model, require_output
+from kincompile.runtime.results.summary import summary
+from kincompile.runtime.results.write import require_known_suffix
+
+
+@click.command("run")
+@click.argument("model")
+@motion_options
+@click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
+@click.option("-o", "--output", metavar="FILE", help="Write the motion: .csv, .npz or .json.")
+@click.pass_context
+def command(
+    context: click.Context,
+    model: str,
+    end: float | None,
+    points: int | None,
+    assignments: tuple[str, ...],
+    through: str | None,
+    analysis: str | None,
+    output: str | None,
+) -> None:
+    """Solve the motion of MODEL over time and summarise it.
+
+    Position, velocity and acceleration are solved at equally spaced times, from 0 to the end. The
+    summary goes to stdout, or to stderr where a file is written. Where the motion does not
+    converge, what was found is written nevertheless, and the exit code is 3.
+    """
+    if output is not None:
+        require_known_suffix(output)
+        require_output(output, model, "the model itself")
+    values = assigned(assignments)
+    mechanism = read_model(model)
+    if analysis is not None:
+        settings = kc.read_analysis(analysis)
+        end = settings.end if end is None else end
+        points = settings.points if points is None else points
+    times = time_grid(mechanism, end, points)
+    module = kc.compile(mechanism)
+    with progress_bar() as progress:
+        solution = kc.solve(module, times, values, through=through, progress=progress)
+    if output is None:
+        print_data(summary(solution) + "\n")
+    else:
+        kc.write(solution, output)
+        click.echo(f"{summary(solution)}\nWrote {output}", err=True)
+    if not solution.success:
+        click.echo(f"Error: {solution.message}", err=True)
+        context.exit(NOT_CONVERGED)

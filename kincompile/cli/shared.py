@@ -1,0 +1,70 @@
+"""What commands share: exit codes, reading a model, options, writing to stdout."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+import kincompile as kc
+from kincompile.errors import InputError
+from kincompile.writing import require_writable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+DIFFERENT, USAGE_OR_MODEL, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
+"""Exit codes."""
+
+
+def read_model(model: str) -> Mechanism | ConstraintSystem:
+    """Read a model; what its file prints is a message, not data."""
+    with redirect_stdout(sys.stderr):
+        read: Mechanism | ConstraintSystem = kc.read_model(model)
+    return read
+
+
+def require_output(path: str | Path, read: str, what: str) -> None:
+    """Refuse an output that cannot be written, or that is a file which is read."""
+    require_writable(path)
+    if Path(path).exists() and Path(read).exists() and Path(path).samefile(read):
+        raise InputError(f"{path} is {what}; give another name to write to")
+
+
+def set_option(what: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return the option ``--set NAME=VALUE``; `what` describes the names."""
+    return click.option(
+        "--set",
+        "assignments",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help=f"Value of a {what}; may be given several times.",
+    )
+
+
+def assigned(assignments: tuple[str, ...]) -> dict[str, float]:
+    """Return the parameters that are set; the last one counts where one is set twice."""
+    values, problems = {}, []
+    for assignment in assignments:
+        name, _, text = assignment.partition("=")
+        try:
+            values[name.strip()] = float(text)
+        except ValueError:
+            problems.append(f"--set {assignment}: give NAME=VALUE with a number, such as a=0.25")
+    if problems:
+        raise InputError(problems)
+    return values
+
+
+def print_data(text: str) -> None:
+    """Write data to stdout; an error of the system becomes an `InputError`."""
+    try:
+        click.echo(text, nl=False)
+    except OSError as error:
+        raise InputError(f"cannot write to stdout: {error.strerror}") from error

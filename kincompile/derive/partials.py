@@ -1,0 +1,116 @@
+"""Phi_q as the book prints it, read off the directional derivative.
+
+By a position r the derivative along a change of r is linear in that change: ``k r_dot`` of a vector
+constraint, whose block is k I, and ``u^T r_dot`` of a scalar one, whose row is u^T.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+from kincompile.calculus.expressions import (
+    ONE,
+    ZERO,
+    ZERO_VECTOR,
+    Dot,
+    Expression,
+    Product,
+    Scalar,
+    Sum,
+    Vector,
+    VectorSymbol,
+    dot,
+    product_of,
+    scaled,
+    split_factor,
+    vector_sum,
+)
+from kincompile.derive.derivation import recorded, units
+from kincompile.derive.rules import Step, along
+from kincompile.errors import InternalError
+
+if TYPE_CHECKING:
+    from kincompile.calculus.symbols import CoordinateSymbol
+    from kincompile.calculus.template import Template
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    """The derivative of a row block by a coordinate.
+
+    Attributes
+    ----------
+    coordinate
+        A coordinate of the template.
+    entry
+        By a vector r: k of the block k I where Phi is a vector, u of the row u^T where Phi is a
+        scalar. By a scalar: a vector or a scalar, as Phi is.
+    steps
+        The rules that fired, innermost first, with what they give in the same form.
+    """
+
+    coordinate: CoordinateSymbol
+    entry: Expression
+    steps: tuple[Step, ...]
+
+    def columns(self, entry: Expression) -> tuple[Expression, ...]:
+        """Return the columns that an entry stands for, this one or another in its place."""
+        return tuple(_applied(entry, unit) for unit in units(self.coordinate))
+
+
+@cache
+def partials(template: Template) -> tuple[tuple[Partial, ...], ...]:
+    """Return the derivatives of a constraint type: by row block, then by coordinate."""
+    changes = tuple(zip(template.coordinates, template.rates, strict=True))
+    return tuple(
+        tuple(_partial(Phi, coordinate, rate) for coordinate, rate in changes)
+        for Phi in template.Phi
+    )
+
+
+def _partial(Phi: Expression, coordinate: CoordinateSymbol, rate: CoordinateSymbol) -> Partial:
+    if not isinstance(rate, VectorSymbol):
+        return Partial(coordinate, *recorded(Phi, {coordinate: ONE}))
+    entry, steps = recorded(Phi, {coordinate: rate})
+    read_off = tuple(
+        Step(step.rule, step.expression, coefficient(step.derivative, rate)) for step in steps
+    )
+    return Partial(coordinate, coefficient(entry, rate), read_off)
+
+
+def _applied(entry: Expression, change: Expression) -> Expression:
+    """Return what an entry gives for a change of its coordinate."""
+    if isinstance(change, Scalar):
+        return change * entry
+    return scaled(entry, change) if isinstance(entry, Scalar) else dot(entry, change)
+
+
+def coefficient(expression: Expression, rate: VectorSymbol) -> Expression:
+    """Return k of a vector k r_dot, u of a scalar u^T r_dot."""
+    if isinstance(expression, Scalar):
+        return _row(expression, rate)
+    if expression == ZERO_VECTOR:
+        return ZERO
+    factor, vector = split_factor(expression)
+    if vector != rate:
+        raise InternalError(f"{expression} is no multiple of {rate}")
+    return factor
+
+
+def _row(expression: Scalar, rate: VectorSymbol) -> Vector:
+    match expression:
+        case Sum(terms):
+            return vector_sum(tuple(_row(term, rate) for term in terms))
+        case Product(factors):
+            rows = (
+                scaled(product_of((*factors[:k], *factors[k + 1 :])), _row(factor, rate))
+                for k, factor in enumerate(factors)
+            )
+            return vector_sum(tuple(rows))
+        case Dot(left, right) if rate in (left, right):
+            return right if left == rate else left
+    if along(expression, {rate: rate}) != ZERO:
+        raise InternalError(f"{expression} is not a multiple of {rate}")
+    return ZERO_VECTOR

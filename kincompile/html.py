@@ -1,0 +1,47 @@
+"""HTML for notebooks: tables, whole pages in a frame, and pictures, which `view` draws."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+@singledispatch
+def picture_html(shown: object) -> str:
+    """Return a picture of a value as HTML; "" where `view` is not loaded or has none."""
+    del shown
+    return ""
+
+
+def table_html(name: str, title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a name, a title and a table as HTML; all text is escaped."""
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
+    body = "".join(
+        f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows
+    )
+    return (
+        f"<p><b>{escape(name)}</b>: {escape(title)}</p>"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    )
+
+
+def framed_html(page: str, title: str, height: str) -> str:
+    """Return a page in a frame, so that its style sheet leaves the notebook alone.
+
+    Parameters
+    ----------
+    page
+        The whole page.
+    title
+        What the frame shows, for those who cannot see it.
+    height
+        With its unit, as in a style sheet.
+    """
+    return (
+        f'<iframe srcdoc="{escape(page)}" title="{escape(title)}" '
+        f'style="width: 100%; height: {height}; border: 0"></iframe>'
+    )

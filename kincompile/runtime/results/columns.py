@@ -1,0 +1,179 @@
+"""A motion as a table: coordinates and rates over time, by name and with units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from kincompile.errors import InputError, package_of_extra
+from kincompile.names import column_name, listed, rate, suggestion
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    import xarray
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.singular.events import Event
+
+TIME_UNIT = "s"
+"""Unit of t, in which every driver and every rate is written."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Column:
+    """A coordinate, its rate or its second rate over time.
+
+    Attributes
+    ----------
+    name, unit
+        As in ``phi_rod_dot`` and ``rad/s``; the unit is "" where there is none.
+    values : ndarray, shape (N,)
+        The numbers, of variants shape (B, N).
+    """
+
+    name: str
+    unit: str
+    values: NDArray[np.float64]
+
+    @property
+    def title(self) -> str:
+        """Name and unit, for instance ``x_rod [m]``."""
+        return titled(self.name, self.unit)
+
+
+def titled(name: str, unit: str) -> str:
+    """Return a name with its unit in brackets, if there is one."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def rate_unit(unit: str, order: int) -> str:
+    """Return the unit of a time derivative: of m, m/s and m/s^2; of none, none."""
+    return f"{unit}{('', '/s', '/s^2')[order]}" if unit else ""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MotionTable:
+    """The part of a solution that tables, files and plots show; `Solution` has the attributes."""
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    q_dot: NDArray[np.float64]
+    q_ddot: NDArray[np.float64]
+    status: NDArray[np.int64]
+    residual: NDArray[np.float64]
+    name: str
+    message: str
+    coordinates: tuple[str, ...]
+    units: dict[str, str]
+    events: list[Event]
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return the values of a coordinate, its rate or its second rate, shape (N,).
+
+        Raises
+        ------
+        InputError
+            When no column has this name; the message lists those that exist.
+        """
+        return self.column(name).values
+
+    def column(self, name: str) -> Column:
+        """Return a coordinate, its rate or its second rate: name, unit and values.
+
+        Raises
+        ------
+        InputError
+            When no column has this name; the message lists those that exist.
+        """
+        wanted = column_name(str(name))
+        for order in range(3):
+            stem = wanted.removesuffix(rate("", order))
+            if stem in self.coordinates and rate(stem, order) == wanted:
+                return self._column(self.coordinates.index(stem), order)
+        near = suggestion(wanted, (column.name for column in self.columns())) or "."
+        raise InputError(
+            f"{self.name} has no column {name!r}{near} The coordinates are "
+            f"{listed(self.coordinates)}; add _dot or _ddot for the rates."
+        )
+
+    def columns(self) -> list[Column]:
+        """Return the coordinates, then their rates, then their second rates."""
+        return [self._column(k, order) for order in range(3) for k in range(len(self.coordinates))]
+
+    def _column(self, k: int, order: int) -> Column:
+        name = self.coordinates[k]
+        values = (self.q, self.q_dot, self.q_ddot)[order][..., k]
+        return Column(rate(name, order), rate_unit(self.units.get(name, ""), order), values)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the motion as a `pandas.DataFrame`, a row a time.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index t; a column for each coordinate, rate and second rate, then status and residual.
+            ``.attrs["units"]`` has the units by column.
+
+        Raises
+        ------
+        UnsupportedError
+            If pandas is not installed.
+        InputError
+            If the solution is one of variants, which a table cannot hold.
+        """
+        with package_of_extra("pandas", "tables"):
+            import pandas as pd
+        self.require_one_motion("a table holds", "use to_xarray()")
+        columns = self.columns()
+        data: dict[str, NDArray[Any]] = {column.name: column.values for column in columns}
+        data |= {"status": self.status, "residual": self.residual}
+        frame = pd.DataFrame(data, index=pd.Index(self.t, name="t"))
+        frame.attrs["units"] = {"t": TIME_UNIT, **{item.name: item.unit for item in columns}}
+        return frame
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the motion as an `xarray.Dataset`.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable for each coordinate, rate and second rate, status and residual, over the
+            dimension t, of variants over variant and t. Each has its unit in ``.attrs["units"]``.
+
+        Raises
+        ------
+        UnsupportedError
+            If xarray is not installed.
+        """
+        with package_of_extra("xarray", "tables"):
+            import xarray
+        dimensions = ("variant", "t") if self.q.ndim > 2 else ("t",)
+        variables: dict[str, Any] = {
+            item.name: (dimensions, item.values, {"units": item.unit} if item.unit else {})
+            for item in self.columns()
+        }
+        variables |= {name: (dimensions, getattr(self, name)) for name in ("status", "residual")}
+        times = {"t": ("t", self.t, {"units": TIME_UNIT})}
+        about = {"name": self.name, "message": self.message}
+        return xarray.Dataset(variables, coords=times, attrs=about)
+
+    def require_one_motion(self, what: str, remedy: str) -> None:
+        """Check that the motion is not one of variants.
+
+        Parameters
+        ----------
+        what
+            What is asked for, with its verb, for instance ``"a table holds"``.
+        remedy
+            What to do instead.
+
+        Raises
+        ------
+        InputError
+            If several parameter sets were solved.
+        """
+        if self.q.ndim > 2:
+            raise InputError(
+                f"{self.name}: {what} one motion, and these are {len(self.q)} variants; {remedy}"
+            )

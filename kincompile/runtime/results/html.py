@@ -1,0 +1,100 @@
+"""How an emitted module and a solution show themselves in a notebook."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from html import escape
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.html import table_html
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.results.columns import MotionTable
+
+MOST_ROWS = 30
+"""Rows of a table that are shown; of more, the first ones."""
+
+RESOLUTION = 100
+"""Of images [dots per inch]."""
+
+
+def module_html(module: ModuleType) -> str:
+    """Return an emitted module's sizes and coordinates as HTML."""
+    header = ("column", "coordinate", "unit", "guess")
+    rows: list[tuple[str, ...]] = [
+        (str(k), name, module.UNITS.get(name, ""), f"{guess:g}")
+        for k, (name, guess) in enumerate(zip(module.COORDINATES, module.GUESS, strict=True))
+    ]
+    title = (
+        f"emitted module, {module.N_COORDINATES} coordinates, {module.N_EQUATIONS} equations, "
+        f"{len(module.PATTERN)} entries of Phi_q, {len(module.PARAMETERS)} parameters"
+    )
+    return _first_rows(module.NAME, title, header, rows)
+
+
+def solution_html(solution: MotionTable) -> str:
+    """Return the first, last, smallest and largest value of each coordinate as HTML.
+
+    Of variants, the smallest and the largest alone.
+    """
+    t = solution.t
+    title = f"{t.size} points from t = {t[0]:g} to {t[-1]:g}. {solution.message}"
+    ends = (0, -1) if solution.q.ndim == 2 else ()
+    header = ("coordinate", "unit", *(f"t = {t[k]:g}" for k in ends), "smallest", "largest")
+    rows: list[tuple[str, ...]] = []
+    for k, name in enumerate(solution.coordinates):
+        values = solution.q[..., k].ravel()
+        numbers = (*values[list(ends)], *_extremes(values))
+        rows.append((name, solution.units.get(name, ""), *(f"{x:.6g}" for x in numbers)))
+    return _first_rows(solution.name, title, header, rows)
+
+
+def _extremes(values: NDArray[np.float64]) -> tuple[np.float64 | float, np.float64 | float]:
+    """Return the smallest and the largest finite value; NaN without any."""
+    found = values[np.isfinite(values)]
+    return (found.min(), found.max()) if found.size else (np.nan, np.nan)
+
+
+def _first_rows(name: str, title: str, header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Return a table of the first rows, and how many there are besides."""
+    rest = len(rows) - MOST_ROWS
+    more = f"<p>and {rest} more</p>" if rest > 0 else ""
+    return table_html(name, title, header, rows[:MOST_ROWS]) + more
+
+
+def figure_html(title: str, size: tuple[float, float], draw: Callable[[Figure], object]) -> str:
+    """Return a matplotlib figure as an image element that carries its own bytes.
+
+    Parameters
+    ----------
+    title
+        What the image shows, for those who cannot see it.
+    size
+        Width and height [inch].
+    draw
+        Draws into the empty figure, which pyplot does not know.
+
+    Returns
+    -------
+    str
+        HTML; "" where matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        return ""
+    figure = Figure(figsize=size, layout="constrained", dpi=RESOLUTION)
+    draw(figure)
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png")
+    data = b64encode(buffer.getvalue()).decode("ascii")
+    return f'<p><img alt="{escape(title)}" src="data:image/png;base64,{data}"/></p>'

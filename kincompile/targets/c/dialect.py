@@ -1,0 +1,15 @@
+"""How C writes expressions of doubles; names that are not of math.h are the template's."""
+
+from kincompile.targets.printer import ELEMENTARY, Dialect
+
+C = Dialect(
+    "C",
+    {name: f"{name}({{}})" for name in ELEMENTARY}
+    # These two say by `far` that an angle is out of their reach.
+    | {"cos": "cosine({}, exact, &far)", "sin": "sine({}, exact, &far)"},
+    pi="PI",
+    table="spline(&{}, {}, {})",
+    signs={"&": "&&", "|": "||"},
+    # C divides integers to integers.
+    number=lambda value: repr(float(value)),
+)

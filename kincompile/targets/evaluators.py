@@ -1,0 +1,145 @@
+"""One function of the emitted module: which values get a name, in which order, what it returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kincompile import quantities
+from kincompile.names import rate
+from kincompile.targets.schedule import Assignment, Scheduler
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.program import Program
+    from kincompile.targets.naming import NameTable
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Cosine and sine of a body's angle, the cosine first; where only one is needed, that one."""
+
+    angle: int
+    values: tuple[Assignment, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """A function as straight-line code.
+
+    Attributes
+    ----------
+    frames
+        Body frames, first of all.
+    steps
+        Values that are used more than once, by the section that needs them first.
+    results
+        Quantity by quantity: the entries of each section, in order.
+    inputs
+        Names of the inputs that are read, in the model.
+    input_names
+        Names of all inputs in the target, by those in the model.
+    functions
+        Names of the elementary functions that are called.
+    names
+        Names of all named nodes, inputs included.
+    """
+
+    frames: tuple[Frame, ...]
+    steps: tuple[tuple[Section, tuple[Assignment, ...]], ...]
+    results: tuple[tuple[str, tuple[tuple[Section, tuple[Entry, ...]], ...]], ...]
+    inputs: frozenset[str]
+    input_names: Mapping[str, str]
+    functions: tuple[str, ...]
+    names: Mapping[int, str]
+
+
+def varying(inline: InlineProgram, section: Section, quantity: str) -> tuple[Entry, ...]:
+    """Return the entries a function computes: of a matrix those that are not plain numbers."""
+    entries = section.entries[quantity]
+    if all(item.name != quantity or not item.is_matrix for item in quantities.QUANTITIES):
+        return entries
+    return tuple(entry for entry in entries if inline.number(entry.node) is None)
+
+
+def schedule(
+    inline: InlineProgram,
+    computed: Sequence[str],
+    input_names: Mapping[str, str],
+    table: NameTable,
+) -> Listing:
+    """Arrange the code of a function.
+
+    Parameters
+    ----------
+    computed
+        The quantities that it returns.
+    input_names
+        Names of coordinates, rates and parameters in the target.
+    table
+        Names that are taken; this function's own names do not leave it.
+    """
+    results = tuple(
+        (name, tuple((section, varying(inline, section, name)) for section in inline.sections))
+        for name in computed
+    )
+    outputs = [entry.node for _, rows in results for _, entries in rows for entry in entries]
+    scheduler = Scheduler(inline.nodes, outputs, {}, table.copy(), inline.hints)
+    uses, names = scheduler.uses, scheduler.names
+    read = {node: inline.nodes[node][1] for node in uses if inline.nodes[node][0] == "input"}
+    names |= {node: input_names[name] for node, name in read.items()}
+    frames = _frames(inline, scheduler)
+    steps = []
+    for position, section in enumerate(inline.sections):
+        starts = [entry.node for _, rows in results for entry in rows[position][1]]
+        own = scheduler.assign(section.instance.name, scheduler.operands_first(starts))
+        if own:
+            steps.append((section, own))
+    functions = _functions(inline, uses, frames)
+    inputs = frozenset(read.values())
+    return Listing(frames, tuple(steps), results, inputs, input_names, functions, names)
+
+
+def input_names(program: Program, table: NameTable) -> dict[str, str]:
+    """Return the names of t, coordinates, rates and parameters in a target, by the model's."""
+    wanted = [item.name for item in program.coordinates]
+    wanted += [*map(rate, wanted), *(item.name for item in program.parameters)]
+    return {"t": "t", **{name: table.take(name) for name in wanted}}
+
+
+def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, str]]:
+    """Yield vector, index and name in the target of each input that is read, t apart."""
+    coordinates = [item.name for item in program.coordinates]
+    vectors = {
+        "q": coordinates,
+        "q_dot": [rate(name) for name in coordinates],
+        "p": [item.name for item in program.parameters],
+    }
+    for vector, members in vectors.items():
+        for k, member in enumerate(members):
+            if member in listing.inputs:
+                yield vector, k, listing.input_names[member]
+
+
+def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[Frame, ...]:
+    """Return the frames whose cosine or sine is used, and name those."""
+    by_angle: dict[int, list[Assignment]] = {}
+    for node in sorted(scheduler.uses):
+        kind, *operands = inline.nodes[node]
+        if kind == "call" and node in inline.hints:
+            by_angle.setdefault(operands[1], []).append(scheduler.name(node))
+    return tuple(Frame(angle, tuple(values)) for angle, values in by_angle.items())
+
+
+def _functions(
+    inline: InlineProgram, uses: Iterable[int], frames: tuple[Frame, ...]
+) -> tuple[str, ...]:
+    """Return the names of the functions called; cosine and sine of a frame are one call."""
+    pairs = [frame for frame in frames if len(frame.values) == 2]
+    shared = {item.node for frame in pairs for item in frame.values}
+    nodes = [inline.nodes[node] for node in uses if node not in shared]
+    called = {node[1] for node in nodes if node[0] == "call"}
+    called |= {"where" for node in nodes if node[0] == "select"}
+    return tuple(sorted(called | ({"cos_sin"} if pairs else set())))

@@ -1,0 +1,399 @@
+"""The NumPy target: one readable module that imports math and NumPy and nothing else."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from typing import TYPE_CHECKING, Any, Literal
+
+from kincompile import quantities
+from kincompile.ir.elimination import plan_solve
+from kincompile.names import rate
+from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
+from kincompile.targets.evaluators import varying
+from kincompile.targets.headings import header, place, short_title, title
+from kincompile.targets.lines import WIDTH, broken, commented, indented, table, wrapped
+from kincompile.targets.naming import NameTable
+from kincompile.targets.numpy.dialect import NUMPY
+from kincompile.targets.numpy.solve import solve_functions
+from kincompile.targets.planned_solve import schedule_solve
+from kincompile.targets.templates import fill
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+
+    from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.program import Program
+    from kincompile.quantities import Quantity
+    from kincompile.targets.evaluators import Listing
+    from kincompile.targets.printer import Printer
+
+DIALECT = NUMPY
+
+Style = Literal["titled", "plain", "packed"]
+
+FUNCTIONS = {
+    "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2",
+    "asinh": "np.arcsinh", "acosh": "np.arccosh", "atanh": "np.arctanh",
+    "pow": "np.power", "where": "np.where", "cos_sin": "staticmethod(_cos_sin)",
+}  # fmt: skip
+"""NumPy's names of elementary functions where they are not those of `math`."""
+
+SCALAR_FUNCTIONS = {
+    "where": "staticmethod(lambda condition, a, b: a if condition else b)",
+    "cos_sin": "staticmethod(lambda angle, cos=math.cos, sin=math.sin: (cos(angle), sin(angle)))",
+}
+"""Functions that `math` does not have."""
+
+RESERVED: tuple[str, ...] = (
+    "f", "q", "q_dot", "t", "p", "np", "math", "pi", "spline", *FUNCTIONS,
+    "sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt",
+)  # fmt: skip
+"""Names that the code of the functions uses."""
+
+RESERVED_IN_SOLVE = ("f", "J", "F", "b")
+
+
+def evaluators() -> dict[str, tuple[str, ...]]:
+    """Return the kernels."""
+    return kernels()
+
+
+def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the lines of a kernel: code for a point, or for arrays of points."""
+    states = "q, q_dot" if is_moving(kernels()[name]) else "q"
+    body = [*_unpack(code.program, listing)]
+    body += function_body(code, listing, printer, "packed" if name == "kinematics" else "titled")
+    matrix = _matrix(code, printer) if name == "position" else []
+    return ["", "", *matrix, f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
+
+
+def files(
+    code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+) -> Mapping[str, str]:
+    """Return the module."""
+    lines = [line for own in functions.values() for line in own]
+    keys = list(functions)
+    plan = plan_solve(code)
+    if plan is not None:
+        solving = schedule_solve(code, plan, NameTable(RESERVED_IN_SOLVE))
+        lines += ["", "", *solve_functions(code, solving)]
+        keys += ["factor", "solve"]
+    data = {
+        **_constants(code),
+        "kernels": "\n".join(lines),
+        "functions": "\n".join(_functions(code)),
+        "results": "\n".join(_results()),
+        "lanes": indented(wrapped(f'"{name}": _{name}' for name in keys)),
+        "scalar_functions": indented(scalar_functions(sorted(called))),
+        "array_functions": indented(array_functions(sorted(called))),
+        "is_planned": plan is not None,
+        "has_large_blocks": plan is not None and plan.has_large_blocks,
+        "has_frames": "cos_sin" in called,
+        **shared_text(),
+    }
+    return {f"{code.program.name}.py": fill("numpy/module.py.jinja", data)}
+
+
+def _constants(code: InlineProgram) -> dict[str, Any]:
+    """Return what the head of the module says."""
+    program = code.program
+    names = [item.name for item in program.coordinates]
+    units = {item.name: item.unit for item in program.coordinates}
+    units |= {item.name: item.unit for item in program.parameters}
+    return {
+        "title": program.name,
+        "header": "\n".join(header(code)),
+        "name": program.name,
+        "format": FORMAT,
+        "fingerprint": program.fingerprint,
+        "n": len(names),
+        "m": len(program.equations),
+        "k": len(program.parameters),
+        "nonzeros": len(code.pattern()),
+        "coordinates": tuple_text(f'"{name}"' for name in names),
+        "equations": tuple_text(f'"{name}"' for name in program.equations),
+        "redundant": tuple_text(f'"{name}"' for name in program.redundant),
+        "is_redundant": bool(program.redundant),
+        "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
+        "bodies": bodies_text(program),
+        "units": indented(wrapped([f'"{name}": "{unit}"' for name, unit in units.items()])),
+        "defaults": tuple_text(repr(item.default) for item in program.parameters),
+        "guess": tuple_text(repr(item.guess) for item in program.coordinates),
+        "patterns": "\n".join(_patterns(code)),
+        "tables": "\n".join(_tables(program)),
+    }
+
+
+def tuple_text(items: Iterable[str]) -> str:
+    """Return a tuple as text: on one line, or its elements on lines of their own."""
+    items = list(items)
+    text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
+    return text if len(text) <= WIDTH - 15 else f"(\n{indented(wrapped(items))}\n)"
+
+
+def bodies_text(program: Program) -> str:
+    """Return the bodies: name, first column and number of columns of each."""
+    return tuple_text(f'("{body}", {angle - 2}, 3)' for body, angle in program.frames)
+
+
+def _pattern_name(quantity: Quantity) -> str:
+    return "PATTERN" if quantity.name == "Phi_q" else f"PATTERN_{quantity.name}"
+
+
+def _patterns(code: InlineProgram) -> Iterator[str]:
+    """Yield the places of the entries of each matrix, and its entries that never change."""
+    for quantity in quantities.QUANTITIES:
+        if not quantity.is_matrix:
+            continue
+        entries, name = code.entries(quantity.name), _pattern_name(quantity)
+        places = wrapped([f"({entry.row}, {entry.column})" for entry in entries])
+        values = {k: code.number(entry.node) for k, entry in enumerate(entries)}
+        constants = [f"{k}: {float(x)!r}" for k, x in values.items() if x is not None]
+        yield f"# row, column of the entries of {quantity.name} that are not identically zero"
+        yield f"{name} = np.array((\n{indented(places)}\n), dtype=int).reshape(-1, 2)"
+        yield "# number in the pattern and value of the entries that never change"
+        suffix = name.removeprefix("PATTERN")
+        yield f"_CONSTANTS{suffix} = {{\n{indented(wrapped(constants))}\n}}"
+
+
+def _results() -> Iterator[str]:
+    """Yield the lines that say what the functions return."""
+    sizes = {
+        "equations": "N_EQUATIONS",
+        "coordinates": "N_COORDINATES",
+        "outputs": "N_OUTPUTS",
+        "parameters": "len(PARAMETERS)",
+    }
+    results: dict[str, list[str]] = {}
+    for quantity in quantities.QUANTITIES:
+        rows, name = sizes[quantity.rows], f"_{quantity.name.upper()}"
+        if not quantity.is_matrix:
+            results.setdefault(f"({rows},), range({rows})", []).append(name)
+            continue
+        columns, pattern = sizes[quantity.columns], _pattern_name(quantity)
+        constants = f"_CONSTANTS{pattern.removeprefix('PATTERN')}"
+        places = f"{pattern} @ ({columns}, 1)"
+        results[f"({rows}, {columns}), {places}, {constants}"] = [name]
+        size = f"len({pattern})"
+        results[f"({size},), range({size}), {constants}"] = [f"{name}_NONZEROS"]
+    for arguments, names in results.items():
+        yield f"{' = '.join(names)} = _Quantity({arguments})"
+
+
+def _functions(code: InlineProgram) -> Iterator[str]:
+    """Yield the public functions of the quantities."""
+    for quantity, name, lines in public_functions(code.program, len(code.pattern())):
+        kernel, states = kernel_of((quantity.name,)), "q, q_dot" if quantity.is_moving else "q"
+        computed = kernels()[kernel]
+        before = computed[: computed.index(quantity.name)]
+        skip = sum(len(varying(code, part, item)) for item in before for part in code.sections)
+        result = f"_{name.upper()}"
+        yield from lines
+        yield f"    return _evaluate(_{kernel}, {skip}, {result}, t, p, {states})\n\n"
+
+
+def public_functions(
+    program: Program, nonzeros: int
+) -> Iterator[tuple[Quantity, str, tuple[str, ...]]]:
+    """Yield name and first lines of the functions of quantities, of a matrix also its nonzeros."""
+    for quantity in quantities.QUANTITIES:
+        shape = ", ".join(map(str, program.shape_of(quantity)))
+        texts = {quantity.name: f"{quantity.about.rstrip('.')}, shape (..., {shape})."}
+        if quantity.is_matrix:
+            size = nonzeros if quantity.name == "Phi_q" else "nonzeros"
+            order = f"Entries of {quantity.name} in the order of {_pattern_name(quantity)}"
+            texts[f"{quantity.name}_nonzeros"] = f"{order}, shape (..., {size})."
+        states = "q, q_dot" if quantity.is_moving else "q"
+        for name, text in texts.items():
+            yield quantity, name, (f"def {name}({states}, t, p=DEFAULTS):", f'    """{text}"""')
+
+
+def shared_text() -> dict[str, str]:
+    """Return the parts that both forms of a module have in common, by slot."""
+    files = {
+        "arguments": "arguments",
+        "block_functions": "blocks",
+        "cos_sin": "cos_sin",
+        "spline": "spline",
+    }
+    return {slot: fill(f"numpy/{name}.py.jinja", {}).rstrip() for slot, name in files.items()}
+
+
+def scalar_functions(called: Iterable[str]) -> list[str]:
+    """Return a class body that maps the functions called to those of `math`."""
+    return [f"{name} = {SCALAR_FUNCTIONS.get(name, f'math.{name}')}" for name in called]
+
+
+def array_functions(called: Iterable[str]) -> list[str]:
+    """Return a class body that maps the functions called to those of NumPy."""
+    return [f"{name} = {FUNCTIONS.get(name, f'np.{name}')}" for name in called]
+
+
+def _tables(program: Program) -> list[str]:
+    lines = []
+    for name, spline in program.tables.items():
+        lines += [f"{name} = (", "    np.array(("]
+        lines += [f"        {line}" for line in wrapped([repr(x) for x in spline.breaks])]
+        lines += ["    )),", "    np.array(("]
+        lines += [f"        ({', '.join(repr(x) for x in row)})," for row in spline.coefficients]
+        lines += ["    )),", ")"]
+    return lines
+
+
+def function_body(
+    code: InlineProgram, listing: Listing, printer: Printer, style: Style
+) -> list[str]:
+    """Return the lines of a function whose inputs have their names already.
+
+    Parameters
+    ----------
+    style
+        ``"titled"``: an entry a line, under comments that name constraints; ``"plain"``: without
+        such comments, since the code is for many constraints; ``"packed"``: entries that stand
+        elsewhere with comments, as many a line as fit.
+    """
+    body = []
+    if listing.functions:
+        called = ", ".join(listing.functions)
+        body.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
+    body += _frames(listing, printer)
+    for section, assignments in listing.steps:
+        body += [f"# {short_title(section)}"] if style == "titled" else []
+        texts = [(item.name, printer.definition(item.node)) for item in assignments]
+        body += _pairs(texts) if style == "packed" else _assignments(texts)
+    body.append("return (")
+    for name, rows in listing.results:
+        body += [f"    # {name}"] if len(listing.results) > 1 else []
+        if style == "packed":
+            body += _packed([printer.text(entry.node) for _, own in rows for entry in own])
+            continue
+        for section, entries in rows:
+            body += _section(name, section, entries, code, printer, style)
+    body.append(")")
+    if body[-2] == "return (":
+        body[-2:] = ["return ()"]
+    return body
+
+
+def _section(
+    name: str,
+    section: Section,
+    entries: Sequence[Entry],
+    code: InlineProgram,
+    printer: Printer,
+    style: Style,
+) -> list[str]:
+    """Return the entries of a constraint; what is nothing but numbers on one line."""
+    texts = [printer.text(entry.node) for entry in entries]
+    if style == "plain" or not entries:
+        return [line for text in texts for line in _element(text, "")]
+    is_own = quantity_named(name).rows == "equations"
+    if is_own and all(code.number(entry.node) == 0 for entry in entries):
+        return [f"    {', '.join(texts)},  # {short_title(section)}"]
+    is_titled = is_own and not quantity_named(name).is_matrix  # of a matrix each entry is named
+    lines = [f"    {line}" for line in commented(title(section))] if is_titled else []
+    for entry, text in zip(entries, texts, strict=True):
+        lines += _element(text, place(name, entry, code))
+    return lines
+
+
+def _packed(texts: Sequence[str]) -> list[str]:
+    """Return the elements of a tuple, as many a line as fit."""
+    lines: list[str] = []
+    for is_long, group in itertools.groupby(texts, lambda text: len(text) > WIDTH - 8):
+        if is_long:
+            lines += [line for text in group for line in _element(text, "")]
+        else:
+            lines += [f"    {line}" for line in wrapped(group)]
+    return lines
+
+
+def _matrix(code: InlineProgram, printer: Printer) -> list[str]:
+    """Return Phi_q as a comment, with all its entries, where it is not wider than a line."""
+    coordinates = [item.name for item in code.program.coordinates]
+    rows = [[name, *("." for _ in coordinates)] for name in code.program.equations]
+    for entry in code.entries("Phi_q"):
+        rows[entry.row][entry.column + 1] = printer.text(entry.node)
+    for heads in (coordinates, [str(k) for k in range(len(coordinates))]):
+        lines = table([["", *heads], *rows], gap=1)
+        if max(map(len, lines)) <= WIDTH:
+            return [f"# {line}" for line in ("Phi_q with all its entries:", *lines)]
+    return []
+
+
+def _assignments(texts: Iterable[tuple[str, str]]) -> list[str]:
+    """Return values with their names, long ones in parentheses."""
+    lines: list[str] = []
+    for name, text in texts:
+        parts = broken(text)
+        if len(parts) == 1:
+            lines.append(f"{name} = {text}")
+        else:
+            lines += [f"{name} = (", *(f"    {line}" for line in parts), ")"]
+    return lines
+
+
+def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
+    """Return values with their names, two on a line where the second does not need the first."""
+    lines: list[str] = []
+    rest = list(texts)
+    while rest:
+        (name, text), *rest = rest
+        if rest and name not in re.findall(r"\w+", rest[0][1]):
+            pair = f"{name}, {rest[0][0]} = {text}, {rest[0][1]}"
+            if len(pair) <= WIDTH - 4:
+                lines.append(pair)
+                del rest[0]
+                continue
+        lines += _assignments([(name, text)])
+    return lines
+
+
+def _element(text: str, comment: str) -> list[str]:
+    """Return an element of the returned tuple, a long one continued with deeper indentation."""
+    first, *rest = broken(text)
+    lines = [f"    {first}", *(f"        {line}" for line in rest)]
+    lines[-1] += f",  # {comment}" if comment else ","
+    return lines
+
+
+def _unpack(program: Program, listing: Listing) -> list[str]:
+    """Return the lines that name the inputs: all of a vector, or the few that are read."""
+    coordinates = [item.name for item in program.coordinates]
+    vectors = {
+        "q": coordinates,
+        "q_dot": [rate(name) for name in coordinates],
+        "p": [item.name for item in program.parameters],
+    }
+    lines, names = [], listing.input_names
+    for vector, members in vectors.items():
+        read = [k for k, name in enumerate(members) if name in listing.inputs]
+        if 2 * len(read) > len(members):
+            lines += _targets([names[name] for name in members], vector)
+        elif read:
+            left = ", ".join(names[members[k]] for k in read)
+            lines.append(f"{left} = {', '.join(f'{vector}[{k}]' for k in read)}")
+    return lines
+
+
+def _targets(members: Sequence[str], vector: str) -> list[str]:
+    """Return the unpacking of a whole vector, a long one in parentheses."""
+    left = f"({members[0]},)" if len(members) == 1 else ", ".join(members)
+    if len(left) <= WIDTH - 8:
+        return [f"{left} = {vector}"]
+    return ["(", *(f"    {line}" for line in wrapped(members)), f") = {vector}"]
+
+
+def _frames(listing: Listing, printer: Printer) -> list[str]:
+    """Return the cosine and sine of each body's angle, a line a body."""
+    if not listing.frames:
+        return []
+    lines = ["# body frames: A = [[c, -s], [s, c]]"]
+    for frame in listing.frames:
+        left = ", ".join(item.name for item in frame.values)
+        if len(frame.values) == 2:
+            lines.append(f"{left} = cos_sin({printer.text(frame.angle)})")
+        else:
+            lines.append(f"{left} = {printer.definition(frame.values[0].node)}")
+    return lines

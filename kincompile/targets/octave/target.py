@@ -1,0 +1,161 @@
+"""The Octave target, which is MATLAB too: a function each for Phi, Phi_q, nu, gamma, and a script.
+
+This is the shape in which courses write them: column vectors, rows that count from 1, and a script
+that solves position, velocity and acceleration over time with Newton's method. No toolbox.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from kincompile import quantities
+from kincompile.errors import InputError, UnsupportedError
+from kincompile.targets.octave.dialect import NAMES, OCTAVE
+from kincompile.targets.statements import Layout
+from kincompile.targets.templates import fill
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.model.spline import SplineTable
+    from kincompile.targets.evaluators import Listing
+    from kincompile.targets.printer import Printer
+
+DIALECT = OCTAVE
+
+LAYOUT = Layout("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, continued=" ...")
+
+LONGEST_NAME = 63
+"""Characters of a name; MATLAB drops those behind them."""
+
+KEYWORDS = (
+    "break", "case", "catch", "classdef", "continue", "do", "else", "elseif", "end", "endif",
+    "endfor", "endfunction", "endwhile", "endswitch", "for", "function", "global", "if",
+    "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "until", "while",
+    "unwind_protect", "unwind_protect_cleanup",
+)  # fmt: skip
+"""Words of MATLAB and of Octave."""
+
+RESERVED: tuple[str, ...] = (
+    *KEYWORDS, *quantities.singles(), *NAMES.values(), "q", "q_dot", "t", "p", "pi", "zeros",
+    "nargin", "either", "in_reals", "NaN", "isreal",
+)  # fmt: skip
+"""Names that the functions use."""
+
+
+def evaluators() -> dict[str, tuple[str, ...]]:
+    """Return the functions: one a quantity."""
+    return quantities.singles()
+
+
+def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the lines of a function.
+
+    Raises
+    ------
+    UnsupportedError
+        If a name is longer than MATLAB reads, or a function does not exist there.
+    """
+    _require_short(listing.names.values())
+    rows, columns = (*code.program.shape_of(quantities.quantity_named(name)), 1)[:2]
+    lines = LAYOUT.inputs(code.program, listing)
+    values = LAYOUT.frames(listing, printer) + LAYOUT.steps(listing, printer)
+    zeros = f"{name} = zeros({rows}, {columns});"
+    results = LAYOUT.results(name, code, printer)
+    return [*lines, *values, *([""] if values else []), zeros, *results]
+
+
+def files(
+    code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+) -> Mapping[str, str]:
+    """Return the .m files, the script first.
+
+    Raises
+    ------
+    UnsupportedError
+        If a file's name is longer than MATLAB reads.
+    InputError
+        If the mechanism's time grid is none.
+    """
+    program = code.program
+    found = {program.name: _script(code)}
+    for name, lines in functions.items():
+        found[f"{program.name}_{name}"] = _function_file(name, code, "\n".join(lines))
+    for name, spline in program.tables.items():
+        found[f"{program.name}_{name}"] = _spline(f"{program.name}_{name}", spline)
+    _require_short(found)
+    return {f"{name}.m": text for name, text in found.items()}
+
+
+def _require_short(names: Iterable[str]) -> None:
+    """Refuse a name that MATLAB would take for another."""
+    long = [name for name in names if len(name) > LONGEST_NAME]
+    if long:
+        raise UnsupportedError(
+            f"MATLAB reads {LONGEST_NAME} characters of a name, and {long[0]!r} has {len(long[0])};"
+            " give shorter names to the mechanism, its bodies and its constraints"
+        )
+
+
+def _function_file(name: str, code: InlineProgram, body: str) -> str:
+    """Return the file of one function."""
+    program = code.program
+    quantity = quantities.quantity_named(name)
+    shape = "" if quantity.is_matrix else ", a column"
+    data = {
+        "quantity": name,
+        "name": program.name,
+        "arguments": ", ".join(quantity.arguments),
+        "n_arguments": len(quantity.arguments),
+        "about": f"{quantity.about[:-1]}{shape}.",
+        "header": LAYOUT.header(code),
+        "fingerprint": program.fingerprint,
+        "defaults": _column(((item.name, item.default) for item in program.parameters), 2),
+        "body": body,
+        "functions": "".join(
+            fill(f"octave/{own}.m.jinja", {}) for own in ("either", "in_reals") if f"{own}(" in body
+        ),
+    }
+    return fill("octave/function.m.jinja", data).rstrip("\n") + "\n"
+
+
+def _column(items: Iterable[tuple[str, float | None]], level: int) -> str:
+    """Return named numbers as the lines of a column vector."""
+    return "\n".join(f"{'    ' * level}{value!r}  % {name}" for name, value in items)
+
+
+def _spline(name: str, spline: SplineTable) -> str:
+    """Return the file of a table."""
+    pieces = (", ".join(map(repr, row)) for row in spline.coefficients)
+    data = {
+        "name": name,
+        "breaks": "\n".join(f"        {x!r}" for x in spline.breaks),
+        "pieces": "\n".join(f"        {row}" for row in pieces),
+    }
+    return fill("octave/spline.m.jinja", data)
+
+
+def _script(code: InlineProgram) -> str:
+    """Return the script that solves the motion."""
+    program = code.program
+    try:
+        end, points = float(program.end), int(program.points)
+    except (TypeError, ValueError):
+        end, points = math.nan, 0
+    if not math.isfinite(end) or points < 1:
+        raise InputError(
+            f"end = {program.end!r}, points = {program.points!r}: give a finite time, and at least "
+            "one point"
+        )
+    data = {
+        "name": program.name,
+        "header": LAYOUT.header(code),
+        "n": len(program.coordinates),
+        "end": repr(end),
+        "points": points,
+        "defaults": _column(((item.name, item.default) for item in program.parameters), 1),
+        "guess": _column(((item.name, item.guess) for item in program.coordinates), 1),
+    }
+    return fill("octave/script.m.jinja", data)

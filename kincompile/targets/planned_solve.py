@@ -1,0 +1,117 @@
+"""The planned solve as two functions: factorization, from Phi_q alone, and solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kincompile.ir.graph import number_of, operands_of
+from kincompile.targets.lines import wrapped
+from kincompile.targets.schedule import Scheduler, count_uses
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    from kincompile.ir.elimination import SolvePlan
+    from kincompile.ir.graph import Node
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.targets.naming import NameTable
+
+
+@dataclass(frozen=True, slots=True)
+class SolveListing:
+    """The planned solve with names.
+
+    Attributes
+    ----------
+    entries
+        Names of the varying entries of Phi_q, in order: the input of the factorization.
+    factors
+        Nodes that the solution reads from the factorization.
+    factor_steps, solve_steps
+        Nodes to be computed one after the other, in each function.
+    names
+        Names of all nodes that have one.
+    """
+
+    plan: SolvePlan
+    entries: tuple[int, ...]
+    factors: tuple[int, ...]
+    factor_steps: tuple[int, ...]
+    solve_steps: tuple[int, ...]
+    names: Mapping[int, str]
+
+
+def schedule_solve(code: InlineProgram, plan: SolvePlan, table: NameTable) -> SolveListing:
+    """Arrange the planned solve: what depends on Phi_q alone is computed once and kept.
+
+    `table` knows the names that the target reserves; coordinates and equations are free here.
+    """
+    equations = [name.replace(".", "_") for name in code.program.equations]
+    coordinates = [item.name for item in code.program.coordinates]
+    names = {
+        node: table.take(f"{equations[row]}_{coordinates[column]}")
+        for row, column, node in plan.entries
+    }
+    names |= {node: table.take(equations[row]) for row, node in enumerate(plan.right)}
+    labels = dict.fromkeys(plan.determinants, "determinant")
+    labels |= zip(plan.solution, coordinates, strict=True)
+    variable = _depending_on(plan.nodes, plan.right)
+    factors = _factors(plan, variable)
+    blocks = {node for node, content in enumerate(plan.nodes) if content[0] == "linear"}
+    scheduler = Scheduler(plan.nodes, labels, names, table, labels, {*labels, *factors, *blocks})
+    needed = sorted(scheduler.uses)
+    factor_steps = scheduler.assign("k", [node for node in needed if node not in variable])
+    solve_steps = scheduler.assign("b", [node for node in needed if node in variable])
+    return SolveListing(
+        plan,
+        tuple(node for _, _, node in plan.entries),
+        factors,
+        tuple(item.node for item in factor_steps),
+        tuple(item.node for item in solve_steps),
+        names,
+    )
+
+
+def _depending_on(nodes: Sequence[Node], inputs: Iterable[int]) -> set[int]:
+    """Return the nodes that depend on any of the inputs."""
+    found = set(inputs)
+    for node, content in enumerate(nodes):
+        if not found.isdisjoint(operands_of(content)):
+            found.add(node)
+    return found
+
+
+def _factors(plan: SolvePlan, variable: Collection[int]) -> tuple[int, ...]:
+    """Return what the solution for a right side reads of the values that Phi_q alone gives."""
+    nodes = plan.nodes
+    needed = count_uses(nodes, plan.solution).keys() & variable
+    read = {k for node in needed for k in operands_of(nodes[node])}
+    read = {nodes[k][1] if nodes[k][0] == "neg" else k for k in read}
+    return tuple(
+        node for node in sorted(read.difference(variable)) if number_of(nodes, node) is None
+    )
+
+
+def explained(code: InlineProgram, plan: SolvePlan) -> list[str]:
+    """Return lines of a comment that say how the system is taken apart."""
+    equations = code.program.equations
+    coordinates = [item.name for item in code.program.coordinates]
+    pivots = [f"{coordinates[item.column]} by {equations[item.row]}" for item in plan.pivots]
+    lines = wrapped(["eliminated:", *pivots]) if pivots else []
+    for block in plan.blocks:
+        rows = ", ".join(equations[row] for row in block.rows)
+        columns = ", ".join(coordinates[column] for column in block.columns)
+        lines.append(f"block: {columns} by {rows}")
+    return [line.replace("eliminated:,", "eliminated:").rstrip(",") for line in lines]
+
+
+def components(plan: SolvePlan, node: int) -> list[int]:
+    """Return the nodes of all components of the solution that a node is one of, in order."""
+    _, _, size, _, *operands = plan.nodes[node]
+    same = [
+        k
+        for k, content in enumerate(plan.nodes)
+        if content[:3] == ("linear", "solve", size) and list(content[4:]) == operands
+    ]
+    return sorted(same, key=lambda k: int(plan.nodes[k][3]))

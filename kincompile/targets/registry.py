@@ -1,0 +1,61 @@
+"""The table of targets; the modules of one are loaded when a program is first emitted in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from kincompile.ir.grouping import GroupedProgram
+    from kincompile.targets.target import Emitted, Target
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A line of the table.
+
+    Attributes
+    ----------
+    folder
+        Package whose module `target` is the `Target`, and whose module `grouped` has
+        `emit_grouped` where there is a grouped form.
+    endings
+        Endings of its files, that of the main one first.
+    is_loadable
+        Whether this process can call its code.
+    has_grouped_form
+        Whether it has a form for large mechanisms.
+    has_redundancy
+        Whether its code may have equations that repeat others.
+    """
+
+    folder: str
+    endings: tuple[str, ...]
+    is_loadable: bool = False
+    has_grouped_form: bool = False
+    has_redundancy: bool = False
+
+
+TARGETS = {
+    "numpy": Listed("kincompile.targets.numpy", (".py",), True, True, True),
+    "c": Listed("kincompile.targets.c", (".c", ".h"), is_loadable=True),
+    "octave": Listed("kincompile.targets.octave", (".m",)),
+    "javascript": Listed("kincompile.targets.javascript", (".js",)),
+}
+"""Languages to emit."""
+
+
+def load_target(name: str) -> Target:
+    """Return a target, whose modules are loaded now."""
+    target: Target = import_module(f"{TARGETS[name].folder}.target")
+    return target
+
+
+def load_grouped_form(name: str) -> Callable[[GroupedProgram], Emitted]:
+    """Return the function that writes the grouped form of a target."""
+    emit: Callable[[GroupedProgram], Emitted]
+    emit = import_module(f"{TARGETS[name].folder}.grouped").emit_grouped
+    return emit

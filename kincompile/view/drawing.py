@@ -1,0 +1,247 @@
+"""`drawing`: the one description of a mechanism's shapes, for plots and pages."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.model.mechanism import system_of
+from kincompile.model.resolve import Joint
+from kincompile.view.body_shapes import links, outlines
+from kincompile.view.geometry import Geometry, JointGeometry
+from kincompile.view.joint_shapes import marks_of
+from kincompile.view.marks import (
+    GROUND_FRAME,
+    Block,
+    BodyPoint,
+    Drive,
+    Mark,
+    Pin,
+    Rail,
+    Span,
+    moves_with,
+    reach,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import ArrayLike
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.view.marks import Array
+
+PARTS = 50
+"""The mechanism's diagonal in sizes of marks."""
+
+OVERHANG = 3
+"""Length of a guide beyond the motion, in sizes of marks."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointLabel:
+    """The name and place of a constraint, for labels and for pointing at it.
+
+    Attributes
+    ----------
+    name, kind
+        Its name, and the name of its type.
+    place
+        Where it is; on a moving body where it has one. None for a free equation.
+    is_driver
+        Whether its value is a function of time.
+    rows
+        First row of Phi and number of rows.
+    """
+
+    name: str
+    kind: str
+    place: BodyPoint | None
+    is_driver: bool
+    rows: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """The shapes of a mechanism.
+
+    Attributes
+    ----------
+    name
+        Name of the mechanism.
+    bodies
+        Names of the bodies; their index is their frame, and body k has the coordinates
+        q[3k : 3k + 3].
+    marks
+        All shapes, from back to front.
+    joints
+        The constraints, in order.
+    size
+        The length in which pins and blocks are measured.
+    """
+
+    name: str
+    bodies: tuple[str, ...]
+    marks: tuple[Mark, ...]
+    joints: tuple[JointLabel, ...]
+    size: float
+
+    def extent(self, q: ArrayLike) -> tuple[float, float, float, float]:
+        """Return smallest x, largest x, smallest y, largest y of all marks.
+
+        Parameters
+        ----------
+        q : array_like, shape (n,) or (N, n)
+            Positions; those that are not finite are left out.
+        """
+        (x_low, y_low), (x_high, y_high) = _box(self.marks, _finite(q))
+        pad = 2 * self.size
+        return float(x_low - pad), float(x_high + pad), float(y_low - pad), float(y_high + pad)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the drawing as plain data; each mark has its type, in small letters, as `kind`."""
+        data = asdict(self)
+        data["marks"] = [
+            {"kind": type(mark).__name__.lower(), **asdict(mark)} for mark in self.marks
+        ]
+        return data
+
+
+def drawing(
+    model: Mechanism | ConstraintSystem,
+    p: Mapping[str, float] | None = None,
+    q: ArrayLike | None = None,
+) -> Drawing:
+    """Derive the shapes of a mechanism.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system; one of free equations alone has no bodies and no marks.
+    p
+        Values of parameters by name; others have their defaults.
+    q : array_like, shape (n,) or (N, n), optional
+        Positions that the rails must reach; without, the guess.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written; every problem is listed.
+    """
+    system = system_of(model)
+    guess = [item.guess for item in system.coordinates]
+    positions = _finite(guess if q is None else q)
+    if not len(positions):
+        positions = _finite(guess)
+    joints = [item for item in system.constraints if isinstance(item, Joint)]
+    geometry = Geometry(
+        joints,
+        {item.name: item.default or 0.0 for item in system.parameters} | dict(p or {}),
+        {body.name: k for k, body in enumerate(system.bodies)},
+        positions,
+    )
+    by_joint = {
+        joint.name: marks_of(joint.written, JointGeometry(joint, geometry)) for joint in joints
+    }
+    bodies: list[Mark] = [*outlines(system.bodies, geometry)]
+    marks = _uncovered(itertools.chain(*by_joint.values()), set().union(*map(moves_with, bodies)))
+    marks = [*bodies, *marks]
+    marks += links(len(system.bodies), geometry.points(joints), marks)
+    size = _size(marks, positions)
+    places = {
+        joint.name: _pointed_at(by_joint[joint.name], geometry.points([joint])) for joint in joints
+    }
+    ordered = sorted((_lengthened(mark, OVERHANG * size) for mark in marks), key=_depth)
+    names = tuple(body.name for body in system.bodies)
+    return Drawing(system.name, names, tuple(ordered), _labels(system, places), size)
+
+
+def _labels(
+    system: ConstraintSystem, places: Mapping[str, BodyPoint | None]
+) -> tuple[JointLabel, ...]:
+    """Return the labels of the constraints, in order."""
+    return tuple(
+        JointLabel(
+            item.name,
+            item.template.type_name if isinstance(item, Joint) else "Equation",
+            places.get(item.name),
+            item.is_driver,
+            (first, len(item.equation_names)),
+        )
+        for item, first in zip(system.constraints, system.row_offsets, strict=True)
+    )
+
+
+def _finite(q: ArrayLike) -> Array:
+    """Return the positions that are finite, shape (N, n)."""
+    positions = np.atleast_2d(np.asarray(q, dtype=np.float64))
+    return positions[np.isfinite(positions).all(axis=1)]
+
+
+def _pointed_at(marks: Iterable[Mark], attached: Iterable[BodyPoint]) -> BodyPoint | None:
+    """Return the place of a joint: its pin or drive, else its last moving point."""
+    pins = [mark.second for mark in marks if isinstance(mark, Pin)]
+    drives = [mark.place for mark in marks if isinstance(mark, Drive)]
+    moving = [place for place in attached if place.frame != GROUND_FRAME]
+    found = pins or drives or moving
+    return found[-1] if found else None
+
+
+def _box(marks: Iterable[Mark], q: Array) -> tuple[Array, Array]:
+    """Return the lower left and the upper right corner of the marks at positions q."""
+    corners = [
+        place.at(q) + offset
+        for mark in marks
+        for place, radius in reach(mark)
+        for offset in (-radius, radius)
+    ]
+    if not corners or not len(q):
+        return np.array((-1.0, -1.0)), np.array((1.0, 1.0))
+    points = np.concatenate(corners)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _size(marks: Iterable[Mark], q: Array) -> float:
+    """Return a part of the diagonal of the marks; of a single point, of a unit length."""
+    low, high = _box(marks, q)
+    return (float(np.hypot(*(high - low))) or 1.0) / PARTS
+
+
+def _lengthened(mark: Mark, overhang: float) -> Mark:
+    """Return a guide with an overhang, so that its block never stands at its end."""
+    if not isinstance(mark, Rail) or mark.style != "guide":
+        return mark
+    start, end = np.array(mark.start), np.array(mark.end)
+    along = overhang * np.array(mark.axis)
+    return replace(mark, start=tuple((start - along).tolist()), end=tuple((end + along).tolist()))
+
+
+def _uncovered(marks: Iterable[Mark], outlined: set[int]) -> list[Mark]:
+    """Return the marks without slides and sleeves that other marks already show.
+
+    A cylinder takes the place of its slide; two outlined bodies show by themselves how they slide.
+    """
+    found = list(marks)
+    spans = [mark for mark in found if isinstance(mark, Span)]
+    cylinders = {(mark.first, mark.second) for mark in spans if mark.style == "cylinder"}
+    covered = {
+        mark.joint
+        for mark in spans
+        if (mark.style == "slide" and (mark.first, mark.second) in cylinders)
+        or {mark.first.frame, mark.second.frame} <= outlined
+    }
+    return [
+        mark for mark in found if not (isinstance(mark, Span | Block) and mark.joint in covered)
+    ]
+
+
+_DEPTHS = ("rail", "wheel", "profile", "outline", "link", "span", "block", "pin", "drive")
+
+
+def _depth(mark: Mark) -> int:
+    """Return the position of a mark in the order from back to front."""
+    return _DEPTHS.index(type(mark).__name__.lower())

@@ -1,0 +1,223 @@
+"""The joints of a mechanism in numbers: their points in frames, and the marks drawn from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.model.arguments import Kind
+from kincompile.model.bodies import GROUND
+from kincompile.model.expressions import alpha, as_expression, depends_on, evaluate
+from kincompile.model.joints import Revolute
+from kincompile.view.marks import GROUND_FRAME, BodyPoint, Pin, Point, Profile, Rail, Span, Wheel
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from kincompile.model.expressions import Scalar, Scalars
+    from kincompile.model.resolve import Joint
+    from kincompile.view.marks import Array
+
+PROFILE_POINTS = 180
+"""Points of a cam profile: its chords are within 1.5e-4 of its radius."""
+
+PITCH_LINE = ("s_P", "s_Q")
+"""Symbols of the points between which a rack is drawn."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The joints of a mechanism, with what turns their attributes into numbers.
+
+    Attributes
+    ----------
+    joints
+        The constraints of known types.
+    values
+        Parameters by name.
+    frames
+        Index of each body by name.
+    q : ndarray, shape (N, n)
+        Positions that rails must fit; all finite.
+    """
+
+    joints: Sequence[Joint]
+    values: Mapping[str, float]
+    frames: Mapping[str, int]
+    q: Array
+
+    def number(self, value: Scalar) -> float:
+        """Return the number of an expression of parameters; zero where it has none."""
+        return evaluate(as_expression(value), dict(self.values)) or 0.0
+
+    def pair(self, pair: Scalars) -> Point:
+        """Return the numbers of a point or a direction."""
+        return self.number(pair[0]), self.number(pair[1])
+
+    def frame_of(self, joint: Joint, symbol: str) -> int:
+        """Return the frame in which a point of a joint is fixed."""
+        owner = joint.written.owners()[symbol]
+        if owner == GROUND.name:
+            return GROUND_FRAME
+        arguments = joint.written.arguments().values()
+        symbols = [item.symbol for item in arguments if item.kind is Kind.BODY]
+        return self.frames.get(joint.bodies[symbols.index(owner)].name, GROUND_FRAME)
+
+    def point(self, joint: Joint, symbol: str) -> BodyPoint:
+        """Return a point of a joint, in the frame of its body."""
+        return BodyPoint(self.frame_of(joint, symbol), self.pair(joint.points[symbol]))
+
+    def points(self, joints: Iterable[Joint]) -> list[BodyPoint]:
+        """Return every point that joints hold; the pitch line of a rack is drawn as such."""
+        return [
+            self.point(joint, item.symbol)
+            for joint in joints
+            for item in joint.written.arguments().values()
+            if item.kind is Kind.POINT and item.symbol not in PITCH_LINE
+        ]
+
+    @cached_property
+    def bearings(self) -> dict[int, BodyPoint]:
+        """The point of each frame's first revolute joint, one with the ground first."""
+        revolutes = [joint for joint in self.joints if isinstance(joint.written, Revolute)]
+        revolutes.sort(key=lambda joint: not _is_on_ground(joint))
+        found: dict[int, BodyPoint] = {}
+        for point in self.points(revolutes):
+            found.setdefault(point.frame, point)
+        return found
+
+    @cached_property
+    def blocks(self) -> frozenset[int]:
+        """The frames with one point for all joints, in a revolute joint of moving bodies."""
+        points: dict[int, set[Point]] = {}
+        for item in self.points(self.joints):
+            points.setdefault(item.frame, set()).add(item.point)
+        pinned = self.points(
+            joint
+            for joint in self.joints
+            if isinstance(joint.written, Revolute) and not _is_on_ground(joint)
+        )
+        return frozenset(item.frame for item in pinned if len(points[item.frame]) == 1)
+
+
+@dataclass(frozen=True, slots=True)
+class JointGeometry:
+    """A joint with its attributes as numbers.
+
+    Attributes
+    ----------
+    joint
+        The resolved constraint.
+    mechanism
+        The joints of the whole mechanism, this one among them.
+    """
+
+    joint: Joint
+    mechanism: Geometry
+
+    @property
+    def name(self) -> str:
+        """Name of the constraint."""
+        return self.joint.name
+
+    @property
+    def is_driver(self) -> bool:
+        """Whether its value is a function of time."""
+        return self.joint.is_driver
+
+    def point(self, symbol: str) -> BodyPoint:
+        """Return a point of the constraint, in the frame of its body."""
+        return self.mechanism.point(self.joint, symbol)
+
+    def unit(self, symbol: str) -> Point:
+        """Return a direction of the constraint, of length one."""
+        x, y = self.mechanism.pair(self.joint.points[symbol])
+        length = math.hypot(x, y) or 1.0
+        return x / length, y / length
+
+    def number(self, symbol: str) -> float:
+        """Return a scalar attribute."""
+        return self.mechanism.number(self.joint.scalars[symbol])
+
+    def constant(self, symbol: str) -> float | None:
+        """Return a scalar attribute, None where it is a function of time."""
+        return None if depends_on(self.joint.scalars[symbol], ("t",)) else self.number(symbol)
+
+    def bearing(self) -> BodyPoint:
+        """Return where the last moving body is held: a turning drive is drawn there."""
+        frames = (self.mechanism.frames.get(body.name) for body in reversed(self.joint.bodies))
+        frame = next(frame for frame in frames if frame is not None)
+        return self.mechanism.bearings.get(frame, BodyPoint(frame, (0.0, 0.0)))
+
+    def pin(self, first: BodyPoint, second: BodyPoint) -> Pin:
+        """Return the pin of two points, one on the ground first."""
+        if second.frame == GROUND_FRAME:
+            first, second = second, first
+        return Pin(self.name, first, second)
+
+    def span(self, first: str, second: str, style: str) -> Span:
+        """Return the line between two points."""
+        return Span(self.name, self.point(first), self.point(second), style)
+
+    def wheel(self, centre: str, radius: str, theta: str) -> Wheel:
+        """Return a gear; a negative radius is an internal one."""
+        size = self.number(radius)
+        return Wheel(self.name, self.point(centre), abs(size), self.number(theta), size < 0)
+
+    def profile(self, centre: str, rho: str, style: str) -> Profile:
+        """Return the curve of radius rho(alpha) about a centre."""
+        place = self.point(centre)
+        x, y = place.point
+        points = []
+        for angle in np.linspace(0, 2 * np.pi, PROFILE_POINTS, endpoint=False).tolist():
+            known = {**self.mechanism.values, alpha.name: angle}
+            length = evaluate(self.joint.profiles[rho], known) or 0.0
+            points.append((x + length * math.cos(angle), y + length * math.sin(angle)))
+        return Profile(self.name, place.frame, tuple(points), style)
+
+    def rail(
+        self,
+        base: BodyPoint,
+        axis: Point,
+        follower: BodyPoint,
+        *,
+        style: str = "guide",
+        offset: float = 0.0,
+        at_least: tuple[float, ...] = (),
+    ) -> Rail:
+        """Return a straight rail as long as the motion of its follower.
+
+        Parameters
+        ----------
+        base, axis
+            A point of the line and its direction, of length one, in the frame of `base`.
+        follower
+            What slides or rolls on it.
+        style
+            As for `Rail`.
+        offset
+            Distance of the rail from the line, to its left.
+        at_least
+            Distances along the axis that it covers in any case.
+        """
+        along = _along(self.mechanism.q, base, axis, follower)
+        ends = [float(along.min()), float(along.max()), *at_least]
+        x, y = base.point[0] - offset * axis[1], base.point[1] + offset * axis[0]
+        start, end = ((x + s * axis[0], y + s * axis[1]) for s in (min(ends), max(ends)))
+        return Rail(self.name, base.frame, start, end, axis, style)
+
+
+def _is_on_ground(joint: Joint) -> bool:
+    return any(body.is_ground for body in joint.bodies)
+
+
+def _along(q: Array, base: BodyPoint, axis: Point, follower: BodyPoint) -> Array:
+    """Return the distance of the follower along the axis, shape (N,)."""
+    start = base.at(q)
+    tip = BodyPoint(base.frame, (base.point[0] + axis[0], base.point[1] + axis[1]))
+    apart, direction = follower.at(q) - start, tip.at(q) - start
+    return np.asarray(np.sum(apart * direction, axis=-1), dtype=np.float64)

@@ -1,0 +1,165 @@
+"""The C target: text that strict compilers accept, and the numbers of every kind of expression."""
+
+import re
+import subprocess
+
+import mpmath
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.runtime.status import Status
+
+STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
+x, y = sympy.symbols("x y")
+
+# what the compiler itself brings, for one processor, is no library
+ALLOWED = re.compile(r'#include (<(stddef|stdint|string|math|emmintrin)\.h>|"\w+\.h")')
+
+
+def compare(model, q, t=0.0, tolerance=1e-13):
+    """Compare all four quantities of the C module and the NumPy module."""
+    native, module = kc.compile(model, target="c"), kc.compile(model)
+    q = np.asarray(q, dtype=float)
+    found, expected = native.kinematics(q, 1 + q**2, t), module.kinematics(q, 1 + q**2, t)
+    for here, there in zip(found, expected, strict=True):
+        np.testing.assert_allclose(here, there, rtol=tolerance, atol=tolerance)
+
+
+# ---------------------------------------------------------------- the text
+
+
+@pytest.mark.parametrize("level", ["-O0", "-O2"])
+def test_strict_compilers_have_nothing_to_say(example, quick_compiler, tmp_path, level):
+    for name, text in example.files("c").items():
+        (tmp_path / name).write_text(text)
+    source = next(iter(example.files("c")))
+    command = (quick_compiler, *STRICT, level, "-c", source, "-o", "out.o")
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_header_can_be_included_alone_and_twice(example, quick_compiler, tmp_path):
+    source, header = example.files("c")
+    (tmp_path / header).write_text(example.files("c")[header])
+    (tmp_path / "user.c").write_text(
+        f'#include "{header}"\n#include "{header}"\nint main(void){{return 0;}}\n'
+    )
+    command = (quick_compiler, *STRICT, "user.c", "-o", "user")
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert source.removesuffix(".c") == header.removesuffix(".h")
+
+
+def test_nothing_but_libm_is_used_and_nothing_from_the_heap(example):
+    for text in example.files("c").values():
+        for line in text.splitlines():
+            assert not line.startswith("#include") or ALLOWED.fullmatch(line)
+        assert not re.search(r"\b(malloc|calloc|realloc|alloca|free|printf|exit|abort)\b *\(", text)
+
+
+def test_the_text_says_what_the_numpy_module_says(example):
+    source = next(iter(example.files("c").values()))
+    for section in re.findall(r"^ *# (\d[-\d]*  .*)$", example.source, re.MULTILINE):
+        assert f"// {section}" in source
+
+
+def test_the_statuses_are_those_of_the_runtime(example_named):
+    header = list(example_named("four_bar").files("c").values())[1]
+    found = dict(re.findall(r"FOUR_BAR_(\w+) = (\d),  +//", header))
+    assert {name: int(value) for name, value in found.items()} == {
+        status.name: int(status) for status in Status
+    }
+
+
+# ---------------------------------------------------------------- cosine and sine
+
+
+@pytest.fixture(scope="module")
+def angles(quick_compiler):
+    """A module with cos(theta) - x and sin(theta) - y."""
+    theta = sympy.Symbol("theta")
+    equations = [sympy.cos(theta) - x, sympy.sin(theta) - y, theta - kc.t]
+    return kc.compile(kc.ConstraintSystem("angles", "x y theta", equations), target="c")
+
+
+@pytest.mark.parametrize("reach", [1e-9, 1.0, 10.0, 1e3, 9.9e4, 1e7, 1e15])
+def test_cosine_and_sine_are_right_to_an_ulp(angles, reach):
+    rng = np.random.default_rng(int(reach) + 1)
+    theta = rng.uniform(-reach, reach, 1500)
+    quarters = np.round(theta / (np.pi / 2)) * (np.pi / 2)  # where one of them nearly vanishes
+    theta = np.concatenate((theta, quarters, [0.0, reach, -reach]))
+    q = np.zeros((theta.size, 3))
+    q[:, 2] = theta
+    found = angles.Phi(q, 0.0)
+    with mpmath.workdps(50):
+        for column, function in enumerate((mpmath.cos, mpmath.sin)):
+            exact = [function(mpmath.mpf(angle)) for angle in theta.tolist()]
+            rounded = np.array([float(value) for value in exact])
+            error = [float(f - e) for f, e in zip(found[:, column].tolist(), exact, strict=True)]
+            assert np.max(np.abs(error) / np.spacing(np.abs(rounded))) < 1.0
+
+
+def test_a_far_angle_does_not_spoil_its_neighbours(angles):
+    theta = np.tile([0.5, 1e9, -2.0], 30)
+    q = np.zeros((90, 3))
+    q[:, 2] = theta
+    np.testing.assert_allclose(angles.Phi(q, 0.0)[:, 0], np.cos(theta), rtol=0, atol=2e-16)
+
+
+# ---------------------------------------------------------------- the planned solve
+
+
+def coupled(n: int) -> kc.ConstraintSystem:
+    """Return equations that leave one block of size n: each is in all coordinates."""
+    names = [f"u{k}" for k in range(n)]
+    u = sympy.symbols(names)
+    equations = [
+        sum(sympy.sin((1 + i * k % 3) * u[k]) * (1 + (i == k) * 4) / 5 for k in range(n))
+        - sympy.Rational(i + 1, 10) * kc.t
+        for i in range(n)
+    ]
+    return kc.ConstraintSystem(f"coupled_{n}", " ".join(names), equations)
+
+
+@pytest.mark.usefixtures("quick_compiler")
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 7])
+def test_blocks_of_every_size(n):
+    native, module = kc.compile(coupled(n), target="c"), kc.compile(coupled(n))
+    rng = np.random.default_rng(n)
+    q, b = rng.uniform(-0.5, 0.5, (2, 50, n))
+    nonzeros = module.Phi_q_nonzeros(q, 0.1)
+    expected = np.linalg.solve(module.Phi_q(q, 0.1), b[..., np.newaxis])[..., 0]
+    np.testing.assert_allclose(native.solve(nonzeros, b), expected, rtol=1e-9, atol=1e-9)
+    times = np.linspace(0, 0.5, 40)
+    found, there = kc.solve(native, times), kc.solve(module, times, method="march")
+    assert found.statistics["compiled"] == 40
+    np.testing.assert_allclose(found.q_ddot, there.q_ddot, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.usefixtures("quick_compiler")
+def test_large_blocks_change_rows_where_a_pivot_vanishes():
+    native = kc.compile(coupled(5), target="c")
+    matrix = np.array(
+        [[0, 2, 0, 0, 1], [1, 0, 3, 0, 0], [0, 0, 0, 4, 2], [0, 1, 1, 0, 0], [5, 0, 0, 1, 0]],
+        dtype=float,
+    )
+    assert len(native.PATTERN) == 25
+    expected = np.linalg.solve(matrix, np.arange(5.0))
+    np.testing.assert_allclose(native.solve(matrix.ravel(), np.arange(5.0)), expected, rtol=1e-13)
+
+
+@pytest.mark.usefixtures("quick_compiler")
+def test_a_singular_block_is_not_finite():
+    native = kc.compile(coupled(4), target="c")
+    assert not np.isfinite(native.solve(np.ones(16), np.arange(4.0))).all()
+
+
+@pytest.mark.usefixtures("quick_compiler")
+def test_equations_that_always_depend_on_each_other_have_no_march():
+    m = kc.ConstraintSystem("twice", "x y", [x + y - kc.t, 2 * x + 2 * y - 2 * kc.t])
+    native = kc.compile(m, target="c")
+    assert not hasattr(native, "march")
+    compare(m, [0.3, 0.4], 0.1)
+    assert not kc.solve(native, [0.0, 1.0]).success

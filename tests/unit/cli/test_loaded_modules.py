@@ -1,0 +1,67 @@
+"""A command loads what it uses: start-up is a large part of a short command."""
+
+import subprocess
+import sys
+
+import pytest
+
+from kincompile.cli import COMMANDS
+
+PROGRAM = """
+import sys
+import kincompile.cli
+kincompile.cli.cli(sys.argv[1:], standalone_mode=False)
+print("\\nLOADED", *sys.modules)
+"""
+
+PAGES = "kincompile.view kincompile.derivation kincompile.compare kincompile.verify"
+LARGE = "kincompile.ir.grouping kincompile.targets.numpy.grouped kincompile.structure.stages"
+EXTRA = "rich platformdirs matplotlib scipy.interpolate scipy.optimize kincompile.runtime.native"
+LANGUAGES = "kincompile.targets.c kincompile.targets.octave kincompile.targets.javascript"
+EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2 scipy"
+RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
+
+NOT_LOADED = {
+    "compile MODEL -o -": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} kincompile.runtime",
+    "compile MODEL -o - --target javascript": (
+        f"{PAGES} {LARGE} {EXTRA} {RANK} kincompile.runtime kincompile.targets.numpy "
+        "kincompile.targets.c kincompile.targets.octave"
+    ),
+    "run MODEL": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK}",
+    "inspect MODEL": f"{PAGES} {EXTRA} {LANGUAGES} kincompile.targets.numpy kincompile.runtime",
+    "derive MODEL -o PAGE.html": (
+        f"{EXTRA} {LARGE} kincompile.view kincompile.compare kincompile.verify"
+    ),
+    "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
+    "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
+    "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
+}
+
+
+def loaded_by(arguments: list[str]) -> set[str]:
+    """Return the modules that a process has loaded after a command."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.rpartition("\nLOADED")[2].split())
+
+
+def test_that_every_command_is_here():
+    assert {line.split()[0] for line in NOT_LOADED} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("line", NOT_LOADED)
+def test_that_a_command_loads_what_it_uses(line, pendulum, tmp_path):
+    hand = tmp_path / "hand.txt"
+    hand.write_text("nu = [0, 0, 2]\n", encoding="utf-8")
+    places = {"MODEL": pendulum, "HAND": hand, "PAGE.html": tmp_path / "page.html"}
+    loaded = loaded_by([str(places.get(word, word)) for word in line.split()])
+    assert "click" in loaded
+    assert sorted(loaded & set(NOT_LOADED[line].split())) == []
+
+
+def test_that_help_does_not_load_sympy():
+    program = "import kincompile.cli as c, click; click.Context(c.cli); print(c.cli.get_help"
+    program += "(click.Context(c.cli))); import sys; sys.exit('sympy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
