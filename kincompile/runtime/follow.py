@@ -57,13 +57,13 @@ class _Way:
     ) -> None:
         self._inputs, self._motion, self._on_grid = inputs, motion, on_grid
         self._progress = progress or (lambda done, total: None)
-        self._times: list[float] = inputs.t.tolist()
+        self._times = inputs.t
         self._index = 0
         self._march = self._march_at(inputs.guess, None)
 
     def start(self) -> Outcome:
         """Assemble the mechanism at the first time."""
-        inputs, time = self._inputs, self._times[0]
+        inputs, time = self._inputs, float(self._times[0])
         outcome = start(self._march, time, inputs)
         if self._is_staged and (outcome.state is None or self._is_on_other_branch(outcome)):
             self._leave_stages(inputs.guess)
@@ -96,14 +96,14 @@ class _Way:
     def explain(self, outcome: Outcome) -> Passage | None:
         """Find the event that ends the motion; return the way through it if there is one."""
         motion, equations, state = self._motion, self._march.equations, outcome.state
-        t = self._times[self._index - 1]
+        t = float(self._times[self._index - 1])
         if not self._may_be_dense:
             return None
         if state is None:
             if outcome.status is Status.SINGULAR and outcome.position is not None:
                 motion.events += filter(None, [singular_start(equations, outcome.position, t)])
             return None
-        found = locate(self._march, state, t, abs(t - self._times[0]))
+        found = locate(self._march, state, t, abs(t - float(self._times[0])))
         if found is not None:
             motion.events.append(found[0])
             return found[1]
@@ -119,7 +119,7 @@ class _Way:
         self._index -= 1
         forward = math.copysign(1.0, after.t - passage.before.t)
         while self._index < len(times) and (times[self._index] - after.t) * forward <= 0:
-            t = times[self._index]
+            t = float(times[self._index])
             q, q_dot, q_ddot = passage.at(t)
             point = equations.at(q, t)
             if point is None or not equations.holds(point, RESIDUAL_FACTOR * self._march.tolerance):
@@ -154,7 +154,7 @@ class _Way:
 
     def _march_at(self, q: NDArray[np.float64], engine: Engine | None) -> March:
         """Return the march of the mechanism, whose size is told by the guess and a position."""
-        inputs, time = self._inputs, self._times[0]
+        inputs, time = self._inputs, float(self._times[0])
         equations = problem(
             inputs.module, inputs.p, q, time, inputs.guess, staged=True, engine=engine
         )
@@ -167,7 +167,7 @@ class _Way:
 
     def _is_on_other_branch(self, outcome: Outcome) -> bool:
         """Say whether a first position lies on another branch than the guess."""
-        guess = self._march.equations.at(self._inputs.guess, self._times[0])
+        guess = self._march.equations.at(self._inputs.guess, float(self._times[0]))
         if guess is None or outcome.position is None:
             return False
         return leaves_branch(self._march.equations, guess, outcome.position)
@@ -180,7 +180,8 @@ class _Way:
 
     def _advance(self, state: State) -> Outcome:
         """Go to the next time point by point."""
-        march, t, most = self._march, self._times[self._index], self._inputs.max_iterations
+        march, most = self._march, self._inputs.max_iterations
+        t = float(self._times[self._index])
         outcome = march.advance(state, t, most)
         doubtful = outcome.state is None or outcome.state.sensitivity > TOO_NEAR
         if self._is_staged and (doubtful or outcome.status is not Status.CONVERGED):
@@ -230,9 +231,9 @@ class _Way:
         motion.status[self._index : stop] = Status.CONVERGED
         self._index = stop
         if stop < len(self._times):
-            return self._state(np.ascontiguousarray(motion.q[last]), self._times[last])
+            return self._state(np.ascontiguousarray(motion.q[last]), float(self._times[last]))
         nothing = np.empty(0)
-        point = Point(motion.q[last], self._times[last], nothing, nothing)
+        point = Point(motion.q[last], float(self._times[last]), nothing, nothing)
         state = State(point.t, point, motion.q_dot[last], motion.q_ddot[last], nothing)
         return Outcome(Status.CONVERGED, 0, state, point)
 

@@ -20,7 +20,7 @@ from kincompile.runtime.coarse import Node, coarse_march
 from kincompile.runtime.engine.lanes import LaneCode
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March
-from kincompile.runtime.problem import within
+from kincompile.runtime.problem import largest, within
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -148,9 +148,6 @@ def _solve_block(
     good = found.good & within(displacements, LARGEST_DISPLACEMENT * spread)
     for values, least in zip(engine.determinants(point, point), smallest, strict=True):
         good = good & (values / least > 1)
-    residual = result.residual[block]
-    residual[:] = 0.0
-    for value in point.Phi:
-        np.maximum(residual, np.abs(value), out=residual)
+    result.residual[block] = largest(point.Phi, t.size)
     interpolated[:] = point.q
     result.good[block] = good & np.isfinite(sum(q_dot) + sum(q_ddot))

@@ -134,8 +134,7 @@ class March:
         self.equations, self.engine, self.tolerance = equations, engine, tolerance
         self._residual = max(RESIDUAL_FACTOR * tolerance, ROUNDING)
         # Factors of Phi_q a rounding error away serve the rates; a dense matrix has none to save.
-        tight = ROUNDING if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
-        self._parts = tight, tolerance
+        self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
 
     def correct(self, q: Array, t: Any, most: int) -> Corrected:
         """Run Newton's method from a prediction, on each of a batch until it has converged.
@@ -143,8 +142,9 @@ class March:
         The last correction may be so small that Phi_q before it serves what comes after it.
         """
         equations, engine, single = self.equations, self.engine, q.ndim == 1
-        rounding = ROUNDING * largest(q)
-        tight, small = (part * equations.reference + rounding for part in self._parts)
+        far = np.abs(q) if single else np.abs(q[:, [0, -1]]).max(axis=1)
+        rounding = ROUNDING * far
+        tight = self._tight * equations.reference + rounding
         q = q.copy()
         done, iterations = np.zeros(q.shape[1:], bool), np.zeros(q.shape[1:], int)
         size: Any = np.inf
@@ -155,25 +155,24 @@ class March:
                 change[:, done] = 0.0
             q -= change
             iterations = iterations + ~done
-            is_small, crawls = within(change, small), np.False_
-            if (done | is_small).all():
-                is_tight = within(change, tight) & equations.holds(point, self._residual)
-                if (done | is_tight).all():
-                    return Corrected(point, done | is_tight, iterations)
             if single:
                 # Near a singular position rounding alone keeps the corrections above any bound.
-                last, size = size, (np.abs(change) / equations.reference).max()
-                crawls = size > last / 4
-            if (is_small | crawls).any():
-                point = engine.evaluate(q, t)
-                done = done | (is_small & equations.holds(point, self._residual))
-                if single and not done:
-                    done = done | equations.holds_to_rounding(point)
+                last, size = size, ((np.abs(change) - rounding) / equations.reference).max()
+                if size <= self.tolerance or size > last / 4:
+                    point = point if size <= self._tight else engine.evaluate(q, t)
+                    done = (size <= self.tolerance) & equations.holds(point, self._residual)
+                    if not done:
+                        done = equations.holds_to_rounding(point)
+                if done or not size < np.inf:
+                    return Corrected(point, done, iterations)
+            else:
+                done = done | within(change, self.tolerance * equations.reference + rounding)
+                if done.all() and within(change, tight).all():
+                    return Corrected(point, equations.holds(point, self._residual), iterations)
                 if done.all():
                     break
-            elif single and not size < np.inf:
-                break
-        return Corrected(point, done, iterations)
+        point = engine.evaluate(q, t)
+        return Corrected(point, done & equations.holds(point, self._residual), iterations)
 
     def complete(self, point: Point) -> tuple[State, Checks]:
         """Solve for velocity and acceleration; say where all is as it must be, and what it is else.
@@ -208,13 +207,17 @@ class March:
         h = t - state.t
         return state.point.q + h * (state.q_dot + (h / 2) * state.q_ddot)
 
-    def is_near(self, state: State, q: Array, predicted: Array, spread: Array) -> Any:
-        """Say where Newton ended near enough to the prediction to have stayed on the branch."""
+    def error(self, state: State, q: Array, predicted: Array, spread: Array) -> tuple[Any, Any]:
+        """Return how far Newton ended from the prediction, and where that is near enough.
+
+        Near enough to have stayed on the branch.
+        """
+        error = distance(q, predicted, spread)
         movement = distance(predicted, state.point.q, spread)
         allowed = np.minimum(LARGE_ERROR, np.maximum(SMALL_ERROR, ALLOWED_PART * movement))
-        return distance(q, predicted, spread) <= allowed
+        return error, error <= allowed
 
-    def follows(self, state: State, following: State, predicted: Array, spread: Array) -> Checks:
+    def follows(self, state: State, following: State, error: Any, spread: Array) -> Checks:
         """Say where a state continues the motion from the one before it.
 
         Where a determinant has changed its sign, a singular configuration lies between the two.
@@ -224,7 +227,6 @@ class March:
         h = following.t - state.t
         expected = state.q_dot + h * state.q_ddot
         kink = abs(h) * distance(following.q_dot, expected, spread)
-        error = distance(following.point.q, predicted, spread)
         signs = np.sign(self.engine.determinants(following.point, state.point))
         same = (signs == np.sign(state.determinants)).all(axis=0)
         smooth = (following.sensitivity <= NEARLY_SINGULAR) | (kink <= KINK * error + SMOOTH)
@@ -236,12 +238,13 @@ class March:
         spread = self.equations.spread(predicted)
         found = self.correct(predicted, t, most)
         point, iterations = found.point, int(found.iterations)
-        if not (found.good and self.is_near(state, point.q, predicted, spread)):
+        error, is_near = self.error(state, point.q, predicted, spread)
+        if not (found.good and is_near):
             return Outcome(Status.NOT_CONVERGED, iterations, None)
         following = self.state(point)
         if isinstance(following, Status):
             return Outcome(following, iterations, None, point)
-        status = first_failed(self.follows(state, following, predicted, spread))
+        status = first_failed(self.follows(state, following, error, spread))
         if status is not Status.CONVERGED:
             return Outcome(status, iterations, None)
         return Outcome(status, iterations, following, point)
@@ -252,8 +255,8 @@ class March:
         spread = self.equations.spread(predicted)
         found = self.correct(predicted, t, most)
         following, checks = self.complete(found.point)
-        near = self.is_near(state, found.point.q, predicted, spread)
-        checks += self.follows(state, following, predicted, spread)
+        error, near = self.error(state, found.point.q, predicted, spread)
+        checks += self.follows(state, following, error, spread)
         is_far = following.sensitivity <= TOO_NEAR
         return following, all_hold(found.good & near & is_far, checks), found.iterations
 
@@ -282,13 +285,6 @@ class March:
             else:
                 step /= 2
         return Outcome(status, iterations, state)
-
-
-def largest(q: Array) -> Array:
-    """Return the size of each coordinate; of a batch the largest."""
-    if q.ndim == 1:
-        return np.abs(q)
-    return np.array([max(row.max(), -row.min()) for row in q])
 
 
 def distance(q: Array, other: Array, spread: Array) -> Any:

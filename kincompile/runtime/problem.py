@@ -9,7 +9,7 @@ get the same verdicts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,8 +48,6 @@ class Problem:
         What the terms of each equation contribute at a generic position.
     limit : ndarray, shape (m,)
         What they contribute at most, wherever they are.
-    lengths : ndarray, shape (n,)
-        One for lengths, zero for angles.
     """
 
     code: Code
@@ -59,18 +57,7 @@ class Problem:
     reference: Array
     probe: Array
     magnitude: Array
-    limit: Array = field(init=False)
-    lengths: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Derive what is needed at every step."""
-        self.measure(self.magnitude)
-        self.lengths = np.where(self.angular, 0.0, 1.0)
-
-    def measure(self, magnitude: Array) -> None:
-        """Set what the terms of the equations contribute."""
-        self.magnitude = magnitude
-        self.limit = np.where(magnitude > 0, STEEP * magnitude, np.inf)
+    limit: Array | float = np.inf
 
     def at(self, q: Array, t: float) -> Point | None:
         """Evaluate the equations, or give None where they have no finite value."""
@@ -89,8 +76,9 @@ class Problem:
         """
         if q.ndim > 1:
             return self.reference[:, np.newaxis]
-        size = (np.abs(q) * self.lengths).max(initial=0.0)
-        return np.asarray(np.maximum(self.reference, size * self.lengths))
+        lengths = self.code.lengths
+        size = (np.abs(q) * lengths).max(initial=0.0)
+        return np.asarray(np.maximum(self.reference, size * lengths))
 
     def is_small(self, correction: Array, q: Array, tolerance: float) -> bool:
         """Say whether a correction that led to q is small, or all that floating point can give."""
@@ -155,7 +143,8 @@ def problem(
         equations.reference = np.where(angular, 1.0, size)
     generic = equations.at(q + equations.reference * equations.probe[: q.size], t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
-        equations.measure(equations.terms(generic, equations.reference))
+        equations.magnitude = terms = equations.terms(generic, equations.reference)
+        equations.limit = np.where(terms > 0, STEEP * terms, np.inf)
     return equations
 
 
@@ -174,6 +163,14 @@ def within(values: Array | Iterable[Array], limits: Array) -> Any:
             if not good.any():
                 break
     return good
+
+
+def largest(rows: Iterable[Any], count: int) -> Array:
+    """Return the largest size in the rows of a batch, for each of it."""
+    result = np.zeros(count)
+    for row in rows:
+        np.maximum(result, np.abs(row), out=result)
+    return result
 
 
 def column(values: Array, q: Array) -> Array:

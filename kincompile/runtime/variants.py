@@ -17,7 +17,7 @@ from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, Outcome, State, all_hold, give_up, start
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import largest, problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
 
@@ -216,7 +216,7 @@ class _Chunk:
         for target, values in zip(arrays.motion[:, index], found, strict=True):
             target[:, own] = values if good.all() else np.where(good, values, np.nan)
         arrays.status[index, own][good] = Status.CONVERGED
-        arrays.residual[index, own][good] = np.max(np.abs(state.point.Phi), axis=0)[good]
+        arrays.residual[index, own][good] = largest(state.point.Phi, good.size)[good]
         arrays.iterations[index, own][good] = iterations[good]
 
     def _take(self, index: int, state: State, variant: int, outcome: Outcome) -> None:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.names import body_coordinates, listed
-from kincompile.runtime.singular.events import owner_of_coordinates
+from kincompile.names import listed
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ def verdict(
     events
         Events on the way, in order.
     """
-    name, times = inputs.module.NAME, inputs.t
+    name, times = inputs.code.name, inputs.t
     if outcome.status is Status.CONVERGED:
         points = f"all {times.size} points" if times.size > 1 else "the point"
         passed = "".join(f" Passed: {event.kind} at t = {event.t:.10g}." for event in events)
@@ -135,9 +134,10 @@ def _unmet(code: Code, point: Point) -> str:
 def _places(code: Code, q: Array) -> Iterator[str]:
     """Yield where each body is, and the values of coordinates that belong to none."""
     values = dict(zip(code.coordinates, q.tolist(), strict=True))
-    for owner in dict.fromkeys(owner_of_coordinates(code).values()):
-        if owner in values:
-            yield f"{owner} = {values[owner]:.4g}"
-        else:
-            x, y, phi = (values[name] for name in body_coordinates(owner))
+    firsts = {body: first for body, first, _ in code.bodies}
+    for owner in dict.fromkeys(code.owners().values()):
+        if owner in firsts:
+            x, y, phi = q[firsts[owner] : firsts[owner] + 3]
             yield f"{owner} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+        else:
+            yield f"{owner} = {values[owner]:.4g}"

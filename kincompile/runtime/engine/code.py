@@ -55,8 +55,12 @@ class Code:
         Where Newton starts.
     pattern : ndarray of int, shape (nnz, 2)
         Rows and columns of Phi_q's entries.
+    bodies
+        Of each body its name, the number of its first coordinate, and how many it has.
     angular : ndarray of bool, shape (n,)
         Which coordinates are angles.
+    lengths : ndarray, shape (n,)
+        Zero for angles, one for the others.
     position, nu, gamma, Phi_q, nonzeros
         Functions of the contract; `nonzeros` is ``Phi_q_nonzeros``.
     redundant
@@ -82,7 +86,9 @@ class Code:
     bodies: tuple[tuple[str, int, int], ...]
     guess: Array
     pattern: NDArray[np.signedinteger[Any]]
+    bodies: tuple[tuple[str, int, int], ...]
     angular: NDArray[np.bool_]
+    lengths: Array
     position: Callable[..., tuple[Array, Array]]
     nu: Callable[..., Array]
     gamma: Callable[..., Array]
@@ -96,6 +102,13 @@ class Code:
     march: Callable[..., int] | None
     march_variants: Callable[..., int] | None
 
+    def owners(self) -> dict[str, str]:
+        """Return the body of each coordinate; one that belongs to none stands for itself."""
+        owners = {name: name for name in self.coordinates}
+        for body, first, count in self.bodies:
+            owners.update(dict.fromkeys(self.coordinates[first : first + count], body))
+        return owners
+
 
 def code_of(module: ModuleType) -> Code:
     """Return a module's `Code`, which the loader has put there; made now for any other module."""
@@ -108,6 +121,7 @@ def attach(module: ModuleType) -> Code:
     names = vars(module)
     lanes = names.get("LANES", {})
     coordinates = names["COORDINATES"]
+    angular = np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool)
     code = Code(
         module=module,
         name=names["NAME"],
@@ -118,7 +132,9 @@ def attach(module: ModuleType) -> Code:
         bodies=names["BODIES"],
         guess=names["GUESS"],
         pattern=names["PATTERN"],
-        angular=np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool),
+        bodies=names.get("BODIES", ()),
+        angular=angular,
+        lengths=np.where(angular, 0.0, 1.0),
         position=names["position"],
         nu=names["nu"],
         gamma=names["gamma"],

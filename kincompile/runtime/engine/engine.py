@@ -35,7 +35,7 @@ class Point:
     t : float or ndarray, shape (N,)
         The time.
     Phi : ndarray, shape (m,) or (m, N)
-        The constraint vector; m > n where redundant equations agree.
+        The constraint vector, of a batch also as a row each; m > n where redundant equations agree.
     Phi_q
         The Jacobian, as its engine has it: a matrix (m, n), the entries of its pattern, or those of
         them that vary.
@@ -45,7 +45,7 @@ class Point:
 
     q: Array
     t: Any
-    Phi: Array
+    Phi: Any
     Phi_q: Any
     factors: Any = None
 

@@ -52,27 +52,31 @@ class LaneCode:
 
     def __init__(self, code: Code, functions: Any, p: Lanes) -> None:
         assert code.lanes is not None
+        own = code.lanes
         self._functions, self._p, self._m = functions, p, len(code.equations)
-        self._code = code.lanes
+        self._position, self._nu, self._gamma = own.position, own.nu, own.gamma
+        self._factor, self._solve = own.factor, own.solve
 
     def evaluate(self, q: Lanes, t: Lane) -> tuple[Lanes, Lanes]:
         """Evaluate Phi, and the entries of Phi_q that vary."""
-        values = self._code.position(self._functions, q, t, self._p)
+        values = self._position(self._functions, q, t, self._p)
         return values[: self._m], values[self._m :]
 
     def factor(self, Phi: Lanes, entries: Lanes) -> Factored:
         """Factor Phi_q."""
-        return Factored(Phi, *self._code.factor(self._functions, entries))
+        return Factored(Phi, *self._factor(self._functions, entries))
 
     def position(self, q: Lanes, t: Lane) -> Factored:
         """Evaluate Phi and Phi_q, and factor Phi_q."""
-        return self.factor(*self.evaluate(q, t))
+        values = self._position(self._functions, q, t, self._p)
+        factors, determinants = self._factor(self._functions, values[self._m :])
+        return Factored(values[: self._m], factors, determinants)
 
     def solve(self, at: Factored, right: Lanes) -> Lanes:
         """Return x of Phi_q x = right."""
-        return self._code.solve(self._functions, at.factors, right)
+        return self._solve(self._functions, at.factors, right)
 
     def rates(self, at: Factored, q: Lanes, t: Lane) -> tuple[Lanes, Lanes]:
         """Return velocity and acceleration at a position."""
-        q_dot = self.solve(at, self._code.nu(self._functions, q, t, self._p))
-        return q_dot, self.solve(at, self._code.gamma(self._functions, q, q_dot, t, self._p))
+        q_dot = self.solve(at, self._nu(self._functions, q, t, self._p))
+        return q_dot, self.solve(at, self._gamma(self._functions, q, q_dot, t, self._p))

@@ -32,7 +32,7 @@ class Planned:
     def evaluate(self, q: Array, t: Any) -> Point:
         """Evaluate Phi and the varying entries of Phi_q."""
         Phi, entries = self._lanes.evaluate(q, t)
-        return Point(q, t, stacked(Phi, q.shape[1]), entries)
+        return Point(q, t, Phi, entries)
 
     def factor(self, point: Point) -> None:
         """Factor Phi_q of a point, once."""

@@ -19,7 +19,7 @@ from kincompile.runtime.march import March, State
 from kincompile.runtime.singular.curve import Bracket, Curve
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from kincompile.runtime.engine.code import Code
     from kincompile.runtime.engine.engine import Array as Vector
@@ -242,17 +242,9 @@ def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
 def _involved(code: Code, movement: Vector) -> tuple[str, ...]:
     """Return the bodies that take part in a movement, and coordinates that belong to none."""
     large = np.abs(movement) > INVOLVED * np.max(np.abs(movement), initial=0.0)
-    owners = owner_of_coordinates(code)
+    owners = code.owners()
     names = zip(code.coordinates, large.tolist(), strict=True)
     return tuple(dict.fromkeys(owners[name] for name, is_large in names if is_large))
-
-
-def owner_of_coordinates(code: Code) -> Mapping[str, str]:
-    """Return the body of each coordinate; one that belongs to none stands for itself."""
-    owners = {name: name for name in code.coordinates}
-    for body, first, count in code.bodies:
-        owners.update(dict.fromkeys(code.coordinates[first : first + count], body))
-    return owners
 
 
 def _passage(march: March, curve: Curve, bracket: Bracket, at: float) -> Passage | None:
