@@ -224,8 +224,8 @@ def _frames(listing: Listing, printer: Printer) -> list[str]:
     lines = ["# body frames: A = [[c, -s], [s, c]]"]
     for frame in listing.frames:
         left = ", ".join(item.name for item in frame.values)
-        if len(frame.values) == 2:
+        if frame.angle is not None:
             lines.append(f"{left} = cos_sin({printer.text(frame.angle)})")
         else:
-            lines.append(f"{left} = {printer.definition(frame.values[0].node)}")
+            lines += [f"{item.name} = {printer.definition(item.node)}" for item in frame.values]
     return lines
