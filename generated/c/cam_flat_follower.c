@@ -38,7 +38,7 @@ enum {
     BLOCKS = 3,  // blocks of the planned solve
 };
 
-const char cam_flat_follower_fingerprint[] = "b6ee97b117891b711e52c1bac1c42baa";
+const char cam_flat_follower_fingerprint[] = "207b0bd47f91e8282f5ac7564f0cbc01";
 const double cam_flat_follower_defaults[] = {
     0.04, 0.02, 6.283185307179586,
 };

@@ -36,7 +36,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char double_pendulum_fingerprint[] = "35596c5d7028e419c1596bc7be883d01";
+const char double_pendulum_fingerprint[] = "5ac1b4e2edc250858319268165b6bd0a";
 const double double_pendulum_defaults[] = {
     0,
 };

@@ -36,7 +36,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char example_3_7_5_fingerprint[] = "620b717a31e9d3865759bdcf2bc9963a";
+const char example_3_7_5_fingerprint[] = "12f1343ed3e4e87477daed8fb9a3ab4f";
 const double example_3_7_5_defaults[] = {
     1.5,
 };

@@ -39,7 +39,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char four_bar_fingerprint[] = "7778ada489011947922096359d2b8301";
+const char four_bar_fingerprint[] = "3096554c953e7691476db5b42d35f271";
 const double four_bar_defaults[] = {
     10.0, 26.0, 18.0, 20.0, 1.5,
 };

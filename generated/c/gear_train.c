@@ -40,7 +40,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char gear_train_fingerprint[] = "4a2cd9881a27e06446b7e4089f3548b7";
+const char gear_train_fingerprint[] = "5f3529ef14869ef4132546a001849222";
 const double gear_train_defaults[] = {
     0.02, 0.03, 6.283185307179586,
 };

@@ -38,7 +38,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char inverted_slider_crank_fingerprint[] = "21a4f6133a501417c90e882101d84d6c";
+const char inverted_slider_crank_fingerprint[] = "138f533fa27d7998aa972cf65c33801e";
 const double inverted_slider_crank_defaults[] = {
     0,
 };

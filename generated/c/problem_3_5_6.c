@@ -35,7 +35,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char problem_3_5_6_fingerprint[] = "fb5595fbe7015ee6230db8cd9b070b75";
+const char problem_3_5_6_fingerprint[] = "cf1b67c63b4e96bb294dd9e63b1ad407";
 const double problem_3_5_6_defaults[] = {
     0,
 };
@@ -201,7 +201,7 @@ INLINE void nu_at(block *at, size_t lane)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->nu[1][lane] = 0.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->nu[2][lane] = t / 50.0 + 2.0 / 25.0;
+    at->nu[2][lane] = (t / 10.0 + 2.0 / 5.0) / 5.0;
 }
 
 static void nu_of_block(block *at, size_t count)
@@ -225,7 +225,7 @@ INLINE int64_t gamma_at(block *at, size_t lane, int exact)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->gamma[1][lane] = -phi3_dot_sq * cosine(phi3, exact, &far) / 4.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * square(x2_dot) - 2.0 * square(y2_dot);
+    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
     return far;
 }
 
@@ -294,7 +294,7 @@ INLINE int64_t velocity_at(block *at, size_t lane, int exact)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->nu[1][lane] = 0.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->nu[2][lane] = t / 50.0 + 2.0 / 25.0;
+    at->nu[2][lane] = (t / 10.0 + 2.0 / 5.0) / 5.0;
     return far;
 }
 
@@ -333,7 +333,7 @@ INLINE int64_t acceleration_at(block *at, size_t lane, int exact)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->gamma[1][lane] = -phi3_dot_sq * cos_phi3 / 4.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * square(x2_dot) - 2.0 * square(y2_dot);
+    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
     return far;
 }
 
@@ -363,12 +363,14 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     const double cos_phi3 = cosine(phi3, exact, &far);
     const double cos_phi3_4 = cos_phi3 / 4.0;
     const double phi3_dot_sq = square(phi3_dot);
+    // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
+    const double equation_3_1 = t / 10.0 + 2.0 / 5.0;
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
     at->Phi[0][lane] = x2 + sin_phi3_4 - 3.0 / 5.0;
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->Phi[1][lane] = y2 - cos_phi3_4;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->Phi[2][lane] = square(x2) + square(y2) - square(t / 10.0 + 2.0 / 5.0);
+    at->Phi[2][lane] = square(x2) + square(y2) - square(equation_3_1);
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
     at->Phi_q[1][lane] = cos_phi3_4;  // equation_1 by phi3
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
@@ -381,13 +383,13 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->nu[1][lane] = 0.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->nu[2][lane] = t / 50.0 + 2.0 / 25.0;
+    at->nu[2][lane] = equation_3_1 / 5.0;
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
     at->gamma[0][lane] = phi3_dot_sq * sin_phi3 / 4.0;
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
     at->gamma[1][lane] = -phi3_dot_sq * cos_phi3 / 4.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * square(x2_dot) - 2.0 * square(y2_dot);
+    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
     return far;
 }
 

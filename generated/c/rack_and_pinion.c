@@ -37,7 +37,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char rack_and_pinion_fingerprint[] = "5acad5b15e178c3db8b55081e6d076d8";
+const char rack_and_pinion_fingerprint[] = "d46f960a2df92710e6efc654b9f36ac9";
 const double rack_and_pinion_defaults[] = {
     0.05, 2.0,
 };

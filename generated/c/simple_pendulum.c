@@ -34,7 +34,7 @@ enum {
     BLOCKS = 0,  // blocks of the planned solve
 };
 
-const char simple_pendulum_fingerprint[] = "b15d21b3af8442402c20a2c9a3b07124";
+const char simple_pendulum_fingerprint[] = "51ff72869cdfa2bd6a05d333f127ba30";
 const double simple_pendulum_defaults[] = {
     0,
 };

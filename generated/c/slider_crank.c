@@ -39,7 +39,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char slider_crank_fingerprint[] = "dc89d486a923428a708c425004a7283f";
+const char slider_crank_fingerprint[] = "372d93c96543d3b8f0288adffc736d59";
 const double slider_crank_defaults[] = {
     0,
 };

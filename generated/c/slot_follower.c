@@ -38,7 +38,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char slot_follower_fingerprint[] = "6e1e26f39b987127200b8e8b72dd3127";
+const char slot_follower_fingerprint[] = "e8b6fdfa08c40c019e86c8d3d79a68ae";
 const double slot_follower_defaults[] = {
     0.05, 0.01, 0.085, 6.283185307179586,
 };

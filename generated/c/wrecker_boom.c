@@ -45,7 +45,7 @@ enum {
     BLOCKS = 3,  // blocks of the planned solve
 };
 
-const char wrecker_boom_fingerprint[] = "415d188a386864830f7d3b0a57941100";
+const char wrecker_boom_fingerprint[] = "2058dd426b88a37ea2749ad910b93f4e";
 const double wrecker_boom_defaults[] = {
     8.0, 1.05, 0.7, 0.3, 1.7,
 };

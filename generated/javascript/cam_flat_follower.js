@@ -21,7 +21,7 @@ const cam_flat_follower = (() => {
 
     const NAME = "cam_flat_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "b6ee97b117891b711e52c1bac1c42baa";
+    const FINGERPRINT = "207b0bd47f91e8282f5ac7564f0cbc01";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

@@ -19,7 +19,7 @@ const double_pendulum = (() => {
 
     const NAME = "double_pendulum";
     const FORMAT = 1;
-    const FINGERPRINT = "35596c5d7028e419c1596bc7be883d01";
+    const FINGERPRINT = "5ac1b4e2edc250858319268165b6bd0a";
     const N_COORDINATES = 6;
     const N_EQUATIONS = 6;
     const COORDINATES = [

@@ -19,7 +19,7 @@ const example_3_7_5 = (() => {
 
     const NAME = "example_3_7_5";
     const FORMAT = 1;
-    const FINGERPRINT = "620b717a31e9d3865759bdcf2bc9963a";
+    const FINGERPRINT = "12f1343ed3e4e87477daed8fb9a3ab4f";
     const N_COORDINATES = 3;
     const N_EQUATIONS = 3;
     const COORDINATES = [

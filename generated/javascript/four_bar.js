@@ -22,7 +22,7 @@ const four_bar = (() => {
 
     const NAME = "four_bar";
     const FORMAT = 1;
-    const FINGERPRINT = "7778ada489011947922096359d2b8301";
+    const FINGERPRINT = "3096554c953e7691476db5b42d35f271";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

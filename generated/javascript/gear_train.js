@@ -23,7 +23,7 @@ const gear_train = (() => {
 
     const NAME = "gear_train";
     const FORMAT = 1;
-    const FINGERPRINT = "4a2cd9881a27e06446b7e4089f3548b7";
+    const FINGERPRINT = "5f3529ef14869ef4132546a001849222";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

@@ -21,7 +21,7 @@ const inverted_slider_crank = (() => {
 
     const NAME = "inverted_slider_crank";
     const FORMAT = 1;
-    const FINGERPRINT = "21a4f6133a501417c90e882101d84d6c";
+    const FINGERPRINT = "138f533fa27d7998aa972cf65c33801e";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

@@ -18,7 +18,7 @@ const problem_3_5_6 = (() => {
 
     const NAME = "problem_3_5_6";
     const FORMAT = 1;
-    const FINGERPRINT = "fb5595fbe7015ee6230db8cd9b070b75";
+    const FINGERPRINT = "cf1b67c63b4e96bb294dd9e63b1ad407";
     const N_COORDINATES = 3;
     const N_EQUATIONS = 3;
     const COORDINATES = [
@@ -98,7 +98,7 @@ const problem_3_5_6 = (() => {
         require_length("p", p, DEFAULTS.length);
         const nu = new Array(3).fill(0);
         // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        nu[2] = t / 50 + 2 / 25;
+        nu[2] = (t / 10 + 2 / 5) / 5;
         return nu;
     }
 
@@ -119,7 +119,7 @@ const problem_3_5_6 = (() => {
         // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         gamma[1] = -phi3_dot_sq * Math.cos(phi3) / 4;
         // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        gamma[2] = 1 / 50 - 2 * square(x2_dot) - 2 * square(y2_dot);
+        gamma[2] = 1 / 50 - 2 * (square(x2_dot) + square(y2_dot));
         return gamma;
     }
 

@@ -20,7 +20,7 @@ const rack_and_pinion = (() => {
 
     const NAME = "rack_and_pinion";
     const FORMAT = 1;
-    const FINGERPRINT = "5acad5b15e178c3db8b55081e6d076d8";
+    const FINGERPRINT = "d46f960a2df92710e6efc654b9f36ac9";
     const N_COORDINATES = 6;
     const N_EQUATIONS = 6;
     const COORDINATES = [

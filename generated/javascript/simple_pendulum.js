@@ -17,7 +17,7 @@ const simple_pendulum = (() => {
 
     const NAME = "simple_pendulum";
     const FORMAT = 1;
-    const FINGERPRINT = "b15d21b3af8442402c20a2c9a3b07124";
+    const FINGERPRINT = "51ff72869cdfa2bd6a05d333f127ba30";
     const N_COORDINATES = 3;
     const N_EQUATIONS = 3;
     const COORDINATES = [

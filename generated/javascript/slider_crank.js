@@ -22,7 +22,7 @@ const slider_crank = (() => {
 
     const NAME = "slider_crank";
     const FORMAT = 1;
-    const FINGERPRINT = "dc89d486a923428a708c425004a7283f";
+    const FINGERPRINT = "372d93c96543d3b8f0288adffc736d59";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

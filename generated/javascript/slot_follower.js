@@ -21,7 +21,7 @@ const slot_follower = (() => {
 
     const NAME = "slot_follower";
     const FORMAT = 1;
-    const FINGERPRINT = "6e1e26f39b987127200b8e8b72dd3127";
+    const FINGERPRINT = "e8b6fdfa08c40c019e86c8d3d79a68ae";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

@@ -28,7 +28,7 @@ const wrecker_boom = (() => {
 
     const NAME = "wrecker_boom";
     const FORMAT = 1;
-    const FINGERPRINT = "415d188a386864830f7d3b0a57941100";
+    const FINGERPRINT = "2058dd426b88a37ea2749ad910b93f4e";
     const N_COORDINATES = 15;
     const N_EQUATIONS = 15;
     const COORDINATES = [

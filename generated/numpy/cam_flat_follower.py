@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "cam_flat_follower"
 FORMAT = 1
-FINGERPRINT = "b6ee97b117891b711e52c1bac1c42baa"
+FINGERPRINT = "207b0bd47f91e8282f5ac7564f0cbc01"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (

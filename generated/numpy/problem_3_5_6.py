@@ -23,7 +23,7 @@ import numpy as np
 
 NAME = "problem_3_5_6"
 FORMAT = 1
-FINGERPRINT = "fb5595fbe7015ee6230db8cd9b070b75"
+FINGERPRINT = "cf1b67c63b4e96bb294dd9e63b1ad407"
 N_COORDINATES = 3
 N_EQUATIONS = 3
 COORDINATES = (
@@ -97,7 +97,7 @@ def _nu(f, q, t, p):
         # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         0,
         # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        t / 50 + 2 / 25,
+        (t / 10 + 2 / 5) / 5,
     )
 
 
@@ -113,7 +113,7 @@ def _gamma(f, q, q_dot, t, p):
         # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         -phi3_dot_sq * cos(phi3) / 4,
         # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        1 / 50 - 2 * x2_dot**2 - 2 * y2_dot**2,
+        1 / 50 - 2 * (x2_dot**2 + y2_dot**2),
     )
 
 
@@ -160,7 +160,7 @@ def _velocity(f, q, t, p):
         # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         0,
         # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        t / 50 + 2 / 25,
+        (t / 10 + 2 / 5) / 5,
     )
 
 
@@ -187,7 +187,7 @@ def _acceleration(f, q, q_dot, t, p):
         # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         -phi3_dot_sq * cos_phi3 / 4,
         # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        1 / 50 - 2 * x2_dot**2 - 2 * y2_dot**2,
+        1 / 50 - 2 * (x2_dot**2 + y2_dot**2),
     )
 
 
@@ -201,6 +201,8 @@ def _kinematics(f, q, q_dot, t, p):
     cos_phi3 = cos(phi3)
     cos_phi3_4 = cos_phi3 / 4
     phi3_dot_sq = phi3_dot**2
+    # 2  Equation "equation_3"
+    equation_3_1 = t / 10 + 2 / 5
     return (
         # Phi
         # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
@@ -208,7 +210,7 @@ def _kinematics(f, q, q_dot, t, p):
         # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         y2 - cos_phi3_4,
         # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        x2**2 + y2**2 - (t / 10 + 2 / 5)**2,
+        x2**2 + y2**2 - equation_3_1**2,
         # Phi_q
         # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
         cos_phi3_4,  # equation_1 by phi3
@@ -223,14 +225,14 @@ def _kinematics(f, q, q_dot, t, p):
         # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         0,
         # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        t / 50 + 2 / 25,
+        equation_3_1 / 5,
         # gamma
         # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
         phi3_dot_sq * sin_phi3 / 4,
         # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         -phi3_dot_sq * cos_phi3 / 4,
         # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        1 / 50 - 2 * x2_dot**2 - 2 * y2_dot**2,
+        1 / 50 - 2 * (x2_dot**2 + y2_dot**2),
     )
 
 

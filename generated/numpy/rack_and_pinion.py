@@ -25,7 +25,7 @@ import numpy as np
 
 NAME = "rack_and_pinion"
 FORMAT = 1
-FINGERPRINT = "5acad5b15e178c3db8b55081e6d076d8"
+FINGERPRINT = "d46f960a2df92710e6efc654b9f36ac9"
 N_COORDINATES = 6
 N_EQUATIONS = 6
 COORDINATES = (

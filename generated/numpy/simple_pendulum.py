@@ -22,7 +22,7 @@ import numpy as np
 
 NAME = "simple_pendulum"
 FORMAT = 1
-FINGERPRINT = "b15d21b3af8442402c20a2c9a3b07124"
+FINGERPRINT = "51ff72869cdfa2bd6a05d333f127ba30"
 N_COORDINATES = 3
 N_EQUATIONS = 3
 COORDINATES = (

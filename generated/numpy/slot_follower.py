@@ -26,7 +26,7 @@ import numpy as np
 
 NAME = "slot_follower"
 FORMAT = 1
-FINGERPRINT = "6e1e26f39b987127200b8e8b72dd3127"
+FINGERPRINT = "e8b6fdfa08c40c019e86c8d3d79a68ae"
 N_COORDINATES = 7
 N_EQUATIONS = 7
 COORDINATES = (

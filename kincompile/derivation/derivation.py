@@ -14,16 +14,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.assembled import assembled_section, unknowns_section
-from kincompile.derivation.derivation_html import as_html
-from kincompile.derivation.derivation_markdown import as_markdown
-from kincompile.derivation.derivation_notebook import as_notebook
 from kincompile.derivation.derivation_page import Page, counted
-from kincompile.derivation.derivation_tex import as_tex
 from kincompile.derivation.document import Document, Section
 from kincompile.derivation.equation_section import equation_section
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
 from kincompile.derivation.situation import Situation, situation
+from kincompile.derivation.to_html import as_html
+from kincompile.derivation.to_latex import as_tex
+from kincompile.derivation.to_markdown import as_markdown
+from kincompile.derivation.to_notebook import as_notebook
 from kincompile.errors import InputError
 from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import reduce
 from typing import TYPE_CHECKING, cast
 
 import sympy
@@ -27,7 +28,7 @@ FUNCTIONS = {
     sympy.asinh: "asinh", sympy.acosh: "acosh", sympy.atanh: "atanh",
     sympy.exp: "exp", sympy.log: "log",
 }  # fmt: skip
-RECIPROCALS = {sympy.cot: "tan", sympy.sec: "cos", sympy.csc: "sin"}
+QUOTIENTS = {sympy.cot: ("cos", "sin"), sympy.sec: (None, "cos"), sympy.csc: (None, "sin")}
 RELATIONS = {
     sympy.Lt: "<", sympy.Le: "<=", sympy.Gt: ">", sympy.Ge: ">=", sympy.Eq: "==", sympy.Ne: "!=",
 }  # fmt: skip
@@ -72,34 +73,44 @@ class Converter:
             return self._graph.const(Fraction(int(value.p), int(value.q)))
         return self._graph.const(float(value))
 
-    def _add(self, value: sympy.Add) -> int:
-        """Add the terms in reading order, a positive one first."""
-        terms = value.as_ordered_terms()
+    def _attribute(self, value: sympy.Number) -> int:
+        """Return the node of a number that is a term, or stands in front of a product."""
+        return self._number(value)
+
+    def _ordered(self, value: sympy.Add | sympy.Mul) -> list[sympy.Expr]:
+        """Return terms in reading order, a positive one first, or factors in reading order."""
+        if isinstance(value, sympy.Mul):
+            factors: list[sympy.Expr] = value.as_ordered_factors()
+            return factors
+        terms: list[sympy.Expr] = value.as_ordered_terms()
         terms.sort(key=lambda term: bool(term.could_extract_minus_sign()))
-        total = self.convert(terms[0])
-        for term in terms[1:]:
-            total = self._graph.add(total, self.convert(term))
-        return total
+        return terms
+
+    def _add(self, value: sympy.Add) -> int:
+        nodes = [
+            self._attribute(term) if isinstance(term, sympy.Number) else self.convert(term)
+            for term in self._ordered(value)
+        ]
+        return reduce(self._graph.add, nodes)
 
     def _mul(self, value: sympy.Mul) -> int:
         """Multiply: one number in front, and one division at most."""
         graph = self._graph
-        coefficient, rest = value.as_coeff_Mul()
-        above, below = graph.const(1), graph.const(1)
-        for factor in rest.as_ordered_factors():
+        number, above, below = graph.const(1), graph.const(1), graph.const(1)
+        for factor in self._ordered(value):
             base, exponent = factor.as_base_exp()
-            if exponent.is_Rational and exponent.is_negative:
+            if isinstance(factor, sympy.Number):
+                number = graph.mul(number, self._attribute(factor))
+            elif exponent.is_Rational and exponent.is_negative:
                 below = graph.mul(below, self._pow(base, -exponent))
             else:
                 above = graph.mul(above, self.convert(factor))
-        return graph.div(graph.mul(self._number(coefficient), above), below)
+        return graph.div(graph.mul(number, above), below)
 
     def _pow(self, base: sympy.Expr, exponent: sympy.Expr) -> int:
         graph = self._graph
-        if isinstance(exponent, sympy.Integer):
-            return graph.pow(self.convert(base), int(exponent))
-        if isinstance(exponent, sympy.Rational) and exponent.q == 2:
-            return graph.pow(graph.call("sqrt", self.convert(base)), int(exponent.p))
+        if isinstance(exponent, sympy.Rational) and exponent.q <= 2:
+            return graph.pow(self.convert(base), Fraction(int(exponent.p), int(exponent.q)))
         return graph.call("pow", self.convert(base), self.convert(exponent))
 
     def _piecewise(self, value: sympy.Piecewise) -> int:
@@ -127,7 +138,9 @@ class Converter:
             return graph.table(value.table_name, value.order, self.convert(value.args[0]))
         if value.func in FUNCTIONS:
             return graph.call(FUNCTIONS[value.func], *(self.convert(item) for item in value.args))
-        if value.func in RECIPROCALS:
-            inner = graph.call(RECIPROCALS[value.func], self.convert(value.args[0]))
-            return graph.div(graph.const(1), inner)
+        if value.func in QUOTIENTS:
+            above, below = QUOTIENTS[value.func]
+            inner = self.convert(value.args[0])
+            dividend = graph.call(above, inner) if above else graph.const(1)
+            return graph.div(dividend, graph.call(below, inner))
         raise InternalError(f"{value} passed the checks but cannot be compiled")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.errors import ModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
 Node = tuple[Any, ...]
 Constant = int | float | Fraction
@@ -181,14 +181,16 @@ class Graph:
             return self.neg(self.div(a, minus_b))
         return self._intern(("div", a, b))
 
-    def pow(self, a: int, exponent: int) -> int:
-        """Return a to an integer power, by repeated squaring."""
+    def pow(self, a: int, exponent: Constant) -> int:
+        """Return a to a constant power: by repeated squaring, of the root for a half of one."""
+        if exponent in (0, 1):
+            return a if exponent else self.const(1)
+        if isinstance(exponent, float) or exponent.denominator > 2:
+            return self.call("pow", a, self.const(exponent))
         if exponent < 0:
             return self.div(self.const(1), self.pow(a, -exponent))
-        if exponent == 0:
-            return self.const(1)
-        if exponent == 1:
-            return a
+        if exponent.denominator == 2:
+            return self.pow(self.call("sqrt", a), exponent.numerator)
         square = self.square(self.pow(a, exponent // 2))
         return self.mul(square, a) if exponent % 2 else square
 
@@ -300,12 +302,35 @@ def number_of(nodes: Sequence[Node], node: int) -> Constant | None:
 _FIRST_OPERAND = {
     "const": 2, "input": 2, "call": 2, "compare": 2, "logic": 2, "table": 3, "linear": 4,
 }  # fmt: skip
-"""Where the operands begin, if not behind the operation's name."""
+"""Where the operands begin, if not right after the operation's name."""
 
 
 def operands_of(node: Node) -> tuple[int, ...]:
     """Return the nodes a node depends on."""
     return node[_FIRST_OPERAND.get(node[0], 1) :]
+
+
+def reachable(nodes: Sequence[Node], outputs: Iterable[int]) -> list[int]:
+    """Return the nodes that some outputs depend on, themselves included, in order."""
+    found, waiting = set(outputs), list(outputs)
+    while waiting:
+        for operand in operands_of(nodes[waiting.pop()]):
+            if operand not in found:
+                found.add(operand)
+                waiting.append(operand)
+    return sorted(found)
+
+
+def pruned(nodes: Sequence[Node], outputs: Iterable[int]) -> tuple[list[Node], dict[int, int]]:
+    """Return the code that some outputs need, and the new number of each node that is left."""
+    kept = reachable(nodes, outputs)
+    number = {node: k for k, node in enumerate(kept)}
+    return [_renumbered(nodes[node], number) for node in kept], number
+
+
+def _renumbered(node: Node, number: Mapping[int, int]) -> Node:
+    first = len(node) - len(operands_of(node))
+    return (*node[:first], *(number[operand] for operand in node[first:]))
 
 
 def _root(value: Constant) -> Constant | None:

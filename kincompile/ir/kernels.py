@@ -20,12 +20,14 @@ from kincompile.calculus.expressions import (
 from kincompile.calculus.symbols import s_i, s_j, v_i, v_j
 from kincompile.calculus.template import Template
 from kincompile.derive.derivation import derive
-from kincompile.derive.equations import derive_equation
+from kincompile.ir.differentiate import negated_tangents, tangents
 from kincompile.ir.from_sympy import Converter
-from kincompile.ir.graph import Graph
+from kincompile.ir.graph import Graph, pruned
 from kincompile.ir.program import Attribute, FrameEntry, Function, Hint, Input, Kernel, Motion
+from kincompile.names import rate
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from fractions import Fraction
 
     from kincompile.calculus.expressions import Components, Profile, Rotation, TimeFunction, Value
@@ -247,22 +249,35 @@ def _separation(template: Template, vector: VectorSum) -> tuple[None, str, str] 
 def equation_kernel(equation: FreeEquation) -> Kernel:
     """Return the kernel of a free equation; its inputs are the names that occur in it."""
     graph = Graph()
-    inputs: dict[str, int] = {}
+    convert = Converter(graph, graph.input).convert
+    return differentiated(graph, [convert(item) for item in equation.expressions], equation.columns)
 
-    def leaf(name: str) -> int:
-        inputs[name] = graph.input(name)
-        return inputs[name]
 
-    convert = Converter(graph, leaf).convert
-    found = [derive_equation(item, equation.columns) for item in equation.expressions]
+def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> Kernel:
+    r"""Return the kernel of equations given as nodes, in the coordinates that are named.
+
+    With :math:`\dot q` constant and :math:`\dot t = 1`, the second derivative of Phi along the
+    motion is :math:`-\gamma`.
+    """
+    one, t = graph.const(1), graph.input("t")
+    motion = {graph.input(name): graph.input(rate(name)) for name in columns} | {t: one}
+    by_column = [tangents(graph, Phi, {graph.input(name): one}) for name in columns]
+    nu = negated_tangents(graph, Phi, {t: one})
+    gamma = negated_tangents(graph, tangents(graph, Phi, motion), motion)
     entries = [
-        (row, column, convert(entry))
-        for row, item in enumerate(found)
-        for column, entry in enumerate(item.Phi_q)
+        (row, column, node)
+        for row in range(len(Phi))
+        for column, node in enumerate(found[row] for found in by_column)
+        if graph.value_of(node) != 0
     ]
-    Phi, nu, gamma = (
-        tuple(convert(getattr(item, quantity)) for item in found)
-        for quantity in ("Phi", "nu", "gamma")
+    nodes, new = pruned(graph.nodes, [*Phi, *nu, *gamma, *(node for _, _, node in entries)])
+    return Kernel(
+        "Equation",
+        tuple(node[1] for node in nodes if node[0] == "input"),
+        tuple(nodes),
+        tuple(new[node] for node in Phi),
+        tuple((row, column, new[node]) for row, column, node in entries),
+        tuple(new[node] for node in nu),
+        tuple(new[node] for node in gamma),
+        (),
     )
-    kept = tuple(entry for entry in entries if graph.value_of(entry[2]) != 0)
-    return Kernel("Equation", tuple(inputs), tuple(graph.nodes), Phi, kept, nu, gamma, ())

@@ -9,6 +9,7 @@ import sympy
 
 from kincompile.calculus.symbols import Frame
 from kincompile.errors import ModelError
+from kincompile.ir.differentiate import derivative_code
 from kincompile.ir.equation_shapes import EquationShapes
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
@@ -108,7 +109,7 @@ def _kernel_mark(instance: Instance, first: str) -> Kernel | str:
 
 
 def _too_deep(constraint: Joint | FreeEquation) -> str:
-    """Return what to do about an expression that SymPy cannot differentiate."""
+    """Return what to do about an expression that Python cannot walk through by recursion."""
     return (
         f"{constraint.name!r}: its expressions are nested too deeply, functions of functions of "
         "functions; give an inner part u a coordinate of its own, with the equation u - (inner "
@@ -142,8 +143,8 @@ class _Binder:
         if isinstance(constraint, Joint):
             kernel = constraint_kernel(constraint.template)
             return kernel, constraint.columns, self.bind(constraint, kernel)
-        shared = self._shapes and self._shapes.shared(constraint)
-        if shared:
+        if self._shapes:
+            shared = self._shapes.shared(constraint)
             return shared.kernel, shared.columns, self.bind_equation(shared)
         kernel = equation_kernel(constraint)
         return kernel, constraint.columns, tuple(self._graph.input(name) for name in kernel.inputs)
@@ -159,26 +160,27 @@ class _Binder:
         """Return the node of C, C', C'', or of rho and its derivatives at the contact."""
         if item.owner is not None:
             # The columns of contacts are the last, one each, as they are the last owners.
-            contact = sympy.Symbol(joint.columns[item.owner - len(joint.template.owners)])
-            return self._derivative(joint.profiles[item.symbol], alpha, item.order, contact)
+            contact = joint.columns[item.owner - len(joint.template.owners)]
+            assert contact is not None
+            return self._derivative(joint.profiles[item.symbol], alpha.name, item.order, contact)
         value = joint.scalars[item.symbol]
         if not isinstance(value, sympy.Expr):
             return self._value(0.0 if item.order else value)
-        return self._derivative(value, t, item.order, t)
+        return self._derivative(value, t.name, item.order, t.name)
 
-    def _derivative(
-        self, value: sympy.Expr, variable: sympy.Symbol, order: int, at: sympy.Symbol
-    ) -> int:
-        """Return the node of a derivative by a variable that stands for another symbol."""
-        shared = self._shapes and self._shapes.derivative(value, variable.name, order)
-        if not shared:
-            found = value.diff(variable, order) if order else value
-            return self._convert(found if at == variable else found.subs(variable, at))
+    def _derivative(self, value: sympy.Expr, variable: str, order: int, at: str) -> int:
+        """Return the node of a derivative by a variable that stands for the input `at`."""
+        if self._shapes:
+            nodes, values = self._shapes.derivative(value, variable, order)
+        else:
+            graph = Graph()
+            node = Converter(graph, graph.input).convert(value)
+            nodes = derivative_code(graph, node, variable, order)
+            values = {item[1]: item[1] for item in nodes if item[0] == "input"}
         inputs = {
-            name: self._named(at.name if named == variable.name else named)
-            for name, named in shared.values.items()
+            name: self._named(at if named == variable else named) for name, named in values.items()
         }
-        return self._graph.instantiate(shared.nodes, inputs)[-1]
+        return self._graph.instantiate(nodes, inputs)[-1]
 
     def _named(self, value: str | sympy.Number) -> int:
         """Return the node of a symbol by name, or of a number."""

@@ -32,8 +32,8 @@ class Layout:
         The matrix A of a body frame, for a comment.
     first
         Number of the first row.
-    continued
-        What ends a line of a statement that goes on.
+    continued, ending
+        What ends a line of a statement that goes on, and its last line.
     """
 
     comment: str
@@ -43,6 +43,7 @@ class Layout:
     rotation: str = "[[c, -s], [s, c]]"
     first: int = 0
     continued: str = ""
+    ending: str = ";"
 
     def header(self, code: InlineProgram) -> str:
         """Return the comment at the top of a file: coordinates, parameters, rows."""
@@ -54,13 +55,16 @@ class Layout:
         first, *rest = broken(text)
         *lines, last = f"{left} = {first}", *(f"    {line}" for line in rest)
         comment = f"  {self.comment} {about}" if about else ""
-        return [*(f"{line}{self.continued}" for line in lines), f"{last};{comment}"]
+        return [*(f"{line}{self.continued}" for line in lines), f"{last}{self.ending}{comment}"]
 
     def inputs(self, program: Program, listing: Listing) -> list[str]:
         """Return the statements that name the inputs that are read."""
         return [
-            f"{self.value.format(name)} = {self.element.format(vector, k + self.first)};"
+            line
             for vector, k, name in inputs_read(program, listing)
+            for line in self.assigned(
+                self.value.format(name), self.element.format(vector, k + self.first)
+            )
         ]
 
     def frames(self, listing: Listing, printer: Printer) -> list[str]:

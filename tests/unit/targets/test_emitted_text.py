@@ -13,8 +13,6 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.ir.interpret import interpret
-from kincompile.ir.lower import lower
 
 STANDALONE = """
 import importlib.abc, runpy, sys
@@ -124,44 +122,6 @@ def test_that_the_files_are_written_whole(rich_model: kc.Mechanism, tmp_path: Pa
     assert path.read_bytes().decode("utf-8") == emitted.source
     assert [item.name for item in path.parent.iterdir()] == ["rich.py"]
     assert kc.load(path).FINGERPRINT == kc.compile(rich_model).FINGERPRINT
-
-
-# Names that the text of a module uses itself, or that Python keeps for itself.
-AWKWARD = (
-    "f", "p", "np", "q", "math", "q_dot", "J", "F", "b", "sin", "cos", "cos_sin", "where",
-    "spline", "lambda", "None", "is", "Phi", "nu", "N_COORDINATES", "DEFAULTS", "values", "float",
-    "x", "Exception", "print", "c_x", "sqrt", "a_2", "solve", "LANES", "ARRAYS",
-)  # fmt: skip
-
-
-def awkward_system() -> kc.ConstraintSystem:
-    """Return a system with an awkward name for each coordinate, every third one a parameter."""
-    names = [name for k, name in enumerate(AWKWARD) if k % 3]
-    parameters = {name: 1.5 + 0.25 * k for k, name in enumerate(AWKWARD[::3])}
-    symbols = [sympy.Symbol(name) for name in names]
-    factors = [sympy.Symbol(name) for name in parameters]
-    equations = [
-        symbol * (2 + sympy.sin(other)) + sympy.cos(symbol) ** 2 / 4 - factor * kc.t
-        for symbol, other, factor in zip(
-            symbols, symbols[1:] + symbols[:1], factors + factors, strict=False
-        )
-    ]
-    return kc.ConstraintSystem("awkward", names, equations, parameters=parameters)
-
-
-def test_that_awkward_names_are_names_like_others() -> None:
-    system = awkward_system()
-    module = kc.compile(system)
-    n = module.N_COORDINATES
-    rng = np.random.default_rng(8)
-    q, q_dot = rng.normal(size=(2, n))
-    program = lower(system)
-    for found, expected in zip(
-        module.kinematics(q, q_dot, 0.3), interpret(program, q, q_dot, 0.3), strict=True
-    ):
-        np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
-    x = module.solve(module.Phi_q_nonzeros(q, 0.3), np.ones(n))
-    np.testing.assert_allclose(module.Phi_q(q, 0.3) @ x, 1, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["f", "q", "np", "lambda", "class", "b", "x", "math", "J"])

@@ -1,4 +1,4 @@
-"""A derivation as a Jupyter notebook: the page, and code that computes its numbers again.
+"""A derivation as a Jupyter notebook: the page, and code that recomputes its numbers.
 
 The code is the emitted module, so the notebook needs NumPy and nothing else.
 """
@@ -6,15 +6,18 @@ The code is the emitted module, so the notebook needs NumPy and nothing else.
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from kincompile.derivation.derivation_markdown import NOTEBOOK, MarkdownRenderer, escape
 from kincompile.derivation.document import Code
+from kincompile.derivation.to_markdown import NOTEBOOK, MarkdownRenderer, escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from typing import TypeAlias
 
     from kincompile.derivation.document import Document, Section
+
+    Cell: TypeAlias = dict[str, object]
 
 FORMAT, MINOR_FORMAT = 4, 5
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
@@ -22,7 +25,10 @@ KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 def as_notebook(document: Document) -> str:
     """Return a document as a notebook, the text of an .ipynb file."""
-    found = [*_preface(document), *_cells(document)]
+    renderer = MarkdownRenderer(document, NOTEBOOK)
+    found = [*_preface(document)]
+    for section in document.sections:
+        found += _section_cells(renderer, section)
     # Ids must be there and differ; numbers make the same notebook the same text.
     cells = [{"id": f"cell-{k}", **cell} for k, cell in enumerate(found)]
     notebook = {
@@ -34,7 +40,7 @@ def as_notebook(document: Document) -> str:
     return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
 
 
-def _preface(document: Document) -> Iterator[dict[str, Any]]:
+def _preface(document: Document) -> Iterator[Cell]:
     yield _markdown([f"# Derivation of `{document.name}`", "", escape(document.summary)])
     yield _markdown(["The module that kincompile emits. It is plain NumPy; run it first."])
     yield _code(document.source)
@@ -42,16 +48,8 @@ def _preface(document: Document) -> Iterator[dict[str, Any]]:
     yield _code(document.state)
 
 
-def _cells(document: Document) -> Iterator[dict[str, Any]]:
-    renderer = MarkdownRenderer(document, NOTEBOOK)
-    for section in document.sections:
-        yield from _section_cells(renderer, section, 2)
-
-
-def _section_cells(
-    renderer: MarkdownRenderer, section: Section, depth: int
-) -> Iterator[dict[str, Any]]:
-    """Yield a section's text in cells, broken where code stands in it."""
+def _section_cells(renderer: MarkdownRenderer, section: Section, depth: int = 0) -> Iterator[Cell]:
+    """Yield the text of a section in cells, broken where code stands in it."""
     lines = list(renderer.heading(section, depth))
     for block in section.blocks:
         if isinstance(block, Code):
@@ -67,11 +65,11 @@ def _section_cells(
         yield from _section_cells(renderer, inner, depth + 1)
 
 
-def _markdown(lines: list[str]) -> dict[str, Any]:
+def _markdown(lines: list[str]) -> Cell:
     return {"cell_type": "markdown", "metadata": {}, "source": "\n".join(lines).rstrip()}
 
 
-def _code(text: str) -> dict[str, Any]:
+def _code(text: str) -> Cell:
     return {
         "cell_type": "code", "execution_count": None, "metadata": {}, "outputs": [],
         "source": text.rstrip(),

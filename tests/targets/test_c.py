@@ -2,20 +2,14 @@
 
 import re
 import subprocess
-from itertools import pairwise
 
 import mpmath
 import numpy as np
 import pytest
 import sympy
-from sympy import Piecewise
 
 import kincompile as kc
-from kincompile.ir import from_sympy
 from kincompile.runtime.status import Status
-from kincompile.targets.c.dialect import C
-from kincompile.targets.naming import NameTable
-from kincompile.targets.printer import Printer
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
 x, y = sympy.symbols("x y")
@@ -77,70 +71,6 @@ def test_the_statuses_are_those_of_the_runtime(example_named):
     assert {name: int(value) for name, value in found.items()} == {
         status.name: int(status) for status in Status
     }
-
-
-# ---------------------------------------------------------------- expressions
-
-
-SMOOTH = [
-    sympy.tan(x), sympy.asin(x / 3), sympy.acos(x / 3), sympy.atan(x), sympy.atan2(y, x),
-    sympy.sinh(x), sympy.cosh(x), sympy.tanh(x), sympy.asinh(x), sympy.acosh(2 + x**2),
-    sympy.atanh(x / 3), sympy.exp(x), sympy.log(3 + x), sympy.sqrt(3 + x), (3 + x) ** y,
-    (3 + x) ** sympy.Rational(3, 2), (3 + x) ** sympy.Rational(1, 3), x**7 - x**-2,
-    sympy.cot(x), sympy.sec(x), sympy.csc(x), sympy.sin(x) * sympy.cos(2 * y), sympy.E**y,
-    x / 3 + sympy.Rational(22, 7) * y, sympy.pi * x - 2 * sympy.pi / 3, -(x - y) / (-y),
-]  # fmt: skip
-
-
-@pytest.mark.usefixtures("quick_compiler")
-def test_every_function_gives_the_numbers_of_numpy():
-    names = [f"u{k}" for k in range(len(SMOOTH))]
-    equations = [f - sympy.Symbol(name) for f, name in zip(SMOOTH, names, strict=True)]
-    m = kc.ConstraintSystem("functions", ["x", "y", *names], [*equations, x - kc.t, y - kc.t])
-    rest = np.random.default_rng(3).uniform(-1, 1, (3, len(SMOOTH)))
-    compare(m, np.hstack(([[0.7, 1.2], [-1.3, 0.4], [2.1, -0.9]], rest)))
-
-
-def test_no_function_of_the_compiler_is_forgotten():
-    assert set(from_sympy.FUNCTIONS.values()) | {"sqrt", "pow"} <= C.functions.keys()
-
-
-def test_a_function_that_c_does_not_have_is_named():
-    printer = Printer(C, [("input", "x"), ("call", "erf", 0)], {0: "x"})
-    with pytest.raises(kc.UnsupportedError, match="the C target has no function 'erf'"):
-        printer.text(1)
-
-
-@pytest.mark.usefixtures("quick_compiler")
-def test_pieces_and_their_conditions():
-    piece = Piecewise((x**2, (x < 1) & (y > 0)), (2 * x - 1, (x >= 2) | (y <= -1)), (x * y, True))
-    m = kc.ConstraintSystem("pieces", "x y", [piece - y, x + y - kc.t])
-    q = np.array([[0.5, 1], [0.5, -0.5], [2.5, 3], [1.5, -2], [1.5, 0.5], [1, 1], [2, -1]])
-    compare(m, q)
-
-
-@pytest.mark.usefixtures("quick_compiler")
-def test_numbers_are_divided_as_fractions_not_as_integers():
-    m = kc.ConstraintSystem("halves", "x", [x / 2 - sympy.Rational(1, 3) * kc.t])
-    assert kc.compile(m, target="c").Phi(np.array([1.0]), 1.0)[0] == 0.5 - 1 / 3
-
-
-@pytest.mark.usefixtures("quick_compiler")
-def test_tables_on_all_their_pieces_and_beyond_a_turn(tabled_model):
-    rng = np.random.default_rng(8)
-    q = np.array([0.3, -0.2, 0.1, 0.0]) + rng.uniform(-1, 1, (200, 4))
-    q[:, 3] = np.r_[np.linspace(-15, 15, 180), 2 * np.pi * np.arange(20) / 20]
-    compare(tabled_model, q, tolerance=1e-11)
-
-
-@pytest.mark.usefixtures("quick_compiler")
-def test_names_that_mean_something_in_c():
-    names = "double int lane at far exact F right to PI LANES N M K block square gamma y1 NULL unix"
-    symbols = sympy.symbols(names)
-    equations = [a + 2 * sympy.sin(b) - kc.t for a, b in pairwise(symbols)]
-    m = kc.ConstraintSystem("struct", names, [*equations, symbols[-1] ** 2 - 2])
-    compare(m, np.random.default_rng(2).uniform(1, 2, (40, len(symbols))), 0.3)
-    assert NameTable(("double",)).take("double") == "double_"
 
 
 # ---------------------------------------------------------------- cosine and sine

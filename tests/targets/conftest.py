@@ -1,0 +1,486 @@
+"""Every mechanism of the suite on every target: each target runs all of them in one process.
+
+The fixture `target` gives, for each target in turn, what its code says of the mechanisms, at the
+same states. `expected` is evaluated by mpmath with 40 digits: Phi as SymPy has it, the others as
+SymPy derives them from Phi, where there are no tables.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.ir.interpret import interpret
+from kincompile.ir.lower import lower
+from kincompile.model.expressions import SMOOTH
+from kincompile.model.spline import PeriodicSpline
+
+EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.py"))
+STATES = 4
+QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
+CONSTANTS = (
+    "NAME", "FORMAT", "FINGERPRINT", "N_COORDINATES", "N_EQUATIONS", "COORDINATES", "EQUATIONS",
+    "PARAMETERS", "UNITS", "DEFAULTS", "GUESS", "PATTERN",
+)  # fmt: skip
+NODE = shutil.which("node") or shutil.which("nodejs")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+OCTAVE = shutil.which("octave-cli")
+
+x, y = sympy.symbols("x y")
+P = sympy.Piecewise
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mechanism and states off its manifold; the first has the default parameters."""
+
+    model: Any
+    q: Any
+    q_dot: Any
+    t: Any
+    p: Any
+
+    @classmethod
+    def of(cls, model: Any, q: Any, t: Any = None) -> "Case":
+        """Return a case with seeded rates, times and parameters."""
+        rng = np.random.default_rng(20240717)
+        rows = np.asarray(q, dtype=float)
+        t = rng.uniform(0.1, 0.9, len(rows)) if t is None else t
+        defaults = np.array([item.default for item in model.system().parameters])
+        p = defaults * rng.uniform(0.8, 1.25, (len(rows), defaults.size))
+        p[0] = defaults
+        return cls(model, rows, rng.uniform(-2, 2, rows.shape), np.asarray(t, dtype=float), p)
+
+    @cached_property
+    def module(self) -> Any:
+        """The NumPy module, written out."""
+        return kc.compile(self.model, form="inline")
+
+    @cached_property
+    def derived(self) -> dict[str, Any]:
+        """Phi, and what SymPy derives from it: Phi_q, nu and gamma."""
+        Phi, q, q_dot = self.model.Phi, self.model.q, self.model.q_dot
+        Phi_q, Phi_t = Phi.jacobian(q), Phi.diff(kc.t)
+        gamma = -(Phi_q * q_dot).jacobian(q) * q_dot
+        gamma -= 2 * Phi_q.diff(kc.t) * q_dot + Phi_t.diff(kc.t)
+        return {"Phi": Phi, "Phi_q": Phi_q, "nu": -Phi_t, "gamma": gamma}
+
+    @cached_property
+    def expected(self) -> dict[str, Any]:
+        """Phi, Phi_q, nu and gamma of all states, (states, m) and (states, m, n)."""
+        return {name: self.evaluate(matrix) for name, matrix in self.derived.items()}
+
+    def evaluate(self, matrix: Any) -> Any:
+        """Evaluate a SymPy matrix in every state; a single column loses its last axis."""
+        names = [item.name for item in self.model.system().parameters]
+        symbols = [*self.model.q, *self.model.q_dot, kc.t, *map(sympy.Symbol, names)]
+        # A symbol may have the name of a function.
+        dummies = [sympy.Dummy() for _ in symbols]
+        matrix = matrix.xreplace(dict(zip(symbols, dummies, strict=True)))
+        tables = {f"table_{k}": type(item) for k, item in enumerate(matrix.atoms(PeriodicSpline))}
+        splines = {key: lambda a, f=f: f.table(float(a), f.order) for key, f in tables.items()}
+        for key, item in tables.items():
+            matrix = matrix.replace(item, sympy.Function(key))
+        function = sympy.lambdify(dummies, matrix.tolist(), modules=[splines, "mpmath"])
+        with mpmath.workdps(40):
+            values = []
+            for state in zip(self.q, self.q_dot, self.t[:, np.newaxis], self.p, strict=True):
+                numbers = [mpmath.mpf(value) for value in np.concatenate(state).tolist()]
+                values.append([[float(entry) for entry in row] for row in function(*numbers)])
+        array = np.array(values)
+        return array[..., 0] if matrix.shape[1] == 1 else array
+
+    def points(self) -> list[list[Any]]:
+        """Return the states one by one, as lists of numbers."""
+        states = zip(self.q, self.q_dot, self.t, self.p, strict=True)
+        return [[value.tolist() for value in state] for state in states]
+
+
+# ---- the mechanisms ------------------------------------------------------------------------------
+
+ONE_ARGUMENT = [f for f in SMOOTH if f not in (P, PeriodicSpline, sympy.atan2, sympy.acosh)]
+EXPRESSIONS = (
+    *(function(x / 2) for function in ONE_ARGUMENT),
+    sympy.acosh(1 + x**2), sympy.sqrt(1 + x**2), 1 / sympy.sqrt(4 + x * y),
+    (1 + x) ** sympy.Rational(5, 3), (1 + x) ** sympy.Float(0.3) * sympy.pi**x,
+    (x - y) ** 11 + x**-3, sympy.E**y - sympy.E, sympy.sin(x) * sympy.cos(2 * y), (3 + x) ** y,
+    x / 3 + sympy.Rational(22, 7) * y, sympy.pi * x - 2 * sympy.pi / 3, -(x - y) / (-y),
+    -(x**2), (-x) ** 2, -(x + y) / (x * y), x**7 - x**-2, sympy.Rational(1, 3) * kc.t,
+    P((x**2, x < 0.5), (x - 0.25, True)), P((x**2 - y, x >= y), (x * y, True)),
+    P((x, (x < 0.3) & (y > 0)), (y, (x > 0.6) | (y <= -0.5)), (1 + x, True)),
+    P((x**2, (x < 1) & (y > 0)), (2 * x - 1, (x >= 2) | (y <= -1)), (x * y, True)),
+    x * P((kc.t**2, kc.t < 0.2), (0.4 * kc.t - 0.04, True)),
+    sympy.sin(P((P((x, y < 0), (2 * x, True)), x < 0.4), (y, True))),
+    P((x**2, x < 0.5), (x - 0.25, x >= 0.5)), P((1 / x, sympy.Ne(x, 0)), (0, True)),
+    P((x**2 - y, sympy.Eq(x, y)), (x * y, True)), P((x**2 - y, sympy.Ne(x, y)), (x * y, True)),
+)  # fmt: skip
+"""Every function that takes complex steps, relation, connective and kind of number."""
+
+POINTS = [
+    (0.37, 0.62), (0.81, -0.44), (0.22, 0.31), (0.55, -0.71), (0.5, 0.5), (1.0, 1.0), (1.5, -2.0),
+    (1.9, 0.4),
+]  # fmt: skip
+
+
+def functions() -> Case:
+    """Return all the expressions, at states on either side of their conditions."""
+    names = [f"u{k}" for k in range(len(EXPRESSIONS))]
+    left = [f - sympy.Symbol(name) for f, name in zip(EXPRESSIONS, names, strict=True)]
+    m = kc.ConstraintSystem("functions", ["x", "y", *names], [*left, x - kc.t, y - kc.t])
+    rest = np.random.default_rng(3).uniform(-1, 1, (len(POINTS), len(EXPRESSIONS)))
+    times = np.where(np.arange(len(POINTS)) % 2, 0.1, 0.7)
+    return Case.of(m, np.hstack((POINTS, rest)), times)
+
+
+def strange() -> Case:
+    """Return a mechanism with names of every language, a table, pieces in time and powers.
+
+    The table is read on all its pieces, where they join, and beyond a turn.
+    """
+    m = kc.Mechanism("top")
+    names = {"square": 0.3, "Math": 0.2, "end": 0.1, "sin": 0.15, "double": 1.1, "lambda": 0.9}
+    square, shift, end, sin, double, factor = (m.parameter(*item) for item in names.items())
+    cam, pin = m.body("new"), m.body("var", guess=(1, 0, 0))
+    angles = [k * 0.7 for k in range(9)]
+    table = (angles, [1 + 0.1 * np.cos(angle) for angle in angles])
+    ramp = P((kc.t**2, kc.t < 0.5), (kc.t - sympy.Rational(1, 4), True))
+    m.add(kc.Revolute("shaft", cam, (square, end), m.ground, (0, shift)))
+    m.add(kc.PointFollower("slot", pin, (sin, 0), cam, (0, 0), table, guess=0.1))
+    m.add(kc.AbsoluteAngle("still", pin, sympy.sqrt(1 + kc.t) + sympy.log(kc.t + shift)))
+    m.add(kc.AbsoluteY("level", pin, (0, 0), -(sympy.atan2(kc.t, 2) ** sympy.Rational(3, 2))))
+    m.add(kc.AbsoluteAngle("motor", cam, double * ramp + factor))
+    alphas = [-20.0, -1e-17, 0.0, 0.7, 6.2, 6.3, 50.0, *np.linspace(-15, 15, 60)]
+    q = np.random.default_rng(11).uniform(0.2, 1.2, (len(alphas), 7))
+    q[:, -1] = alphas
+    return Case.of(m, q)
+
+
+# Names that some language or the text of some target uses itself.
+AWKWARD = (
+    "f", "p", "np", "q", "math", "q_dot", "J", "F", "b", "sin", "cos", "cos_sin", "where",
+    "spline", "lambda", "None", "is", "Phi", "nu", "N_COORDINATES", "DEFAULTS", "values", "float",
+    "x", "Exception", "print", "c_x", "sqrt", "a_2", "solve", "LANES", "ARRAYS", "double", "int",
+    "lane", "at", "far", "exact", "right", "to", "PI", "N", "M", "K", "block", "square", "gamma",
+    "y1", "NULL", "unix", "end", "new", "var", "Math", "zeros", "class", "arguments",
+)  # fmt: skip
+
+
+def awkward() -> Case:
+    """Return equations with awkward names, of which every third is a parameter's, and `atan2`."""
+    names = [name for k, name in enumerate(AWKWARD) if k % 3]
+    parameters = {name: 1.5 + 0.25 * k for k, name in enumerate(AWKWARD[::3])}
+    symbols, factors = sympy.symbols(names), sympy.symbols(list(parameters))
+    equations = [
+        symbol * (2 + sympy.sin(other)) + sympy.cos(symbol) ** 2 / 4 - factor * kc.t
+        for symbol, other, factor in zip(
+            symbols, symbols[1:] + symbols[:1], factors + factors, strict=False
+        )
+    ]
+    equations[0] += sympy.atan2(symbols[0] - 1, symbols[1])
+    m = kc.ConstraintSystem("struct", names, equations, parameters=parameters)
+    return Case.of(m, np.random.default_rng(2).uniform(1, 2, (STATES, len(names))))
+
+
+def domain() -> Case:
+    """Return an arm whose driver has no value at the state, which is before the time 0."""
+    m = kc.Mechanism("domain")
+    m.add(kc.AbsoluteAngle("root", m.body("arm"), sympy.sqrt(kc.t)))
+    m.add(kc.AbsoluteX("x", "arm", (0, 0), 0))
+    m.add(kc.AbsoluteY("y", "arm", (0, 0), 0))
+    return Case.of(m, np.zeros((1, 3)), [-1.0])
+
+
+OWN = {"functions": functions, "top": strange, "struct": awkward, "domain": domain}
+
+
+@pytest.fixture(scope="session")
+def case_named(example_named) -> Callable[[str], Case]:
+    """Return the function that gives a case by name: an example, or a mechanism of the suite."""
+
+    @cache
+    def found(name: str) -> Case:
+        if name in OWN:
+            return OWN[name]()
+        example = example_named(name)
+        rng = np.random.default_rng(20240717)
+        rows = rng.integers(example.solution.t.size, size=STATES)
+        size = 1 + np.abs(example.solution.q).max(axis=0)
+        q = example.solution.q[rows] + 0.3 * size * rng.uniform(-1, 1, (STATES, size.size))
+        return Case.of(example.model, q, example.solution.t[rows])
+
+    return found
+
+
+NAMES = [*(path.stem for path in EXAMPLES), *OWN]
+
+
+@pytest.fixture(params=[name for name in NAMES if name != "domain"])
+def name(request) -> str:
+    """Return the name of each case in turn, but for the one without a value."""
+    return str(request.param)
+
+
+# ---- the targets ---------------------------------------------------------------------------------
+
+Results = dict[str, dict[str, Any]]
+"""Quantities, and whatever else a target tells, by case."""
+
+WRONG = (("Phi", "q", 2, 9), ("gamma", "q_dot", 1, 9), ("Phi_q", "p", 0, 5))
+"""Calls of the four-bar with a vector of the wrong length: function, vector, length, right one."""
+
+
+def interpreted(cases: dict[str, Case], folder: Path) -> Results:
+    """Evaluate by the interpreter of the program, each state by itself."""
+    del folder
+    found = {}
+    for name, case in cases.items():
+        program = lower(case.model.system())
+        states = zip(case.q, case.q_dot, case.t, case.p, strict=True)
+        with np.errstate(all="ignore"):
+            rows = [interpret(program, *state) for state in states]
+        found[name] = dict(zip(QUANTITIES, map(np.array, zip(*rows, strict=True)), strict=True))
+    return found
+
+
+def loaded(**options: str) -> Callable[[dict[str, Case], Path], Results]:
+    """Return the function that evaluates by modules compiled with options, on a batch."""
+
+    def run(cases: dict[str, Case], folder: Path) -> Results:
+        del folder
+        found = {}
+        for name, case in cases.items():
+            module = kc.compile(case.model, **options)
+            values = module.kinematics(case.q, case.q_dot, case.t, case.p)
+            found[name] = dict(zip(QUANTITIES, values, strict=True)) | {"module": module}
+            found[name]["constants"] = {item: getattr(module, item) for item in CONSTANTS}
+            if options.get("form") == "grouped":  # another program, with a fingerprint of its own
+                del found[name]["constants"]["FINGERPRINT"]
+            if name == "four_bar":
+                found[name]["refused"] = [refusal(module, *wrong) for wrong in WRONG]
+        return found
+
+    return run
+
+
+def refusal(module: Any, function: str, vector: str, length: int, right: int) -> str:
+    """Return what a module says of a vector of the wrong length."""
+    del right
+    given = {"q": module.GUESS, "q_dot": module.GUESS, "t": 0.0, "p": module.DEFAULTS}
+    given[vector] = np.ones(length)
+    if function != "gamma":
+        del given["q_dot"]
+    with pytest.raises(kc.InputError) as caught:
+        getattr(module, function)(**given)
+    return str(caught.value)
+
+
+def in_octave(cases: dict[str, Case], folder: Path) -> Results:
+    """Evaluate by Octave; of an example take the motion that its script finds, too."""
+    lines = []
+    for name, case in cases.items():
+        kc.emit(case.model, "octave").write(folder)
+        for k, state in enumerate(case.points()):
+            q, q_dot, t, p = (json.dumps(value) for value in state)
+            lines.append(f"q = {q}'; q_dot = {q_dot}'; t = {t}; p = {p}';")
+            for quantity in QUANTITIES:
+                arguments = "q, q_dot, t" if quantity == "gamma" else "q, t"
+                arguments += ", p" if k else ""
+                lines.append(f"show('{name}.{quantity}', {name}_{quantity}({arguments})');")
+        if name not in OWN:
+            shown = ("T", "Q", "Q_dot", "Q_ddot")
+            lines += [name, *(f"show('{name}.{value}', {value});" for value in shown)]
+    found: Results = {}
+    for key, rows in run_octave(folder, lines).items():
+        name, quantity = key.split(".")
+        m = len(rows[0])
+        is_matrix = quantity == "Phi_q"
+        shape = (len(rows), -1, cases[name].q.shape[1]) if is_matrix else (len(rows), m)
+        found.setdefault(name, {})[quantity] = np.array(rows).reshape(shape)
+    return found
+
+
+def run_octave(folder: Path, lines: list[str]) -> dict[str, list[list[float]]]:
+    """Run code in a folder and return what `show` printed, as lists of numbers by name."""
+    (folder / "show.m").write_text(
+        "function show(name, values)\nprintf('%s', name);\nprintf(' %.17g', values);\n"
+        "printf('\\n');\nend\n",
+        encoding="utf-8",
+    )
+    (folder / "all_of_it.m").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    done = subprocess.run(
+        [str(OCTAVE), "--norc", "--no-history", "--no-window-system", "--quiet", "all_of_it.m"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found: dict[str, list[list[float]]] = {}
+    for line in done.stdout.splitlines():
+        name, *numbers = line.split()
+        found.setdefault(name, []).append([float(number) for number in numbers])
+    return found
+
+
+# Evaluates the models of a page, or of node, at their states; JSON has no NaN.
+EVALUATE = """((models, points, wrong) => JSON.stringify(
+  Object.fromEntries(Object.entries(models).map(([name, model]) => [name, {
+    constants: model,
+    quantities: points[name].map(([q, q_dot, t, p], k) => ({
+      Phi: k ? model.Phi(q, t, p) : model.Phi(q, t),
+      Phi_q: k ? model.Phi_q(q, t, p) : model.Phi_q(q, t),
+      nu: k ? model.nu(q, t, p) : model.nu(q, t),
+      gamma: k ? model.gamma(q, q_dot, t, p) : model.gamma(q, q_dot, t),
+    })),
+    refused: name !== "four_bar" ? [] : wrong.map(([f, vector, length]) => {
+      const given = { q: model.GUESS, q_dot: model.GUESS, p: model.DEFAULTS };
+      given[vector] = new Array(length).fill(1);
+      const rates = f === "gamma" ? [given.q_dot] : [];
+      try { model[f](given.q, ...rates, 0, given.p); } catch (error) { return String(error); }
+    }),
+  }])),
+  (key, value) => typeof value === "number" && !isFinite(value) ? String(value) : value,
+))"""
+
+
+def in_javascript(run: Callable[[Path, dict[str, str], str], str]) -> Any:
+    """Return the function that evaluates by one of the homes of JavaScript."""
+
+    def evaluated(cases: dict[str, Case], folder: Path) -> Results:
+        variables = {}
+        for name, case in cases.items():
+            source = kc.emit(case.model, "javascript").source
+            (folder / f"{name}.js").write_text(source, encoding="utf-8")
+            declared = re.search(r"it declares (\w+)\.", source)
+            assert declared is not None
+            variables[name] = declared[1]
+        points = {name: case.points() for name, case in cases.items()}
+        models = ", ".join(f'"{name}": {variable}' for name, variable in variables.items())
+        arguments = f"{{ {models} }}, {json.dumps(points)}, {json.dumps(WRONG)}"
+        found: Results = {}
+        for name, item in json.loads(run(folder, variables, f"{EVALUATE}({arguments})")).items():
+            rows = item.pop("quantities")
+            for quantity in QUANTITIES:
+                values = np.array([row[quantity] for row in rows], dtype=object)
+                item[quantity] = values.astype(float)
+            found[name] = item
+        return found
+
+    return evaluated
+
+
+def in_node(folder: Path, variables: dict[str, str], expression: str) -> str:
+    """Return what an expression gives under node, which takes the files by `require`."""
+    lines = [f"const {item} = require('./{name}.js');" for name, item in variables.items()]
+    (folder / "all_of_it.js").write_text("\n".join([*lines, f"console.log({expression});"]))
+    done = subprocess.run(
+        [str(NODE), "all_of_it.js"], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def in_chromium(folder: Path, variables: dict[str, str], expression: str) -> str:
+    """Return what an expression gives in a page that has the files as its scripts."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    scripts = "".join(f"<script src={name}.js></script>" for name in variables)
+    (folder / "page.html").write_text(f"<!doctype html>{scripts}")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page()
+        page.goto((folder / "page.html").as_uri())
+        result = str(page.evaluate(expression))
+        browser.close()
+    return result
+
+
+RUNNERS = {
+    "interpreter": interpreted,
+    "numpy": loaded(form="inline"),
+    "grouped": loaded(form="grouped"),
+    "c": loaded(target="c"),
+    "octave": in_octave,
+    "node": in_javascript(in_node),
+    "chromium": in_javascript(in_chromium),
+}
+NEEDED = {
+    "octave": (OCTAVE, "octave-cli is not installed (Debian: octave)"),
+    "node": (NODE, "node is not installed (Debian: nodejs)"),
+    "chromium": (CHROMIUM, "Chromium is not installed"),
+}
+
+
+def marked(names: Any) -> list[Any]:
+    """Return targets as parameters of a test; what runs in a browser is slow."""
+    marks = {"chromium": [pytest.mark.slow, pytest.mark.browser]}
+    return [pytest.param(name, marks=marks.get(name, [])) for name in names]
+
+
+MODULES = [name for name in RUNNERS if name not in ("interpreter", "octave")]
+"""Targets whose file is a module, with constants, and checks of its arguments."""
+
+
+@pytest.fixture(scope="session")
+def results_of(request, case_named, tmp_path_factory) -> Callable[[str], Results]:
+    """Return the function that runs all cases on a target, once a session."""
+
+    @cache
+    def found(target: str) -> Results:
+        program, reason = NEEDED.get(target, (os.name, ""))
+        if program is None:
+            pytest.skip(reason)
+        if target == "c":
+            request.getfixturevalue("quick_compiler")
+        cases = {name: case_named(name) for name in NAMES}
+        results: Results = RUNNERS[target](cases, tmp_path_factory.mktemp(target))
+        return results
+
+    return found
+
+
+@pytest.fixture(scope="module", params=marked(RUNNERS))
+def target(request, results_of) -> Results:
+    """Return what each target says of all cases."""
+    results: Results = results_of(request.param)
+    return results
+
+
+@pytest.fixture(scope="module", params=marked(MODULES))
+def emitted_module(request, results_of) -> Results:
+    """Return what each target says of all cases whose file is a module."""
+    found: Results = results_of(request.param)
+    return found
+
+
+@pytest.fixture(params=WRONG, ids=lambda item: item[0])
+def refused(request, emitted_module) -> tuple[str, int, int, str]:
+    """Return the vector of a wrong call, its length, the right one, and what the module says."""
+    messages = emitted_module["four_bar"]["refused"]
+    return (*request.param[1:], messages[WRONG.index(request.param)])
+
+
+@pytest.fixture(scope="module", params=["numpy", "grouped", "c"])
+def module_of(request, results_of) -> Callable[[str], Any]:
+    """Return the function that gives a case's module, of each target that can be loaded."""
+    results = results_of(request.param)
+    return lambda name: results[name]["module"]
+
+
+@pytest.fixture
+def octave(tmp_path) -> Callable[[list[str]], dict[str, list[list[float]]]]:
+    """Return the function that runs lines in a folder of their own, and gives what they show."""
+    if OCTAVE is None:
+        pytest.skip(NEEDED["octave"][1])
+    return partial(run_octave, tmp_path)

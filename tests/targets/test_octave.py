@@ -1,0 +1,44 @@
+"""What the .m files have beside functions: the script of a motion, and MATLAB's limits."""
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+
+
+def test_that_the_script_finds_the_same_motion(example, results_of):
+    found, solution = results_of("octave")[example.path.stem], example.solution
+    np.testing.assert_allclose(found["T"][0], solution.t, rtol=1e-12, atol=1e-12)
+    for quantity, expected in (
+        ("Q", solution.q), ("Q_dot", solution.q_dot), ("Q_ddot", solution.q_ddot),
+    ):  # fmt: skip
+        # Two solvers stop at two points within the tolerance; Phi_q magnifies the difference.
+        rows = found[quantity].reshape(expected.shape)
+        np.testing.assert_allclose(rows, expected, rtol=1e-10, atol=1e-10)
+
+
+def test_that_a_guess_at_which_phi_q_is_singular_gives_no_motion(octave, tmp_path):
+    """Newton goes 1e14 rad away, where corrections are small beside q and Phi is not zero."""
+    m = kc.Mechanism("stuck")
+    cam, follower = m.body("cam"), m.body("follower", guess=(0, 0.06, 0))
+    angles = [2 * np.pi * k / 36 for k in range(36)]
+    table = (angles, [0.05 + 0.01 * np.cos(angle) for angle in angles])
+    m.add(kc.Revolute("axle", m.ground, (0, 0), cam, (0, 0)))
+    m.add(kc.Translational("guide", m.ground, (0, 0), (0, 1), follower, (0, 0), (0, 1)))
+    m.add(kc.PointFollower("contact", follower, (0, 0), cam, (0, 0), table))
+    m.add(kc.AbsoluteAngle("motor", cam, 2 * kc.pi * kc.t))
+    emitted = kc.emit(m, "octave")
+    assert "stuck_rho_j_contact.m" in emitted.files
+    emitted.write(tmp_path)
+    refused = "show('refused', strfind(problem.message, 'no position found at t = 0;'));"
+    found = octave(["try", "stuck", "show('found', 1);", "catch problem", refused, "end"])
+    assert found == {"refused": [[8.0]]}
+
+
+def test_that_a_name_beyond_matlab_is_refused():
+    m = kc.Mechanism("long")
+    m.add(kc.AbsoluteAngle("motor", m.body("b" * 70), kc.t))
+    m.add(kc.AbsoluteX("x", "b" * 70, (0, 0), 0))
+    m.add(kc.AbsoluteY("y", "b" * 70, (0, 0), 0))
+    with pytest.raises(kc.UnsupportedError, match="MATLAB reads 63 characters of a name"):
+        kc.emit(m, "octave")
