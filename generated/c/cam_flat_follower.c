@@ -33,12 +33,12 @@ enum {
     K = 3,  // parameters
     NONZEROS = 15,  // of Phi_q
     LANES = 32,  // points in a block
-    FAR = (4 << 20) / 8 / (3 * M + NONZEROS),  // points whose results leave little of a cache
+    FAR = (4 << 20) / 8 / (36),  // points whose results leave little of a cache
     FACTORS = 11,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 3,  // blocks of the planned solve
 };
 
-const char cam_flat_follower_fingerprint[] = "207b0bd47f91e8282f5ac7564f0cbc01";
+const char cam_flat_follower_fingerprint[] = "b754e12faf3ede9e348c6d86fe905e76";
 const double cam_flat_follower_defaults[] = {
     0.04, 0.02, 6.283185307179586,
 };
@@ -49,32 +49,34 @@ const int cam_flat_follower_pattern[][2] = {
     {0, 0}, {1, 1}, {2, 3}, {3, 5}, {4, 0}, {4, 1}, {4, 2}, {4, 3}, {4, 4}, {4, 5}, {4, 6},
     {5, 2}, {5, 5}, {5, 6}, {6, 2},
 };
-// entries of the pattern that never change, with their values, and entries that are computed
-static const struct {
+// number and value of an entry that never changes
+typedef struct {
     int entry;
     double value;
-} CONSTANT[] = {
-    {0, 1.0}, {1, 1.0}, {2, -1.0}, {14, 1.0},
+} constant;
+
+// the entries that never change, and those that are computed
+static const constant Phi_constant[] = { {0, 0.0} };
+static const int Phi_computed[] = { 0, 1, 2, 3, 4, 5, 6 };
+static const constant Phi_q_constant[] = { {0, 1.0}, {1, 1.0}, {2, -1.0}, {14, 1.0} };
+static const int Phi_q_computed[] = { 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13 };
+static const int Phi_q_place[] = { 26, 28, 29, 30, 31, 32, 33, 34, 37, 40, 41 };
+static const constant nu_constant[] = {
+    {0, 0.0}, {1, 0.0}, {2, 0.0}, {3, 0.0}, {4, 0.0}, {5, 0.0},
 };
-enum { CONSTANTS = 4, VARYING = 11 };
-static const int VARYING_ENTRY[] = {
-    3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13,
-};
-// rows of nu and gamma that are computed
-enum { NU_ROWS = 1, GAMMA_ROWS = 3 };
-static const int NU_ROW[] = {
-    6,
-};
-static const int GAMMA_ROW[] = {
-    3, 4, 5,
-};
+static const int nu_computed[] = { 6 };
+static const constant gamma_constant[] = { {0, 0.0}, {1, 0.0}, {2, 0.0}, {6, 0.0} };
+static const int gamma_computed[] = { 3, 4, 5 };
 
 // A block of points: the last axis is the point.
 typedef struct {
     double t[LANES];
     double p[K > 0 ? K : 1][LANES];
     double q[N][LANES], q_dot[N][LANES], q_ddot[N][LANES];
-    double Phi[M][LANES], Phi_q[NONZEROS][LANES], nu[M][LANES], gamma[M][LANES];
+    double Phi[7][LANES];
+    double Phi_q[15][LANES];
+    double nu[7][LANES];
+    double gamma[7][LANES];
     double F[FACTORS > 0 ? FACTORS : 1][LANES], determinants[BLOCKS > 0 ? BLOCKS : 1][LANES];
 } block;
 
@@ -144,8 +146,8 @@ INLINE double sine(double angle, int exact, int64_t *far)
     return s;
 }
 
-// Constraint vector Phi(q, t).
-INLINE int64_t Phi_at(block *at, size_t lane, int exact)
+// Phi and Phi_q in one go: a step of Newton's method.
+INLINE int64_t position_at(block *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double x_cam = at->q[0][lane];
@@ -170,9 +172,17 @@ INLINE int64_t Phi_at(block *at, size_t lane, int exact)
     const double sin_alpha_contact = sine(alpha_contact, exact, &far);
     const double contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam;
     const double contact_5 = contact_rho_cam * contact_u_cam_y;
+    const double contact_d_y = y_follower - y_cam - contact_5;
     const double contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam;
-    const double contact_7 = contact_rho_cam * contact_u_cam_x;
-    const double contact_rho_cam_1 = lift * sin_alpha_contact / 2.0;
+    const double contact_8 = contact_rho_cam * contact_u_cam_x;
+    const double contact_d_x = x_follower - x_cam - contact_8;
+    const double lift_sin_alpha_contact = lift * sin_alpha_contact;
+    const double contact_rho_cam_1 = lift_sin_alpha_contact / 2.0;
+    const double contact_12 = contact_5 - contact_rho_cam_1 * contact_u_cam_x;
+    const double contact_13 = contact_rho_cam_1 * contact_u_cam_y + contact_8;
+    const double contact_14 = s_follower * contact_12 + c_follower * contact_13;
+    const double contact_15 = s_follower * contact_13 - c_follower * contact_12;
+    const double contact_16 = lift * cos_alpha_contact / 2.0 - contact_rho_cam;
     // 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
     at->Phi[0][lane] = x_cam;
     at->Phi[1][lane] = y_cam;
@@ -180,81 +190,34 @@ INLINE int64_t Phi_at(block *at, size_t lane, int exact)
     at->Phi[2][lane] = -x_follower;
     at->Phi[3][lane] = s_follower;
     // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    at->Phi[4][lane] = c_follower * (y_follower - y_cam - contact_5)
-        - s_follower * (x_follower - x_cam - contact_7);
-    at->Phi[5][lane] = s_follower * (contact_5 - contact_rho_cam_1 * contact_u_cam_x)
-        + c_follower * (contact_rho_cam_1 * contact_u_cam_y + contact_7);
+    at->Phi[4][lane] = c_follower * contact_d_y - s_follower * contact_d_x;
+    at->Phi[5][lane] = contact_14;
     // 6  AbsoluteAngle "motor": cam angle omega*t
     at->Phi[6][lane] = phi_cam - omega * t;
-    return far;
-}
-
-static void Phi_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= Phi_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        Phi_at(at, lane, 1);
-}
-
-// Jacobian of Phi by q: the entries that vary.
-INLINE int64_t Phi_q_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x_cam = at->q[0][lane];
-    const double y_cam = at->q[1][lane];
-    const double phi_cam = at->q[2][lane];
-    const double x_follower = at->q[3][lane];
-    const double y_follower = at->q[4][lane];
-    const double phi_follower = at->q[5][lane];
-    const double alpha_contact = at->q[6][lane];
-    const double base = at->p[0][lane];
-    const double lift = at->p[1][lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_cam, s_cam;
-    far |= cos_sin(phi_cam, exact, &c_cam, &s_cam);
-    double c_follower, s_follower;
-    far |= cos_sin(phi_follower, exact, &c_follower, &s_follower);
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    const double cos_alpha_contact = cosine(alpha_contact, exact, &far);
-    const double contact_rho_cam = base + lift * (1.0 - cos_alpha_contact) / 2.0;
-    const double sin_alpha_contact = sine(alpha_contact, exact, &far);
-    const double contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam;
-    const double contact_5 = contact_rho_cam * contact_u_cam_y;
-    const double contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam;
-    const double contact_7 = contact_rho_cam * contact_u_cam_x;
-    const double lift_sin_alpha_contact = lift * sin_alpha_contact;
-    const double contact_rho_cam_1 = lift_sin_alpha_contact / 2.0;
-    const double contact_10 = contact_5 - contact_rho_cam_1 * contact_u_cam_x;
-    const double contact_11 = contact_rho_cam_1 * contact_u_cam_y + contact_7;
-    const double contact_12 = s_follower * contact_11 - c_follower * contact_10;
-    const double contact_13 = lift * cos_alpha_contact / 2.0 - contact_rho_cam;
     // 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
     at->Phi_q[3][lane] = c_follower;  // guide.parallel by phi_follower
     // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
     at->Phi_q[4][lane] = s_follower;  // contact.contact by x_cam
     at->Phi_q[5][lane] = -c_follower;  // contact.contact by y_cam
-    at->Phi_q[6][lane] = -(s_follower * contact_5 + c_follower * contact_7);  // contact.contact by phi_cam
+    at->Phi_q[6][lane] = -(s_follower * contact_5 + c_follower * contact_8);  // contact.contact by phi_cam
     at->Phi_q[7][lane] = -s_follower;  // contact.contact by x_follower
     at->Phi_q[8][lane] = c_follower;  // contact.contact by y_follower
-    at->Phi_q[9][lane] = -(c_follower * (x_follower - x_cam - contact_7)
-            + s_follower * (y_follower - y_cam - contact_5));  // contact.contact by phi_follower
-    at->Phi_q[10][lane] = -(s_follower * contact_10 + c_follower * contact_11);  // contact.contact by alpha_contact
-    at->Phi_q[11][lane] = contact_12;  // contact.tangent by phi_cam
-    at->Phi_q[12][lane] = -contact_12;  // contact.tangent by phi_follower
-    at->Phi_q[13][lane] = c_follower * (contact_13 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-        - s_follower * (contact_13 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y);  // contact.tangent by alpha_contact
+    at->Phi_q[9][lane] = -(c_follower * contact_d_x + s_follower * contact_d_y);  // contact.contact by phi_follower
+    at->Phi_q[10][lane] = -contact_14;  // contact.contact by alpha_contact
+    at->Phi_q[11][lane] = contact_15;  // contact.tangent by phi_cam
+    at->Phi_q[12][lane] = -contact_15;  // contact.tangent by phi_follower
+    at->Phi_q[13][lane] = c_follower * (contact_16 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
+        - s_follower * (contact_16 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y);  // contact.tangent by alpha_contact
     return far;
 }
 
-static void Phi_q_of_block(block *at, size_t count)
+static void position_of_block(block *at, size_t count)
 {
     int64_t far = 0;
     for (size_t lane = 0; lane < count; lane++)
-        far |= Phi_q_at(at, lane, 0);
+        far |= position_at(at, lane, 0);
     for (size_t lane = 0; far && lane < count; lane++)
-        Phi_q_at(at, lane, 1);
+        position_at(at, lane, 1);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
@@ -379,270 +342,6 @@ static void gamma_of_block(block *at, size_t count)
         far |= gamma_at(at, lane, 0);
     for (size_t lane = 0; far && lane < count; lane++)
         gamma_at(at, lane, 1);
-}
-
-// Phi and Phi_q in one go: a step of Newton's method.
-INLINE int64_t position_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x_cam = at->q[0][lane];
-    const double y_cam = at->q[1][lane];
-    const double phi_cam = at->q[2][lane];
-    const double x_follower = at->q[3][lane];
-    const double y_follower = at->q[4][lane];
-    const double phi_follower = at->q[5][lane];
-    const double alpha_contact = at->q[6][lane];
-    const double base = at->p[0][lane];
-    const double lift = at->p[1][lane];
-    const double omega = at->p[2][lane];
-    const double t = at->t[lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_cam, s_cam;
-    far |= cos_sin(phi_cam, exact, &c_cam, &s_cam);
-    double c_follower, s_follower;
-    far |= cos_sin(phi_follower, exact, &c_follower, &s_follower);
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    const double cos_alpha_contact = cosine(alpha_contact, exact, &far);
-    const double contact_rho_cam = base + lift * (1.0 - cos_alpha_contact) / 2.0;
-    const double sin_alpha_contact = sine(alpha_contact, exact, &far);
-    const double contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam;
-    const double contact_5 = contact_rho_cam * contact_u_cam_y;
-    const double contact_d_y = y_follower - y_cam - contact_5;
-    const double contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam;
-    const double contact_8 = contact_rho_cam * contact_u_cam_x;
-    const double contact_d_x = x_follower - x_cam - contact_8;
-    const double lift_sin_alpha_contact = lift * sin_alpha_contact;
-    const double contact_rho_cam_1 = lift_sin_alpha_contact / 2.0;
-    const double contact_12 = contact_5 - contact_rho_cam_1 * contact_u_cam_x;
-    const double contact_13 = contact_rho_cam_1 * contact_u_cam_y + contact_8;
-    const double contact_14 = s_follower * contact_12 + c_follower * contact_13;
-    const double contact_15 = s_follower * contact_13 - c_follower * contact_12;
-    const double contact_16 = lift * cos_alpha_contact / 2.0 - contact_rho_cam;
-    // 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-    at->Phi[0][lane] = x_cam;
-    at->Phi[1][lane] = y_cam;
-    // 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-    at->Phi[2][lane] = -x_follower;
-    at->Phi[3][lane] = s_follower;
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    at->Phi[4][lane] = c_follower * contact_d_y - s_follower * contact_d_x;
-    at->Phi[5][lane] = contact_14;
-    // 6  AbsoluteAngle "motor": cam angle omega*t
-    at->Phi[6][lane] = phi_cam - omega * t;
-    // 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-    at->Phi_q[3][lane] = c_follower;  // guide.parallel by phi_follower
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    at->Phi_q[4][lane] = s_follower;  // contact.contact by x_cam
-    at->Phi_q[5][lane] = -c_follower;  // contact.contact by y_cam
-    at->Phi_q[6][lane] = -(s_follower * contact_5 + c_follower * contact_8);  // contact.contact by phi_cam
-    at->Phi_q[7][lane] = -s_follower;  // contact.contact by x_follower
-    at->Phi_q[8][lane] = c_follower;  // contact.contact by y_follower
-    at->Phi_q[9][lane] = -(c_follower * contact_d_x + s_follower * contact_d_y);  // contact.contact by phi_follower
-    at->Phi_q[10][lane] = -contact_14;  // contact.contact by alpha_contact
-    at->Phi_q[11][lane] = contact_15;  // contact.tangent by phi_cam
-    at->Phi_q[12][lane] = -contact_15;  // contact.tangent by phi_follower
-    at->Phi_q[13][lane] = c_follower * (contact_16 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-        - s_follower * (contact_16 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y);  // contact.tangent by alpha_contact
-    return far;
-}
-
-static void position_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= position_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
-}
-
-// Phi_q and nu in one go: the velocity equation.
-INLINE int64_t velocity_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x_cam = at->q[0][lane];
-    const double y_cam = at->q[1][lane];
-    const double phi_cam = at->q[2][lane];
-    const double x_follower = at->q[3][lane];
-    const double y_follower = at->q[4][lane];
-    const double phi_follower = at->q[5][lane];
-    const double alpha_contact = at->q[6][lane];
-    const double base = at->p[0][lane];
-    const double lift = at->p[1][lane];
-    const double omega = at->p[2][lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_cam, s_cam;
-    far |= cos_sin(phi_cam, exact, &c_cam, &s_cam);
-    double c_follower, s_follower;
-    far |= cos_sin(phi_follower, exact, &c_follower, &s_follower);
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    const double cos_alpha_contact = cosine(alpha_contact, exact, &far);
-    const double contact_rho_cam = base + lift * (1.0 - cos_alpha_contact) / 2.0;
-    const double sin_alpha_contact = sine(alpha_contact, exact, &far);
-    const double contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam;
-    const double contact_5 = contact_rho_cam * contact_u_cam_y;
-    const double contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam;
-    const double contact_7 = contact_rho_cam * contact_u_cam_x;
-    const double lift_sin_alpha_contact = lift * sin_alpha_contact;
-    const double contact_rho_cam_1 = lift_sin_alpha_contact / 2.0;
-    const double contact_10 = contact_5 - contact_rho_cam_1 * contact_u_cam_x;
-    const double contact_11 = contact_rho_cam_1 * contact_u_cam_y + contact_7;
-    const double contact_12 = s_follower * contact_11 - c_follower * contact_10;
-    const double contact_13 = lift * cos_alpha_contact / 2.0 - contact_rho_cam;
-    // 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-    at->Phi_q[3][lane] = c_follower;  // guide.parallel by phi_follower
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    at->Phi_q[4][lane] = s_follower;  // contact.contact by x_cam
-    at->Phi_q[5][lane] = -c_follower;  // contact.contact by y_cam
-    at->Phi_q[6][lane] = -(s_follower * contact_5 + c_follower * contact_7);  // contact.contact by phi_cam
-    at->Phi_q[7][lane] = -s_follower;  // contact.contact by x_follower
-    at->Phi_q[8][lane] = c_follower;  // contact.contact by y_follower
-    at->Phi_q[9][lane] = -(c_follower * (x_follower - x_cam - contact_7)
-            + s_follower * (y_follower - y_cam - contact_5));  // contact.contact by phi_follower
-    at->Phi_q[10][lane] = -(s_follower * contact_10 + c_follower * contact_11);  // contact.contact by alpha_contact
-    at->Phi_q[11][lane] = contact_12;  // contact.tangent by phi_cam
-    at->Phi_q[12][lane] = -contact_12;  // contact.tangent by phi_follower
-    at->Phi_q[13][lane] = c_follower * (contact_13 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-        - s_follower * (contact_13 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y);  // contact.tangent by alpha_contact
-    // 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-    at->nu[0][lane] = 0.0;
-    at->nu[1][lane] = 0.0;
-    // 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-    at->nu[2][lane] = 0.0;
-    at->nu[3][lane] = 0.0;
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    at->nu[4][lane] = 0.0;
-    at->nu[5][lane] = 0.0;
-    // 6  AbsoluteAngle "motor": cam angle omega*t
-    at->nu[6][lane] = omega;
-    return far;
-}
-
-static void velocity_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= velocity_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        velocity_at(at, lane, 1);
-}
-
-// Phi_q and gamma in one go: the acceleration equation.
-INLINE int64_t acceleration_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x_cam = at->q[0][lane];
-    const double y_cam = at->q[1][lane];
-    const double phi_cam = at->q[2][lane];
-    const double x_follower = at->q[3][lane];
-    const double y_follower = at->q[4][lane];
-    const double phi_follower = at->q[5][lane];
-    const double alpha_contact = at->q[6][lane];
-    const double x_cam_dot = at->q_dot[0][lane];
-    const double y_cam_dot = at->q_dot[1][lane];
-    const double phi_cam_dot = at->q_dot[2][lane];
-    const double x_follower_dot = at->q_dot[3][lane];
-    const double y_follower_dot = at->q_dot[4][lane];
-    const double phi_follower_dot = at->q_dot[5][lane];
-    const double alpha_contact_dot = at->q_dot[6][lane];
-    const double base = at->p[0][lane];
-    const double lift = at->p[1][lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_cam, s_cam;
-    far |= cos_sin(phi_cam, exact, &c_cam, &s_cam);
-    double c_follower, s_follower;
-    far |= cos_sin(phi_follower, exact, &c_follower, &s_follower);
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    const double cos_alpha_contact = cosine(alpha_contact, exact, &far);
-    const double contact_rho_cam = base + lift * (1.0 - cos_alpha_contact) / 2.0;
-    const double sin_alpha_contact = sine(alpha_contact, exact, &far);
-    const double contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam;
-    const double contact_5 = contact_rho_cam * contact_u_cam_y;
-    const double contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam;
-    const double contact_7 = contact_rho_cam * contact_u_cam_x;
-    const double contact_d_x = x_follower - x_cam - contact_7;
-    const double contact_d_y = y_follower - y_cam - contact_5;
-    const double lift_sin_alpha_contact = lift * sin_alpha_contact;
-    const double contact_rho_cam_1 = lift_sin_alpha_contact / 2.0;
-    const double contact_12 = contact_5 - contact_rho_cam_1 * contact_u_cam_x;
-    const double contact_13 = contact_rho_cam_1 * contact_u_cam_y + contact_7;
-    const double contact_14 = s_follower * contact_12 + c_follower * contact_13;
-    const double contact_15 = s_follower * contact_13 - c_follower * contact_12;
-    const double lift_cos_alpha_contact = lift * cos_alpha_contact;
-    const double contact_rho_cam_2 = lift_cos_alpha_contact / 2.0;
-    const double contact_18 = contact_rho_cam_2 - contact_rho_cam;
-    const double contact_19 = contact_rho_cam_1 * alpha_contact_dot;
-    const double contact_20 = contact_19 * contact_u_cam_x;
-    const double contact_21 = phi_cam_dot * contact_u_cam_y + alpha_contact_dot * contact_u_cam_y;
-    const double contact_22 = contact_rho_cam * contact_21;
-    const double contact_23 = contact_19 * contact_u_cam_y;
-    const double contact_24 = phi_cam_dot * contact_u_cam_x + alpha_contact_dot * contact_u_cam_x;
-    const double contact_25 = contact_rho_cam * contact_24;
-    const double contact_26 = c_follower * (x_follower_dot - x_cam_dot - contact_20 + contact_22)
-        + s_follower * (y_follower_dot - y_cam_dot - contact_23 - contact_25);
-    const double contact_27 = phi_cam_dot * contact_21 + alpha_contact_dot * contact_21;
-    const double contact_28 = contact_rho_cam * contact_27;
-    const double alpha_contact_dot_sq = square(alpha_contact_dot);
-    const double contact_30 = contact_rho_cam_2 * alpha_contact_dot_sq;
-    const double contact_31 = contact_30 * contact_u_cam_y;
-    const double contact_32 = lift_sin_alpha_contact * alpha_contact_dot;
-    const double contact_33 = contact_32 * contact_24;
-    const double contact_34 = contact_32 * contact_21;
-    const double contact_35 = contact_30 * contact_u_cam_x;
-    const double contact_36 = phi_cam_dot * contact_24 + alpha_contact_dot * contact_24;
-    const double contact_37 = contact_rho_cam * contact_36;
-    const double contact_38 = contact_rho_cam_2 * alpha_contact_dot;
-    const double contact_39 = c_follower * (contact_38 * contact_u_cam_x - contact_rho_cam_1 * contact_21
-            - contact_23 - contact_25)
-        + s_follower * (contact_38 * contact_u_cam_y + contact_rho_cam_1 * contact_24
-            + contact_20 - contact_22);
-    const double contact_40 = lift_cos_alpha_contact * alpha_contact_dot;
-    const double contact_41 = contact_rho_cam_1 * alpha_contact_dot_sq;
-    // 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-    at->Phi_q[3][lane] = c_follower;  // guide.parallel by phi_follower
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    at->Phi_q[4][lane] = s_follower;  // contact.contact by x_cam
-    at->Phi_q[5][lane] = -c_follower;  // contact.contact by y_cam
-    at->Phi_q[6][lane] = -(s_follower * contact_5 + c_follower * contact_7);  // contact.contact by phi_cam
-    at->Phi_q[7][lane] = -s_follower;  // contact.contact by x_follower
-    at->Phi_q[8][lane] = c_follower;  // contact.contact by y_follower
-    at->Phi_q[9][lane] = -(c_follower * contact_d_x + s_follower * contact_d_y);  // contact.contact by phi_follower
-    at->Phi_q[10][lane] = -contact_14;  // contact.contact by alpha_contact
-    at->Phi_q[11][lane] = contact_15;  // contact.tangent by phi_cam
-    at->Phi_q[12][lane] = -contact_15;  // contact.tangent by phi_follower
-    at->Phi_q[13][lane] = c_follower * (contact_18 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-        - s_follower * (contact_18 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y);  // contact.tangent by alpha_contact
-    // 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-    at->gamma[0][lane] = 0.0;
-    at->gamma[1][lane] = 0.0;
-    // 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-    at->gamma[2][lane] = 0.0;
-    at->gamma[3][lane] = phi_follower_dot * (phi_follower_dot * s_follower);
-    // 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-    at->gamma[4][lane] = phi_follower_dot * (phi_follower_dot * (c_follower * contact_d_y
-                - s_follower * contact_d_x)
-            + contact_26)
-        + phi_follower_dot * contact_26
-        - (c_follower * (contact_28 - (contact_31 + contact_33))
-            - s_follower * (contact_34 - contact_35 + contact_37));
-    at->gamma[5][lane] = phi_follower_dot * (phi_follower_dot * contact_14 + contact_39)
-        + phi_follower_dot * contact_39
-        - (c_follower * (contact_40 * contact_24 - contact_41 * contact_u_cam_y
-                - contact_rho_cam_1 * contact_27 + contact_35 - contact_34 - contact_37)
-            - s_follower * (contact_28
-                - (contact_41 * contact_u_cam_x + contact_40 * contact_21
-                    + contact_rho_cam_1 * contact_36 + contact_31 + contact_33)));
-    // 6  AbsoluteAngle "motor": cam angle omega*t
-    at->gamma[6][lane] = 0.0;
-    return far;
-}
-
-static void acceleration_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= acceleration_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        acceleration_at(at, lane, 1);
 }
 
 // Phi, Phi_q, nu and gamma in one go.
@@ -948,60 +647,139 @@ static void write_rows(cam_flat_follower_output to, double (*rows)[LANES], const
     store_rows(to, rows, listed, size, start, count, 0);
 }
 
-// Write the nonzeros of Phi_q into whole matrices: all entries, or only those that are computed.
-// `matrix` holds the others.
-static void write_matrices(cam_flat_follower_output to, double (*nonzeros)[LANES], double *matrix,
-    int varying_only, size_t start, size_t count, int is_far)
+// A quantity: where its entries are in a block and its results in a batch, its size, which entries
+// never change, and which are computed. A vector has no columns, and a matrix a place in `matrices`.
+typedef struct {
+    size_t rows, result, nonzeros;
+    int height, width, place, entries, constants, computed;
+    const int (*pattern)[2];
+    const constant *constant;
+    const int *computed_entry, *computed_place;
+} quantity;
+
+static const quantity QUANTITY[] = {
+    {offsetof(block, Phi), offsetof(cam_flat_follower_batch, Phi),
+        0, 7, 0, 0,
+        7, 0, 7,
+        NULL,
+        Phi_constant, Phi_computed, NULL},
+    {offsetof(block, Phi_q), offsetof(cam_flat_follower_batch, Phi_q),
+        offsetof(cam_flat_follower_batch, nonzeros), 7, 7, 0,
+        15, 4, 11,
+        cam_flat_follower_pattern,
+        Phi_q_constant, Phi_q_computed, Phi_q_place},
+    {offsetof(block, nu), offsetof(cam_flat_follower_batch, nu),
+        0, 7, 0, 49,
+        7, 6, 1,
+        NULL,
+        nu_constant, nu_computed, NULL},
+    {offsetof(block, gamma), offsetof(cam_flat_follower_batch, gamma),
+        0, 7, 0, 49,
+        7, 4, 3,
+        NULL,
+        gamma_constant, gamma_computed, NULL},
+};
+enum { QUANTITIES = 4, MATRICES = 49 };
+
+// The kernels, the quantities that each gives, as bits, and the quantities that depend on rates.
+static const struct {
+    unsigned gives;
+    void (*run)(block *, size_t);
+} KERNEL[] = {
+    {3, position_of_block},
+    {4, nu_of_block},
+    {8, gamma_of_block},
+    {15, kinematics_of_block},
+};
+enum { KERNELS = 4, MOVING = 8 };
+
+// Run the first kernel that gives all that is wanted, or as many as it takes.
+static void run_kernels(unsigned wanted, block *b, size_t count)
 {
-    const int is_copied = to.entry == 1 && !varying_only;
+    for (int k = 0; k < KERNELS; k++)
+        if ((wanted & ~KERNEL[k].gives) == 0) {
+            KERNEL[k].run(b, count);
+            return;
+        }
+    for (int k = KERNELS - 1; k >= 0; k--)
+        if (wanted & KERNEL[k].gives) {
+            KERNEL[k].run(b, count);
+            wanted &= ~KERNEL[k].gives;
+        }
+}
+
+// Write the nonzeros into whole matrices: all entries, or only those that are computed. `matrix`
+// holds the others.
+INLINE void write_matrices(cam_flat_follower_output to, const quantity *q, double (*rows)[LANES],
+    double *matrix, int varying_only, size_t start, size_t count, int is_far)
+{
+    const int is_copied = to.entry == 1 && !varying_only, size = q->height * q->width;
     for (size_t k = 0; k < count; k++) {
         double *first = to.first + (ptrdiff_t)(start + k) * to.point;
-        for (int i = 0; !is_copied && !varying_only && i < M * N; i++)
+        for (int i = 0; !is_copied && !varying_only && i < size; i++)
             first[i * to.entry] = matrix[i];
-        for (int v = 0; v < VARYING; v++) {
-            const int entry = VARYING_ENTRY[v], *place = cam_flat_follower_pattern[entry];
-            const int i = place[0] * N + place[1];
-            *(is_copied ? matrix + i : first + i * to.entry) = nonzeros[entry][k];
+        for (int v = 0; v < q->computed; v++) {
+            const int i = q->computed_place[v];
+            *(is_copied ? matrix + i : first + i * to.entry) = rows[q->computed_entry[v]][k];
         }
         if (is_copied)
-            copy(first, matrix, M * N, is_far);
+            copy(first, matrix, (size_t)size, is_far);
     }
 }
 
-// Put the entries of Phi_q that never change in place: in a block, and in a whole matrix.
-static void place_constants(block *b, double *matrix, size_t count)
+// The entries of a quantity in a block, and the outputs of a batch.
+INLINE double (*rows_of(block *b, const quantity *q))[LANES]
 {
-    memset(matrix, 0, M * N * sizeof *matrix);
-    for (int c = 0; c < CONSTANTS; c++) {
-        const int *place = cam_flat_follower_pattern[CONSTANT[c].entry];
-        matrix[place[0] * N + place[1]] = CONSTANT[c].value;
-        for (size_t k = 0; k < count; k++)
-            b->Phi_q[CONSTANT[c].entry][k] = CONSTANT[c].value;
-    }
+    return (double (*)[LANES])((char *)b + q->rows);
 }
 
-// The function that gives the wanted quantities: 1 for Phi, 2 for Phi_q, 4 for nu, 8 for gamma.
-static void (*const FUNCTION[16])(block *, size_t) = {
-    NULL, Phi_of_block, Phi_q_of_block, position_of_block, nu_of_block, kinematics_of_block,
-    velocity_of_block, kinematics_of_block, gamma_of_block, kinematics_of_block,
-    acceleration_of_block, kinematics_of_block, kinematics_of_block, kinematics_of_block,
-    kinematics_of_block, kinematics_of_block,
-};
+INLINE cam_flat_follower_output output_of(const cam_flat_follower_batch *batch, size_t offset)
+{
+    return *(const cam_flat_follower_output *)((const char *)batch + offset);
+}
+
+// Put the entries of matrices that never change in place: in a block, and in whole matrices.
+static void place_constants(block *b, double *matrices, size_t count)
+{
+    memset(matrices, 0, MATRICES * sizeof *matrices);
+    for (const quantity *q = QUANTITY; q < QUANTITY + QUANTITIES; q++)
+        for (int c = 0; q->width > 0 && c < q->constants; c++) {
+            const constant *entry = q->constant + c;
+            const int *place = q->pattern[entry->entry];
+            matrices[q->place + place[0] * q->width + place[1]] = entry->value;
+            for (size_t k = 0; k < count; k++)
+                rows_of(b, q)[entry->entry][k] = entry->value;
+        }
+}
+
+// Write a quantity of a block of points: as vectors or nonzeros, and as whole matrices. It is called
+// once a quantity, so that a compiler knows the sizes.
+INLINE void write_quantity(const cam_flat_follower_batch *batch, const quantity *q, block *b,
+    double *matrices, size_t start, size_t count, int is_far)
+{
+    const cam_flat_follower_output whole = output_of(batch, q->result);
+    const int only = batch->varying_only, is_matrix = q->width > 0;
+    if (is_matrix && whole.first)
+        write_matrices(whole, q, rows_of(b, q), matrices + q->place, only, start, count, is_far);
+    store_rows(is_matrix ? output_of(batch, q->nonzeros) : whole, rows_of(b, q),
+        only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
+}
 
 int cam_flat_follower_evaluate(const cam_flat_follower_batch *batch)
 {
     block b;
-    double matrix[M * N], check[LANES] = { 0 };
-    const int wants_Phi_q = batch->Phi_q.first || batch->nonzeros.first;
-    const int wanted = (batch->Phi.first ? 1 : 0) | (wants_Phi_q ? 2 : 0)
-        | (batch->nu.first ? 4 : 0) | (batch->gamma.first ? 8 : 0);
+    double matrices[MATRICES], check[LANES] = { 0 };
+    unsigned wanted = 0;
+    for (int k = 0; k < QUANTITIES; k++)
+        if (output_of(batch, QUANTITY[k].result).first
+            || (QUANTITY[k].width > 0 && output_of(batch, QUANTITY[k].nonzeros).first))
+            wanted |= 1u << k;
     if (wanted == 0)
         return 0;
-    const int is_far = batch->count > FAR;
+    const int is_far = batch->count > FAR, wants_rates = wanted & MOVING && batch->q_dot.first;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
-    const int only = batch->varying_only, wants_rates = wanted & 8 && batch->q_dot.first;
-    if (wants_Phi_q && !only)
-        place_constants(&b, matrix, widest);
+    if (!batch->varying_only)
+        place_constants(&b, matrices, widest);
     if (!wants_rates)
         memset(b.q_dot, 0, sizeof b.q_dot);
     for (size_t start = 0; start < batch->count; start += LANES) {
@@ -1013,15 +791,19 @@ int cam_flat_follower_evaluate(const cam_flat_follower_batch *batch)
         read_rows(b.q, N, batch->q, start, count, check);
         if (wants_rates)
             read_rows(b.q_dot, N, batch->q_dot, start, count, check);
-        FUNCTION[wanted](&b, count);
-        store_rows(batch->Phi, b.Phi, NULL, M, start, count, is_far);
-        if (batch->Phi_q.first)
-            write_matrices(batch->Phi_q, b.Phi_q, matrix, only, start, count, is_far);
-        store_rows(batch->nonzeros, b.Phi_q, only ? VARYING_ENTRY : NULL,
-            only ? VARYING : NONZEROS, start, count, is_far);
-        store_rows(batch->nu, b.nu, only ? NU_ROW : NULL, only ? NU_ROWS : M, start, count, is_far);
-        store_rows(batch->gamma, b.gamma, only ? GAMMA_ROW : NULL, only ? GAMMA_ROWS : M, start,
-            count, is_far);
+        run_kernels(wanted, &b, count);
+        if (wanted & 1)
+            write_quantity(batch, &QUANTITY[0], &b, matrices, start, count,
+                is_far);
+        if (wanted & 2)
+            write_quantity(batch, &QUANTITY[1], &b, matrices, start, count,
+                is_far);
+        if (wanted & 4)
+            write_quantity(batch, &QUANTITY[2], &b, matrices, start, count,
+                is_far);
+        if (wanted & 8)
+            write_quantity(batch, &QUANTITY[3], &b, matrices, start, count,
+                is_far);
     }
 #ifdef __x86_64__
     if (is_far)
@@ -1036,8 +818,8 @@ int cam_flat_follower_evaluate(const cam_flat_follower_batch *batch)
 void cam_flat_follower_solve(const cam_flat_follower_system *system)
 {
     block b;
-    double matrix[M * N], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
-    place_constants(&b, matrix, LANES);
+    double matrices[MATRICES], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
+    place_constants(&b, matrices, LANES);
     for (size_t start = 0; start < system->count; start += LANES) {
         const size_t rest = system->count - start, count = rest < LANES ? rest : LANES;
         read_rows(b.Phi_q, NONZEROS, system->nonzeros, start, count, check);
@@ -1336,9 +1118,9 @@ size_t cam_flat_follower_march(const cam_flat_follower_motion *motion)
     scales s;
     outcome o;
     state at;
-    double matrix[M * N];
+    double matrices[MATRICES];
     s.tolerance = motion->tolerance;
-    place_constants(&b, matrix, LANES);
+    place_constants(&b, matrices, LANES);
     for (int i = 0; i < K; i++)
         for (size_t k = 0; k < LANES; k++)
             b.p[i][k] = motion->p[i];
@@ -1417,8 +1199,8 @@ static void advance_alone(block *b, const scales *s, state *at, size_t k, outcom
     block alone;
     scales own;
     outcome found;
-    double matrix[M * N];
-    place_constants(&alone, matrix, 1);
+    double matrices[MATRICES];
+    place_constants(&alone, matrices, 1);
     own.tolerance = s->tolerance;
     found.is_over[0] = 0;
     for (int i = 0; i < K; i++)
@@ -1466,10 +1248,10 @@ size_t cam_flat_follower_march_variants(const cam_flat_follower_variants *all)
     block b;
     scales s;
     outcome o;
-    double matrix[M * N], check[LANES] = { 0 };
+    double matrices[MATRICES], check[LANES] = { 0 };
     size_t good = 0;
     s.tolerance = all->tolerance;
-    place_constants(&b, matrix, LANES);
+    place_constants(&b, matrices, LANES);
     for (size_t first = 0; first < all->variants; first += LANES) {
         const size_t rest = all->variants - first, count = rest < LANES ? rest : LANES;
         read_rows(b.p, K, all->p, first, count, check);

@@ -49,16 +49,17 @@ typedef struct {
 } cam_flat_follower_output;
 
 // What is to be evaluated at `count` points, from coordinates q, rates q_dot, time t and
-// parameters p. A result whose `first` is NULL is not wanted; only gamma needs q_dot.
+// parameters p. A result whose `first` is NULL is not wanted; where nothing depends on q_dot, it is
+// not read.
 typedef struct {
     size_t count;
     cam_flat_follower_input q, q_dot, t, p;
-    cam_flat_follower_output Phi;       // 7 entries: Phi(q, t)
-    cam_flat_follower_output Phi_q;     // 7 x 7 entries, row by row
+    cam_flat_follower_output Phi;  // 7: Constraint vector Phi(q, t).
+    cam_flat_follower_output Phi_q;  // 7 x 7: Jacobian of Phi by q.
     cam_flat_follower_output nonzeros;  // 15 entries of Phi_q, in the order of the pattern
-    cam_flat_follower_output nu;        // 7 entries: Phi_q q_dot = nu = -Phi_t
-    cam_flat_follower_output gamma;     // 7 entries: Phi_q q_ddot = gamma
-    int varying_only;  // not 0: entries of Phi_q, nu and gamma that never change are in place
+    cam_flat_follower_output nu;  // 7: Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
+    cam_flat_follower_output gamma;  // 7: Right side of the acceleration equation Phi_q q_ddot = gamma.
+    int varying_only;  // not 0: entries that never change are in place
 } cam_flat_follower_batch;
 
 // Evaluate a batch. Returns 0, or 1 where an input is not finite.

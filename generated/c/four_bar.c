@@ -34,12 +34,12 @@ enum {
     K = 5,  // parameters
     NONZEROS = 25,  // of Phi_q
     LANES = 32,  // points in a block
-    FAR = (4 << 20) / 8 / (3 * M + NONZEROS),  // points whose results leave little of a cache
+    FAR = (4 << 20) / 8 / (52),  // points whose results leave little of a cache
     FACTORS = 13,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char four_bar_fingerprint[] = "3096554c953e7691476db5b42d35f271";
+const char four_bar_fingerprint[] = "cc0bd5779c29cb6873cf0b0a081eaf91";
 const double four_bar_defaults[] = {
     10.0, 26.0, 18.0, 20.0, 1.5,
 };
@@ -51,33 +51,37 @@ const int four_bar_pattern[][2] = {
     {3, 5}, {4, 3}, {4, 5}, {4, 6}, {4, 8}, {5, 4}, {5, 5}, {5, 7}, {5, 8}, {6, 6}, {6, 8},
     {7, 7}, {7, 8}, {8, 2},
 };
-// entries of the pattern that never change, with their values, and entries that are computed
-static const struct {
+// number and value of an entry that never changes
+typedef struct {
     int entry;
     double value;
-} CONSTANT[] = {
+} constant;
+
+// the entries that never change, and those that are computed
+static const constant Phi_constant[] = { {0, 0.0} };
+static const int Phi_computed[] = { 0, 1, 2, 3, 4, 5, 6, 7, 8 };
+static const constant Phi_q_constant[] = {
     {0, 1.0}, {2, 1.0}, {4, 1.0}, {6, -1.0}, {8, 1.0}, {10, -1.0}, {12, 1.0}, {14, -1.0},
     {16, 1.0}, {18, -1.0}, {20, 1.0}, {22, 1.0}, {24, 1.0},
 };
-enum { CONSTANTS = 13, VARYING = 12 };
-static const int VARYING_ENTRY[] = {
-    1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23,
+static const int Phi_q_computed[] = { 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23 };
+static const int Phi_q_place[] = { 2, 11, 20, 23, 29, 32, 41, 44, 50, 53, 62, 71 };
+static const constant nu_constant[] = {
+    {0, 0.0}, {1, 0.0}, {2, 0.0}, {3, 0.0}, {4, 0.0}, {5, 0.0}, {6, 0.0}, {7, 0.0},
 };
-// rows of nu and gamma that are computed
-enum { NU_ROWS = 1, GAMMA_ROWS = 8 };
-static const int NU_ROW[] = {
-    8,
-};
-static const int GAMMA_ROW[] = {
-    0, 1, 2, 3, 4, 5, 6, 7,
-};
+static const int nu_computed[] = { 8 };
+static const constant gamma_constant[] = { {8, 0.0} };
+static const int gamma_computed[] = { 0, 1, 2, 3, 4, 5, 6, 7 };
 
 // A block of points: the last axis is the point.
 typedef struct {
     double t[LANES];
     double p[K > 0 ? K : 1][LANES];
     double q[N][LANES], q_dot[N][LANES], q_ddot[N][LANES];
-    double Phi[M][LANES], Phi_q[NONZEROS][LANES], nu[M][LANES], gamma[M][LANES];
+    double Phi[9][LANES];
+    double Phi_q[25][LANES];
+    double nu[9][LANES];
+    double gamma[9][LANES];
     double F[FACTORS > 0 ? FACTORS : 1][LANES], determinants[BLOCKS > 0 ? BLOCKS : 1][LANES];
 } block;
 
@@ -133,8 +137,8 @@ INLINE int64_t cos_sin(double angle, int exact, double *cosine, double *sine)
     return !(fabs(angle) <= 1e5);
 }
 
-// Constraint vector Phi(q, t).
-INLINE int64_t Phi_at(block *at, size_t lane, int exact)
+// Phi and Phi_q in one go: a step of Newton's method.
+INLINE int64_t position_at(block *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double x_crank = at->q[0][lane];
@@ -185,47 +189,6 @@ INLINE int64_t Phi_at(block *at, size_t lane, int exact)
     at->Phi[7][lane] = y_rocker + D_rocker_y;
     // 8  AbsoluteAngle "motor": crank angle omega*t
     at->Phi[8][lane] = phi_crank - omega * t;
-    return far;
-}
-
-static void Phi_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= Phi_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        Phi_at(at, lane, 1);
-}
-
-// Jacobian of Phi by q: the entries that vary.
-INLINE int64_t Phi_q_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double phi_crank = at->q[2][lane];
-    const double phi_coupler = at->q[5][lane];
-    const double phi_rocker = at->q[8][lane];
-    const double a = at->p[0][lane];
-    const double b = at->p[1][lane];
-    const double c = at->p[2][lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_coupler, s_coupler;
-    far |= cos_sin(phi_coupler, exact, &c_coupler, &s_coupler);
-    double c_rocker, s_rocker;
-    far |= cos_sin(phi_rocker, exact, &c_rocker, &s_rocker);
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    const double a_2 = a / 2.0;
-    const double B_crank_y = a_2 * s_crank;
-    const double B_crank_x = a_2 * c_crank;
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    const double b_2 = b / 2.0;
-    const double C_coupler_y = b_2 * s_coupler;
-    const double C_coupler_x = b_2 * c_coupler;
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    const double c_2 = c / 2.0;
-    const double D_rocker_y = c_2 * s_rocker;
-    const double D_rocker_x = c_2 * c_rocker;
     // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
     at->Phi_q[1][lane] = B_crank_y;  // A.x by phi_crank
     at->Phi_q[3][lane] = -B_crank_x;  // A.y by phi_crank
@@ -245,13 +208,13 @@ INLINE int64_t Phi_q_at(block *at, size_t lane, int exact)
     return far;
 }
 
-static void Phi_q_of_block(block *at, size_t count)
+static void position_of_block(block *at, size_t count)
 {
     int64_t far = 0;
     for (size_t lane = 0; lane < count; lane++)
-        far |= Phi_q_at(at, lane, 0);
+        far |= position_at(at, lane, 0);
     for (size_t lane = 0; far && lane < count; lane++)
-        Phi_q_at(at, lane, 1);
+        position_at(at, lane, 1);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
@@ -339,241 +302,6 @@ static void gamma_of_block(block *at, size_t count)
         far |= gamma_at(at, lane, 0);
     for (size_t lane = 0; far && lane < count; lane++)
         gamma_at(at, lane, 1);
-}
-
-// Phi and Phi_q in one go: a step of Newton's method.
-INLINE int64_t position_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x_crank = at->q[0][lane];
-    const double y_crank = at->q[1][lane];
-    const double phi_crank = at->q[2][lane];
-    const double x_coupler = at->q[3][lane];
-    const double y_coupler = at->q[4][lane];
-    const double phi_coupler = at->q[5][lane];
-    const double x_rocker = at->q[6][lane];
-    const double y_rocker = at->q[7][lane];
-    const double phi_rocker = at->q[8][lane];
-    const double a = at->p[0][lane];
-    const double b = at->p[1][lane];
-    const double c = at->p[2][lane];
-    const double d = at->p[3][lane];
-    const double omega = at->p[4][lane];
-    const double t = at->t[lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_coupler, s_coupler;
-    far |= cos_sin(phi_coupler, exact, &c_coupler, &s_coupler);
-    double c_rocker, s_rocker;
-    far |= cos_sin(phi_rocker, exact, &c_rocker, &s_rocker);
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    const double a_2 = a / 2.0;
-    const double B_crank_x = a_2 * c_crank;
-    const double B_crank_y = a_2 * s_crank;
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    const double b_2 = b / 2.0;
-    const double C_coupler_x = b_2 * c_coupler;
-    const double C_coupler_y = b_2 * s_coupler;
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    const double c_2 = c / 2.0;
-    const double D_rocker_x = c_2 * c_rocker;
-    const double D_rocker_y = c_2 * s_rocker;
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    at->Phi[0][lane] = x_crank - B_crank_x;
-    at->Phi[1][lane] = y_crank - B_crank_y;
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    at->Phi[2][lane] = x_crank + B_crank_x - x_coupler + C_coupler_x;
-    at->Phi[3][lane] = y_crank + B_crank_y - y_coupler + C_coupler_y;
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    at->Phi[4][lane] = x_coupler + C_coupler_x - x_rocker + D_rocker_x;
-    at->Phi[5][lane] = y_coupler + C_coupler_y - y_rocker + D_rocker_y;
-    // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-    at->Phi[6][lane] = x_rocker + D_rocker_x - d;
-    at->Phi[7][lane] = y_rocker + D_rocker_y;
-    // 8  AbsoluteAngle "motor": crank angle omega*t
-    at->Phi[8][lane] = phi_crank - omega * t;
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    at->Phi_q[1][lane] = B_crank_y;  // A.x by phi_crank
-    at->Phi_q[3][lane] = -B_crank_x;  // A.y by phi_crank
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    at->Phi_q[5][lane] = -B_crank_y;  // B.x by phi_crank
-    at->Phi_q[7][lane] = -C_coupler_y;  // B.x by phi_coupler
-    at->Phi_q[9][lane] = B_crank_x;  // B.y by phi_crank
-    at->Phi_q[11][lane] = C_coupler_x;  // B.y by phi_coupler
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    at->Phi_q[13][lane] = -C_coupler_y;  // C.x by phi_coupler
-    at->Phi_q[15][lane] = -D_rocker_y;  // C.x by phi_rocker
-    at->Phi_q[17][lane] = C_coupler_x;  // C.y by phi_coupler
-    at->Phi_q[19][lane] = D_rocker_x;  // C.y by phi_rocker
-    // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-    at->Phi_q[21][lane] = -D_rocker_y;  // D.x by phi_rocker
-    at->Phi_q[23][lane] = D_rocker_x;  // D.y by phi_rocker
-    return far;
-}
-
-static void position_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= position_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
-}
-
-// Phi_q and nu in one go: the velocity equation.
-INLINE int64_t velocity_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double phi_crank = at->q[2][lane];
-    const double phi_coupler = at->q[5][lane];
-    const double phi_rocker = at->q[8][lane];
-    const double a = at->p[0][lane];
-    const double b = at->p[1][lane];
-    const double c = at->p[2][lane];
-    const double omega = at->p[4][lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_coupler, s_coupler;
-    far |= cos_sin(phi_coupler, exact, &c_coupler, &s_coupler);
-    double c_rocker, s_rocker;
-    far |= cos_sin(phi_rocker, exact, &c_rocker, &s_rocker);
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    const double a_2 = a / 2.0;
-    const double B_crank_y = a_2 * s_crank;
-    const double B_crank_x = a_2 * c_crank;
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    const double b_2 = b / 2.0;
-    const double C_coupler_y = b_2 * s_coupler;
-    const double C_coupler_x = b_2 * c_coupler;
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    const double c_2 = c / 2.0;
-    const double D_rocker_y = c_2 * s_rocker;
-    const double D_rocker_x = c_2 * c_rocker;
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    at->Phi_q[1][lane] = B_crank_y;  // A.x by phi_crank
-    at->Phi_q[3][lane] = -B_crank_x;  // A.y by phi_crank
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    at->Phi_q[5][lane] = -B_crank_y;  // B.x by phi_crank
-    at->Phi_q[7][lane] = -C_coupler_y;  // B.x by phi_coupler
-    at->Phi_q[9][lane] = B_crank_x;  // B.y by phi_crank
-    at->Phi_q[11][lane] = C_coupler_x;  // B.y by phi_coupler
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    at->Phi_q[13][lane] = -C_coupler_y;  // C.x by phi_coupler
-    at->Phi_q[15][lane] = -D_rocker_y;  // C.x by phi_rocker
-    at->Phi_q[17][lane] = C_coupler_x;  // C.y by phi_coupler
-    at->Phi_q[19][lane] = D_rocker_x;  // C.y by phi_rocker
-    // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-    at->Phi_q[21][lane] = -D_rocker_y;  // D.x by phi_rocker
-    at->Phi_q[23][lane] = D_rocker_x;  // D.y by phi_rocker
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    at->nu[0][lane] = 0.0;
-    at->nu[1][lane] = 0.0;
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    at->nu[2][lane] = 0.0;
-    at->nu[3][lane] = 0.0;
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    at->nu[4][lane] = 0.0;
-    at->nu[5][lane] = 0.0;
-    // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-    at->nu[6][lane] = 0.0;
-    at->nu[7][lane] = 0.0;
-    // 8  AbsoluteAngle "motor": crank angle omega*t
-    at->nu[8][lane] = omega;
-    return far;
-}
-
-static void velocity_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= velocity_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        velocity_at(at, lane, 1);
-}
-
-// Phi_q and gamma in one go: the acceleration equation.
-INLINE int64_t acceleration_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double phi_crank = at->q[2][lane];
-    const double phi_coupler = at->q[5][lane];
-    const double phi_rocker = at->q[8][lane];
-    const double phi_crank_dot = at->q_dot[2][lane];
-    const double phi_coupler_dot = at->q_dot[5][lane];
-    const double phi_rocker_dot = at->q_dot[8][lane];
-    const double a = at->p[0][lane];
-    const double b = at->p[1][lane];
-    const double c = at->p[2][lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_coupler, s_coupler;
-    far |= cos_sin(phi_coupler, exact, &c_coupler, &s_coupler);
-    double c_rocker, s_rocker;
-    far |= cos_sin(phi_rocker, exact, &c_rocker, &s_rocker);
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    const double a_2 = a / 2.0;
-    const double B_crank_y = a_2 * s_crank;
-    const double B_crank_x = a_2 * c_crank;
-    const double phi_crank_dot_sq = square(phi_crank_dot);
-    const double B_crank_w2_x = phi_crank_dot_sq * B_crank_x;
-    const double B_crank_w2_y = phi_crank_dot_sq * B_crank_y;
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    const double b_2 = b / 2.0;
-    const double C_coupler_y = b_2 * s_coupler;
-    const double C_coupler_x = b_2 * c_coupler;
-    const double phi_coupler_dot_sq = square(phi_coupler_dot);
-    const double C_coupler_w2_x = phi_coupler_dot_sq * C_coupler_x;
-    const double C_coupler_w2_y = phi_coupler_dot_sq * C_coupler_y;
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    const double c_2 = c / 2.0;
-    const double D_rocker_y = c_2 * s_rocker;
-    const double D_rocker_x = c_2 * c_rocker;
-    const double phi_rocker_dot_sq = square(phi_rocker_dot);
-    const double D_rocker_w2_x = phi_rocker_dot_sq * D_rocker_x;
-    const double D_rocker_w2_y = phi_rocker_dot_sq * D_rocker_y;
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    at->Phi_q[1][lane] = B_crank_y;  // A.x by phi_crank
-    at->Phi_q[3][lane] = -B_crank_x;  // A.y by phi_crank
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    at->Phi_q[5][lane] = -B_crank_y;  // B.x by phi_crank
-    at->Phi_q[7][lane] = -C_coupler_y;  // B.x by phi_coupler
-    at->Phi_q[9][lane] = B_crank_x;  // B.y by phi_crank
-    at->Phi_q[11][lane] = C_coupler_x;  // B.y by phi_coupler
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    at->Phi_q[13][lane] = -C_coupler_y;  // C.x by phi_coupler
-    at->Phi_q[15][lane] = -D_rocker_y;  // C.x by phi_rocker
-    at->Phi_q[17][lane] = C_coupler_x;  // C.y by phi_coupler
-    at->Phi_q[19][lane] = D_rocker_x;  // C.y by phi_rocker
-    // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-    at->Phi_q[21][lane] = -D_rocker_y;  // D.x by phi_rocker
-    at->Phi_q[23][lane] = D_rocker_x;  // D.y by phi_rocker
-    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-    at->gamma[0][lane] = -B_crank_w2_x;
-    at->gamma[1][lane] = -B_crank_w2_y;
-    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-    at->gamma[2][lane] = B_crank_w2_x + C_coupler_w2_x;
-    at->gamma[3][lane] = B_crank_w2_y + C_coupler_w2_y;
-    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-    at->gamma[4][lane] = C_coupler_w2_x + D_rocker_w2_x;
-    at->gamma[5][lane] = C_coupler_w2_y + D_rocker_w2_y;
-    // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-    at->gamma[6][lane] = D_rocker_w2_x;
-    at->gamma[7][lane] = D_rocker_w2_y;
-    // 8  AbsoluteAngle "motor": crank angle omega*t
-    at->gamma[8][lane] = 0.0;
-    return far;
-}
-
-static void acceleration_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= acceleration_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        acceleration_at(at, lane, 1);
 }
 
 // Phi, Phi_q, nu and gamma in one go.
@@ -869,60 +597,139 @@ static void write_rows(four_bar_output to, double (*rows)[LANES], const int *lis
     store_rows(to, rows, listed, size, start, count, 0);
 }
 
-// Write the nonzeros of Phi_q into whole matrices: all entries, or only those that are computed.
-// `matrix` holds the others.
-static void write_matrices(four_bar_output to, double (*nonzeros)[LANES], double *matrix,
-    int varying_only, size_t start, size_t count, int is_far)
+// A quantity: where its entries are in a block and its results in a batch, its size, which entries
+// never change, and which are computed. A vector has no columns, and a matrix a place in `matrices`.
+typedef struct {
+    size_t rows, result, nonzeros;
+    int height, width, place, entries, constants, computed;
+    const int (*pattern)[2];
+    const constant *constant;
+    const int *computed_entry, *computed_place;
+} quantity;
+
+static const quantity QUANTITY[] = {
+    {offsetof(block, Phi), offsetof(four_bar_batch, Phi),
+        0, 9, 0, 0,
+        9, 0, 9,
+        NULL,
+        Phi_constant, Phi_computed, NULL},
+    {offsetof(block, Phi_q), offsetof(four_bar_batch, Phi_q),
+        offsetof(four_bar_batch, nonzeros), 9, 9, 0,
+        25, 13, 12,
+        four_bar_pattern,
+        Phi_q_constant, Phi_q_computed, Phi_q_place},
+    {offsetof(block, nu), offsetof(four_bar_batch, nu),
+        0, 9, 0, 81,
+        9, 8, 1,
+        NULL,
+        nu_constant, nu_computed, NULL},
+    {offsetof(block, gamma), offsetof(four_bar_batch, gamma),
+        0, 9, 0, 81,
+        9, 1, 8,
+        NULL,
+        gamma_constant, gamma_computed, NULL},
+};
+enum { QUANTITIES = 4, MATRICES = 81 };
+
+// The kernels, the quantities that each gives, as bits, and the quantities that depend on rates.
+static const struct {
+    unsigned gives;
+    void (*run)(block *, size_t);
+} KERNEL[] = {
+    {3, position_of_block},
+    {4, nu_of_block},
+    {8, gamma_of_block},
+    {15, kinematics_of_block},
+};
+enum { KERNELS = 4, MOVING = 8 };
+
+// Run the first kernel that gives all that is wanted, or as many as it takes.
+static void run_kernels(unsigned wanted, block *b, size_t count)
 {
-    const int is_copied = to.entry == 1 && !varying_only;
+    for (int k = 0; k < KERNELS; k++)
+        if ((wanted & ~KERNEL[k].gives) == 0) {
+            KERNEL[k].run(b, count);
+            return;
+        }
+    for (int k = KERNELS - 1; k >= 0; k--)
+        if (wanted & KERNEL[k].gives) {
+            KERNEL[k].run(b, count);
+            wanted &= ~KERNEL[k].gives;
+        }
+}
+
+// Write the nonzeros into whole matrices: all entries, or only those that are computed. `matrix`
+// holds the others.
+INLINE void write_matrices(four_bar_output to, const quantity *q, double (*rows)[LANES],
+    double *matrix, int varying_only, size_t start, size_t count, int is_far)
+{
+    const int is_copied = to.entry == 1 && !varying_only, size = q->height * q->width;
     for (size_t k = 0; k < count; k++) {
         double *first = to.first + (ptrdiff_t)(start + k) * to.point;
-        for (int i = 0; !is_copied && !varying_only && i < M * N; i++)
+        for (int i = 0; !is_copied && !varying_only && i < size; i++)
             first[i * to.entry] = matrix[i];
-        for (int v = 0; v < VARYING; v++) {
-            const int entry = VARYING_ENTRY[v], *place = four_bar_pattern[entry];
-            const int i = place[0] * N + place[1];
-            *(is_copied ? matrix + i : first + i * to.entry) = nonzeros[entry][k];
+        for (int v = 0; v < q->computed; v++) {
+            const int i = q->computed_place[v];
+            *(is_copied ? matrix + i : first + i * to.entry) = rows[q->computed_entry[v]][k];
         }
         if (is_copied)
-            copy(first, matrix, M * N, is_far);
+            copy(first, matrix, (size_t)size, is_far);
     }
 }
 
-// Put the entries of Phi_q that never change in place: in a block, and in a whole matrix.
-static void place_constants(block *b, double *matrix, size_t count)
+// The entries of a quantity in a block, and the outputs of a batch.
+INLINE double (*rows_of(block *b, const quantity *q))[LANES]
 {
-    memset(matrix, 0, M * N * sizeof *matrix);
-    for (int c = 0; c < CONSTANTS; c++) {
-        const int *place = four_bar_pattern[CONSTANT[c].entry];
-        matrix[place[0] * N + place[1]] = CONSTANT[c].value;
-        for (size_t k = 0; k < count; k++)
-            b->Phi_q[CONSTANT[c].entry][k] = CONSTANT[c].value;
-    }
+    return (double (*)[LANES])((char *)b + q->rows);
 }
 
-// The function that gives the wanted quantities: 1 for Phi, 2 for Phi_q, 4 for nu, 8 for gamma.
-static void (*const FUNCTION[16])(block *, size_t) = {
-    NULL, Phi_of_block, Phi_q_of_block, position_of_block, nu_of_block, kinematics_of_block,
-    velocity_of_block, kinematics_of_block, gamma_of_block, kinematics_of_block,
-    acceleration_of_block, kinematics_of_block, kinematics_of_block, kinematics_of_block,
-    kinematics_of_block, kinematics_of_block,
-};
+INLINE four_bar_output output_of(const four_bar_batch *batch, size_t offset)
+{
+    return *(const four_bar_output *)((const char *)batch + offset);
+}
+
+// Put the entries of matrices that never change in place: in a block, and in whole matrices.
+static void place_constants(block *b, double *matrices, size_t count)
+{
+    memset(matrices, 0, MATRICES * sizeof *matrices);
+    for (const quantity *q = QUANTITY; q < QUANTITY + QUANTITIES; q++)
+        for (int c = 0; q->width > 0 && c < q->constants; c++) {
+            const constant *entry = q->constant + c;
+            const int *place = q->pattern[entry->entry];
+            matrices[q->place + place[0] * q->width + place[1]] = entry->value;
+            for (size_t k = 0; k < count; k++)
+                rows_of(b, q)[entry->entry][k] = entry->value;
+        }
+}
+
+// Write a quantity of a block of points: as vectors or nonzeros, and as whole matrices. It is called
+// once a quantity, so that a compiler knows the sizes.
+INLINE void write_quantity(const four_bar_batch *batch, const quantity *q, block *b,
+    double *matrices, size_t start, size_t count, int is_far)
+{
+    const four_bar_output whole = output_of(batch, q->result);
+    const int only = batch->varying_only, is_matrix = q->width > 0;
+    if (is_matrix && whole.first)
+        write_matrices(whole, q, rows_of(b, q), matrices + q->place, only, start, count, is_far);
+    store_rows(is_matrix ? output_of(batch, q->nonzeros) : whole, rows_of(b, q),
+        only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
+}
 
 int four_bar_evaluate(const four_bar_batch *batch)
 {
     block b;
-    double matrix[M * N], check[LANES] = { 0 };
-    const int wants_Phi_q = batch->Phi_q.first || batch->nonzeros.first;
-    const int wanted = (batch->Phi.first ? 1 : 0) | (wants_Phi_q ? 2 : 0)
-        | (batch->nu.first ? 4 : 0) | (batch->gamma.first ? 8 : 0);
+    double matrices[MATRICES], check[LANES] = { 0 };
+    unsigned wanted = 0;
+    for (int k = 0; k < QUANTITIES; k++)
+        if (output_of(batch, QUANTITY[k].result).first
+            || (QUANTITY[k].width > 0 && output_of(batch, QUANTITY[k].nonzeros).first))
+            wanted |= 1u << k;
     if (wanted == 0)
         return 0;
-    const int is_far = batch->count > FAR;
+    const int is_far = batch->count > FAR, wants_rates = wanted & MOVING && batch->q_dot.first;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
-    const int only = batch->varying_only, wants_rates = wanted & 8 && batch->q_dot.first;
-    if (wants_Phi_q && !only)
-        place_constants(&b, matrix, widest);
+    if (!batch->varying_only)
+        place_constants(&b, matrices, widest);
     if (!wants_rates)
         memset(b.q_dot, 0, sizeof b.q_dot);
     for (size_t start = 0; start < batch->count; start += LANES) {
@@ -934,15 +741,19 @@ int four_bar_evaluate(const four_bar_batch *batch)
         read_rows(b.q, N, batch->q, start, count, check);
         if (wants_rates)
             read_rows(b.q_dot, N, batch->q_dot, start, count, check);
-        FUNCTION[wanted](&b, count);
-        store_rows(batch->Phi, b.Phi, NULL, M, start, count, is_far);
-        if (batch->Phi_q.first)
-            write_matrices(batch->Phi_q, b.Phi_q, matrix, only, start, count, is_far);
-        store_rows(batch->nonzeros, b.Phi_q, only ? VARYING_ENTRY : NULL,
-            only ? VARYING : NONZEROS, start, count, is_far);
-        store_rows(batch->nu, b.nu, only ? NU_ROW : NULL, only ? NU_ROWS : M, start, count, is_far);
-        store_rows(batch->gamma, b.gamma, only ? GAMMA_ROW : NULL, only ? GAMMA_ROWS : M, start,
-            count, is_far);
+        run_kernels(wanted, &b, count);
+        if (wanted & 1)
+            write_quantity(batch, &QUANTITY[0], &b, matrices, start, count,
+                is_far);
+        if (wanted & 2)
+            write_quantity(batch, &QUANTITY[1], &b, matrices, start, count,
+                is_far);
+        if (wanted & 4)
+            write_quantity(batch, &QUANTITY[2], &b, matrices, start, count,
+                is_far);
+        if (wanted & 8)
+            write_quantity(batch, &QUANTITY[3], &b, matrices, start, count,
+                is_far);
     }
 #ifdef __x86_64__
     if (is_far)
@@ -957,8 +768,8 @@ int four_bar_evaluate(const four_bar_batch *batch)
 void four_bar_solve(const four_bar_system *system)
 {
     block b;
-    double matrix[M * N], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
-    place_constants(&b, matrix, LANES);
+    double matrices[MATRICES], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
+    place_constants(&b, matrices, LANES);
     for (size_t start = 0; start < system->count; start += LANES) {
         const size_t rest = system->count - start, count = rest < LANES ? rest : LANES;
         read_rows(b.Phi_q, NONZEROS, system->nonzeros, start, count, check);
@@ -1258,9 +1069,9 @@ size_t four_bar_march(const four_bar_motion *motion)
     scales s;
     outcome o;
     state at;
-    double matrix[M * N];
+    double matrices[MATRICES];
     s.tolerance = motion->tolerance;
-    place_constants(&b, matrix, LANES);
+    place_constants(&b, matrices, LANES);
     for (int i = 0; i < K; i++)
         for (size_t k = 0; k < LANES; k++)
             b.p[i][k] = motion->p[i];
@@ -1339,8 +1150,8 @@ static void advance_alone(block *b, const scales *s, state *at, size_t k, outcom
     block alone;
     scales own;
     outcome found;
-    double matrix[M * N];
-    place_constants(&alone, matrix, 1);
+    double matrices[MATRICES];
+    place_constants(&alone, matrices, 1);
     own.tolerance = s->tolerance;
     found.is_over[0] = 0;
     for (int i = 0; i < K; i++)
@@ -1388,10 +1199,10 @@ size_t four_bar_march_variants(const four_bar_variants *all)
     block b;
     scales s;
     outcome o;
-    double matrix[M * N], check[LANES] = { 0 };
+    double matrices[MATRICES], check[LANES] = { 0 };
     size_t good = 0;
     s.tolerance = all->tolerance;
-    place_constants(&b, matrix, LANES);
+    place_constants(&b, matrices, LANES);
     for (size_t first = 0; first < all->variants; first += LANES) {
         const size_t rest = all->variants - first, count = rest < LANES ? rest : LANES;
         read_rows(b.p, K, all->p, first, count, check);

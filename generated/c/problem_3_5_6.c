@@ -30,47 +30,45 @@ enum {
     K = 0,  // parameters
     NONZEROS = 6,  // of Phi_q
     LANES = 32,  // points in a block
-    FAR = (4 << 20) / 8 / (3 * M + NONZEROS),  // points whose results leave little of a cache
+    FAR = (4 << 20) / 8 / (15),  // points whose results leave little of a cache
     FACTORS = 5,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char problem_3_5_6_fingerprint[] = "cf1b67c63b4e96bb294dd9e63b1ad407";
+const char problem_3_5_6_fingerprint[] = "fa7adf382924fd70db26c5bd35276fee";
 const double problem_3_5_6_defaults[] = {
     0,
 };
 const double problem_3_5_6_guess[] = {
     0.2, 0.2, 0.7853981633974483,
 };
-const int problem_3_5_6_pattern[][2] = {
-    {0, 0}, {0, 2}, {1, 1}, {1, 2}, {2, 0}, {2, 1},
-};
-// entries of the pattern that never change, with their values, and entries that are computed
-static const struct {
+const int problem_3_5_6_pattern[][2] = { {0, 0}, {0, 2}, {1, 1}, {1, 2}, {2, 0}, {2, 1} };
+// number and value of an entry that never changes
+typedef struct {
     int entry;
     double value;
-} CONSTANT[] = {
-    {0, 1.0}, {2, 1.0},
-};
-enum { CONSTANTS = 2, VARYING = 4 };
-static const int VARYING_ENTRY[] = {
-    1, 3, 4, 5,
-};
-// rows of nu and gamma that are computed
-enum { NU_ROWS = 1, GAMMA_ROWS = 3 };
-static const int NU_ROW[] = {
-    2,
-};
-static const int GAMMA_ROW[] = {
-    0, 1, 2,
-};
+} constant;
+
+// the entries that never change, and those that are computed
+static const constant Phi_constant[] = { {0, 0.0} };
+static const int Phi_computed[] = { 0, 1, 2 };
+static const constant Phi_q_constant[] = { {0, 1.0}, {2, 1.0} };
+static const int Phi_q_computed[] = { 1, 3, 4, 5 };
+static const int Phi_q_place[] = { 2, 5, 6, 7 };
+static const constant nu_constant[] = { {0, 0.0}, {1, 0.0} };
+static const int nu_computed[] = { 2 };
+static const constant gamma_constant[] = { {0, 0.0} };
+static const int gamma_computed[] = { 0, 1, 2 };
 
 // A block of points: the last axis is the point.
 typedef struct {
     double t[LANES];
     double p[K > 0 ? K : 1][LANES];
     double q[N][LANES], q_dot[N][LANES], q_ddot[N][LANES];
-    double Phi[M][LANES], Phi_q[NONZEROS][LANES], nu[M][LANES], gamma[M][LANES];
+    double Phi[3][LANES];
+    double Phi_q[6][LANES];
+    double nu[3][LANES];
+    double gamma[3][LANES];
     double F[FACTORS > 0 ? FACTORS : 1][LANES], determinants[BLOCKS > 0 ? BLOCKS : 1][LANES];
 } block;
 
@@ -140,8 +138,8 @@ INLINE double sine(double angle, int exact, int64_t *far)
     return s;
 }
 
-// Constraint vector Phi(q, t).
-INLINE int64_t Phi_at(block *at, size_t lane, int exact)
+// Phi and Phi_q in one go: a step of Newton's method.
+INLINE int64_t position_at(block *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double x2 = at->q[0][lane];
@@ -149,47 +147,31 @@ INLINE int64_t Phi_at(block *at, size_t lane, int exact)
     const double phi3 = at->q[2][lane];
     const double t = at->t[lane];
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->Phi[0][lane] = x2 + sine(phi3, exact, &far) / 4.0 - 3.0 / 5.0;
+    const double equation_1_1 = sine(phi3, exact, &far) / 4.0;
+    const double equation_1_2 = cosine(phi3, exact, &far) / 4.0;
+    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
+    at->Phi[0][lane] = x2 + equation_1_1 - 3.0 / 5.0;
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->Phi[1][lane] = y2 - cosine(phi3, exact, &far) / 4.0;
+    at->Phi[1][lane] = y2 - equation_1_2;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
     at->Phi[2][lane] = square(x2) + square(y2) - square(t / 10.0 + 2.0 / 5.0);
-    return far;
-}
-
-static void Phi_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= Phi_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        Phi_at(at, lane, 1);
-}
-
-// Jacobian of Phi by q: the entries that vary.
-INLINE int64_t Phi_q_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x2 = at->q[0][lane];
-    const double y2 = at->q[1][lane];
-    const double phi3 = at->q[2][lane];
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->Phi_q[1][lane] = cosine(phi3, exact, &far) / 4.0;  // equation_1 by phi3
+    at->Phi_q[1][lane] = equation_1_2;  // equation_1 by phi3
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->Phi_q[3][lane] = sine(phi3, exact, &far) / 4.0;  // equation_2 by phi3
+    at->Phi_q[3][lane] = equation_1_1;  // equation_2 by phi3
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
     at->Phi_q[4][lane] = 2.0 * x2;  // equation_3 by x2
     at->Phi_q[5][lane] = 2.0 * y2;  // equation_3 by y2
     return far;
 }
 
-static void Phi_q_of_block(block *at, size_t count)
+static void position_of_block(block *at, size_t count)
 {
     int64_t far = 0;
     for (size_t lane = 0; lane < count; lane++)
-        far |= Phi_q_at(at, lane, 0);
+        far |= position_at(at, lane, 0);
     for (size_t lane = 0; far && lane < count; lane++)
-        Phi_q_at(at, lane, 1);
+        position_at(at, lane, 1);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
@@ -236,114 +218,6 @@ static void gamma_of_block(block *at, size_t count)
         far |= gamma_at(at, lane, 0);
     for (size_t lane = 0; far && lane < count; lane++)
         gamma_at(at, lane, 1);
-}
-
-// Phi and Phi_q in one go: a step of Newton's method.
-INLINE int64_t position_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x2 = at->q[0][lane];
-    const double y2 = at->q[1][lane];
-    const double phi3 = at->q[2][lane];
-    const double t = at->t[lane];
-    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    const double equation_1_1 = sine(phi3, exact, &far) / 4.0;
-    const double equation_1_2 = cosine(phi3, exact, &far) / 4.0;
-    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->Phi[0][lane] = x2 + equation_1_1 - 3.0 / 5.0;
-    // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->Phi[1][lane] = y2 - equation_1_2;
-    // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->Phi[2][lane] = square(x2) + square(y2) - square(t / 10.0 + 2.0 / 5.0);
-    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->Phi_q[1][lane] = equation_1_2;  // equation_1 by phi3
-    // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->Phi_q[3][lane] = equation_1_1;  // equation_2 by phi3
-    // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->Phi_q[4][lane] = 2.0 * x2;  // equation_3 by x2
-    at->Phi_q[5][lane] = 2.0 * y2;  // equation_3 by y2
-    return far;
-}
-
-static void position_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= position_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
-}
-
-// Phi_q and nu in one go: the velocity equation.
-INLINE int64_t velocity_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x2 = at->q[0][lane];
-    const double y2 = at->q[1][lane];
-    const double phi3 = at->q[2][lane];
-    const double t = at->t[lane];
-    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->Phi_q[1][lane] = cosine(phi3, exact, &far) / 4.0;  // equation_1 by phi3
-    // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->Phi_q[3][lane] = sine(phi3, exact, &far) / 4.0;  // equation_2 by phi3
-    // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->Phi_q[4][lane] = 2.0 * x2;  // equation_3 by x2
-    at->Phi_q[5][lane] = 2.0 * y2;  // equation_3 by y2
-    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->nu[0][lane] = 0.0;
-    // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->nu[1][lane] = 0.0;
-    // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->nu[2][lane] = (t / 10.0 + 2.0 / 5.0) / 5.0;
-    return far;
-}
-
-static void velocity_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= velocity_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        velocity_at(at, lane, 1);
-}
-
-// Phi_q and gamma in one go: the acceleration equation.
-INLINE int64_t acceleration_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x2 = at->q[0][lane];
-    const double y2 = at->q[1][lane];
-    const double phi3 = at->q[2][lane];
-    const double x2_dot = at->q_dot[0][lane];
-    const double y2_dot = at->q_dot[1][lane];
-    const double phi3_dot = at->q_dot[2][lane];
-    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    const double cos_phi3 = cosine(phi3, exact, &far);
-    const double phi3_dot_sq = square(phi3_dot);
-    const double sin_phi3 = sine(phi3, exact, &far);
-    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->Phi_q[1][lane] = cos_phi3 / 4.0;  // equation_1 by phi3
-    // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->Phi_q[3][lane] = sin_phi3 / 4.0;  // equation_2 by phi3
-    // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->Phi_q[4][lane] = 2.0 * x2;  // equation_3 by x2
-    at->Phi_q[5][lane] = 2.0 * y2;  // equation_3 by y2
-    // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->gamma[0][lane] = phi3_dot_sq * sin_phi3 / 4.0;
-    // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->gamma[1][lane] = -phi3_dot_sq * cos_phi3 / 4.0;
-    // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-    at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
-    return far;
-}
-
-static void acceleration_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= acceleration_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        acceleration_at(at, lane, 1);
 }
 
 // Phi, Phi_q, nu and gamma in one go.
@@ -527,60 +401,139 @@ static void write_rows(problem_3_5_6_output to, double (*rows)[LANES], const int
     store_rows(to, rows, listed, size, start, count, 0);
 }
 
-// Write the nonzeros of Phi_q into whole matrices: all entries, or only those that are computed.
-// `matrix` holds the others.
-static void write_matrices(problem_3_5_6_output to, double (*nonzeros)[LANES], double *matrix,
-    int varying_only, size_t start, size_t count, int is_far)
+// A quantity: where its entries are in a block and its results in a batch, its size, which entries
+// never change, and which are computed. A vector has no columns, and a matrix a place in `matrices`.
+typedef struct {
+    size_t rows, result, nonzeros;
+    int height, width, place, entries, constants, computed;
+    const int (*pattern)[2];
+    const constant *constant;
+    const int *computed_entry, *computed_place;
+} quantity;
+
+static const quantity QUANTITY[] = {
+    {offsetof(block, Phi), offsetof(problem_3_5_6_batch, Phi),
+        0, 3, 0, 0,
+        3, 0, 3,
+        NULL,
+        Phi_constant, Phi_computed, NULL},
+    {offsetof(block, Phi_q), offsetof(problem_3_5_6_batch, Phi_q),
+        offsetof(problem_3_5_6_batch, nonzeros), 3, 3, 0,
+        6, 2, 4,
+        problem_3_5_6_pattern,
+        Phi_q_constant, Phi_q_computed, Phi_q_place},
+    {offsetof(block, nu), offsetof(problem_3_5_6_batch, nu),
+        0, 3, 0, 9,
+        3, 2, 1,
+        NULL,
+        nu_constant, nu_computed, NULL},
+    {offsetof(block, gamma), offsetof(problem_3_5_6_batch, gamma),
+        0, 3, 0, 9,
+        3, 0, 3,
+        NULL,
+        gamma_constant, gamma_computed, NULL},
+};
+enum { QUANTITIES = 4, MATRICES = 9 };
+
+// The kernels, the quantities that each gives, as bits, and the quantities that depend on rates.
+static const struct {
+    unsigned gives;
+    void (*run)(block *, size_t);
+} KERNEL[] = {
+    {3, position_of_block},
+    {4, nu_of_block},
+    {8, gamma_of_block},
+    {15, kinematics_of_block},
+};
+enum { KERNELS = 4, MOVING = 8 };
+
+// Run the first kernel that gives all that is wanted, or as many as it takes.
+static void run_kernels(unsigned wanted, block *b, size_t count)
 {
-    const int is_copied = to.entry == 1 && !varying_only;
+    for (int k = 0; k < KERNELS; k++)
+        if ((wanted & ~KERNEL[k].gives) == 0) {
+            KERNEL[k].run(b, count);
+            return;
+        }
+    for (int k = KERNELS - 1; k >= 0; k--)
+        if (wanted & KERNEL[k].gives) {
+            KERNEL[k].run(b, count);
+            wanted &= ~KERNEL[k].gives;
+        }
+}
+
+// Write the nonzeros into whole matrices: all entries, or only those that are computed. `matrix`
+// holds the others.
+INLINE void write_matrices(problem_3_5_6_output to, const quantity *q, double (*rows)[LANES],
+    double *matrix, int varying_only, size_t start, size_t count, int is_far)
+{
+    const int is_copied = to.entry == 1 && !varying_only, size = q->height * q->width;
     for (size_t k = 0; k < count; k++) {
         double *first = to.first + (ptrdiff_t)(start + k) * to.point;
-        for (int i = 0; !is_copied && !varying_only && i < M * N; i++)
+        for (int i = 0; !is_copied && !varying_only && i < size; i++)
             first[i * to.entry] = matrix[i];
-        for (int v = 0; v < VARYING; v++) {
-            const int entry = VARYING_ENTRY[v], *place = problem_3_5_6_pattern[entry];
-            const int i = place[0] * N + place[1];
-            *(is_copied ? matrix + i : first + i * to.entry) = nonzeros[entry][k];
+        for (int v = 0; v < q->computed; v++) {
+            const int i = q->computed_place[v];
+            *(is_copied ? matrix + i : first + i * to.entry) = rows[q->computed_entry[v]][k];
         }
         if (is_copied)
-            copy(first, matrix, M * N, is_far);
+            copy(first, matrix, (size_t)size, is_far);
     }
 }
 
-// Put the entries of Phi_q that never change in place: in a block, and in a whole matrix.
-static void place_constants(block *b, double *matrix, size_t count)
+// The entries of a quantity in a block, and the outputs of a batch.
+INLINE double (*rows_of(block *b, const quantity *q))[LANES]
 {
-    memset(matrix, 0, M * N * sizeof *matrix);
-    for (int c = 0; c < CONSTANTS; c++) {
-        const int *place = problem_3_5_6_pattern[CONSTANT[c].entry];
-        matrix[place[0] * N + place[1]] = CONSTANT[c].value;
-        for (size_t k = 0; k < count; k++)
-            b->Phi_q[CONSTANT[c].entry][k] = CONSTANT[c].value;
-    }
+    return (double (*)[LANES])((char *)b + q->rows);
 }
 
-// The function that gives the wanted quantities: 1 for Phi, 2 for Phi_q, 4 for nu, 8 for gamma.
-static void (*const FUNCTION[16])(block *, size_t) = {
-    NULL, Phi_of_block, Phi_q_of_block, position_of_block, nu_of_block, kinematics_of_block,
-    velocity_of_block, kinematics_of_block, gamma_of_block, kinematics_of_block,
-    acceleration_of_block, kinematics_of_block, kinematics_of_block, kinematics_of_block,
-    kinematics_of_block, kinematics_of_block,
-};
+INLINE problem_3_5_6_output output_of(const problem_3_5_6_batch *batch, size_t offset)
+{
+    return *(const problem_3_5_6_output *)((const char *)batch + offset);
+}
+
+// Put the entries of matrices that never change in place: in a block, and in whole matrices.
+static void place_constants(block *b, double *matrices, size_t count)
+{
+    memset(matrices, 0, MATRICES * sizeof *matrices);
+    for (const quantity *q = QUANTITY; q < QUANTITY + QUANTITIES; q++)
+        for (int c = 0; q->width > 0 && c < q->constants; c++) {
+            const constant *entry = q->constant + c;
+            const int *place = q->pattern[entry->entry];
+            matrices[q->place + place[0] * q->width + place[1]] = entry->value;
+            for (size_t k = 0; k < count; k++)
+                rows_of(b, q)[entry->entry][k] = entry->value;
+        }
+}
+
+// Write a quantity of a block of points: as vectors or nonzeros, and as whole matrices. It is called
+// once a quantity, so that a compiler knows the sizes.
+INLINE void write_quantity(const problem_3_5_6_batch *batch, const quantity *q, block *b,
+    double *matrices, size_t start, size_t count, int is_far)
+{
+    const problem_3_5_6_output whole = output_of(batch, q->result);
+    const int only = batch->varying_only, is_matrix = q->width > 0;
+    if (is_matrix && whole.first)
+        write_matrices(whole, q, rows_of(b, q), matrices + q->place, only, start, count, is_far);
+    store_rows(is_matrix ? output_of(batch, q->nonzeros) : whole, rows_of(b, q),
+        only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
+}
 
 int problem_3_5_6_evaluate(const problem_3_5_6_batch *batch)
 {
     block b;
-    double matrix[M * N], check[LANES] = { 0 };
-    const int wants_Phi_q = batch->Phi_q.first || batch->nonzeros.first;
-    const int wanted = (batch->Phi.first ? 1 : 0) | (wants_Phi_q ? 2 : 0)
-        | (batch->nu.first ? 4 : 0) | (batch->gamma.first ? 8 : 0);
+    double matrices[MATRICES], check[LANES] = { 0 };
+    unsigned wanted = 0;
+    for (int k = 0; k < QUANTITIES; k++)
+        if (output_of(batch, QUANTITY[k].result).first
+            || (QUANTITY[k].width > 0 && output_of(batch, QUANTITY[k].nonzeros).first))
+            wanted |= 1u << k;
     if (wanted == 0)
         return 0;
-    const int is_far = batch->count > FAR;
+    const int is_far = batch->count > FAR, wants_rates = wanted & MOVING && batch->q_dot.first;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
-    const int only = batch->varying_only, wants_rates = wanted & 8 && batch->q_dot.first;
-    if (wants_Phi_q && !only)
-        place_constants(&b, matrix, widest);
+    if (!batch->varying_only)
+        place_constants(&b, matrices, widest);
     if (!wants_rates)
         memset(b.q_dot, 0, sizeof b.q_dot);
     for (size_t start = 0; start < batch->count; start += LANES) {
@@ -592,15 +545,19 @@ int problem_3_5_6_evaluate(const problem_3_5_6_batch *batch)
         read_rows(b.q, N, batch->q, start, count, check);
         if (wants_rates)
             read_rows(b.q_dot, N, batch->q_dot, start, count, check);
-        FUNCTION[wanted](&b, count);
-        store_rows(batch->Phi, b.Phi, NULL, M, start, count, is_far);
-        if (batch->Phi_q.first)
-            write_matrices(batch->Phi_q, b.Phi_q, matrix, only, start, count, is_far);
-        store_rows(batch->nonzeros, b.Phi_q, only ? VARYING_ENTRY : NULL,
-            only ? VARYING : NONZEROS, start, count, is_far);
-        store_rows(batch->nu, b.nu, only ? NU_ROW : NULL, only ? NU_ROWS : M, start, count, is_far);
-        store_rows(batch->gamma, b.gamma, only ? GAMMA_ROW : NULL, only ? GAMMA_ROWS : M, start,
-            count, is_far);
+        run_kernels(wanted, &b, count);
+        if (wanted & 1)
+            write_quantity(batch, &QUANTITY[0], &b, matrices, start, count,
+                is_far);
+        if (wanted & 2)
+            write_quantity(batch, &QUANTITY[1], &b, matrices, start, count,
+                is_far);
+        if (wanted & 4)
+            write_quantity(batch, &QUANTITY[2], &b, matrices, start, count,
+                is_far);
+        if (wanted & 8)
+            write_quantity(batch, &QUANTITY[3], &b, matrices, start, count,
+                is_far);
     }
 #ifdef __x86_64__
     if (is_far)
@@ -615,8 +572,8 @@ int problem_3_5_6_evaluate(const problem_3_5_6_batch *batch)
 void problem_3_5_6_solve(const problem_3_5_6_system *system)
 {
     block b;
-    double matrix[M * N], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
-    place_constants(&b, matrix, LANES);
+    double matrices[MATRICES], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
+    place_constants(&b, matrices, LANES);
     for (size_t start = 0; start < system->count; start += LANES) {
         const size_t rest = system->count - start, count = rest < LANES ? rest : LANES;
         read_rows(b.Phi_q, NONZEROS, system->nonzeros, start, count, check);
@@ -914,9 +871,9 @@ size_t problem_3_5_6_march(const problem_3_5_6_motion *motion)
     scales s;
     outcome o;
     state at;
-    double matrix[M * N];
+    double matrices[MATRICES];
     s.tolerance = motion->tolerance;
-    place_constants(&b, matrix, LANES);
+    place_constants(&b, matrices, LANES);
     for (int i = 0; i < K; i++)
         for (size_t k = 0; k < LANES; k++)
             b.p[i][k] = motion->p[i];
@@ -995,8 +952,8 @@ static void advance_alone(block *b, const scales *s, state *at, size_t k, outcom
     block alone;
     scales own;
     outcome found;
-    double matrix[M * N];
-    place_constants(&alone, matrix, 1);
+    double matrices[MATRICES];
+    place_constants(&alone, matrices, 1);
     own.tolerance = s->tolerance;
     found.is_over[0] = 0;
     for (int i = 0; i < K; i++)
@@ -1044,10 +1001,10 @@ size_t problem_3_5_6_march_variants(const problem_3_5_6_variants *all)
     block b;
     scales s;
     outcome o;
-    double matrix[M * N], check[LANES] = { 0 };
+    double matrices[MATRICES], check[LANES] = { 0 };
     size_t good = 0;
     s.tolerance = all->tolerance;
-    place_constants(&b, matrix, LANES);
+    place_constants(&b, matrices, LANES);
     for (size_t first = 0; first < all->variants; first += LANES) {
         const size_t rest = all->variants - first, count = rest < LANES ? rest : LANES;
         read_rows(b.p, K, all->p, first, count, check);

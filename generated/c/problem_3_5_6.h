@@ -46,16 +46,17 @@ typedef struct {
 } problem_3_5_6_output;
 
 // What is to be evaluated at `count` points, from coordinates q, rates q_dot, time t and
-// parameters p. A result whose `first` is NULL is not wanted; only gamma needs q_dot.
+// parameters p. A result whose `first` is NULL is not wanted; where nothing depends on q_dot, it is
+// not read.
 typedef struct {
     size_t count;
     problem_3_5_6_input q, q_dot, t, p;
-    problem_3_5_6_output Phi;       // 3 entries: Phi(q, t)
-    problem_3_5_6_output Phi_q;     // 3 x 3 entries, row by row
+    problem_3_5_6_output Phi;  // 3: Constraint vector Phi(q, t).
+    problem_3_5_6_output Phi_q;  // 3 x 3: Jacobian of Phi by q.
     problem_3_5_6_output nonzeros;  // 6 entries of Phi_q, in the order of the pattern
-    problem_3_5_6_output nu;        // 3 entries: Phi_q q_dot = nu = -Phi_t
-    problem_3_5_6_output gamma;     // 3 entries: Phi_q q_ddot = gamma
-    int varying_only;  // not 0: entries of Phi_q, nu and gamma that never change are in place
+    problem_3_5_6_output nu;  // 3: Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
+    problem_3_5_6_output gamma;  // 3: Right side of the acceleration equation Phi_q q_ddot = gamma.
+    int varying_only;  // not 0: entries that never change are in place
 } problem_3_5_6_batch;
 
 // Evaluate a batch. Returns 0, or 1 where an input is not finite.

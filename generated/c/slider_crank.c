@@ -34,12 +34,12 @@ enum {
     K = 0,  // parameters
     NONZEROS = 21,  // of Phi_q
     LANES = 32,  // points in a block
-    FAR = (4 << 20) / 8 / (3 * M + NONZEROS),  // points whose results leave little of a cache
+    FAR = (4 << 20) / 8 / (48),  // points whose results leave little of a cache
     FACTORS = 8,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char slider_crank_fingerprint[] = "372d93c96543d3b8f0288adffc736d59";
+const char slider_crank_fingerprint[] = "a527bb03116fe32da0a1d1f9e0aaa06b";
 const double slider_crank_defaults[] = {
     0,
 };
@@ -50,33 +50,37 @@ const int slider_crank_pattern[][2] = {
     {0, 0}, {0, 2}, {1, 1}, {1, 2}, {2, 0}, {2, 2}, {2, 3}, {2, 5}, {3, 1}, {3, 2}, {3, 4},
     {3, 5}, {4, 3}, {4, 5}, {4, 6}, {5, 4}, {5, 5}, {5, 7}, {6, 7}, {7, 8}, {8, 2},
 };
-// entries of the pattern that never change, with their values, and entries that are computed
-static const struct {
+// number and value of an entry that never changes
+typedef struct {
     int entry;
     double value;
-} CONSTANT[] = {
+} constant;
+
+// the entries that never change, and those that are computed
+static const constant Phi_constant[] = { {0, 0.0} };
+static const int Phi_computed[] = { 0, 1, 2, 3, 4, 5, 6, 7, 8 };
+static const constant Phi_q_constant[] = {
     {0, 1.0}, {2, 1.0}, {4, 1.0}, {6, -1.0}, {8, 1.0}, {10, -1.0}, {12, 1.0}, {14, -1.0},
     {15, 1.0}, {17, -1.0}, {18, 1.0}, {19, 1.0}, {20, 1.0},
 };
-enum { CONSTANTS = 13, VARYING = 8 };
-static const int VARYING_ENTRY[] = {
-    1, 3, 5, 7, 9, 11, 13, 16,
+static const int Phi_q_computed[] = { 1, 3, 5, 7, 9, 11, 13, 16 };
+static const int Phi_q_place[] = { 2, 11, 20, 23, 29, 32, 41, 50 };
+static const constant nu_constant[] = {
+    {0, 0.0}, {1, 0.0}, {2, 0.0}, {3, 0.0}, {4, 0.0}, {5, 0.0}, {6, 0.0}, {7, 0.0},
 };
-// rows of nu and gamma that are computed
-enum { NU_ROWS = 1, GAMMA_ROWS = 6 };
-static const int NU_ROW[] = {
-    8,
-};
-static const int GAMMA_ROW[] = {
-    0, 1, 2, 3, 4, 5,
-};
+static const int nu_computed[] = { 8 };
+static const constant gamma_constant[] = { {6, 0.0}, {7, 0.0}, {8, 2.0} };
+static const int gamma_computed[] = { 0, 1, 2, 3, 4, 5 };
 
 // A block of points: the last axis is the point.
 typedef struct {
     double t[LANES];
     double p[K > 0 ? K : 1][LANES];
     double q[N][LANES], q_dot[N][LANES], q_ddot[N][LANES];
-    double Phi[M][LANES], Phi_q[NONZEROS][LANES], nu[M][LANES], gamma[M][LANES];
+    double Phi[9][LANES];
+    double Phi_q[21][LANES];
+    double nu[9][LANES];
+    double gamma[9][LANES];
     double F[FACTORS > 0 ? FACTORS : 1][LANES], determinants[BLOCKS > 0 ? BLOCKS : 1][LANES];
 } block;
 
@@ -132,8 +136,8 @@ INLINE int64_t cos_sin(double angle, int exact, double *cosine, double *sine)
     return !(fabs(angle) <= 1e5);
 }
 
-// Constraint vector Phi(q, t).
-INLINE int64_t Phi_at(block *at, size_t lane, int exact)
+// Phi and Phi_q in one go: a step of Newton's method.
+INLINE int64_t position_at(block *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double x_crank = at->q[0][lane];
@@ -172,35 +176,6 @@ INLINE int64_t Phi_at(block *at, size_t lane, int exact)
     at->Phi[7][lane] = phi_slider;
     // 8  AbsoluteAngle "motor": crank angle t**2
     at->Phi[8][lane] = phi_crank - square(t);
-    return far;
-}
-
-static void Phi_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= Phi_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        Phi_at(at, lane, 1);
-}
-
-// Jacobian of Phi by q: the entries that vary.
-INLINE int64_t Phi_q_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double phi_crank = at->q[2][lane];
-    const double phi_rod = at->q[5][lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_rod, s_rod;
-    far |= cos_sin(phi_rod, exact, &c_rod, &s_rod);
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    const double crank_pin_crank_y = 2.0 * s_crank;
-    const double crank_pin_crank_x = 2.0 * c_crank;
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    const double wrist_pin_rod_y = 3.0 * s_rod;
-    const double wrist_pin_rod_x = 3.0 * c_rod;
     // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
     at->Phi_q[1][lane] = crank_pin_crank_y;  // main_bearing.x by phi_crank
     at->Phi_q[3][lane] = -crank_pin_crank_x;  // main_bearing.y by phi_crank
@@ -215,13 +190,13 @@ INLINE int64_t Phi_q_at(block *at, size_t lane, int exact)
     return far;
 }
 
-static void Phi_q_of_block(block *at, size_t count)
+static void position_of_block(block *at, size_t count)
 {
     int64_t far = 0;
     for (size_t lane = 0; lane < count; lane++)
-        far |= Phi_q_at(at, lane, 0);
+        far |= position_at(at, lane, 0);
     for (size_t lane = 0; far && lane < count; lane++)
-        Phi_q_at(at, lane, 1);
+        position_at(at, lane, 1);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
@@ -297,188 +272,6 @@ static void gamma_of_block(block *at, size_t count)
         far |= gamma_at(at, lane, 0);
     for (size_t lane = 0; far && lane < count; lane++)
         gamma_at(at, lane, 1);
-}
-
-// Phi and Phi_q in one go: a step of Newton's method.
-INLINE int64_t position_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double x_crank = at->q[0][lane];
-    const double y_crank = at->q[1][lane];
-    const double phi_crank = at->q[2][lane];
-    const double x_rod = at->q[3][lane];
-    const double y_rod = at->q[4][lane];
-    const double phi_rod = at->q[5][lane];
-    const double x_slider = at->q[6][lane];
-    const double y_slider = at->q[7][lane];
-    const double phi_slider = at->q[8][lane];
-    const double t = at->t[lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_rod, s_rod;
-    far |= cos_sin(phi_rod, exact, &c_rod, &s_rod);
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    const double crank_pin_crank_x = 2.0 * c_crank;
-    const double crank_pin_crank_y = 2.0 * s_crank;
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    const double wrist_pin_rod_x = 3.0 * c_rod;
-    const double wrist_pin_rod_y = 3.0 * s_rod;
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    at->Phi[0][lane] = x_crank - crank_pin_crank_x;
-    at->Phi[1][lane] = y_crank - crank_pin_crank_y;
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    at->Phi[2][lane] = x_crank + crank_pin_crank_x - x_rod + wrist_pin_rod_x;
-    at->Phi[3][lane] = y_crank + crank_pin_crank_y - y_rod + wrist_pin_rod_y;
-    // 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-    at->Phi[4][lane] = x_rod + wrist_pin_rod_x - x_slider;
-    at->Phi[5][lane] = y_rod + wrist_pin_rod_y - y_slider;
-    // 6  AbsoluteY "guide_height": slider (0, 0) value 0
-    at->Phi[6][lane] = y_slider;
-    // 7  AbsoluteAngle "guide_angle": slider angle 0
-    at->Phi[7][lane] = phi_slider;
-    // 8  AbsoluteAngle "motor": crank angle t**2
-    at->Phi[8][lane] = phi_crank - square(t);
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    at->Phi_q[1][lane] = crank_pin_crank_y;  // main_bearing.x by phi_crank
-    at->Phi_q[3][lane] = -crank_pin_crank_x;  // main_bearing.y by phi_crank
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    at->Phi_q[5][lane] = -crank_pin_crank_y;  // crank_pin.x by phi_crank
-    at->Phi_q[7][lane] = -wrist_pin_rod_y;  // crank_pin.x by phi_rod
-    at->Phi_q[9][lane] = crank_pin_crank_x;  // crank_pin.y by phi_crank
-    at->Phi_q[11][lane] = wrist_pin_rod_x;  // crank_pin.y by phi_rod
-    // 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-    at->Phi_q[13][lane] = -wrist_pin_rod_y;  // wrist_pin.x by phi_rod
-    at->Phi_q[16][lane] = wrist_pin_rod_x;  // wrist_pin.y by phi_rod
-    return far;
-}
-
-static void position_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= position_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
-}
-
-// Phi_q and nu in one go: the velocity equation.
-INLINE int64_t velocity_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double phi_crank = at->q[2][lane];
-    const double phi_rod = at->q[5][lane];
-    const double t = at->t[lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_rod, s_rod;
-    far |= cos_sin(phi_rod, exact, &c_rod, &s_rod);
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    const double crank_pin_crank_y = 2.0 * s_crank;
-    const double crank_pin_crank_x = 2.0 * c_crank;
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    const double wrist_pin_rod_y = 3.0 * s_rod;
-    const double wrist_pin_rod_x = 3.0 * c_rod;
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    at->Phi_q[1][lane] = crank_pin_crank_y;  // main_bearing.x by phi_crank
-    at->Phi_q[3][lane] = -crank_pin_crank_x;  // main_bearing.y by phi_crank
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    at->Phi_q[5][lane] = -crank_pin_crank_y;  // crank_pin.x by phi_crank
-    at->Phi_q[7][lane] = -wrist_pin_rod_y;  // crank_pin.x by phi_rod
-    at->Phi_q[9][lane] = crank_pin_crank_x;  // crank_pin.y by phi_crank
-    at->Phi_q[11][lane] = wrist_pin_rod_x;  // crank_pin.y by phi_rod
-    // 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-    at->Phi_q[13][lane] = -wrist_pin_rod_y;  // wrist_pin.x by phi_rod
-    at->Phi_q[16][lane] = wrist_pin_rod_x;  // wrist_pin.y by phi_rod
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    at->nu[0][lane] = 0.0;
-    at->nu[1][lane] = 0.0;
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    at->nu[2][lane] = 0.0;
-    at->nu[3][lane] = 0.0;
-    // 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-    at->nu[4][lane] = 0.0;
-    at->nu[5][lane] = 0.0;
-    // 6  AbsoluteY "guide_height": slider (0, 0) value 0
-    at->nu[6][lane] = 0.0;
-    // 7  AbsoluteAngle "guide_angle": slider angle 0
-    at->nu[7][lane] = 0.0;
-    // 8  AbsoluteAngle "motor": crank angle t**2
-    at->nu[8][lane] = 2.0 * t;
-    return far;
-}
-
-static void velocity_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= velocity_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        velocity_at(at, lane, 1);
-}
-
-// Phi_q and gamma in one go: the acceleration equation.
-INLINE int64_t acceleration_at(block *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double phi_crank = at->q[2][lane];
-    const double phi_rod = at->q[5][lane];
-    const double phi_crank_dot = at->q_dot[2][lane];
-    const double phi_rod_dot = at->q_dot[5][lane];
-    // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_rod, s_rod;
-    far |= cos_sin(phi_rod, exact, &c_rod, &s_rod);
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    const double crank_pin_crank_y = 2.0 * s_crank;
-    const double crank_pin_crank_x = 2.0 * c_crank;
-    const double phi_crank_dot_sq = square(phi_crank_dot);
-    const double crank_pin_crank_w2_x = phi_crank_dot_sq * crank_pin_crank_x;
-    const double crank_pin_crank_w2_y = phi_crank_dot_sq * crank_pin_crank_y;
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    const double wrist_pin_rod_y = 3.0 * s_rod;
-    const double wrist_pin_rod_x = 3.0 * c_rod;
-    const double phi_rod_dot_sq = square(phi_rod_dot);
-    const double wrist_pin_rod_w2_x = phi_rod_dot_sq * wrist_pin_rod_x;
-    const double wrist_pin_rod_w2_y = phi_rod_dot_sq * wrist_pin_rod_y;
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    at->Phi_q[1][lane] = crank_pin_crank_y;  // main_bearing.x by phi_crank
-    at->Phi_q[3][lane] = -crank_pin_crank_x;  // main_bearing.y by phi_crank
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    at->Phi_q[5][lane] = -crank_pin_crank_y;  // crank_pin.x by phi_crank
-    at->Phi_q[7][lane] = -wrist_pin_rod_y;  // crank_pin.x by phi_rod
-    at->Phi_q[9][lane] = crank_pin_crank_x;  // crank_pin.y by phi_crank
-    at->Phi_q[11][lane] = wrist_pin_rod_x;  // crank_pin.y by phi_rod
-    // 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-    at->Phi_q[13][lane] = -wrist_pin_rod_y;  // wrist_pin.x by phi_rod
-    at->Phi_q[16][lane] = wrist_pin_rod_x;  // wrist_pin.y by phi_rod
-    // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-    at->gamma[0][lane] = -crank_pin_crank_w2_x;
-    at->gamma[1][lane] = -crank_pin_crank_w2_y;
-    // 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-    at->gamma[2][lane] = crank_pin_crank_w2_x + wrist_pin_rod_w2_x;
-    at->gamma[3][lane] = crank_pin_crank_w2_y + wrist_pin_rod_w2_y;
-    // 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-    at->gamma[4][lane] = wrist_pin_rod_w2_x;
-    at->gamma[5][lane] = wrist_pin_rod_w2_y;
-    // 6  AbsoluteY "guide_height": slider (0, 0) value 0
-    at->gamma[6][lane] = 0.0;
-    // 7  AbsoluteAngle "guide_angle": slider angle 0
-    at->gamma[7][lane] = 0.0;
-    // 8  AbsoluteAngle "motor": crank angle t**2
-    at->gamma[8][lane] = 2.0;
-    return far;
-}
-
-static void acceleration_of_block(block *at, size_t count)
-{
-    int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= acceleration_at(at, lane, 0);
-    for (size_t lane = 0; far && lane < count; lane++)
-        acceleration_at(at, lane, 1);
 }
 
 // Phi, Phi_q, nu and gamma in one go.
@@ -734,60 +527,139 @@ static void write_rows(slider_crank_output to, double (*rows)[LANES], const int 
     store_rows(to, rows, listed, size, start, count, 0);
 }
 
-// Write the nonzeros of Phi_q into whole matrices: all entries, or only those that are computed.
-// `matrix` holds the others.
-static void write_matrices(slider_crank_output to, double (*nonzeros)[LANES], double *matrix,
-    int varying_only, size_t start, size_t count, int is_far)
+// A quantity: where its entries are in a block and its results in a batch, its size, which entries
+// never change, and which are computed. A vector has no columns, and a matrix a place in `matrices`.
+typedef struct {
+    size_t rows, result, nonzeros;
+    int height, width, place, entries, constants, computed;
+    const int (*pattern)[2];
+    const constant *constant;
+    const int *computed_entry, *computed_place;
+} quantity;
+
+static const quantity QUANTITY[] = {
+    {offsetof(block, Phi), offsetof(slider_crank_batch, Phi),
+        0, 9, 0, 0,
+        9, 0, 9,
+        NULL,
+        Phi_constant, Phi_computed, NULL},
+    {offsetof(block, Phi_q), offsetof(slider_crank_batch, Phi_q),
+        offsetof(slider_crank_batch, nonzeros), 9, 9, 0,
+        21, 13, 8,
+        slider_crank_pattern,
+        Phi_q_constant, Phi_q_computed, Phi_q_place},
+    {offsetof(block, nu), offsetof(slider_crank_batch, nu),
+        0, 9, 0, 81,
+        9, 8, 1,
+        NULL,
+        nu_constant, nu_computed, NULL},
+    {offsetof(block, gamma), offsetof(slider_crank_batch, gamma),
+        0, 9, 0, 81,
+        9, 3, 6,
+        NULL,
+        gamma_constant, gamma_computed, NULL},
+};
+enum { QUANTITIES = 4, MATRICES = 81 };
+
+// The kernels, the quantities that each gives, as bits, and the quantities that depend on rates.
+static const struct {
+    unsigned gives;
+    void (*run)(block *, size_t);
+} KERNEL[] = {
+    {3, position_of_block},
+    {4, nu_of_block},
+    {8, gamma_of_block},
+    {15, kinematics_of_block},
+};
+enum { KERNELS = 4, MOVING = 8 };
+
+// Run the first kernel that gives all that is wanted, or as many as it takes.
+static void run_kernels(unsigned wanted, block *b, size_t count)
 {
-    const int is_copied = to.entry == 1 && !varying_only;
+    for (int k = 0; k < KERNELS; k++)
+        if ((wanted & ~KERNEL[k].gives) == 0) {
+            KERNEL[k].run(b, count);
+            return;
+        }
+    for (int k = KERNELS - 1; k >= 0; k--)
+        if (wanted & KERNEL[k].gives) {
+            KERNEL[k].run(b, count);
+            wanted &= ~KERNEL[k].gives;
+        }
+}
+
+// Write the nonzeros into whole matrices: all entries, or only those that are computed. `matrix`
+// holds the others.
+INLINE void write_matrices(slider_crank_output to, const quantity *q, double (*rows)[LANES],
+    double *matrix, int varying_only, size_t start, size_t count, int is_far)
+{
+    const int is_copied = to.entry == 1 && !varying_only, size = q->height * q->width;
     for (size_t k = 0; k < count; k++) {
         double *first = to.first + (ptrdiff_t)(start + k) * to.point;
-        for (int i = 0; !is_copied && !varying_only && i < M * N; i++)
+        for (int i = 0; !is_copied && !varying_only && i < size; i++)
             first[i * to.entry] = matrix[i];
-        for (int v = 0; v < VARYING; v++) {
-            const int entry = VARYING_ENTRY[v], *place = slider_crank_pattern[entry];
-            const int i = place[0] * N + place[1];
-            *(is_copied ? matrix + i : first + i * to.entry) = nonzeros[entry][k];
+        for (int v = 0; v < q->computed; v++) {
+            const int i = q->computed_place[v];
+            *(is_copied ? matrix + i : first + i * to.entry) = rows[q->computed_entry[v]][k];
         }
         if (is_copied)
-            copy(first, matrix, M * N, is_far);
+            copy(first, matrix, (size_t)size, is_far);
     }
 }
 
-// Put the entries of Phi_q that never change in place: in a block, and in a whole matrix.
-static void place_constants(block *b, double *matrix, size_t count)
+// The entries of a quantity in a block, and the outputs of a batch.
+INLINE double (*rows_of(block *b, const quantity *q))[LANES]
 {
-    memset(matrix, 0, M * N * sizeof *matrix);
-    for (int c = 0; c < CONSTANTS; c++) {
-        const int *place = slider_crank_pattern[CONSTANT[c].entry];
-        matrix[place[0] * N + place[1]] = CONSTANT[c].value;
-        for (size_t k = 0; k < count; k++)
-            b->Phi_q[CONSTANT[c].entry][k] = CONSTANT[c].value;
-    }
+    return (double (*)[LANES])((char *)b + q->rows);
 }
 
-// The function that gives the wanted quantities: 1 for Phi, 2 for Phi_q, 4 for nu, 8 for gamma.
-static void (*const FUNCTION[16])(block *, size_t) = {
-    NULL, Phi_of_block, Phi_q_of_block, position_of_block, nu_of_block, kinematics_of_block,
-    velocity_of_block, kinematics_of_block, gamma_of_block, kinematics_of_block,
-    acceleration_of_block, kinematics_of_block, kinematics_of_block, kinematics_of_block,
-    kinematics_of_block, kinematics_of_block,
-};
+INLINE slider_crank_output output_of(const slider_crank_batch *batch, size_t offset)
+{
+    return *(const slider_crank_output *)((const char *)batch + offset);
+}
+
+// Put the entries of matrices that never change in place: in a block, and in whole matrices.
+static void place_constants(block *b, double *matrices, size_t count)
+{
+    memset(matrices, 0, MATRICES * sizeof *matrices);
+    for (const quantity *q = QUANTITY; q < QUANTITY + QUANTITIES; q++)
+        for (int c = 0; q->width > 0 && c < q->constants; c++) {
+            const constant *entry = q->constant + c;
+            const int *place = q->pattern[entry->entry];
+            matrices[q->place + place[0] * q->width + place[1]] = entry->value;
+            for (size_t k = 0; k < count; k++)
+                rows_of(b, q)[entry->entry][k] = entry->value;
+        }
+}
+
+// Write a quantity of a block of points: as vectors or nonzeros, and as whole matrices. It is called
+// once a quantity, so that a compiler knows the sizes.
+INLINE void write_quantity(const slider_crank_batch *batch, const quantity *q, block *b,
+    double *matrices, size_t start, size_t count, int is_far)
+{
+    const slider_crank_output whole = output_of(batch, q->result);
+    const int only = batch->varying_only, is_matrix = q->width > 0;
+    if (is_matrix && whole.first)
+        write_matrices(whole, q, rows_of(b, q), matrices + q->place, only, start, count, is_far);
+    store_rows(is_matrix ? output_of(batch, q->nonzeros) : whole, rows_of(b, q),
+        only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
+}
 
 int slider_crank_evaluate(const slider_crank_batch *batch)
 {
     block b;
-    double matrix[M * N], check[LANES] = { 0 };
-    const int wants_Phi_q = batch->Phi_q.first || batch->nonzeros.first;
-    const int wanted = (batch->Phi.first ? 1 : 0) | (wants_Phi_q ? 2 : 0)
-        | (batch->nu.first ? 4 : 0) | (batch->gamma.first ? 8 : 0);
+    double matrices[MATRICES], check[LANES] = { 0 };
+    unsigned wanted = 0;
+    for (int k = 0; k < QUANTITIES; k++)
+        if (output_of(batch, QUANTITY[k].result).first
+            || (QUANTITY[k].width > 0 && output_of(batch, QUANTITY[k].nonzeros).first))
+            wanted |= 1u << k;
     if (wanted == 0)
         return 0;
-    const int is_far = batch->count > FAR;
+    const int is_far = batch->count > FAR, wants_rates = wanted & MOVING && batch->q_dot.first;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
-    const int only = batch->varying_only, wants_rates = wanted & 8 && batch->q_dot.first;
-    if (wants_Phi_q && !only)
-        place_constants(&b, matrix, widest);
+    if (!batch->varying_only)
+        place_constants(&b, matrices, widest);
     if (!wants_rates)
         memset(b.q_dot, 0, sizeof b.q_dot);
     for (size_t start = 0; start < batch->count; start += LANES) {
@@ -799,15 +671,19 @@ int slider_crank_evaluate(const slider_crank_batch *batch)
         read_rows(b.q, N, batch->q, start, count, check);
         if (wants_rates)
             read_rows(b.q_dot, N, batch->q_dot, start, count, check);
-        FUNCTION[wanted](&b, count);
-        store_rows(batch->Phi, b.Phi, NULL, M, start, count, is_far);
-        if (batch->Phi_q.first)
-            write_matrices(batch->Phi_q, b.Phi_q, matrix, only, start, count, is_far);
-        store_rows(batch->nonzeros, b.Phi_q, only ? VARYING_ENTRY : NULL,
-            only ? VARYING : NONZEROS, start, count, is_far);
-        store_rows(batch->nu, b.nu, only ? NU_ROW : NULL, only ? NU_ROWS : M, start, count, is_far);
-        store_rows(batch->gamma, b.gamma, only ? GAMMA_ROW : NULL, only ? GAMMA_ROWS : M, start,
-            count, is_far);
+        run_kernels(wanted, &b, count);
+        if (wanted & 1)
+            write_quantity(batch, &QUANTITY[0], &b, matrices, start, count,
+                is_far);
+        if (wanted & 2)
+            write_quantity(batch, &QUANTITY[1], &b, matrices, start, count,
+                is_far);
+        if (wanted & 4)
+            write_quantity(batch, &QUANTITY[2], &b, matrices, start, count,
+                is_far);
+        if (wanted & 8)
+            write_quantity(batch, &QUANTITY[3], &b, matrices, start, count,
+                is_far);
     }
 #ifdef __x86_64__
     if (is_far)
@@ -822,8 +698,8 @@ int slider_crank_evaluate(const slider_crank_batch *batch)
 void slider_crank_solve(const slider_crank_system *system)
 {
     block b;
-    double matrix[M * N], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
-    place_constants(&b, matrix, LANES);
+    double matrices[MATRICES], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
+    place_constants(&b, matrices, LANES);
     for (size_t start = 0; start < system->count; start += LANES) {
         const size_t rest = system->count - start, count = rest < LANES ? rest : LANES;
         read_rows(b.Phi_q, NONZEROS, system->nonzeros, start, count, check);
@@ -1123,9 +999,9 @@ size_t slider_crank_march(const slider_crank_motion *motion)
     scales s;
     outcome o;
     state at;
-    double matrix[M * N];
+    double matrices[MATRICES];
     s.tolerance = motion->tolerance;
-    place_constants(&b, matrix, LANES);
+    place_constants(&b, matrices, LANES);
     for (int i = 0; i < K; i++)
         for (size_t k = 0; k < LANES; k++)
             b.p[i][k] = motion->p[i];
@@ -1204,8 +1080,8 @@ static void advance_alone(block *b, const scales *s, state *at, size_t k, outcom
     block alone;
     scales own;
     outcome found;
-    double matrix[M * N];
-    place_constants(&alone, matrix, 1);
+    double matrices[MATRICES];
+    place_constants(&alone, matrices, 1);
     own.tolerance = s->tolerance;
     found.is_over[0] = 0;
     for (int i = 0; i < K; i++)
@@ -1253,10 +1129,10 @@ size_t slider_crank_march_variants(const slider_crank_variants *all)
     block b;
     scales s;
     outcome o;
-    double matrix[M * N], check[LANES] = { 0 };
+    double matrices[MATRICES], check[LANES] = { 0 };
     size_t good = 0;
     s.tolerance = all->tolerance;
-    place_constants(&b, matrix, LANES);
+    place_constants(&b, matrices, LANES);
     for (size_t first = 0; first < all->variants; first += LANES) {
         const size_t rest = all->variants - first, count = rest < LANES ? rest : LANES;
         read_rows(b.p, K, all->p, first, count, check);

@@ -50,16 +50,17 @@ typedef struct {
 } slider_crank_output;
 
 // What is to be evaluated at `count` points, from coordinates q, rates q_dot, time t and
-// parameters p. A result whose `first` is NULL is not wanted; only gamma needs q_dot.
+// parameters p. A result whose `first` is NULL is not wanted; where nothing depends on q_dot, it is
+// not read.
 typedef struct {
     size_t count;
     slider_crank_input q, q_dot, t, p;
-    slider_crank_output Phi;       // 9 entries: Phi(q, t)
-    slider_crank_output Phi_q;     // 9 x 9 entries, row by row
+    slider_crank_output Phi;  // 9: Constraint vector Phi(q, t).
+    slider_crank_output Phi_q;  // 9 x 9: Jacobian of Phi by q.
     slider_crank_output nonzeros;  // 21 entries of Phi_q, in the order of the pattern
-    slider_crank_output nu;        // 9 entries: Phi_q q_dot = nu = -Phi_t
-    slider_crank_output gamma;     // 9 entries: Phi_q q_ddot = gamma
-    int varying_only;  // not 0: entries of Phi_q, nu and gamma that never change are in place
+    slider_crank_output nu;  // 9: Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
+    slider_crank_output gamma;  // 9: Right side of the acceleration equation Phi_q q_ddot = gamma.
+    int varying_only;  // not 0: entries that never change are in place
 } slider_crank_batch;
 
 // Evaluate a batch. Returns 0, or 1 where an input is not finite.

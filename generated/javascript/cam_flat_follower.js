@@ -20,8 +20,8 @@ const cam_flat_follower = (() => {
     "use strict";
 
     const NAME = "cam_flat_follower";
-    const FORMAT = 1;
-    const FINGERPRINT = "207b0bd47f91e8282f5ac7564f0cbc01";
+    const FORMAT = 2;
+    const FINGERPRINT = "b754e12faf3ede9e348c6d86fe905e76";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

@@ -21,8 +21,8 @@ const four_bar = (() => {
     "use strict";
 
     const NAME = "four_bar";
-    const FORMAT = 1;
-    const FINGERPRINT = "3096554c953e7691476db5b42d35f271";
+    const FORMAT = 2;
+    const FINGERPRINT = "cc0bd5779c29cb6873cf0b0a081eaf91";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

@@ -17,8 +17,8 @@ const problem_3_5_6 = (() => {
     "use strict";
 
     const NAME = "problem_3_5_6";
-    const FORMAT = 1;
-    const FINGERPRINT = "cf1b67c63b4e96bb294dd9e63b1ad407";
+    const FORMAT = 2;
+    const FINGERPRINT = "fa7adf382924fd70db26c5bd35276fee";
     const N_COORDINATES = 3;
     const N_EQUATIONS = 3;
     const COORDINATES = [

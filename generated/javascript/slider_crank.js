@@ -21,8 +21,8 @@ const slider_crank = (() => {
     "use strict";
 
     const NAME = "slider_crank";
-    const FORMAT = 1;
-    const FINGERPRINT = "372d93c96543d3b8f0288adffc736d59";
+    const FORMAT = 2;
+    const FINGERPRINT = "a527bb03116fe32da0a1d1f9e0aaa06b";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

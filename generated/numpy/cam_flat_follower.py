@@ -12,12 +12,16 @@ row  constraint                                         source
 4-5  CamFlatFollower "contact"       cam - follower     Haug 3.4
 6    AbsoluteAngle "motor" (driver)  cam                Haug 3.2.6
 
+Read `_position` first: Phi and Phi_q, constraint by constraint. `_nu` and `_gamma` are the right
+sides of velocity and acceleration, gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt.
+`_kinematics` is all of it once more, for batches. From `_Quantity` on all modules are alike.
+
 The functions take one point, q of shape (7,), or batches: q (..., 7), t (...)
-and p (..., 3) broadcast against each other. The code of the mechanism is in the functions
-that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
-of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
-a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
+and p (..., 3) broadcast against each other. What begins with an underscore runs on floats
+(f = FLOATS) and on arrays (f = ARRAYS), whose last axis is the batch. Names in it, for a joint J on
+a body b: c_b and s_b are the cosine and sine of phi_b, J_b_x and J_b_y the point's vector A s,
+J_b_w2_x the same times phi_b_dot squared (_sq is a square), J_axis_b_x an axis A v, J_d_x the
+vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -25,10 +29,9 @@ import math
 import numpy as np
 
 NAME = "cam_flat_follower"
-FORMAT = 1
-FINGERPRINT = "207b0bd47f91e8282f5ac7564f0cbc01"
-N_COORDINATES = 7
-N_EQUATIONS = 7
+FORMAT = 2
+FINGERPRINT = "b754e12faf3ede9e348c6d86fe905e76"
+N_COORDINATES, N_EQUATIONS = 7, 7
 COORDINATES = (
     "x_cam", "y_cam", "phi_cam", "x_follower", "y_follower", "phi_follower", "alpha_contact",
 )
@@ -36,46 +39,28 @@ EQUATIONS = (
     "shaft.x", "shaft.y", "guide.normal", "guide.parallel", "contact.contact",
     "contact.tangent", "motor",
 )
-PARAMETERS = (
-    "base", "lift", "omega",
-)
+PARAMETERS = ("base", "lift", "omega")
+# name, first column and number of columns of each body
+BODIES = (("cam", 0, 3), ("follower", 3, 3))
 UNITS = {
-    'x_cam': 'm',
-    'y_cam': 'm',
-    'phi_cam': 'rad',
-    'x_follower': 'm',
-    'y_follower': 'm',
-    'phi_follower': 'rad',
-    'alpha_contact': 'rad',
-    'base': 'm',
-    'lift': 'm',
-    'omega': 'rad/s',
+    "x_cam": "m", "y_cam": "m", "phi_cam": "rad", "x_follower": "m", "y_follower": "m",
+    "phi_follower": "rad", "alpha_contact": "rad", "base": "m", "lift": "m", "omega": "rad/s",
 }
-DEFAULTS = np.array((
-    0.04, 0.02, 6.283185307179586,
-), dtype=float)
-GUESS = np.array((
-    0.0, 0.0, 0.0, 0.0, 0.05, 0.0, 1.5707963267948966,
-), dtype=float)
+DEFAULTS = np.array((0.04, 0.02, 6.283185307179586), dtype=float)
+GUESS = np.array((0.0, 0.0, 0.0, 0.0, 0.05, 0.0, 1.5707963267948966), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
 PATTERN = np.array((
     (0, 0), (1, 1), (2, 3), (3, 5), (4, 0), (4, 1), (4, 2), (4, 3), (4, 4), (4, 5), (4, 6),
     (5, 2), (5, 5), (5, 6), (6, 2),
 ), dtype=int).reshape(-1, 2)
-# entries of PATTERN that never change, their values, and the entries that are computed
-_FIXED = np.array((
-    0, 1, 2, 14,
-), dtype=int)
-_CONSTANTS = np.array((
-    1.0, 1.0, -1.0, 1.0,
-), dtype=float)
-_VARYING = np.array((
-    3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13,
-), dtype=int)
+# number in the pattern and value of the entries that never change
+_CONSTANTS = {
+    0: 1.0, 1: 1.0, 2: -1.0, 14: 1.0,
+}
 pi = math.pi
 
 
-def _Phi(f, q, t, p):
+def _position(f, q, t, p):
     x_cam, y_cam, phi_cam, x_follower, y_follower, phi_follower, alpha_contact = q
     base, lift, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
@@ -88,10 +73,19 @@ def _Phi(f, q, t, p):
     sin_alpha_contact = sin(alpha_contact)
     contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
     contact_5 = contact_rho_cam * contact_u_cam_y
+    contact_d_y = y_follower - y_cam - contact_5
     contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_rho_cam * contact_u_cam_x
-    contact_rho_cam_1 = lift * sin_alpha_contact / 2
+    contact_8 = contact_rho_cam * contact_u_cam_x
+    contact_d_x = x_follower - x_cam - contact_8
+    lift_sin_alpha_contact = lift * sin_alpha_contact
+    contact_rho_cam_1 = lift_sin_alpha_contact / 2
+    contact_12 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
+    contact_13 = contact_rho_cam_1 * contact_u_cam_y + contact_8
+    contact_14 = s_follower * contact_12 + c_follower * contact_13
+    contact_15 = s_follower * contact_13 - c_follower * contact_12
+    contact_16 = lift * cos_alpha_contact / 2 - contact_rho_cam
     return (
+        # Phi
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
         x_cam,
         y_cam,
@@ -99,67 +93,32 @@ def _Phi(f, q, t, p):
         -x_follower,
         s_follower,
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        c_follower * (y_follower - y_cam - contact_5)
-            - s_follower * (x_follower - x_cam - contact_7),
-        s_follower * (contact_5 - contact_rho_cam_1 * contact_u_cam_x)
-            + c_follower * (contact_rho_cam_1 * contact_u_cam_y + contact_7),
+        c_follower * contact_d_y - s_follower * contact_d_x,
+        contact_14,
         # 6  AbsoluteAngle "motor": cam angle omega*t
         phi_cam - omega * t,
-    )
-
-
-def _Phi_q(f, q, t, p):
-    x_cam, y_cam, phi_cam, x_follower, y_follower, phi_follower, alpha_contact = q
-    base, lift, omega = p
-    cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_cam, s_cam = cos_sin(phi_cam)
-    c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact"
-    cos_alpha_contact = cos(alpha_contact)
-    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
-    sin_alpha_contact = sin(alpha_contact)
-    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_rho_cam * contact_u_cam_y
-    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_rho_cam * contact_u_cam_x
-    lift_sin_alpha_contact = lift * sin_alpha_contact
-    contact_rho_cam_1 = lift_sin_alpha_contact / 2
-    contact_10 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
-    contact_11 = contact_rho_cam_1 * contact_u_cam_y + contact_7
-    contact_12 = s_follower * contact_11 - c_follower * contact_10
-    contact_13 = lift * cos_alpha_contact / 2 - contact_rho_cam
-    return (
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
+        # Phi_q
         c_follower,  # guide.parallel by phi_follower
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         s_follower,  # contact.contact by x_cam
         -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_5 + c_follower * contact_7),  # contact.contact by phi_cam
+        -(s_follower * contact_5 + c_follower * contact_8),  # contact.contact by phi_cam
         -s_follower,  # contact.contact by x_follower
         c_follower,  # contact.contact by y_follower
-        -(c_follower * (x_follower - x_cam - contact_7)
-                + s_follower * (y_follower - y_cam - contact_5)),  # contact.contact by phi_follower
-        -(s_follower * contact_10 + c_follower * contact_11),  # contact.contact by alpha_contact
-        contact_12,  # contact.tangent by phi_cam
-        -contact_12,  # contact.tangent by phi_follower
-        c_follower * (contact_13 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-            - s_follower * (contact_13 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
+        -(c_follower * contact_d_x + s_follower * contact_d_y),  # contact.contact by phi_follower
+        -contact_14,  # contact.contact by alpha_contact
+        contact_15,  # contact.tangent by phi_cam
+        -contact_15,  # contact.tangent by phi_follower
+        c_follower * (contact_16 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
+            - s_follower * (contact_16 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
     )
 
 
 def _nu(f, q, t, p):
     omega = p[2]
     return (
-        # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        0,
-        0,
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        0,
-        0,
+        0, 0,  # 0-1  Revolute "shaft"
+        0, 0,  # 2-3  Translational "guide"
+        0, 0,  # 4-5  CamFlatFollower "contact"
         # 6  AbsoluteAngle "motor": cam angle omega*t
         omega,
     )
@@ -220,9 +179,7 @@ def _gamma(f, q, q_dot, t, p):
     contact_33 = lift_cos_alpha_contact * alpha_contact_dot
     contact_34 = contact_rho_cam_1 * alpha_contact_dot_sq
     return (
-        # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-        0,
-        0,
+        0, 0,  # 0-1  Revolute "shaft"
         # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
         0,
         phi_follower_dot * (phi_follower_dot * s_follower),
@@ -243,219 +200,7 @@ def _gamma(f, q, q_dot, t, p):
                 - s_follower * (contact_19
                     - (contact_34 * contact_u_cam_x + contact_33 * contact_12
                         + contact_rho_cam_1 * contact_29 + contact_24 + contact_26))),
-        # 6  AbsoluteAngle "motor": cam angle omega*t
-        0,
-    )
-
-
-def _position(f, q, t, p):
-    x_cam, y_cam, phi_cam, x_follower, y_follower, phi_follower, alpha_contact = q
-    base, lift, omega = p
-    cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_cam, s_cam = cos_sin(phi_cam)
-    c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact"
-    cos_alpha_contact = cos(alpha_contact)
-    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
-    sin_alpha_contact = sin(alpha_contact)
-    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_rho_cam * contact_u_cam_y
-    contact_d_y = y_follower - y_cam - contact_5
-    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_8 = contact_rho_cam * contact_u_cam_x
-    contact_d_x = x_follower - x_cam - contact_8
-    lift_sin_alpha_contact = lift * sin_alpha_contact
-    contact_rho_cam_1 = lift_sin_alpha_contact / 2
-    contact_12 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
-    contact_13 = contact_rho_cam_1 * contact_u_cam_y + contact_8
-    contact_14 = s_follower * contact_12 + c_follower * contact_13
-    contact_15 = s_follower * contact_13 - c_follower * contact_12
-    contact_16 = lift * cos_alpha_contact / 2 - contact_rho_cam
-    return (
-        # Phi
-        # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-        x_cam,
-        y_cam,
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        -x_follower,
-        s_follower,
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        c_follower * contact_d_y - s_follower * contact_d_x,
-        contact_14,
-        # 6  AbsoluteAngle "motor": cam angle omega*t
-        phi_cam - omega * t,
-        # Phi_q
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        c_follower,  # guide.parallel by phi_follower
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        s_follower,  # contact.contact by x_cam
-        -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_5 + c_follower * contact_8),  # contact.contact by phi_cam
-        -s_follower,  # contact.contact by x_follower
-        c_follower,  # contact.contact by y_follower
-        -(c_follower * contact_d_x + s_follower * contact_d_y),  # contact.contact by phi_follower
-        -contact_14,  # contact.contact by alpha_contact
-        contact_15,  # contact.tangent by phi_cam
-        -contact_15,  # contact.tangent by phi_follower
-        c_follower * (contact_16 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-            - s_follower * (contact_16 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
-    )
-
-
-def _velocity(f, q, t, p):
-    x_cam, y_cam, phi_cam, x_follower, y_follower, phi_follower, alpha_contact = q
-    base, lift, omega = p
-    cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_cam, s_cam = cos_sin(phi_cam)
-    c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact"
-    cos_alpha_contact = cos(alpha_contact)
-    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
-    sin_alpha_contact = sin(alpha_contact)
-    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_rho_cam * contact_u_cam_y
-    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_rho_cam * contact_u_cam_x
-    lift_sin_alpha_contact = lift * sin_alpha_contact
-    contact_rho_cam_1 = lift_sin_alpha_contact / 2
-    contact_10 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
-    contact_11 = contact_rho_cam_1 * contact_u_cam_y + contact_7
-    contact_12 = s_follower * contact_11 - c_follower * contact_10
-    contact_13 = lift * cos_alpha_contact / 2 - contact_rho_cam
-    return (
-        # Phi_q
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        c_follower,  # guide.parallel by phi_follower
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        s_follower,  # contact.contact by x_cam
-        -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_5 + c_follower * contact_7),  # contact.contact by phi_cam
-        -s_follower,  # contact.contact by x_follower
-        c_follower,  # contact.contact by y_follower
-        -(c_follower * (x_follower - x_cam - contact_7)
-                + s_follower * (y_follower - y_cam - contact_5)),  # contact.contact by phi_follower
-        -(s_follower * contact_10 + c_follower * contact_11),  # contact.contact by alpha_contact
-        contact_12,  # contact.tangent by phi_cam
-        -contact_12,  # contact.tangent by phi_follower
-        c_follower * (contact_13 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-            - s_follower * (contact_13 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
-        # nu
-        # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        0,
-        0,
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        0,
-        0,
-        # 6  AbsoluteAngle "motor": cam angle omega*t
-        omega,
-    )
-
-
-def _acceleration(f, q, q_dot, t, p):
-    x_cam, y_cam, phi_cam, x_follower, y_follower, phi_follower, alpha_contact = q
-    (
-        x_cam_dot, y_cam_dot, phi_cam_dot, x_follower_dot, y_follower_dot, phi_follower_dot,
-        alpha_contact_dot,
-    ) = q_dot
-    base, lift, omega = p
-    cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_cam, s_cam = cos_sin(phi_cam)
-    c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact"
-    cos_alpha_contact = cos(alpha_contact)
-    contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
-    sin_alpha_contact = sin(alpha_contact)
-    contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
-    contact_5 = contact_rho_cam * contact_u_cam_y
-    contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_7 = contact_rho_cam * contact_u_cam_x
-    contact_d_x = x_follower - x_cam - contact_7
-    contact_d_y = y_follower - y_cam - contact_5
-    lift_sin_alpha_contact = lift * sin_alpha_contact
-    contact_rho_cam_1 = lift_sin_alpha_contact / 2
-    contact_12 = contact_5 - contact_rho_cam_1 * contact_u_cam_x
-    contact_13 = contact_rho_cam_1 * contact_u_cam_y + contact_7
-    contact_14 = s_follower * contact_12 + c_follower * contact_13
-    contact_15 = s_follower * contact_13 - c_follower * contact_12
-    lift_cos_alpha_contact = lift * cos_alpha_contact
-    contact_rho_cam_2 = lift_cos_alpha_contact / 2
-    contact_18 = contact_rho_cam_2 - contact_rho_cam
-    contact_19 = contact_rho_cam_1 * alpha_contact_dot
-    contact_20 = contact_19 * contact_u_cam_x
-    contact_21 = phi_cam_dot * contact_u_cam_y + alpha_contact_dot * contact_u_cam_y
-    contact_22 = contact_rho_cam * contact_21
-    contact_23 = contact_19 * contact_u_cam_y
-    contact_24 = phi_cam_dot * contact_u_cam_x + alpha_contact_dot * contact_u_cam_x
-    contact_25 = contact_rho_cam * contact_24
-    contact_26 = (
-        c_follower * (x_follower_dot - x_cam_dot - contact_20 + contact_22)
-        + s_follower * (y_follower_dot - y_cam_dot - contact_23 - contact_25)
-    )
-    contact_27 = phi_cam_dot * contact_21 + alpha_contact_dot * contact_21
-    contact_28 = contact_rho_cam * contact_27
-    alpha_contact_dot_sq = alpha_contact_dot**2
-    contact_30 = contact_rho_cam_2 * alpha_contact_dot_sq
-    contact_31 = contact_30 * contact_u_cam_y
-    contact_32 = lift_sin_alpha_contact * alpha_contact_dot
-    contact_33 = contact_32 * contact_24
-    contact_34 = contact_32 * contact_21
-    contact_35 = contact_30 * contact_u_cam_x
-    contact_36 = phi_cam_dot * contact_24 + alpha_contact_dot * contact_24
-    contact_37 = contact_rho_cam * contact_36
-    contact_38 = contact_rho_cam_2 * alpha_contact_dot
-    contact_39 = (
-        c_follower * (contact_38 * contact_u_cam_x - contact_rho_cam_1 * contact_21
-            - contact_23 - contact_25)
-        + s_follower * (contact_38 * contact_u_cam_y + contact_rho_cam_1 * contact_24
-            + contact_20 - contact_22)
-    )
-    contact_40 = lift_cos_alpha_contact * alpha_contact_dot
-    contact_41 = contact_rho_cam_1 * alpha_contact_dot_sq
-    return (
-        # Phi_q
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        c_follower,  # guide.parallel by phi_follower
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        s_follower,  # contact.contact by x_cam
-        -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_5 + c_follower * contact_7),  # contact.contact by phi_cam
-        -s_follower,  # contact.contact by x_follower
-        c_follower,  # contact.contact by y_follower
-        -(c_follower * contact_d_x + s_follower * contact_d_y),  # contact.contact by phi_follower
-        -contact_14,  # contact.contact by alpha_contact
-        contact_15,  # contact.tangent by phi_cam
-        -contact_15,  # contact.tangent by phi_follower
-        c_follower * (contact_18 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-            - s_follower * (contact_18 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
-        # gamma
-        # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        0,
-        phi_follower_dot * (phi_follower_dot * s_follower),
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        phi_follower_dot * (phi_follower_dot * (c_follower * contact_d_y
-                    - s_follower * contact_d_x)
-                + contact_26)
-            + phi_follower_dot * contact_26
-            - (c_follower * (contact_28 - (contact_31 + contact_33))
-                - s_follower * (contact_34 - contact_35 + contact_37)),
-        phi_follower_dot * (phi_follower_dot * contact_14 + contact_39)
-            + phi_follower_dot * contact_39
-            - (c_follower * (contact_40 * contact_24 - contact_41 * contact_u_cam_y
-                    - contact_rho_cam_1 * contact_27 + contact_35 - contact_34 - contact_37)
-                - s_follower * (contact_28
-                    - (contact_41 * contact_u_cam_x + contact_40 * contact_21
-                        + contact_rho_cam_1 * contact_36 + contact_31 + contact_33))),
-        # 6  AbsoluteAngle "motor": cam angle omega*t
-        0,
+        0,  # 6  AbsoluteAngle "motor"
     )
 
 
@@ -470,7 +215,6 @@ def _kinematics(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
@@ -493,8 +237,7 @@ def _kinematics(f, q, q_dot, t, p):
     contact_20 = contact_rho_cam_1 * alpha_contact_dot
     contact_21 = contact_20 * contact_u_cam_x
     contact_22 = phi_cam_dot * contact_u_cam_y + alpha_contact_dot * contact_u_cam_y
-    contact_23 = contact_rho_cam * contact_22
-    contact_24 = contact_20 * contact_u_cam_y
+    contact_23, contact_24 = contact_rho_cam * contact_22, contact_20 * contact_u_cam_y
     contact_25 = phi_cam_dot * contact_u_cam_x + alpha_contact_dot * contact_u_cam_x
     contact_26 = contact_rho_cam * contact_25
     contact_27 = (
@@ -502,17 +245,14 @@ def _kinematics(f, q, q_dot, t, p):
         + s_follower * (y_follower_dot - y_cam_dot - contact_24 - contact_26)
     )
     contact_28 = phi_cam_dot * contact_22 + alpha_contact_dot * contact_22
-    contact_29 = contact_rho_cam * contact_28
-    alpha_contact_dot_sq = alpha_contact_dot**2
+    contact_29, alpha_contact_dot_sq = contact_rho_cam * contact_28, alpha_contact_dot**2
     contact_31 = contact_rho_cam_2 * alpha_contact_dot_sq
     contact_32 = contact_31 * contact_u_cam_y
     contact_33 = lift_sin_alpha_contact * alpha_contact_dot
-    contact_34 = contact_33 * contact_25
-    contact_35 = contact_33 * contact_22
+    contact_34, contact_35 = contact_33 * contact_25, contact_33 * contact_22
     contact_36 = contact_31 * contact_u_cam_x
     contact_37 = phi_cam_dot * contact_25 + alpha_contact_dot * contact_25
-    contact_38 = contact_rho_cam * contact_37
-    contact_39 = contact_rho_cam_2 * alpha_contact_dot
+    contact_38, contact_39 = contact_rho_cam * contact_37, contact_rho_cam_2 * alpha_contact_dot
     contact_40 = (
         c_follower * (contact_39 * contact_u_cam_x - contact_rho_cam_1 * contact_22
             - contact_24 - contact_26)
@@ -523,52 +263,17 @@ def _kinematics(f, q, q_dot, t, p):
     contact_42 = contact_rho_cam_1 * alpha_contact_dot_sq
     return (
         # Phi
-        # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-        x_cam,
-        y_cam,
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        -x_follower,
-        s_follower,
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        contact_10,
-        contact_15,
-        # 6  AbsoluteAngle "motor": cam angle omega*t
-        phi_cam - omega * t,
+        x_cam, y_cam, -x_follower, s_follower, contact_10, contact_15, phi_cam - omega * t,
         # Phi_q
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        c_follower,  # guide.parallel by phi_follower
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        s_follower,  # contact.contact by x_cam
-        -c_follower,  # contact.contact by y_cam
-        -(s_follower * contact_5 + c_follower * contact_8),  # contact.contact by phi_cam
-        -s_follower,  # contact.contact by x_follower
-        c_follower,  # contact.contact by y_follower
-        -(c_follower * contact_d_x + s_follower * contact_d_y),  # contact.contact by phi_follower
-        -contact_15,  # contact.contact by alpha_contact
-        contact_16,  # contact.tangent by phi_cam
-        -contact_16,  # contact.tangent by phi_follower
+        c_follower, s_follower, -c_follower, -(s_follower * contact_5 + c_follower * contact_8),
+        -s_follower, c_follower, -(c_follower * contact_d_x + s_follower * contact_d_y),
+        -contact_15, contact_16, -contact_16,
         c_follower * (contact_19 * contact_u_cam_y + lift_sin_alpha_contact * contact_u_cam_x)
-            - s_follower * (contact_19 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),  # contact.tangent by alpha_contact
+            - s_follower * (contact_19 * contact_u_cam_x - lift_sin_alpha_contact * contact_u_cam_y),
         # nu
-        # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        0,
-        0,
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
-        0,
-        0,
-        # 6  AbsoluteAngle "motor": cam angle omega*t
-        omega,
+        0, 0, 0, 0, 0, 0, omega,
         # gamma
-        # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        0,
-        phi_follower_dot * (phi_follower_dot * s_follower),
-        # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
+        0, 0, 0, phi_follower_dot * (phi_follower_dot * s_follower),
         phi_follower_dot * (phi_follower_dot * contact_10 + contact_27)
             + phi_follower_dot * contact_27
             - (c_follower * (contact_29 - (contact_32 + contact_34))
@@ -580,7 +285,6 @@ def _kinematics(f, q, q_dot, t, p):
                 - s_follower * (contact_29
                     - (contact_42 * contact_u_cam_x + contact_41 * contact_22
                         + contact_rho_cam_1 * contact_37 + contact_32 + contact_34))),
-        # 6  AbsoluteAngle "motor": cam angle omega*t
         0,
     )
 
@@ -602,21 +306,11 @@ def _factor(f, J):
     k_2 = 1 / contact_tangent_alpha_contact
     k_3 = 1 / contact_contact_y_follower
     return (
-        contact_contact_x_cam,
-        contact_contact_y_cam,
-        contact_contact_phi_cam,
-        contact_contact_x_follower,
-        contact_contact_phi_follower,
-        contact_contact_alpha_contact,
-        contact_tangent_phi_cam,
-        contact_tangent_phi_follower,
-        k_1,
-        k_2,
-        k_3,
+        contact_contact_x_cam, contact_contact_y_cam, contact_contact_phi_cam,
+        contact_contact_x_follower, contact_contact_phi_follower, contact_contact_alpha_contact,
+        contact_tangent_phi_cam, contact_tangent_phi_follower, k_1, k_2, k_3,
     ), (
-        guide_parallel_phi_follower,
-        contact_tangent_alpha_contact,
-        contact_contact_y_follower,
+        guide_parallel_phi_follower, contact_tangent_alpha_contact, contact_contact_y_follower,
     )
 
 
@@ -627,9 +321,7 @@ def _solve(f, F, b):
         contact_contact_x_follower, contact_contact_phi_follower, contact_contact_alpha_contact,
         contact_tangent_phi_cam, contact_tangent_phi_follower, k_1, k_2, k_3,
     ) = F
-    (
-        shaft_x, shaft_y, guide_normal, guide_parallel, contact_contact, contact_tangent, motor,
-    ) = b
+    shaft_x, shaft_y, guide_normal, guide_parallel, contact_contact, contact_tangent, motor = b
     phi_follower = guide_parallel * k_1
     alpha_contact = (
         (contact_tangent - contact_tangent_phi_cam * motor
@@ -643,102 +335,84 @@ def _solve(f, F, b):
     )
     x_follower = -guide_normal
     return (
-        shaft_x,
-        shaft_y,
-        motor,
-        x_follower,
-        y_follower,
-        phi_follower,
-        alpha_contact,
+        shaft_x, shaft_y, motor, x_follower, y_follower, phi_follower, alpha_contact,
     )
 
 
 def Phi(q, t, p=DEFAULTS):
     """Constraint vector Phi(q, t), shape (..., 7)."""
-    return _evaluate(_Phi, _PHI, t, p, q)
+    return _evaluate(_position, 0, _PHI, t, p, q)
 
 
 def Phi_q(q, t, p=DEFAULTS):
     """Jacobian of Phi by q, shape (..., 7, 7)."""
-    return _evaluate(_Phi_q, _PHI_Q, t, p, q)
-
-
-def nu(q, t, p=DEFAULTS):
-    """Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, shape (..., 7)."""
-    return _evaluate(_nu, _NU, t, p, q)
-
-
-def gamma(q, q_dot, t, p=DEFAULTS):
-    """Right side of the acceleration equation Phi_q q_ddot = gamma, shape (..., 7).
-
-    gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt
-    """
-    return _evaluate(_gamma, _GAMMA, t, p, q, q_dot)
+    return _evaluate(_position, 7, _PHI_Q, t, p, q)
 
 
 def Phi_q_nonzeros(q, t, p=DEFAULTS):
     """Entries of Phi_q in the order of PATTERN, shape (..., 15)."""
-    return _evaluate(_Phi_q, _NONZEROS, t, p, q)
+    return _evaluate(_position, 7, _PHI_Q_NONZEROS, t, p, q)
+
+
+def nu(q, t, p=DEFAULTS):
+    """Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, shape (..., 7)."""
+    return _evaluate(_nu, 0, _NU, t, p, q)
+
+
+def gamma(q, q_dot, t, p=DEFAULTS):
+    """Right side of the acceleration equation Phi_q q_ddot = gamma, shape (..., 7)."""
+    return _evaluate(_gamma, 0, _GAMMA, t, p, q, q_dot)
 
 
 def position(q, t, p=DEFAULTS):
     """Phi and Phi_q in one go: a step of Newton's method."""
-    return _evaluate_together(_position, (_PHI, _PHI_Q), t, p, q)
+    return _evaluate(_position, 0, (_PHI, _PHI_Q), t, p, q)
 
 
 def velocity(q, t, p=DEFAULTS):
-    """Phi_q and nu in one go: the velocity equation."""
-    return _evaluate_together(_velocity, (_PHI_Q, _NU), t, p, q)
+    """Phi_q and nu: the velocity equation."""
+    return Phi_q(q, t, p), nu(q, t, p)
 
 
 def acceleration(q, q_dot, t, p=DEFAULTS):
-    """Phi_q and gamma in one go: the acceleration equation."""
-    return _evaluate_together(_acceleration, (_PHI_Q, _GAMMA), t, p, q, q_dot)
+    """Phi_q and gamma: the acceleration equation."""
+    return kinematics(q, q_dot, t, p)[1::2]
 
 
 def kinematics(q, q_dot, t, p=DEFAULTS):
     """Phi, Phi_q, nu and gamma in one go."""
-    return _evaluate_together(_kinematics, (_PHI, _PHI_Q, _NU, _GAMMA), t, p, q, q_dot)
+    return _evaluate(_kinematics, 0, (_PHI, _PHI_Q, _NU, _GAMMA), t, p, q, q_dot)
 
 
 def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
     """Phi, the nonzeros of Phi_q, nu and gamma of a batch whose axis is the last one.
 
     q and q_dot have the shape (7, N), t () or (N,), p (3,) or (3, N).
-    The results have the shapes (7, N), (15, N), (7, N), (7, N):
-    the layout in which the code runs fastest.
+    The results have the shapes (7, N), (15, N), (7, N), (7, N).
     """
-    return _evaluate_batch_last(_kinematics, (_PHI, _NONZEROS, _NU, _GAMMA), t, p, q, q_dot)
+    states, t, p = _batch_last(t, p, (q, q_dot))
+    quantities = _PHI, _PHI_Q_NONZEROS, _NU, _GAMMA
+    return _on_batch(_kinematics, 0, quantities, t, p, states, is_last=True)
 
 
 def solve(nonzeros, b):
     """Return x of Phi_q x = b by the planned elimination, shape (..., 7).
 
-    nonzeros (..., 15) are the entries of Phi_q in the order of PATTERN, b has the shape
-    (..., 7). Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that
-    may happen.
+    nonzeros (..., 15) are the entries of Phi_q in the order of PATTERN, b is (..., 7).
+    Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that may happen.
     """
     nonzeros, b = np.asarray(nonzeros, dtype=float), np.asarray(b, dtype=float)
     with np.errstate(all="ignore"):
-        F, _ = _factor(_Arrays, [nonzeros[..., k] for k in _VARYING])
-        x = _solve(_Arrays, F, [b[..., k] for k in range(N_EQUATIONS)])
+        F, _ = _factor(ARRAYS, [nonzeros[..., k] for k in _PHI_Q_NONZEROS.places])
+        x = _solve(ARRAYS, F, [b[..., k] for k in range(N_EQUATIONS)])
     return np.stack(np.broadcast_arrays(*x), axis=-1)
 
 
 # The code itself, for callers that keep each coordinate in an array of its own: functions of
-# (f, q, [q_dot,] t, p), with f = ARRAYS and sequences q, q_dot, p of numbers or arrays (N,), or
-# with f = FLOATS and sequences of floats. Of Phi_q they give the entries that vary.
+# (f, q, [q_dot,] t, p) with sequences q, q_dot, p. Of Phi_q they give the entries that vary.
 LANES = {
-    "Phi": _Phi,
-    "Phi_q": _Phi_q,
-    "nu": _nu,
-    "gamma": _gamma,
-    "position": _position,
-    "velocity": _velocity,
-    "acceleration": _acceleration,
-    "kinematics": _kinematics,
-    "factor": _factor,
-    "solve": _solve,
+    "position": _position, "nu": _nu, "gamma": _gamma, "kinematics": _kinematics,
+    "factor": _factor, "solve": _solve,
 }
 
 
@@ -749,43 +423,39 @@ class InputError(ValueError):
 def _cos_sin(angle):
     """Cosine and sine of an array through t = tan(angle / 2): half the time of np.cos and np.sin.
 
-    With R = 2 / (1 + t^2) they are R - 1 and t R. No angle is out of reach, since a float is never
-    exactly pi: there t is about 1e16, and t^2 far from overflow. The error is at most 4e-16.
+    With R = 2 / (1 + t^2) they are R - 1 and t R. A float is never exactly pi: there t is about
+    1e16, and t^2 far from overflow. The error is at most 4e-16.
     """
     t = np.tan(0.5 * angle)
     R = 2.0 / (1.0 + t * t)
     return R - 1.0, t * R
 
 
-class _Floats:
+class FLOATS:
     """Elementary functions of one number."""
-
     cos = math.cos
     cos_sin = staticmethod(lambda angle, cos=math.cos, sin=math.sin: (cos(angle), sin(angle)))
     sin = math.sin
 
 
-class _Arrays:
+class ARRAYS:
     """Elementary functions of arrays."""
-
     cos = np.cos
     cos_sin = staticmethod(_cos_sin)
     sin = np.sin
 
 
 class _Quantity:
-    """What a function returns: its shape, its constant entries, and where the computed ones go."""
+    """A result: its shape, where its computed entries go, and its entries that never change."""
 
-    def __init__(self, shape, places, fixed=(), constants=()):
-        self.shape = shape
-        self.size = math.prod(shape)
-        self.index = np.array(places, dtype=int)
-        self.places = self.index.tolist()
-        self.count = len(self.places)
-        self.fixed = np.array(fixed, dtype=int)
-        self.constants = np.reshape(constants, (-1, 1))
+    def __init__(self, shape, places, constants=()):
+        self.shape, self.size = shape, math.prod(shape)
+        self.places = [int(place) for k, place in enumerate(places) if k not in constants]
+        self.index, self.count = np.array(self.places, dtype=int), len(self.places)
+        self.fixed = [int(places[k]) for k in constants]
+        self.constants = np.array([[constants[k]] for k in constants], dtype=float).reshape(-1, 1)
         self.start = np.zeros(shape)
-        self.start.put(self.fixed, constants)
+        self.start.put(self.fixed, self.constants)
         self.is_full = shape == (self.count,)
 
     def at_point(self, values):
@@ -797,24 +467,11 @@ class _Quantity:
         result.put(self.index, computed)
         return result
 
-    def for_batch(self, count, dtype):
-        """Return an array (size, N) with the constant entries in place.
 
-        It lies in memory point by point, as it is wanted in the end.
-        """
-        result = _empty((count, self.size), dtype)
-        if not self.is_full:
-            result[:] = self.start.reshape(-1)
-        return result.T
-
-
-FLOATS, ARRAYS = _Floats, _Arrays
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
-_FLAT = PATTERN @ (N_COORDINATES, 1)
-_PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), _FLAT[_VARYING], _FLAT[_FIXED], _CONSTANTS)
-_NONZEROS = _Quantity((len(PATTERN),), _VARYING, _FIXED, _CONSTANTS)
-_STATES = ("q", "q_dot")
-_SHAPE = (N_COORDINATES,)
+_PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
+_PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
+_STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
 _BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
 _PARAMETER_LIST = DEFAULTS.tolist()
@@ -823,8 +480,9 @@ for _array in (DEFAULTS, GUESS, PATTERN):
     _array.flags.writeable = False
 
 
-def _evaluate(kernel, quantity, t, p, *states):
-    """Return one quantity: of one point with floats, or of a batch with arrays."""
+def _evaluate(kernel, skip, wanted, t, p, *states):
+    """Return a quantity or several, what a kernel computes after so many values."""
+    quantities = wanted if type(wanted) is tuple else (wanted,)
     point = _point(t, p, states)
     if point is not None:
         try:
@@ -832,72 +490,37 @@ def _evaluate(kernel, quantity, t, p, *states):
         except (ArithmeticError, ValueError):
             pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
         else:
-            return quantity.at_point(values)
-    return _evaluate_batch(kernel, (quantity,), t, p, states)[0]
-
-
-def _evaluate_together(kernel, quantities, t, p, *states):
-    """Return several quantities that share work."""
-    point = _point(t, p, states)
-    if point is not None:
-        try:
-            values = iter(kernel(*point))
-        except (ArithmeticError, ValueError):
-            pass
-        else:
+            if quantities is not wanted:
+                return wanted.at_point(values[skip:])
+            values = iter(values)
             return tuple([quantity.at_point(values) for quantity in quantities])
-    return _evaluate_batch(kernel, quantities, t, p, states)
-
-
-def _evaluate_batch(kernel, quantities, t, p, states):
-    """Run a kernel on a batch whose axes are the first ones."""
     states, t, p, shape = _batch(t, p, states)
-    dtype = states[0].dtype
-    results = [quantity.for_batch(math.prod(shape), dtype) for quantity in quantities]
-    _fill(results, kernel, quantities, t, p, states)
-    return tuple(
-        result.T.reshape(shape + quantity.shape)
-        for quantity, result in zip(quantities, results)
-    )
+    results = _on_batch(kernel, skip, quantities, t, p, states)
+    found = [part.T.reshape(shape + item.shape) for item, part in zip(quantities, results)]
+    return tuple(found) if quantities is wanted else found[0]
 
 
-def _evaluate_batch_last(kernel, quantities, t, p, *states):
-    """Run a kernel on a batch whose axis is the last one."""
-    states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
-    t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
-    count = states[0].shape[-1]
-    batches = {state.shape[1:] for state in states}
-    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
-        shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
-        raise InputError(
-            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
-            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
-            f"({len(PARAMETERS)}, N)"
-        )
-    dtype = np.result_type(*states, t, p)
-    results = [_empty((quantity.size, count), dtype) for quantity in quantities]
-    for quantity, result in zip(quantities, results):
-        if not quantity.is_full:
-            result[quantity.fixed] = quantity.constants
-    _fill(results, kernel, quantities, t, p, states)
+def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
+    """Return quantities as arrays (size, N), in memory point by point or with the batch last."""
+    count, dtype = states[0].shape[1], np.result_type(*states, t, p)
+    results = []
+    for item in quantities:
+        if is_last:
+            results.append(_empty((item.size, count), dtype))
+            results[-1][item.fixed] = item.constants
+        else:
+            results.append(_empty((count, item.size), dtype).T)
+            if not item.is_full:
+                results[-1].T[:] = item.start.reshape(-1)
+    for start in range(0, count, _BLOCK):
+        block = ..., slice(start, start + _BLOCK)
+        at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
+        with np.errstate(all="ignore"):
+            found = iter(kernel(ARRAYS, *(part[block] for part in states), at, parameters)[skip:])
+            for item, part in zip(quantities, [result[block] for result in results]):
+                for place, value in zip(item.places, found):
+                    part[place] = value
     return tuple(results)
-
-
-def _fill(results, kernel, quantities, t, p, states):
-    """Run a kernel, block by block, and put its values into arrays (size, N)."""
-    count = results[0].shape[1]
-    if count > _BLOCK:
-        for start in range(0, count, _BLOCK):
-            block = ..., slice(start, start + _BLOCK)
-            at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
-            parts = [result[block] for result in results]
-            _fill(parts, kernel, quantities, at, parameters, [state[block] for state in states])
-        return
-    with np.errstate(all="ignore"):
-        values = iter(kernel(_Arrays, *states, t, p))
-        for quantity, result in zip(quantities, results):
-            for place, value in zip(quantity.places, values):
-                result[place] = value
 
 
 def _point(t, p, states):
@@ -913,7 +536,7 @@ def _point(t, p, states):
         total = t + sum(parameters)
     else:
         return None
-    arguments = [_Floats]
+    arguments = [FLOATS]
     for state in states:
         if type(state) is not _ndarray or state.shape != _SHAPE or state.dtype is not _REAL:
             return None
@@ -939,21 +562,34 @@ def _batch(t, p, states):
             "other; they broadcast like NumPy arrays"
         ) from None
     dtype = np.result_type(*states, t, p)
-    states = [_rows(state, shape).astype(dtype, copy=False) for state in states]
-    t = t if t.ndim == 0 else _spread(t, shape).reshape(-1)
-    p = p if p.ndim == 1 else _rows(p, shape)
+    whole = (*shape, N_COORDINATES)
+    states = [_rows(state, whole).astype(dtype, copy=False) for state in states]
+    t = t if t.ndim == 0 else _rows(t[..., np.newaxis], (*shape, 1))[0]
+    p = p if p.ndim == 1 else _rows(p, (*shape, len(PARAMETERS)))
     return states, t, p, shape
 
 
+def _batch_last(t, p, states):
+    """Check the arguments of a batch whose axis is the last one."""
+    states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
+    t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
+    count = states[0].shape[-1]
+    batches = {state.shape[1:] for state in states}
+    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
+        shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
+        raise InputError(
+            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
+            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
+            f"({len(PARAMETERS)}, N)"
+        )
+    return states, t, p
+
+
 def _rows(array, shape):
-    """Return an array (..., n), broadcast to a batch's shape, as (n, N)."""
-    size = array.shape[-1]
-    return _spread(array, (*shape, size)).reshape(math.prod(shape), size).T
-
-
-def _spread(array, shape):
-    """Return np.broadcast_to(array, shape), which is slow even where nothing is to be done."""
-    return array if array.shape == shape else np.broadcast_to(array, shape)
+    """Return an array (..., n), broadcast to a shape, as (n, N)."""
+    if array.shape != shape:  # np.broadcast_to is slow even where nothing is to be done
+        array = np.broadcast_to(array, shape)
+    return array.reshape(math.prod(shape[:-1]), shape[-1]).T
 
 
 def _checked(name, value, entries=None, axis=-1):

@@ -13,12 +13,16 @@ row  constraint                                        source
 6-7  Revolute "D"                    rocker - ground   Haug 3.3.10
 8    AbsoluteAngle "motor" (driver)  crank             Haug 3.2.6
 
+Read `_position` first: Phi and Phi_q, constraint by constraint. `_nu` and `_gamma` are the right
+sides of velocity and acceleration, gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt.
+`_kinematics` is all of it once more, for batches. From `_Quantity` on all modules are alike.
+
 The functions take one point, q of shape (9,), or batches: q (..., 9), t (...)
-and p (..., 5) broadcast against each other. The code of the mechanism is in the functions
-that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
-of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
-a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
+and p (..., 5) broadcast against each other. What begins with an underscore runs on floats
+(f = FLOATS) and on arrays (f = ARRAYS), whose last axis is the batch. Names in it, for a joint J on
+a body b: c_b and s_b are the cosine and sine of phi_b, J_b_x and J_b_y the point's vector A s,
+J_b_w2_x the same times phi_b_dot squared (_sq is a square), J_axis_b_x an axis A v, J_d_x the
+vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -26,62 +30,50 @@ import math
 import numpy as np
 
 NAME = "four_bar"
-FORMAT = 1
-FINGERPRINT = "3096554c953e7691476db5b42d35f271"
-N_COORDINATES = 9
-N_EQUATIONS = 9
+FORMAT = 2
+FINGERPRINT = "cc0bd5779c29cb6873cf0b0a081eaf91"
+N_COORDINATES, N_EQUATIONS = 9, 9
 COORDINATES = (
     "x_crank", "y_crank", "phi_crank", "x_coupler", "y_coupler", "phi_coupler", "x_rocker",
     "y_rocker", "phi_rocker",
 )
-EQUATIONS = (
-    "A.x", "A.y", "B.x", "B.y", "C.x", "C.y", "D.x", "D.y", "motor",
-)
-PARAMETERS = (
-    "a", "b", "c", "d", "omega",
-)
+EQUATIONS = ("A.x", "A.y", "B.x", "B.y", "C.x", "C.y", "D.x", "D.y", "motor")
+PARAMETERS = ("a", "b", "c", "d", "omega")
+# name, first column and number of columns of each body
+BODIES = (("crank", 0, 3), ("coupler", 3, 3), ("rocker", 6, 3))
 UNITS = {
-    'x_crank': 'm',
-    'y_crank': 'm',
-    'phi_crank': 'rad',
-    'x_coupler': 'm',
-    'y_coupler': 'm',
-    'phi_coupler': 'rad',
-    'x_rocker': 'm',
-    'y_rocker': 'm',
-    'phi_rocker': 'rad',
-    'a': 'm',
-    'b': 'm',
-    'c': 'm',
-    'd': 'm',
-    'omega': 'rad/s',
+    "x_crank": "m", "y_crank": "m", "phi_crank": "rad", "x_coupler": "m", "y_coupler": "m",
+    "phi_coupler": "rad", "x_rocker": "m", "y_rocker": "m", "phi_rocker": "rad", "a": "m",
+    "b": "m", "c": "m", "d": "m", "omega": "rad/s",
 }
-DEFAULTS = np.array((
-    10.0, 26.0, 18.0, 20.0, 1.5,
-), dtype=float)
-GUESS = np.array((
-    5.0, 0.0, 0.0, 20.0, 10.0, 0.7853981633974483, 20.0, 9.0, 4.71238898038469,
-), dtype=float)
+DEFAULTS = np.array((10.0, 26.0, 18.0, 20.0, 1.5), dtype=float)
+GUESS = np.array((5.0, 0.0, 0.0, 20.0, 10.0, 0.7853981633974483, 20.0, 9.0, 4.71238898038469), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
 PATTERN = np.array((
     (0, 0), (0, 2), (1, 1), (1, 2), (2, 0), (2, 2), (2, 3), (2, 5), (3, 1), (3, 2), (3, 4),
     (3, 5), (4, 3), (4, 5), (4, 6), (4, 8), (5, 4), (5, 5), (5, 7), (5, 8), (6, 6), (6, 8),
     (7, 7), (7, 8), (8, 2),
 ), dtype=int).reshape(-1, 2)
-# entries of PATTERN that never change, their values, and the entries that are computed
-_FIXED = np.array((
-    0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24,
-), dtype=int)
-_CONSTANTS = np.array((
-    1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0,
-), dtype=float)
-_VARYING = np.array((
-    1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23,
-), dtype=int)
+# number in the pattern and value of the entries that never change
+_CONSTANTS = {
+    0: 1.0, 2: 1.0, 4: 1.0, 6: -1.0, 8: 1.0, 10: -1.0, 12: 1.0, 14: -1.0, 16: 1.0, 18: -1.0,
+    20: 1.0, 22: 1.0, 24: 1.0,
+}
 pi = math.pi
 
 
-def _Phi(f, q, t, p):
+# Phi_q with all its entries:
+#       x_crank y_crank phi_crank  x_coupler y_coupler phi_coupler  x_rocker y_rocker phi_rocker
+# A.x   1       .       B_crank_y  .         .         .            .        .        .
+# A.y   .       1       -B_crank_x .         .         .            .        .        .
+# B.x   1       .       -B_crank_y -1        .         -C_coupler_y .        .        .
+# B.y   .       1       B_crank_x  .         -1        C_coupler_x  .        .        .
+# C.x   .       .       .          1         .         -C_coupler_y -1       .        -D_rocker_y
+# C.y   .       .       .          .         1         C_coupler_x  .        -1       D_rocker_x
+# D.x   .       .       .          .         .         .            1        .        -D_rocker_y
+# D.y   .       .       .          .         .         .            .        1        D_rocker_x
+# motor .       .       1          .         .         .            .        .        .
+def _position(f, q, t, p):
     (
         x_crank, y_crank, phi_crank, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker,
         phi_rocker,
@@ -105,6 +97,7 @@ def _Phi(f, q, t, p):
     D_rocker_x = c_2 * c_rocker
     D_rocker_y = c_2 * s_rocker
     return (
+        # Phi
         # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
         x_crank - B_crank_x,
         y_crank - B_crank_y,
@@ -119,44 +112,17 @@ def _Phi(f, q, t, p):
         y_rocker + D_rocker_y,
         # 8  AbsoluteAngle "motor": crank angle omega*t
         phi_crank - omega * t,
-    )
-
-
-def _Phi_q(f, q, t, p):
-    phi_crank, phi_coupler, phi_rocker = q[2], q[5], q[8]
-    a, b, c, d, omega = p
-    cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_crank, s_crank = cos_sin(phi_crank)
-    c_coupler, s_coupler = cos_sin(phi_coupler)
-    c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A"
-    a_2 = a / 2
-    B_crank_y = a_2 * s_crank
-    B_crank_x = a_2 * c_crank
-    # 2-3  Revolute "B"
-    b_2 = b / 2
-    C_coupler_y = b_2 * s_coupler
-    C_coupler_x = b_2 * c_coupler
-    # 4-5  Revolute "C"
-    c_2 = c / 2
-    D_rocker_y = c_2 * s_rocker
-    D_rocker_x = c_2 * c_rocker
-    return (
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+        # Phi_q
         B_crank_y,  # A.x by phi_crank
         -B_crank_x,  # A.y by phi_crank
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
         -B_crank_y,  # B.x by phi_crank
         -C_coupler_y,  # B.x by phi_coupler
         B_crank_x,  # B.y by phi_crank
         C_coupler_x,  # B.y by phi_coupler
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
         -C_coupler_y,  # C.x by phi_coupler
         -D_rocker_y,  # C.x by phi_rocker
         C_coupler_x,  # C.y by phi_coupler
         D_rocker_x,  # C.y by phi_rocker
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
         -D_rocker_y,  # D.x by phi_rocker
         D_rocker_x,  # D.y by phi_rocker
     )
@@ -165,18 +131,10 @@ def _Phi_q(f, q, t, p):
 def _nu(f, q, t, p):
     omega = p[4]
     return (
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        0,
-        0,
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        0,
-        0,
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        0,
-        0,
+        0, 0,  # 0-1  Revolute "A"
+        0, 0,  # 2-3  Revolute "B"
+        0, 0,  # 4-5  Revolute "C"
+        0, 0,  # 6-7  Revolute "D"
         # 8  AbsoluteAngle "motor": crank angle omega*t
         omega,
     )
@@ -219,189 +177,7 @@ def _gamma(f, q, q_dot, t, p):
         # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
         D_rocker_w2_x,
         D_rocker_w2_y,
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        0,
-    )
-
-
-def _position(f, q, t, p):
-    (
-        x_crank, y_crank, phi_crank, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker,
-        phi_rocker,
-    ) = q
-    a, b, c, d, omega = p
-    cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_crank, s_crank = cos_sin(phi_crank)
-    c_coupler, s_coupler = cos_sin(phi_coupler)
-    c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A"
-    a_2 = a / 2
-    B_crank_x = a_2 * c_crank
-    B_crank_y = a_2 * s_crank
-    # 2-3  Revolute "B"
-    b_2 = b / 2
-    C_coupler_x = b_2 * c_coupler
-    C_coupler_y = b_2 * s_coupler
-    # 4-5  Revolute "C"
-    c_2 = c / 2
-    D_rocker_x = c_2 * c_rocker
-    D_rocker_y = c_2 * s_rocker
-    return (
-        # Phi
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        x_crank - B_crank_x,
-        y_crank - B_crank_y,
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        x_crank + B_crank_x - x_coupler + C_coupler_x,
-        y_crank + B_crank_y - y_coupler + C_coupler_y,
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        x_coupler + C_coupler_x - x_rocker + D_rocker_x,
-        y_coupler + C_coupler_y - y_rocker + D_rocker_y,
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        x_rocker + D_rocker_x - d,
-        y_rocker + D_rocker_y,
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        phi_crank - omega * t,
-        # Phi_q
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        B_crank_y,  # A.x by phi_crank
-        -B_crank_x,  # A.y by phi_crank
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        -B_crank_y,  # B.x by phi_crank
-        -C_coupler_y,  # B.x by phi_coupler
-        B_crank_x,  # B.y by phi_crank
-        C_coupler_x,  # B.y by phi_coupler
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        -C_coupler_y,  # C.x by phi_coupler
-        -D_rocker_y,  # C.x by phi_rocker
-        C_coupler_x,  # C.y by phi_coupler
-        D_rocker_x,  # C.y by phi_rocker
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        -D_rocker_y,  # D.x by phi_rocker
-        D_rocker_x,  # D.y by phi_rocker
-    )
-
-
-def _velocity(f, q, t, p):
-    phi_crank, phi_coupler, phi_rocker = q[2], q[5], q[8]
-    a, b, c, d, omega = p
-    cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_crank, s_crank = cos_sin(phi_crank)
-    c_coupler, s_coupler = cos_sin(phi_coupler)
-    c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A"
-    a_2 = a / 2
-    B_crank_y = a_2 * s_crank
-    B_crank_x = a_2 * c_crank
-    # 2-3  Revolute "B"
-    b_2 = b / 2
-    C_coupler_y = b_2 * s_coupler
-    C_coupler_x = b_2 * c_coupler
-    # 4-5  Revolute "C"
-    c_2 = c / 2
-    D_rocker_y = c_2 * s_rocker
-    D_rocker_x = c_2 * c_rocker
-    return (
-        # Phi_q
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        B_crank_y,  # A.x by phi_crank
-        -B_crank_x,  # A.y by phi_crank
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        -B_crank_y,  # B.x by phi_crank
-        -C_coupler_y,  # B.x by phi_coupler
-        B_crank_x,  # B.y by phi_crank
-        C_coupler_x,  # B.y by phi_coupler
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        -C_coupler_y,  # C.x by phi_coupler
-        -D_rocker_y,  # C.x by phi_rocker
-        C_coupler_x,  # C.y by phi_coupler
-        D_rocker_x,  # C.y by phi_rocker
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        -D_rocker_y,  # D.x by phi_rocker
-        D_rocker_x,  # D.y by phi_rocker
-        # nu
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        0,
-        0,
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        0,
-        0,
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        0,
-        0,
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        omega,
-    )
-
-
-def _acceleration(f, q, q_dot, t, p):
-    phi_crank, phi_coupler, phi_rocker = q[2], q[5], q[8]
-    phi_crank_dot, phi_coupler_dot, phi_rocker_dot = q_dot[2], q_dot[5], q_dot[8]
-    a, b, c, d, omega = p
-    cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_crank, s_crank = cos_sin(phi_crank)
-    c_coupler, s_coupler = cos_sin(phi_coupler)
-    c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A"
-    a_2 = a / 2
-    B_crank_y = a_2 * s_crank
-    B_crank_x = a_2 * c_crank
-    phi_crank_dot_sq = phi_crank_dot**2
-    B_crank_w2_x = phi_crank_dot_sq * B_crank_x
-    B_crank_w2_y = phi_crank_dot_sq * B_crank_y
-    # 2-3  Revolute "B"
-    b_2 = b / 2
-    C_coupler_y = b_2 * s_coupler
-    C_coupler_x = b_2 * c_coupler
-    phi_coupler_dot_sq = phi_coupler_dot**2
-    C_coupler_w2_x = phi_coupler_dot_sq * C_coupler_x
-    C_coupler_w2_y = phi_coupler_dot_sq * C_coupler_y
-    # 4-5  Revolute "C"
-    c_2 = c / 2
-    D_rocker_y = c_2 * s_rocker
-    D_rocker_x = c_2 * c_rocker
-    phi_rocker_dot_sq = phi_rocker_dot**2
-    D_rocker_w2_x = phi_rocker_dot_sq * D_rocker_x
-    D_rocker_w2_y = phi_rocker_dot_sq * D_rocker_y
-    return (
-        # Phi_q
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        B_crank_y,  # A.x by phi_crank
-        -B_crank_x,  # A.y by phi_crank
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        -B_crank_y,  # B.x by phi_crank
-        -C_coupler_y,  # B.x by phi_coupler
-        B_crank_x,  # B.y by phi_crank
-        C_coupler_x,  # B.y by phi_coupler
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        -C_coupler_y,  # C.x by phi_coupler
-        -D_rocker_y,  # C.x by phi_rocker
-        C_coupler_x,  # C.y by phi_coupler
-        D_rocker_x,  # C.y by phi_rocker
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        -D_rocker_y,  # D.x by phi_rocker
-        D_rocker_x,  # D.y by phi_rocker
-        # gamma
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        -B_crank_w2_x,
-        -B_crank_w2_y,
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        B_crank_w2_x + C_coupler_w2_x,
-        B_crank_w2_y + C_coupler_w2_y,
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        C_coupler_w2_x + D_rocker_w2_x,
-        C_coupler_w2_y + D_rocker_w2_y,
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        D_rocker_w2_x,
-        D_rocker_w2_y,
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        0,
+        0,  # 8  AbsoluteAngle "motor"
     )
 
 
@@ -417,90 +193,36 @@ def _kinematics(f, q, q_dot, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A"
     a_2 = a / 2
-    B_crank_x = a_2 * c_crank
-    B_crank_y = a_2 * s_crank
+    B_crank_x, B_crank_y = a_2 * c_crank, a_2 * s_crank
     phi_crank_dot_sq = phi_crank_dot**2
-    B_crank_w2_x = phi_crank_dot_sq * B_crank_x
-    B_crank_w2_y = phi_crank_dot_sq * B_crank_y
-    # 2-3  Revolute "B"
+    B_crank_w2_x, B_crank_w2_y = phi_crank_dot_sq * B_crank_x, phi_crank_dot_sq * B_crank_y
     b_2 = b / 2
-    C_coupler_x = b_2 * c_coupler
-    C_coupler_y = b_2 * s_coupler
+    C_coupler_x, C_coupler_y = b_2 * c_coupler, b_2 * s_coupler
     phi_coupler_dot_sq = phi_coupler_dot**2
     C_coupler_w2_x = phi_coupler_dot_sq * C_coupler_x
     C_coupler_w2_y = phi_coupler_dot_sq * C_coupler_y
-    # 4-5  Revolute "C"
     c_2 = c / 2
-    D_rocker_x = c_2 * c_rocker
-    D_rocker_y = c_2 * s_rocker
+    D_rocker_x, D_rocker_y = c_2 * c_rocker, c_2 * s_rocker
     phi_rocker_dot_sq = phi_rocker_dot**2
     D_rocker_w2_x = phi_rocker_dot_sq * D_rocker_x
     D_rocker_w2_y = phi_rocker_dot_sq * D_rocker_y
     return (
         # Phi
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        x_crank - B_crank_x,
-        y_crank - B_crank_y,
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        x_crank + B_crank_x - x_coupler + C_coupler_x,
+        x_crank - B_crank_x, y_crank - B_crank_y, x_crank + B_crank_x - x_coupler + C_coupler_x,
         y_crank + B_crank_y - y_coupler + C_coupler_y,
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
         x_coupler + C_coupler_x - x_rocker + D_rocker_x,
-        y_coupler + C_coupler_y - y_rocker + D_rocker_y,
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        x_rocker + D_rocker_x - d,
-        y_rocker + D_rocker_y,
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        phi_crank - omega * t,
+        y_coupler + C_coupler_y - y_rocker + D_rocker_y, x_rocker + D_rocker_x - d,
+        y_rocker + D_rocker_y, phi_crank - omega * t,
         # Phi_q
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        B_crank_y,  # A.x by phi_crank
-        -B_crank_x,  # A.y by phi_crank
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        -B_crank_y,  # B.x by phi_crank
-        -C_coupler_y,  # B.x by phi_coupler
-        B_crank_x,  # B.y by phi_crank
-        C_coupler_x,  # B.y by phi_coupler
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        -C_coupler_y,  # C.x by phi_coupler
-        -D_rocker_y,  # C.x by phi_rocker
-        C_coupler_x,  # C.y by phi_coupler
-        D_rocker_x,  # C.y by phi_rocker
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        -D_rocker_y,  # D.x by phi_rocker
-        D_rocker_x,  # D.y by phi_rocker
+        B_crank_y, -B_crank_x, -B_crank_y, -C_coupler_y, B_crank_x, C_coupler_x, -C_coupler_y,
+        -D_rocker_y, C_coupler_x, D_rocker_x, -D_rocker_y, D_rocker_x,
         # nu
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        0,
-        0,
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        0,
-        0,
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        0,
-        0,
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        omega,
+        0, 0, 0, 0, 0, 0, 0, 0, omega,
         # gamma
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        -B_crank_w2_x,
-        -B_crank_w2_y,
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        B_crank_w2_x + C_coupler_w2_x,
-        B_crank_w2_y + C_coupler_w2_y,
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        C_coupler_w2_x + D_rocker_w2_x,
-        C_coupler_w2_y + D_rocker_w2_y,
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        D_rocker_w2_x,
-        D_rocker_w2_y,
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        0,
+        -B_crank_w2_x, -B_crank_w2_y, B_crank_w2_x + C_coupler_w2_x, B_crank_w2_y + C_coupler_w2_y,
+        C_coupler_w2_x + D_rocker_w2_x, C_coupler_w2_y + D_rocker_w2_y, D_rocker_w2_x,
+        D_rocker_w2_y, 0,
     )
 
 
@@ -521,19 +243,8 @@ def _factor(f, J):
     determinant = k_1 * k_4 - k_3 * k_2
     k_6 = 1 / determinant
     return (
-        A_x_phi_crank,
-        A_y_phi_crank,
-        B_x_phi_crank,
-        B_x_phi_coupler,
-        B_y_phi_crank,
-        B_y_phi_coupler,
-        D_x_phi_rocker,
-        D_y_phi_rocker,
-        k_1,
-        k_2,
-        k_3,
-        k_4,
-        k_6,
+        A_x_phi_crank, A_y_phi_crank, B_x_phi_crank, B_x_phi_coupler, B_y_phi_crank,
+        B_y_phi_coupler, D_x_phi_rocker, D_y_phi_rocker, k_1, k_2, k_3, k_4, k_6,
     ), (
         determinant,
     )
@@ -545,9 +256,7 @@ def _solve(f, F, b):
         A_x_phi_crank, A_y_phi_crank, B_x_phi_crank, B_x_phi_coupler, B_y_phi_crank,
         B_y_phi_coupler, D_x_phi_rocker, D_y_phi_rocker, k_1, k_2, k_3, k_4, k_6,
     ) = F
-    (
-        A_x, A_y, B_x, B_y, C_x, C_y, D_x, D_y, motor,
-    ) = b
+    A_x, A_y, B_x, B_y, C_x, C_y, D_x, D_y, motor = b
     x_crank = A_x - A_x_phi_crank * motor
     y_crank = A_y - A_y_phi_crank * motor
     b_3 = B_x - B_x_phi_crank * motor - x_crank
@@ -561,104 +270,84 @@ def _solve(f, F, b):
     y_coupler = -(b_4 - B_y_phi_coupler * phi_coupler)
     x_coupler = -(b_3 - B_x_phi_coupler * phi_coupler)
     return (
-        x_crank,
-        y_crank,
-        motor,
-        x_coupler,
-        y_coupler,
-        phi_coupler,
-        x_rocker,
-        y_rocker,
-        phi_rocker,
+        x_crank, y_crank, motor, x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker, phi_rocker,
     )
 
 
 def Phi(q, t, p=DEFAULTS):
     """Constraint vector Phi(q, t), shape (..., 9)."""
-    return _evaluate(_Phi, _PHI, t, p, q)
+    return _evaluate(_position, 0, _PHI, t, p, q)
 
 
 def Phi_q(q, t, p=DEFAULTS):
     """Jacobian of Phi by q, shape (..., 9, 9)."""
-    return _evaluate(_Phi_q, _PHI_Q, t, p, q)
-
-
-def nu(q, t, p=DEFAULTS):
-    """Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, shape (..., 9)."""
-    return _evaluate(_nu, _NU, t, p, q)
-
-
-def gamma(q, q_dot, t, p=DEFAULTS):
-    """Right side of the acceleration equation Phi_q q_ddot = gamma, shape (..., 9).
-
-    gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt
-    """
-    return _evaluate(_gamma, _GAMMA, t, p, q, q_dot)
+    return _evaluate(_position, 9, _PHI_Q, t, p, q)
 
 
 def Phi_q_nonzeros(q, t, p=DEFAULTS):
     """Entries of Phi_q in the order of PATTERN, shape (..., 25)."""
-    return _evaluate(_Phi_q, _NONZEROS, t, p, q)
+    return _evaluate(_position, 9, _PHI_Q_NONZEROS, t, p, q)
+
+
+def nu(q, t, p=DEFAULTS):
+    """Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, shape (..., 9)."""
+    return _evaluate(_nu, 0, _NU, t, p, q)
+
+
+def gamma(q, q_dot, t, p=DEFAULTS):
+    """Right side of the acceleration equation Phi_q q_ddot = gamma, shape (..., 9)."""
+    return _evaluate(_gamma, 0, _GAMMA, t, p, q, q_dot)
 
 
 def position(q, t, p=DEFAULTS):
     """Phi and Phi_q in one go: a step of Newton's method."""
-    return _evaluate_together(_position, (_PHI, _PHI_Q), t, p, q)
+    return _evaluate(_position, 0, (_PHI, _PHI_Q), t, p, q)
 
 
 def velocity(q, t, p=DEFAULTS):
-    """Phi_q and nu in one go: the velocity equation."""
-    return _evaluate_together(_velocity, (_PHI_Q, _NU), t, p, q)
+    """Phi_q and nu: the velocity equation."""
+    return Phi_q(q, t, p), nu(q, t, p)
 
 
 def acceleration(q, q_dot, t, p=DEFAULTS):
-    """Phi_q and gamma in one go: the acceleration equation."""
-    return _evaluate_together(_acceleration, (_PHI_Q, _GAMMA), t, p, q, q_dot)
+    """Phi_q and gamma: the acceleration equation."""
+    return kinematics(q, q_dot, t, p)[1::2]
 
 
 def kinematics(q, q_dot, t, p=DEFAULTS):
     """Phi, Phi_q, nu and gamma in one go."""
-    return _evaluate_together(_kinematics, (_PHI, _PHI_Q, _NU, _GAMMA), t, p, q, q_dot)
+    return _evaluate(_kinematics, 0, (_PHI, _PHI_Q, _NU, _GAMMA), t, p, q, q_dot)
 
 
 def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
     """Phi, the nonzeros of Phi_q, nu and gamma of a batch whose axis is the last one.
 
     q and q_dot have the shape (9, N), t () or (N,), p (5,) or (5, N).
-    The results have the shapes (9, N), (25, N), (9, N), (9, N):
-    the layout in which the code runs fastest.
+    The results have the shapes (9, N), (25, N), (9, N), (9, N).
     """
-    return _evaluate_batch_last(_kinematics, (_PHI, _NONZEROS, _NU, _GAMMA), t, p, q, q_dot)
+    states, t, p = _batch_last(t, p, (q, q_dot))
+    quantities = _PHI, _PHI_Q_NONZEROS, _NU, _GAMMA
+    return _on_batch(_kinematics, 0, quantities, t, p, states, is_last=True)
 
 
 def solve(nonzeros, b):
     """Return x of Phi_q x = b by the planned elimination, shape (..., 9).
 
-    nonzeros (..., 25) are the entries of Phi_q in the order of PATTERN, b has the shape
-    (..., 9). Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that
-    may happen.
+    nonzeros (..., 25) are the entries of Phi_q in the order of PATTERN, b is (..., 9).
+    Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that may happen.
     """
     nonzeros, b = np.asarray(nonzeros, dtype=float), np.asarray(b, dtype=float)
     with np.errstate(all="ignore"):
-        F, _ = _factor(_Arrays, [nonzeros[..., k] for k in _VARYING])
-        x = _solve(_Arrays, F, [b[..., k] for k in range(N_EQUATIONS)])
+        F, _ = _factor(ARRAYS, [nonzeros[..., k] for k in _PHI_Q_NONZEROS.places])
+        x = _solve(ARRAYS, F, [b[..., k] for k in range(N_EQUATIONS)])
     return np.stack(np.broadcast_arrays(*x), axis=-1)
 
 
 # The code itself, for callers that keep each coordinate in an array of its own: functions of
-# (f, q, [q_dot,] t, p), with f = ARRAYS and sequences q, q_dot, p of numbers or arrays (N,), or
-# with f = FLOATS and sequences of floats. Of Phi_q they give the entries that vary.
+# (f, q, [q_dot,] t, p) with sequences q, q_dot, p. Of Phi_q they give the entries that vary.
 LANES = {
-    "Phi": _Phi,
-    "Phi_q": _Phi_q,
-    "nu": _nu,
-    "gamma": _gamma,
-    "position": _position,
-    "velocity": _velocity,
-    "acceleration": _acceleration,
-    "kinematics": _kinematics,
-    "factor": _factor,
-    "solve": _solve,
+    "position": _position, "nu": _nu, "gamma": _gamma, "kinematics": _kinematics,
+    "factor": _factor, "solve": _solve,
 }
 
 
@@ -669,39 +358,35 @@ class InputError(ValueError):
 def _cos_sin(angle):
     """Cosine and sine of an array through t = tan(angle / 2): half the time of np.cos and np.sin.
 
-    With R = 2 / (1 + t^2) they are R - 1 and t R. No angle is out of reach, since a float is never
-    exactly pi: there t is about 1e16, and t^2 far from overflow. The error is at most 4e-16.
+    With R = 2 / (1 + t^2) they are R - 1 and t R. A float is never exactly pi: there t is about
+    1e16, and t^2 far from overflow. The error is at most 4e-16.
     """
     t = np.tan(0.5 * angle)
     R = 2.0 / (1.0 + t * t)
     return R - 1.0, t * R
 
 
-class _Floats:
+class FLOATS:
     """Elementary functions of one number."""
-
     cos_sin = staticmethod(lambda angle, cos=math.cos, sin=math.sin: (cos(angle), sin(angle)))
 
 
-class _Arrays:
+class ARRAYS:
     """Elementary functions of arrays."""
-
     cos_sin = staticmethod(_cos_sin)
 
 
 class _Quantity:
-    """What a function returns: its shape, its constant entries, and where the computed ones go."""
+    """A result: its shape, where its computed entries go, and its entries that never change."""
 
-    def __init__(self, shape, places, fixed=(), constants=()):
-        self.shape = shape
-        self.size = math.prod(shape)
-        self.index = np.array(places, dtype=int)
-        self.places = self.index.tolist()
-        self.count = len(self.places)
-        self.fixed = np.array(fixed, dtype=int)
-        self.constants = np.reshape(constants, (-1, 1))
+    def __init__(self, shape, places, constants=()):
+        self.shape, self.size = shape, math.prod(shape)
+        self.places = [int(place) for k, place in enumerate(places) if k not in constants]
+        self.index, self.count = np.array(self.places, dtype=int), len(self.places)
+        self.fixed = [int(places[k]) for k in constants]
+        self.constants = np.array([[constants[k]] for k in constants], dtype=float).reshape(-1, 1)
         self.start = np.zeros(shape)
-        self.start.put(self.fixed, constants)
+        self.start.put(self.fixed, self.constants)
         self.is_full = shape == (self.count,)
 
     def at_point(self, values):
@@ -713,24 +398,11 @@ class _Quantity:
         result.put(self.index, computed)
         return result
 
-    def for_batch(self, count, dtype):
-        """Return an array (size, N) with the constant entries in place.
 
-        It lies in memory point by point, as it is wanted in the end.
-        """
-        result = _empty((count, self.size), dtype)
-        if not self.is_full:
-            result[:] = self.start.reshape(-1)
-        return result.T
-
-
-FLOATS, ARRAYS = _Floats, _Arrays
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
-_FLAT = PATTERN @ (N_COORDINATES, 1)
-_PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), _FLAT[_VARYING], _FLAT[_FIXED], _CONSTANTS)
-_NONZEROS = _Quantity((len(PATTERN),), _VARYING, _FIXED, _CONSTANTS)
-_STATES = ("q", "q_dot")
-_SHAPE = (N_COORDINATES,)
+_PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
+_PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
+_STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
 _BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
 _PARAMETER_LIST = DEFAULTS.tolist()
@@ -739,8 +411,9 @@ for _array in (DEFAULTS, GUESS, PATTERN):
     _array.flags.writeable = False
 
 
-def _evaluate(kernel, quantity, t, p, *states):
-    """Return one quantity: of one point with floats, or of a batch with arrays."""
+def _evaluate(kernel, skip, wanted, t, p, *states):
+    """Return a quantity or several, what a kernel computes after so many values."""
+    quantities = wanted if type(wanted) is tuple else (wanted,)
     point = _point(t, p, states)
     if point is not None:
         try:
@@ -748,72 +421,37 @@ def _evaluate(kernel, quantity, t, p, *states):
         except (ArithmeticError, ValueError):
             pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
         else:
-            return quantity.at_point(values)
-    return _evaluate_batch(kernel, (quantity,), t, p, states)[0]
-
-
-def _evaluate_together(kernel, quantities, t, p, *states):
-    """Return several quantities that share work."""
-    point = _point(t, p, states)
-    if point is not None:
-        try:
-            values = iter(kernel(*point))
-        except (ArithmeticError, ValueError):
-            pass
-        else:
+            if quantities is not wanted:
+                return wanted.at_point(values[skip:])
+            values = iter(values)
             return tuple([quantity.at_point(values) for quantity in quantities])
-    return _evaluate_batch(kernel, quantities, t, p, states)
-
-
-def _evaluate_batch(kernel, quantities, t, p, states):
-    """Run a kernel on a batch whose axes are the first ones."""
     states, t, p, shape = _batch(t, p, states)
-    dtype = states[0].dtype
-    results = [quantity.for_batch(math.prod(shape), dtype) for quantity in quantities]
-    _fill(results, kernel, quantities, t, p, states)
-    return tuple(
-        result.T.reshape(shape + quantity.shape)
-        for quantity, result in zip(quantities, results)
-    )
+    results = _on_batch(kernel, skip, quantities, t, p, states)
+    found = [part.T.reshape(shape + item.shape) for item, part in zip(quantities, results)]
+    return tuple(found) if quantities is wanted else found[0]
 
 
-def _evaluate_batch_last(kernel, quantities, t, p, *states):
-    """Run a kernel on a batch whose axis is the last one."""
-    states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
-    t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
-    count = states[0].shape[-1]
-    batches = {state.shape[1:] for state in states}
-    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
-        shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
-        raise InputError(
-            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
-            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
-            f"({len(PARAMETERS)}, N)"
-        )
-    dtype = np.result_type(*states, t, p)
-    results = [_empty((quantity.size, count), dtype) for quantity in quantities]
-    for quantity, result in zip(quantities, results):
-        if not quantity.is_full:
-            result[quantity.fixed] = quantity.constants
-    _fill(results, kernel, quantities, t, p, states)
+def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
+    """Return quantities as arrays (size, N), in memory point by point or with the batch last."""
+    count, dtype = states[0].shape[1], np.result_type(*states, t, p)
+    results = []
+    for item in quantities:
+        if is_last:
+            results.append(_empty((item.size, count), dtype))
+            results[-1][item.fixed] = item.constants
+        else:
+            results.append(_empty((count, item.size), dtype).T)
+            if not item.is_full:
+                results[-1].T[:] = item.start.reshape(-1)
+    for start in range(0, count, _BLOCK):
+        block = ..., slice(start, start + _BLOCK)
+        at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
+        with np.errstate(all="ignore"):
+            found = iter(kernel(ARRAYS, *(part[block] for part in states), at, parameters)[skip:])
+            for item, part in zip(quantities, [result[block] for result in results]):
+                for place, value in zip(item.places, found):
+                    part[place] = value
     return tuple(results)
-
-
-def _fill(results, kernel, quantities, t, p, states):
-    """Run a kernel, block by block, and put its values into arrays (size, N)."""
-    count = results[0].shape[1]
-    if count > _BLOCK:
-        for start in range(0, count, _BLOCK):
-            block = ..., slice(start, start + _BLOCK)
-            at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
-            parts = [result[block] for result in results]
-            _fill(parts, kernel, quantities, at, parameters, [state[block] for state in states])
-        return
-    with np.errstate(all="ignore"):
-        values = iter(kernel(_Arrays, *states, t, p))
-        for quantity, result in zip(quantities, results):
-            for place, value in zip(quantity.places, values):
-                result[place] = value
 
 
 def _point(t, p, states):
@@ -829,7 +467,7 @@ def _point(t, p, states):
         total = t + sum(parameters)
     else:
         return None
-    arguments = [_Floats]
+    arguments = [FLOATS]
     for state in states:
         if type(state) is not _ndarray or state.shape != _SHAPE or state.dtype is not _REAL:
             return None
@@ -855,21 +493,34 @@ def _batch(t, p, states):
             "other; they broadcast like NumPy arrays"
         ) from None
     dtype = np.result_type(*states, t, p)
-    states = [_rows(state, shape).astype(dtype, copy=False) for state in states]
-    t = t if t.ndim == 0 else _spread(t, shape).reshape(-1)
-    p = p if p.ndim == 1 else _rows(p, shape)
+    whole = (*shape, N_COORDINATES)
+    states = [_rows(state, whole).astype(dtype, copy=False) for state in states]
+    t = t if t.ndim == 0 else _rows(t[..., np.newaxis], (*shape, 1))[0]
+    p = p if p.ndim == 1 else _rows(p, (*shape, len(PARAMETERS)))
     return states, t, p, shape
 
 
+def _batch_last(t, p, states):
+    """Check the arguments of a batch whose axis is the last one."""
+    states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
+    t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
+    count = states[0].shape[-1]
+    batches = {state.shape[1:] for state in states}
+    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
+        shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
+        raise InputError(
+            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
+            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
+            f"({len(PARAMETERS)}, N)"
+        )
+    return states, t, p
+
+
 def _rows(array, shape):
-    """Return an array (..., n), broadcast to a batch's shape, as (n, N)."""
-    size = array.shape[-1]
-    return _spread(array, (*shape, size)).reshape(math.prod(shape), size).T
-
-
-def _spread(array, shape):
-    """Return np.broadcast_to(array, shape), which is slow even where nothing is to be done."""
-    return array if array.shape == shape else np.broadcast_to(array, shape)
+    """Return an array (..., n), broadcast to a shape, as (n, N)."""
+    if array.shape != shape:  # np.broadcast_to is slow even where nothing is to be done
+        array = np.broadcast_to(array, shape)
+    return array.reshape(math.prod(shape[:-1]), shape[-1]).T
 
 
 def _checked(name, value, entries=None, axis=-1):

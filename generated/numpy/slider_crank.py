@@ -13,12 +13,16 @@ row  constraint                                      source
 7    AbsoluteAngle "guide_angle"     slider          Haug 3.2.6
 8    AbsoluteAngle "motor" (driver)  crank           Haug 3.2.6
 
+Read `_position` first: Phi and Phi_q, constraint by constraint. `_nu` and `_gamma` are the right
+sides of velocity and acceleration, gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt.
+`_kinematics` is all of it once more, for batches. From `_Quantity` on all modules are alike.
+
 The functions take one point, q of shape (9,), or batches: q (..., 9), t (...)
-and p (..., 0) broadcast against each other. The code of the mechanism is in the functions
-that begin with an underscore; it runs on floats (f = _Floats) and on arrays (f = _Arrays), whose
-last axis is the batch. Names in it, for a joint J on a body b: c_b and s_b are the cosine and sine
-of phi_b, J_b_x and J_b_y the point's vector A s, J_b_w2_x the same times phi_b_dot squared (_sq is
-a square), J_axis_b_x an axis A v, J_d_x the vector d between the points, J_d_dot_x its rate.
+and p (..., 0) broadcast against each other. What begins with an underscore runs on floats
+(f = FLOATS) and on arrays (f = ARRAYS), whose last axis is the batch. Names in it, for a joint J on
+a body b: c_b and s_b are the cosine and sine of phi_b, J_b_x and J_b_y the point's vector A s,
+J_b_w2_x the same times phi_b_dot squared (_sq is a square), J_axis_b_x an axis A v, J_d_x the
+vector d between the points, J_d_dot_x its rate.
 """
 
 import math
@@ -26,10 +30,9 @@ import math
 import numpy as np
 
 NAME = "slider_crank"
-FORMAT = 1
-FINGERPRINT = "372d93c96543d3b8f0288adffc736d59"
-N_COORDINATES = 9
-N_EQUATIONS = 9
+FORMAT = 2
+FINGERPRINT = "a527bb03116fe32da0a1d1f9e0aaa06b"
+N_COORDINATES, N_EQUATIONS = 9, 9
 COORDINATES = (
     "x_crank", "y_crank", "phi_crank", "x_rod", "y_rod", "phi_rod", "x_slider", "y_slider",
     "phi_slider",
@@ -38,156 +41,39 @@ EQUATIONS = (
     "main_bearing.x", "main_bearing.y", "crank_pin.x", "crank_pin.y", "wrist_pin.x",
     "wrist_pin.y", "guide_height", "guide_angle", "motor",
 )
-PARAMETERS = (
-
-)
+PARAMETERS = ()
+# name, first column and number of columns of each body
+BODIES = (("crank", 0, 3), ("rod", 3, 3), ("slider", 6, 3))
 UNITS = {
-    'x_crank': 'm',
-    'y_crank': 'm',
-    'phi_crank': 'rad',
-    'x_rod': 'm',
-    'y_rod': 'm',
-    'phi_rod': 'rad',
-    'x_slider': 'm',
-    'y_slider': 'm',
-    'phi_slider': 'rad',
+    "x_crank": "m", "y_crank": "m", "phi_crank": "rad", "x_rod": "m", "y_rod": "m",
+    "phi_rod": "rad", "x_slider": "m", "y_slider": "m", "phi_slider": "rad",
 }
-DEFAULTS = np.array((
-
-), dtype=float)
-GUESS = np.array((
-    2.0, 0.0, 0.0, 7.0, 0.0, 0.0, 10.0, 0.0, 0.0,
-), dtype=float)
+DEFAULTS = np.array((), dtype=float)
+GUESS = np.array((2.0, 0.0, 0.0, 7.0, 0.0, 0.0, 10.0, 0.0, 0.0), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
 PATTERN = np.array((
     (0, 0), (0, 2), (1, 1), (1, 2), (2, 0), (2, 2), (2, 3), (2, 5), (3, 1), (3, 2), (3, 4),
     (3, 5), (4, 3), (4, 5), (4, 6), (5, 4), (5, 5), (5, 7), (6, 7), (7, 8), (8, 2),
 ), dtype=int).reshape(-1, 2)
-# entries of PATTERN that never change, their values, and the entries that are computed
-_FIXED = np.array((
-    0, 2, 4, 6, 8, 10, 12, 14, 15, 17, 18, 19, 20,
-), dtype=int)
-_CONSTANTS = np.array((
-    1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0,
-), dtype=float)
-_VARYING = np.array((
-    1, 3, 5, 7, 9, 11, 13, 16,
-), dtype=int)
+# number in the pattern and value of the entries that never change
+_CONSTANTS = {
+    0: 1.0, 2: 1.0, 4: 1.0, 6: -1.0, 8: 1.0, 10: -1.0, 12: 1.0, 14: -1.0, 15: 1.0, 17: -1.0,
+    18: 1.0, 19: 1.0, 20: 1.0,
+}
 pi = math.pi
 
 
-def _Phi(f, q, t, p):
-    x_crank, y_crank, phi_crank, x_rod, y_rod, phi_rod, x_slider, y_slider, phi_slider = q
-    cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_crank, s_crank = cos_sin(phi_crank)
-    c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing"
-    crank_pin_crank_x = 2 * c_crank
-    crank_pin_crank_y = 2 * s_crank
-    # 2-3  Revolute "crank_pin"
-    wrist_pin_rod_x = 3 * c_rod
-    wrist_pin_rod_y = 3 * s_rod
-    return (
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        x_crank - crank_pin_crank_x,
-        y_crank - crank_pin_crank_y,
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        x_crank + crank_pin_crank_x - x_rod + wrist_pin_rod_x,
-        y_crank + crank_pin_crank_y - y_rod + wrist_pin_rod_y,
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        x_rod + wrist_pin_rod_x - x_slider,
-        y_rod + wrist_pin_rod_y - y_slider,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        y_slider,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        phi_slider,
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        phi_crank - t**2,
-    )
-
-
-def _Phi_q(f, q, t, p):
-    phi_crank, phi_rod = q[2], q[5]
-    cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_crank, s_crank = cos_sin(phi_crank)
-    c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing"
-    crank_pin_crank_y = 2 * s_crank
-    crank_pin_crank_x = 2 * c_crank
-    # 2-3  Revolute "crank_pin"
-    wrist_pin_rod_y = 3 * s_rod
-    wrist_pin_rod_x = 3 * c_rod
-    return (
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        crank_pin_crank_y,  # main_bearing.x by phi_crank
-        -crank_pin_crank_x,  # main_bearing.y by phi_crank
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        -crank_pin_crank_y,  # crank_pin.x by phi_crank
-        -wrist_pin_rod_y,  # crank_pin.x by phi_rod
-        crank_pin_crank_x,  # crank_pin.y by phi_crank
-        wrist_pin_rod_x,  # crank_pin.y by phi_rod
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        -wrist_pin_rod_y,  # wrist_pin.x by phi_rod
-        wrist_pin_rod_x,  # wrist_pin.y by phi_rod
-    )
-
-
-def _nu(f, q, t, p):
-    return (
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        0,
-        0,
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        0,
-        0,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        0,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        0,
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        2 * t,
-    )
-
-
-def _gamma(f, q, q_dot, t, p):
-    phi_crank, phi_rod = q[2], q[5]
-    phi_crank_dot, phi_rod_dot = q_dot[2], q_dot[5]
-    cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_crank, s_crank = cos_sin(phi_crank)
-    c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing"
-    phi_crank_dot_sq = phi_crank_dot**2
-    crank_pin_crank_w2_x = phi_crank_dot_sq * (2 * c_crank)
-    crank_pin_crank_w2_y = phi_crank_dot_sq * (2 * s_crank)
-    # 2-3  Revolute "crank_pin"
-    phi_rod_dot_sq = phi_rod_dot**2
-    wrist_pin_rod_w2_x = phi_rod_dot_sq * (3 * c_rod)
-    wrist_pin_rod_w2_y = phi_rod_dot_sq * (3 * s_rod)
-    return (
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        -crank_pin_crank_w2_x,
-        -crank_pin_crank_w2_y,
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        crank_pin_crank_w2_x + wrist_pin_rod_w2_x,
-        crank_pin_crank_w2_y + wrist_pin_rod_w2_y,
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        wrist_pin_rod_w2_x,
-        wrist_pin_rod_w2_y,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        0,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        0,
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        2,
-    )
-
-
+# Phi_q with all its entries:
+#                0 1 2                  3  4  5                6  7  8
+# main_bearing.x 1 . crank_pin_crank_y  .  .  .                .  .  .
+# main_bearing.y . 1 -crank_pin_crank_x .  .  .                .  .  .
+# crank_pin.x    1 . -crank_pin_crank_y -1 .  -wrist_pin_rod_y .  .  .
+# crank_pin.y    . 1 crank_pin_crank_x  .  -1 wrist_pin_rod_x  .  .  .
+# wrist_pin.x    . . .                  1  .  -wrist_pin_rod_y -1 .  .
+# wrist_pin.y    . . .                  .  1  wrist_pin_rod_x  .  -1 .
+# guide_height   . . .                  .  .  .                .  1  .
+# guide_angle    . . .                  .  .  .                .  .  1
+# motor          . . 1                  .  .  .                .  .  .
 def _position(f, q, t, p):
     x_crank, y_crank, phi_crank, x_rod, y_rod, phi_rod, x_slider, y_slider, phi_slider = q
     cos_sin = f.cos_sin
@@ -218,65 +104,30 @@ def _position(f, q, t, p):
         # 8  AbsoluteAngle "motor": crank angle t**2
         phi_crank - t**2,
         # Phi_q
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
         crank_pin_crank_y,  # main_bearing.x by phi_crank
         -crank_pin_crank_x,  # main_bearing.y by phi_crank
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
         -crank_pin_crank_y,  # crank_pin.x by phi_crank
         -wrist_pin_rod_y,  # crank_pin.x by phi_rod
         crank_pin_crank_x,  # crank_pin.y by phi_crank
         wrist_pin_rod_x,  # crank_pin.y by phi_rod
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
         -wrist_pin_rod_y,  # wrist_pin.x by phi_rod
         wrist_pin_rod_x,  # wrist_pin.y by phi_rod
     )
 
 
-def _velocity(f, q, t, p):
-    phi_crank, phi_rod = q[2], q[5]
-    cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
-    c_crank, s_crank = cos_sin(phi_crank)
-    c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing"
-    crank_pin_crank_y = 2 * s_crank
-    crank_pin_crank_x = 2 * c_crank
-    # 2-3  Revolute "crank_pin"
-    wrist_pin_rod_y = 3 * s_rod
-    wrist_pin_rod_x = 3 * c_rod
+def _nu(f, q, t, p):
     return (
-        # Phi_q
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        crank_pin_crank_y,  # main_bearing.x by phi_crank
-        -crank_pin_crank_x,  # main_bearing.y by phi_crank
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        -crank_pin_crank_y,  # crank_pin.x by phi_crank
-        -wrist_pin_rod_y,  # crank_pin.x by phi_rod
-        crank_pin_crank_x,  # crank_pin.y by phi_crank
-        wrist_pin_rod_x,  # crank_pin.y by phi_rod
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        -wrist_pin_rod_y,  # wrist_pin.x by phi_rod
-        wrist_pin_rod_x,  # wrist_pin.y by phi_rod
-        # nu
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        0,
-        0,
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        0,
-        0,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        0,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        0,
+        0, 0,  # 0-1  Revolute "main_bearing"
+        0, 0,  # 2-3  Revolute "crank_pin"
+        0, 0,  # 4-5  Revolute "wrist_pin"
+        0,  # 6  AbsoluteY "guide_height"
+        0,  # 7  AbsoluteAngle "guide_angle"
         # 8  AbsoluteAngle "motor": crank angle t**2
         2 * t,
     )
 
 
-def _acceleration(f, q, q_dot, t, p):
+def _gamma(f, q, q_dot, t, p):
     phi_crank, phi_rod = q[2], q[5]
     phi_crank_dot, phi_rod_dot = q_dot[2], q_dot[5]
     cos_sin = f.cos_sin
@@ -284,31 +135,14 @@ def _acceleration(f, q, q_dot, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
     # 0-1  Revolute "main_bearing"
-    crank_pin_crank_y = 2 * s_crank
-    crank_pin_crank_x = 2 * c_crank
     phi_crank_dot_sq = phi_crank_dot**2
-    crank_pin_crank_w2_x = phi_crank_dot_sq * crank_pin_crank_x
-    crank_pin_crank_w2_y = phi_crank_dot_sq * crank_pin_crank_y
+    crank_pin_crank_w2_x = phi_crank_dot_sq * (2 * c_crank)
+    crank_pin_crank_w2_y = phi_crank_dot_sq * (2 * s_crank)
     # 2-3  Revolute "crank_pin"
-    wrist_pin_rod_y = 3 * s_rod
-    wrist_pin_rod_x = 3 * c_rod
     phi_rod_dot_sq = phi_rod_dot**2
-    wrist_pin_rod_w2_x = phi_rod_dot_sq * wrist_pin_rod_x
-    wrist_pin_rod_w2_y = phi_rod_dot_sq * wrist_pin_rod_y
+    wrist_pin_rod_w2_x = phi_rod_dot_sq * (3 * c_rod)
+    wrist_pin_rod_w2_y = phi_rod_dot_sq * (3 * s_rod)
     return (
-        # Phi_q
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        crank_pin_crank_y,  # main_bearing.x by phi_crank
-        -crank_pin_crank_x,  # main_bearing.y by phi_crank
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        -crank_pin_crank_y,  # crank_pin.x by phi_crank
-        -wrist_pin_rod_y,  # crank_pin.x by phi_rod
-        crank_pin_crank_x,  # crank_pin.y by phi_crank
-        wrist_pin_rod_x,  # crank_pin.y by phi_rod
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        -wrist_pin_rod_y,  # wrist_pin.x by phi_rod
-        wrist_pin_rod_x,  # wrist_pin.y by phi_rod
-        # gamma
         # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
         -crank_pin_crank_w2_x,
         -crank_pin_crank_w2_y,
@@ -318,10 +152,8 @@ def _acceleration(f, q, q_dot, t, p):
         # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
         wrist_pin_rod_w2_x,
         wrist_pin_rod_w2_y,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        0,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        0,
+        0,  # 6  AbsoluteY "guide_height"
+        0,  # 7  AbsoluteAngle "guide_angle"
         # 8  AbsoluteAngle "motor": crank angle t**2
         2,
     )
@@ -334,79 +166,28 @@ def _kinematics(f, q, q_dot, t, p):
     # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing"
-    crank_pin_crank_x = 2 * c_crank
-    crank_pin_crank_y = 2 * s_crank
+    crank_pin_crank_x, crank_pin_crank_y = 2 * c_crank, 2 * s_crank
     phi_crank_dot_sq = phi_crank_dot**2
     crank_pin_crank_w2_x = phi_crank_dot_sq * crank_pin_crank_x
     crank_pin_crank_w2_y = phi_crank_dot_sq * crank_pin_crank_y
-    # 2-3  Revolute "crank_pin"
-    wrist_pin_rod_x = 3 * c_rod
-    wrist_pin_rod_y = 3 * s_rod
+    wrist_pin_rod_x, wrist_pin_rod_y = 3 * c_rod, 3 * s_rod
     phi_rod_dot_sq = phi_rod_dot**2
     wrist_pin_rod_w2_x = phi_rod_dot_sq * wrist_pin_rod_x
     wrist_pin_rod_w2_y = phi_rod_dot_sq * wrist_pin_rod_y
     return (
         # Phi
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        x_crank - crank_pin_crank_x,
-        y_crank - crank_pin_crank_y,
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
+        x_crank - crank_pin_crank_x, y_crank - crank_pin_crank_y,
         x_crank + crank_pin_crank_x - x_rod + wrist_pin_rod_x,
-        y_crank + crank_pin_crank_y - y_rod + wrist_pin_rod_y,
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        x_rod + wrist_pin_rod_x - x_slider,
-        y_rod + wrist_pin_rod_y - y_slider,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        y_slider,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        phi_slider,
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        phi_crank - t**2,
+        y_crank + crank_pin_crank_y - y_rod + wrist_pin_rod_y, x_rod + wrist_pin_rod_x - x_slider,
+        y_rod + wrist_pin_rod_y - y_slider, y_slider, phi_slider, phi_crank - t**2,
         # Phi_q
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        crank_pin_crank_y,  # main_bearing.x by phi_crank
-        -crank_pin_crank_x,  # main_bearing.y by phi_crank
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        -crank_pin_crank_y,  # crank_pin.x by phi_crank
-        -wrist_pin_rod_y,  # crank_pin.x by phi_rod
-        crank_pin_crank_x,  # crank_pin.y by phi_crank
-        wrist_pin_rod_x,  # crank_pin.y by phi_rod
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        -wrist_pin_rod_y,  # wrist_pin.x by phi_rod
-        wrist_pin_rod_x,  # wrist_pin.y by phi_rod
+        crank_pin_crank_y, -crank_pin_crank_x, -crank_pin_crank_y, -wrist_pin_rod_y,
+        crank_pin_crank_x, wrist_pin_rod_x, -wrist_pin_rod_y, wrist_pin_rod_x,
         # nu
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        0,
-        0,
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        0,
-        0,
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        0,
-        0,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        0,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        0,
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        2 * t,
+        0, 0, 0, 0, 0, 0, 0, 0, 2 * t,
         # gamma
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        -crank_pin_crank_w2_x,
-        -crank_pin_crank_w2_y,
-        # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
-        crank_pin_crank_w2_x + wrist_pin_rod_w2_x,
-        crank_pin_crank_w2_y + wrist_pin_rod_w2_y,
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        wrist_pin_rod_w2_x,
-        wrist_pin_rod_w2_y,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        0,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        0,
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        2,
+        -crank_pin_crank_w2_x, -crank_pin_crank_w2_y, crank_pin_crank_w2_x + wrist_pin_rod_w2_x,
+        crank_pin_crank_w2_y + wrist_pin_rod_w2_y, wrist_pin_rod_w2_x, wrist_pin_rod_w2_y, 0, 0, 2,
     )
 
 
@@ -424,14 +205,8 @@ def _factor(f, J):
     determinant = wrist_pin_y_phi_rod + crank_pin_y_phi_rod
     k_2 = 1 / determinant
     return (
-        main_bearing_x_phi_crank,
-        main_bearing_y_phi_crank,
-        crank_pin_x_phi_crank,
-        crank_pin_x_phi_rod,
-        crank_pin_y_phi_crank,
-        crank_pin_y_phi_rod,
-        wrist_pin_x_phi_rod,
-        k_2,
+        main_bearing_x_phi_crank, main_bearing_y_phi_crank, crank_pin_x_phi_crank,
+        crank_pin_x_phi_rod, crank_pin_y_phi_crank, crank_pin_y_phi_rod, wrist_pin_x_phi_rod, k_2,
     ), (
         determinant,
     )
@@ -456,104 +231,84 @@ def _solve(f, F, b):
     x_rod = -b_6
     x_slider = -(wrist_pin_x + b_6 - wrist_pin_x_phi_rod * phi_rod)
     return (
-        x_crank,
-        y_crank,
-        motor,
-        x_rod,
-        y_rod,
-        phi_rod,
-        x_slider,
-        guide_height,
-        guide_angle,
+        x_crank, y_crank, motor, x_rod, y_rod, phi_rod, x_slider, guide_height, guide_angle,
     )
 
 
 def Phi(q, t, p=DEFAULTS):
     """Constraint vector Phi(q, t), shape (..., 9)."""
-    return _evaluate(_Phi, _PHI, t, p, q)
+    return _evaluate(_position, 0, _PHI, t, p, q)
 
 
 def Phi_q(q, t, p=DEFAULTS):
     """Jacobian of Phi by q, shape (..., 9, 9)."""
-    return _evaluate(_Phi_q, _PHI_Q, t, p, q)
-
-
-def nu(q, t, p=DEFAULTS):
-    """Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, shape (..., 9)."""
-    return _evaluate(_nu, _NU, t, p, q)
-
-
-def gamma(q, q_dot, t, p=DEFAULTS):
-    """Right side of the acceleration equation Phi_q q_ddot = gamma, shape (..., 9).
-
-    gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt
-    """
-    return _evaluate(_gamma, _GAMMA, t, p, q, q_dot)
+    return _evaluate(_position, 9, _PHI_Q, t, p, q)
 
 
 def Phi_q_nonzeros(q, t, p=DEFAULTS):
     """Entries of Phi_q in the order of PATTERN, shape (..., 21)."""
-    return _evaluate(_Phi_q, _NONZEROS, t, p, q)
+    return _evaluate(_position, 9, _PHI_Q_NONZEROS, t, p, q)
+
+
+def nu(q, t, p=DEFAULTS):
+    """Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, shape (..., 9)."""
+    return _evaluate(_nu, 0, _NU, t, p, q)
+
+
+def gamma(q, q_dot, t, p=DEFAULTS):
+    """Right side of the acceleration equation Phi_q q_ddot = gamma, shape (..., 9)."""
+    return _evaluate(_gamma, 0, _GAMMA, t, p, q, q_dot)
 
 
 def position(q, t, p=DEFAULTS):
     """Phi and Phi_q in one go: a step of Newton's method."""
-    return _evaluate_together(_position, (_PHI, _PHI_Q), t, p, q)
+    return _evaluate(_position, 0, (_PHI, _PHI_Q), t, p, q)
 
 
 def velocity(q, t, p=DEFAULTS):
-    """Phi_q and nu in one go: the velocity equation."""
-    return _evaluate_together(_velocity, (_PHI_Q, _NU), t, p, q)
+    """Phi_q and nu: the velocity equation."""
+    return Phi_q(q, t, p), nu(q, t, p)
 
 
 def acceleration(q, q_dot, t, p=DEFAULTS):
-    """Phi_q and gamma in one go: the acceleration equation."""
-    return _evaluate_together(_acceleration, (_PHI_Q, _GAMMA), t, p, q, q_dot)
+    """Phi_q and gamma: the acceleration equation."""
+    return kinematics(q, q_dot, t, p)[1::2]
 
 
 def kinematics(q, q_dot, t, p=DEFAULTS):
     """Phi, Phi_q, nu and gamma in one go."""
-    return _evaluate_together(_kinematics, (_PHI, _PHI_Q, _NU, _GAMMA), t, p, q, q_dot)
+    return _evaluate(_kinematics, 0, (_PHI, _PHI_Q, _NU, _GAMMA), t, p, q, q_dot)
 
 
 def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
     """Phi, the nonzeros of Phi_q, nu and gamma of a batch whose axis is the last one.
 
     q and q_dot have the shape (9, N), t () or (N,), p (0,) or (0, N).
-    The results have the shapes (9, N), (21, N), (9, N), (9, N):
-    the layout in which the code runs fastest.
+    The results have the shapes (9, N), (21, N), (9, N), (9, N).
     """
-    return _evaluate_batch_last(_kinematics, (_PHI, _NONZEROS, _NU, _GAMMA), t, p, q, q_dot)
+    states, t, p = _batch_last(t, p, (q, q_dot))
+    quantities = _PHI, _PHI_Q_NONZEROS, _NU, _GAMMA
+    return _on_batch(_kinematics, 0, quantities, t, p, states, is_last=True)
 
 
 def solve(nonzeros, b):
     """Return x of Phi_q x = b by the planned elimination, shape (..., 9).
 
-    nonzeros (..., 21) are the entries of Phi_q in the order of PATTERN, b has the shape
-    (..., 9). Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that
-    may happen.
+    nonzeros (..., 21) are the entries of Phi_q in the order of PATTERN, b is (..., 9).
+    Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that may happen.
     """
     nonzeros, b = np.asarray(nonzeros, dtype=float), np.asarray(b, dtype=float)
     with np.errstate(all="ignore"):
-        F, _ = _factor(_Arrays, [nonzeros[..., k] for k in _VARYING])
-        x = _solve(_Arrays, F, [b[..., k] for k in range(N_EQUATIONS)])
+        F, _ = _factor(ARRAYS, [nonzeros[..., k] for k in _PHI_Q_NONZEROS.places])
+        x = _solve(ARRAYS, F, [b[..., k] for k in range(N_EQUATIONS)])
     return np.stack(np.broadcast_arrays(*x), axis=-1)
 
 
 # The code itself, for callers that keep each coordinate in an array of its own: functions of
-# (f, q, [q_dot,] t, p), with f = ARRAYS and sequences q, q_dot, p of numbers or arrays (N,), or
-# with f = FLOATS and sequences of floats. Of Phi_q they give the entries that vary.
+# (f, q, [q_dot,] t, p) with sequences q, q_dot, p. Of Phi_q they give the entries that vary.
 LANES = {
-    "Phi": _Phi,
-    "Phi_q": _Phi_q,
-    "nu": _nu,
-    "gamma": _gamma,
-    "position": _position,
-    "velocity": _velocity,
-    "acceleration": _acceleration,
-    "kinematics": _kinematics,
-    "factor": _factor,
-    "solve": _solve,
+    "position": _position, "nu": _nu, "gamma": _gamma, "kinematics": _kinematics,
+    "factor": _factor, "solve": _solve,
 }
 
 
@@ -564,39 +319,35 @@ class InputError(ValueError):
 def _cos_sin(angle):
     """Cosine and sine of an array through t = tan(angle / 2): half the time of np.cos and np.sin.
 
-    With R = 2 / (1 + t^2) they are R - 1 and t R. No angle is out of reach, since a float is never
-    exactly pi: there t is about 1e16, and t^2 far from overflow. The error is at most 4e-16.
+    With R = 2 / (1 + t^2) they are R - 1 and t R. A float is never exactly pi: there t is about
+    1e16, and t^2 far from overflow. The error is at most 4e-16.
     """
     t = np.tan(0.5 * angle)
     R = 2.0 / (1.0 + t * t)
     return R - 1.0, t * R
 
 
-class _Floats:
+class FLOATS:
     """Elementary functions of one number."""
-
     cos_sin = staticmethod(lambda angle, cos=math.cos, sin=math.sin: (cos(angle), sin(angle)))
 
 
-class _Arrays:
+class ARRAYS:
     """Elementary functions of arrays."""
-
     cos_sin = staticmethod(_cos_sin)
 
 
 class _Quantity:
-    """What a function returns: its shape, its constant entries, and where the computed ones go."""
+    """A result: its shape, where its computed entries go, and its entries that never change."""
 
-    def __init__(self, shape, places, fixed=(), constants=()):
-        self.shape = shape
-        self.size = math.prod(shape)
-        self.index = np.array(places, dtype=int)
-        self.places = self.index.tolist()
-        self.count = len(self.places)
-        self.fixed = np.array(fixed, dtype=int)
-        self.constants = np.reshape(constants, (-1, 1))
+    def __init__(self, shape, places, constants=()):
+        self.shape, self.size = shape, math.prod(shape)
+        self.places = [int(place) for k, place in enumerate(places) if k not in constants]
+        self.index, self.count = np.array(self.places, dtype=int), len(self.places)
+        self.fixed = [int(places[k]) for k in constants]
+        self.constants = np.array([[constants[k]] for k in constants], dtype=float).reshape(-1, 1)
         self.start = np.zeros(shape)
-        self.start.put(self.fixed, constants)
+        self.start.put(self.fixed, self.constants)
         self.is_full = shape == (self.count,)
 
     def at_point(self, values):
@@ -608,24 +359,11 @@ class _Quantity:
         result.put(self.index, computed)
         return result
 
-    def for_batch(self, count, dtype):
-        """Return an array (size, N) with the constant entries in place.
 
-        It lies in memory point by point, as it is wanted in the end.
-        """
-        result = _empty((count, self.size), dtype)
-        if not self.is_full:
-            result[:] = self.start.reshape(-1)
-        return result.T
-
-
-FLOATS, ARRAYS = _Floats, _Arrays
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
-_FLAT = PATTERN @ (N_COORDINATES, 1)
-_PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), _FLAT[_VARYING], _FLAT[_FIXED], _CONSTANTS)
-_NONZEROS = _Quantity((len(PATTERN),), _VARYING, _FIXED, _CONSTANTS)
-_STATES = ("q", "q_dot")
-_SHAPE = (N_COORDINATES,)
+_PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
+_PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
+_STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
 _BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
 _PARAMETER_LIST = DEFAULTS.tolist()
@@ -634,8 +372,9 @@ for _array in (DEFAULTS, GUESS, PATTERN):
     _array.flags.writeable = False
 
 
-def _evaluate(kernel, quantity, t, p, *states):
-    """Return one quantity: of one point with floats, or of a batch with arrays."""
+def _evaluate(kernel, skip, wanted, t, p, *states):
+    """Return a quantity or several, what a kernel computes after so many values."""
+    quantities = wanted if type(wanted) is tuple else (wanted,)
     point = _point(t, p, states)
     if point is not None:
         try:
@@ -643,72 +382,37 @@ def _evaluate(kernel, quantity, t, p, *states):
         except (ArithmeticError, ValueError):
             pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
         else:
-            return quantity.at_point(values)
-    return _evaluate_batch(kernel, (quantity,), t, p, states)[0]
-
-
-def _evaluate_together(kernel, quantities, t, p, *states):
-    """Return several quantities that share work."""
-    point = _point(t, p, states)
-    if point is not None:
-        try:
-            values = iter(kernel(*point))
-        except (ArithmeticError, ValueError):
-            pass
-        else:
+            if quantities is not wanted:
+                return wanted.at_point(values[skip:])
+            values = iter(values)
             return tuple([quantity.at_point(values) for quantity in quantities])
-    return _evaluate_batch(kernel, quantities, t, p, states)
-
-
-def _evaluate_batch(kernel, quantities, t, p, states):
-    """Run a kernel on a batch whose axes are the first ones."""
     states, t, p, shape = _batch(t, p, states)
-    dtype = states[0].dtype
-    results = [quantity.for_batch(math.prod(shape), dtype) for quantity in quantities]
-    _fill(results, kernel, quantities, t, p, states)
-    return tuple(
-        result.T.reshape(shape + quantity.shape)
-        for quantity, result in zip(quantities, results)
-    )
+    results = _on_batch(kernel, skip, quantities, t, p, states)
+    found = [part.T.reshape(shape + item.shape) for item, part in zip(quantities, results)]
+    return tuple(found) if quantities is wanted else found[0]
 
 
-def _evaluate_batch_last(kernel, quantities, t, p, *states):
-    """Run a kernel on a batch whose axis is the last one."""
-    states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
-    t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
-    count = states[0].shape[-1]
-    batches = {state.shape[1:] for state in states}
-    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
-        shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
-        raise InputError(
-            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
-            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
-            f"({len(PARAMETERS)}, N)"
-        )
-    dtype = np.result_type(*states, t, p)
-    results = [_empty((quantity.size, count), dtype) for quantity in quantities]
-    for quantity, result in zip(quantities, results):
-        if not quantity.is_full:
-            result[quantity.fixed] = quantity.constants
-    _fill(results, kernel, quantities, t, p, states)
+def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
+    """Return quantities as arrays (size, N), in memory point by point or with the batch last."""
+    count, dtype = states[0].shape[1], np.result_type(*states, t, p)
+    results = []
+    for item in quantities:
+        if is_last:
+            results.append(_empty((item.size, count), dtype))
+            results[-1][item.fixed] = item.constants
+        else:
+            results.append(_empty((count, item.size), dtype).T)
+            if not item.is_full:
+                results[-1].T[:] = item.start.reshape(-1)
+    for start in range(0, count, _BLOCK):
+        block = ..., slice(start, start + _BLOCK)
+        at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
+        with np.errstate(all="ignore"):
+            found = iter(kernel(ARRAYS, *(part[block] for part in states), at, parameters)[skip:])
+            for item, part in zip(quantities, [result[block] for result in results]):
+                for place, value in zip(item.places, found):
+                    part[place] = value
     return tuple(results)
-
-
-def _fill(results, kernel, quantities, t, p, states):
-    """Run a kernel, block by block, and put its values into arrays (size, N)."""
-    count = results[0].shape[1]
-    if count > _BLOCK:
-        for start in range(0, count, _BLOCK):
-            block = ..., slice(start, start + _BLOCK)
-            at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
-            parts = [result[block] for result in results]
-            _fill(parts, kernel, quantities, at, parameters, [state[block] for state in states])
-        return
-    with np.errstate(all="ignore"):
-        values = iter(kernel(_Arrays, *states, t, p))
-        for quantity, result in zip(quantities, results):
-            for place, value in zip(quantity.places, values):
-                result[place] = value
 
 
 def _point(t, p, states):
@@ -724,7 +428,7 @@ def _point(t, p, states):
         total = t + sum(parameters)
     else:
         return None
-    arguments = [_Floats]
+    arguments = [FLOATS]
     for state in states:
         if type(state) is not _ndarray or state.shape != _SHAPE or state.dtype is not _REAL:
             return None
@@ -750,21 +454,34 @@ def _batch(t, p, states):
             "other; they broadcast like NumPy arrays"
         ) from None
     dtype = np.result_type(*states, t, p)
-    states = [_rows(state, shape).astype(dtype, copy=False) for state in states]
-    t = t if t.ndim == 0 else _spread(t, shape).reshape(-1)
-    p = p if p.ndim == 1 else _rows(p, shape)
+    whole = (*shape, N_COORDINATES)
+    states = [_rows(state, whole).astype(dtype, copy=False) for state in states]
+    t = t if t.ndim == 0 else _rows(t[..., np.newaxis], (*shape, 1))[0]
+    p = p if p.ndim == 1 else _rows(p, (*shape, len(PARAMETERS)))
     return states, t, p, shape
 
 
+def _batch_last(t, p, states):
+    """Check the arguments of a batch whose axis is the last one."""
+    states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
+    t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
+    count = states[0].shape[-1]
+    batches = {state.shape[1:] for state in states}
+    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
+        shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
+        raise InputError(
+            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
+            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
+            f"({len(PARAMETERS)}, N)"
+        )
+    return states, t, p
+
+
 def _rows(array, shape):
-    """Return an array (..., n), broadcast to a batch's shape, as (n, N)."""
-    size = array.shape[-1]
-    return _spread(array, (*shape, size)).reshape(math.prod(shape), size).T
-
-
-def _spread(array, shape):
-    """Return np.broadcast_to(array, shape), which is slow even where nothing is to be done."""
-    return array if array.shape == shape else np.broadcast_to(array, shape)
+    """Return an array (..., n), broadcast to a shape, as (n, N)."""
+    if array.shape != shape:  # np.broadcast_to is slow even where nothing is to be done
+        array = np.broadcast_to(array, shape)
+    return array.reshape(math.prod(shape[:-1]), shape[-1]).T
 
 
 def _checked(name, value, entries=None, axis=-1):

@@ -122,7 +122,9 @@ class VectorFaults:
         self._expansion: Expansion = numeric_expansion(joint, reference, states)
         frames = joint.template.frames
         self._symbols = Symbols(
-            frozenset(frame.phi.name for frame in frames), frozenset(joint.points)
+            frozenset(frame.phi.name for frame in frames),
+            frozenset(joint.points),
+            joint.written.partners(),
         )
         self._right = {place: self._values(place, item) for place, item in self._parts().items()}
 
@@ -298,7 +300,7 @@ def _exchanged_names(parts: Mapping[Place, Expression], symbols: Symbols) -> Ite
         yield mutations.MIXED_ANGLES, "phi_i and phi_j are exchanged throughout", changed
 
     def points(node: Expression) -> Expression | None:
-        if isinstance(node, VectorSymbol) and (partner := symbols.partner(node.name)):
+        if isinstance(node, VectorSymbol) and (partner := symbols.partners.get(node.name)):
             return VectorSymbol(partner)
         return None
 

@@ -35,7 +35,7 @@ from kincompile.compare.plain_text import described
 from kincompile.compare.vectors import Exchanged
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
 SIGN = "sign"
 FACTOR = "factor 2 or 1/2"
@@ -56,7 +56,6 @@ DRIVER_RATE = "driver's rate forgotten"
 HALF = Number(Fraction(1, 2))
 TWO = Number(Fraction(2))
 MINUS_ONE = Number(Fraction(-1))
-_PARTNERS = {"s_i": "s_j", "s_j": "s_i", "s_P": "s_Q", "s_Q": "s_P", "v_i": "v_j", "v_j": "v_i"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,20 +79,24 @@ class Mutation:
 
 @dataclass(frozen=True, slots=True)
 class Symbols:
-    """What a joint has: names of its bodies' angles and of its body-fixed vectors."""
+    """What a joint has: names of its bodies' angles and of its body-fixed vectors.
+
+    Attributes
+    ----------
+    angles, vectors
+        The names.
+    partners
+        By the name of a vector, the one that is easily taken for it.
+    """
 
     angles: frozenset[str]
     vectors: frozenset[str]
+    partners: Mapping[str, str]
 
     def other_angle(self, name: str) -> str | None:
         """Return the angle of the other body."""
         others = self.angles - {name} if name in self.angles else ()
         return next(iter(others), None)
-
-    def partner(self, name: str) -> str | None:
-        """Return the vector that is easily taken for another."""
-        partner = _PARTNERS.get(name)
-        return partner if partner in self.vectors else None
 
 
 def times(factor: Number, expression: Any) -> Expression:
@@ -186,7 +189,7 @@ def swaps(node: Expression, symbols: Symbols) -> Iterator[tuple[str, str, Expres
     if isinstance(node, VectorSymbol) and node.name in symbols.vectors:
         swapped = Exchanged(node.name, node.size)
         yield XI_ETA, f"xi and eta of {node.name} are swapped", swapped
-        partner = symbols.partner(node.name)
+        partner = symbols.partners.get(node.name)
         if partner is not None:
             text = f"{partner} stands where {node.name} belongs"
             yield MIXED_POINTS, text, VectorSymbol(partner)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy
 
+from kincompile import quantities
 from kincompile.compare.states import (
     Array,
     States,
@@ -27,29 +28,30 @@ from kincompile.model.mechanism import system_of
 from kincompile.names import listed, rate, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from kincompile.ir.graph import Node
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.system import ConstraintSystem
 
-QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
+QUANTITIES = tuple(item.name for item in quantities.QUANTITIES)
 
 
 @dataclass(frozen=True, slots=True)
 class Values:
-    """Phi, nu and gamma (N, m) and Phi_q (N, m, n) at N states."""
+    """The quantities at N states: vectors (N, m) and matrices (N, m, n)."""
 
-    Phi: Array
-    Phi_q: Array
-    nu: Array
-    gamma: Array
+    arrays: Mapping[str, Array]
+
+    def __getitem__(self, quantity: str) -> Array:
+        """Return a quantity, shape (N, m) or (N, m, n)."""
+        return self.arrays[quantity]
 
     def of(self, quantity: str) -> Array:
         """Return a quantity as matrices, shape (N, m, 1) or (N, m, n)."""
-        array: Array = getattr(self, quantity)
-        return array if quantity == "Phi_q" else array[..., None]
+        array = self.arrays[quantity]
+        return array if quantities.quantity_named(quantity).is_matrix else array[..., None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +135,8 @@ class Reference:
     def values(self, states: States) -> Values:
         """Evaluate the generated quantities."""
         with np.errstate(all="ignore"):
-            return Values(*interpret(self.program, states.q, states.q_dot, states.t, states.p.T))
+            found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
+        return Values(dict(zip(QUANTITIES, found, strict=True)))
 
     @cached_property
     def random(self) -> States:
@@ -163,7 +166,8 @@ class Reference:
 
         def constraints(states: States) -> tuple[Array, Array, Array]:
             found = self.values(states)
-            return found.Phi[:, chosen], found.Phi_q[:, chosen], found.nu[:, chosen]
+            Phi, Phi_q, nu = (found[name][:, chosen] for name in ("Phi", "Phi_q", "nu"))
+            return Phi, Phi_q, nu
 
         return consistent_states(start, constraints)
 

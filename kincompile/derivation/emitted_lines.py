@@ -6,6 +6,7 @@ import ast
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.document import SourceLine
+from kincompile.quantities import kernels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -25,31 +26,33 @@ def emitted_lines(code: InlineProgram, source: str) -> dict[Place, SourceLine]:
     lines = source.splitlines()
     functions = {item.name: item for item in tree.body if isinstance(item, ast.FunctionDef)}
     found: dict[Place, SourceLine] = {}
-    for quantity in ("Phi", "Phi_q", "nu", "gamma"):
-        entries = [entry for section in code.sections for entry in section.entries[quantity]]
-        if quantity == "Phi_q":
-            constants = [entry for entry in entries if code.number(entry.node) is not None]
-            entries = [entry for entry in entries if code.number(entry.node) is None]
-            found |= _constant_lines(tree, constants)
-        function = functions.get(f"_{quantity}")
+    for kernel, computed in kernels().items():
+        if kernel == "kinematics":  # what the others compute once more
+            continue
+        entries = {name: code.entries(name) for name in computed}
+        if "Phi_q" in entries:
+            found |= _constant_lines(tree, entries["Phi_q"])
+            entries["Phi_q"] = [x for x in entries["Phi_q"] if code.number(x.node) is None]
+        function = functions.get(f"_{kernel}")
         if function is not None:
-            found |= _lines(quantity, function, entries, lines)
+            places = [(name, x.row, x.column) for name, own in entries.items() for x in own]
+            found |= _lines(places, function, lines)
     return found
 
 
 def _lines(
-    quantity: str, function: ast.FunctionDef, entries: Sequence[Entry], lines: Sequence[str]
+    places: Sequence[Place], function: ast.FunctionDef, lines: Sequence[str]
 ) -> dict[Place, SourceLine]:
     returned = function.body[-1]
     if not (isinstance(returned, ast.Return) and isinstance(returned.value, ast.Tuple)):
         return {}
     elements = returned.value.elts
-    if len(elements) != len(entries):
+    if len(elements) != len(places):
         return {}
     definitions = _definitions(function)
     return {
-        (quantity, entry.row, entry.column): _source_line(element, definitions, lines)
-        for entry, element in zip(entries, elements, strict=True)
+        place: _source_line(element, definitions, lines)
+        for place, element in zip(places, elements, strict=True)
     }
 
 
@@ -90,11 +93,11 @@ def _constant_lines(tree: ast.Module, entries: Sequence[Entry]) -> dict[Place, S
     """Return where the constant entries of Phi_q stand: the numbers of `_CONSTANTS`."""
     for node in tree.body:
         match node:
-            case ast.Assign([ast.Name("_CONSTANTS")], ast.Call(args=[ast.Tuple(numbers)])):
-                return {
-                    ("Phi_q", entry.row, entry.column): SourceLine(
-                        number.lineno, f"_CONSTANTS[{k}] = {ast.unparse(number)}"
-                    )
-                    for k, (entry, number) in enumerate(zip(entries, numbers, strict=True))
-                }
+            case ast.Assign([ast.Name("_CONSTANTS")], ast.Dict(keys, values)):
+                found = {}
+                for key, value in zip(keys, values, strict=True):
+                    number = ast.literal_eval(key) if key else -1
+                    entry, text = entries[number], f"_CONSTANTS[{number}] = {ast.unparse(value)}"
+                    found["Phi_q", entry.row, entry.column] = SourceLine(value.lineno, text)
+                return found
     return {}

@@ -1,4 +1,4 @@
-"""The text of a data file, TOML or JSON, as nested values that know the lines they stand in.
+"""The text of a data file, TOML or JSON, as nested values with their lines.
 
 Nothing in a data file is run. Python's own readers give the values and no places; the lines are
 looked up in the text when a message needs them, so that a good file does not pay for them.
@@ -41,7 +41,7 @@ class Document:
     file
         Its name, for messages.
     text
-        What stands in it.
+        Its text.
     data
         Its values: dicts, lists, texts, numbers, truth values.
     is_toml
@@ -127,7 +127,7 @@ def _too_long(path: Path, text: str) -> ModelError:
 
 
 def _toml_problem(message: str, text: str) -> tuple[str, int]:
-    """Return what tomllib says, and the line."""
+    """Return the message of tomllib, and the line."""
     found = re.fullmatch(r"(.*) \(at line (\d+), column (\d+)\)", message, re.DOTALL)
     if found is None:
         return message.replace(" (at end of document)", ", the file ends here"), (
@@ -142,7 +142,7 @@ def read_json(path: Path, text: str, *, has_fractions: bool = False) -> Document
     Parameters
     ----------
     path, text
-        The file, and what stands in it.
+        The file, and its text.
     has_fractions
         Whether a number may be written 187/255; it is read as a text.
 
@@ -194,7 +194,7 @@ def _only_once(pairs: list[tuple[str, Any]], repeated: list[str]) -> dict[str, A
 
 
 def _repetitions(document: Document) -> list[str]:
-    """Return a message for each key that stands in an object twice."""
+    """Return a message for each key that an object has twice."""
     first: dict[Address, int] = {}
     problems = []
     for address, line in json_lines(document.text):

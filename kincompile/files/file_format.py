@@ -1,4 +1,4 @@
-"""The format of a model file, in one place: what the reader checks and the JSON Schema says."""
+"""The format of a model file, in one place: for the reader, the writer and the JSON Schema."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Field:
     Attributes
     ----------
     schema
-        What JSON Schema says of its value.
+        JSON Schema of its value.
     is_required
         Whether it must be there.
     """
@@ -117,7 +117,7 @@ def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
 def model_schema() -> dict[str, Any]:
     """Return the JSON Schema of a model file.
 
-    What it cannot say, whether a formula can be read and a body exists, `kincompile inspect` says.
+    Whether a formula can be read and a body exists is checked by `kincompile inspect`.
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
     kinds = [_object(constraint_fields(item)) for item in CONSTRAINTS.values()]

@@ -1,4 +1,4 @@
-"""A model from a file; the suffix says how to read it."""
+"""A model from a file; the suffix decides how it is read."""
 
 from __future__ import annotations
 

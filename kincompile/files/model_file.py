@@ -204,7 +204,7 @@ class _ModelReader(FieldReader):
         unit = self.unit(row.get("unit", ""), (*address, "unit"), f"parameter {name!r}")
         if name:
             self._names[name] = sympy.Symbol(name)
-            self.stands(f"parameter {name!r}", address)
+            self.remember(f"parameter {name!r}", address)
         return Parameter(name, default, unit) if self._is_free(name, address) and complete else None
 
     def _body(self, address: Address, row: Row) -> Body | None:
@@ -224,8 +224,8 @@ class _ModelReader(FieldReader):
         body = Body(name, (start[0], start[1], start[2]), outline)
         for coordinate in body.coordinates:
             self._names[coordinate] = sympy.Symbol(coordinate)
-            self.stands(f"guess of {coordinate}", (*address, "guess"))
-        self.stands(f"outline of {name}", (*address, "outline"))
+            self.remember(f"guess of {coordinate}", (*address, "guess"))
+        self.remember(f"outline of {name}", (*address, "outline"))
         return body
 
     def _outline(
@@ -247,7 +247,7 @@ class _ModelReader(FieldReader):
         guess = self.expression(row.get("guess", 0.0), (*address, "guess"), self._names)
         if name:
             self._names[name] = sympy.Symbol(name)
-            self.stands(f"guess of {name}", address)
+            self.remember(f"guess of {name}", address)
         return (name, guess) if self._is_free(name, address) else None
 
     def _declare_contacts(self, row: Row) -> None:
@@ -288,7 +288,7 @@ class _ModelReader(FieldReader):
             line = self.document.line(other)
             self.problem((*address, "name"), f"{name!r} is the name in line {line} already")
         for title in (f"{kind} {name!r}", f"equation {name!r}", f"equation '{name}."):
-            self.stands(title, address)
+            self.remember(title, address)
 
     def _equation(self, address: Address, row: Row, name: str) -> Equation:
         self.has_fields(address, row, FIELDS["Equation"])
@@ -307,7 +307,7 @@ class _ModelReader(FieldReader):
             if key in row
         }
         for key in arguments:
-            self.stands(f"{kind.__name__} {name!r}, {key}", (*address, key))
+            self.remember(f"{kind.__name__} {name!r}, {key}", (*address, key))
         if len(arguments) < len(kind.arguments()):
             return kind(name, *[None] * len(kind.arguments()))
         if "guess" in row and "guess" in fields:

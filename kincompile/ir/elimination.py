@@ -76,11 +76,7 @@ def plan_solve(code: InlineProgram) -> SolvePlan | None:
 
 def jacobian_entries(code: InlineProgram) -> list[tuple[int, int, Constant | None]]:
     """Return row, column and, where it is one, number of each entry not identically zero."""
-    return [
-        (entry.row, entry.column, code.number(entry.node))
-        for section in code.sections
-        for entry in section.entries["Phi_q"]
-    ]
+    return [(entry.row, entry.column, code.number(entry.node)) for entry in code.entries("Phi_q")]
 
 
 def plan_entries(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile import quantities
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.ir.graph import Graph, Node, number_of, operands_of
 from kincompile.ir.program import FrameEntry
@@ -59,10 +60,9 @@ class Group:
         Its code, folded for the shape of the group.
     inputs
         Where each input that is left comes from.
-    Phi, nu, gamma
-        Nodes, one an equation.
-    Phi_q
-        ``(row, column, node)`` in the constraint's own count.
+    outputs
+        By quantity ``(row, column, node)``, as in the kernel, without what is on the ground or
+        zero.
     rows
         First row of each constraint, shape (L,).
     columns
@@ -76,10 +76,7 @@ class Group:
     sample: Instance
     nodes: tuple[Node, ...]
     inputs: Mapping[str, Source]
-    Phi: tuple[int, ...]
-    Phi_q: tuple[tuple[int, int, int], ...]
-    nu: tuple[int, ...]
-    gamma: tuple[int, ...]
+    outputs: Mapping[str, tuple[tuple[int, int, int], ...]]
     rows: Index
     columns: Index
     hints: Mapping[int, str]
@@ -116,7 +113,7 @@ class GroupedProgram:
         parts = [
             np.stack((item.rows + row, item.columns[:, column]), axis=1)
             for item in self.groups
-            for row, column, _ in item.Phi_q
+            for row, column, _ in item.outputs["Phi_q"]
         ]
         return np.concatenate(parts) if parts else np.empty((0, 2), dtype=np.intp)
 
@@ -293,14 +290,15 @@ class _Builder:
             sample,
             tuple(graph.nodes),
             sources.by_name,
-            tuple(new[node] for node in kernel.Phi),
-            tuple(
-                (row, column, new[node])
-                for row, column, node in kernel.Phi_q
-                if columns[0, column] >= 0 and graph.value_of(new[node]) != 0
-            ),
-            tuple(new[node] for node in kernel.nu),
-            tuple(new[node] for node in kernel.gamma),
+            {
+                quantity.name: tuple(
+                    (row, column, new[node])
+                    for row, column, node in kernel.outputs.get(quantity.name, ())
+                    if sample.place(quantity, row, column) is not None
+                    and not (quantity.is_matrix and graph.value_of(new[node]) == 0)
+                )
+                for quantity in quantities.QUANTITIES
+            },
             rows,
             columns,
             {

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from kincompile import quantities
 from kincompile.ir.graph import Constant, Graph, Node, number_of
 from kincompile.ir.program import Function
 from kincompile.names import rate
@@ -13,8 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from kincompile.ir.program import Hint, Instance, Program
-
-QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +34,8 @@ class Section:
     text
         The constraint in words, kept because printing its arguments takes its time.
     entries
-        Entries by quantity; of Phi_q those that are not identically zero, row by row.
+        Entries by quantity, row by row; of a matrix those that are not identically zero. The last
+        constraint has those to which several contribute.
     """
 
     instance: Instance
@@ -65,13 +65,13 @@ class InlineProgram:
     hints: Mapping[int, str]
     frames: tuple[tuple[int, ...], ...] = ()
 
-    def pattern(self) -> tuple[tuple[int, int], ...]:
-        """Return row and column of each entry of Phi_q not identically zero, row by row."""
-        return tuple(
-            (entry.row, entry.column)
-            for section in self.sections
-            for entry in section.entries["Phi_q"]
-        )
+    def entries(self, quantity: str) -> list[Entry]:
+        """Return the entries of a quantity, row by row."""
+        return [entry for section in self.sections for entry in section.entries[quantity]]
+
+    def pattern(self, quantity: str = "Phi_q") -> tuple[tuple[int, int], ...]:
+        """Return row and column of each entry of a matrix not identically zero, row by row."""
+        return tuple((entry.row, entry.column) for entry in self.entries(quantity))
 
     def number(self, node: int) -> Constant | None:
         """Return the number a node stands for, None where it is not a plain number."""
@@ -86,7 +86,8 @@ def inline(program: Program) -> InlineProgram:
         hints.update(zip(body.entries, body.labels, strict=True))
     for item in program.coordinates:
         hints[graph.square(graph.input(rate(item.name)))] = f"{rate(item.name)}_sq"
-    sections = []
+    sections: list[Section] = []
+    shared: dict[str, dict[tuple[int, int], int]] = {}
     for instance in program.instances:
         kernel = instance.kernel
         inputs = dict(zip(kernel.inputs, instance.bindings, strict=True))
@@ -101,24 +102,52 @@ def inline(program: Program) -> InlineProgram:
             # A call is named by its function and argument.
             if graph.nodes[node][0] not in ("neg", "const", "input", "call"):
                 hints.setdefault(node, name)
-        sections.append(Section(instance, instance.constraint.text, _entries(instance, new, graph)))
+        entries = _entries(instance, new, graph, shared)
+        sections.append(Section(instance, instance.constraint.text, entries))
+    if shared:  # a sum is complete where the last constraint has contributed
+        sums = _sums(program, graph, shared)
+        sections[-1] = replace(sections[-1], entries={**sections[-1].entries, **sums})
     frames = tuple(sorted(body.entries for body in program.bodies))
     return InlineProgram(program, tuple(graph.nodes), tuple(sections), hints, frames)
 
 
-def _entries(instance: Instance, new: list[int], graph: Graph) -> dict[str, tuple[Entry, ...]]:
-    first, kernel = instance.first_row, instance.kernel
-    Phi_q = []
-    for row, local, node in kernel.Phi_q:
-        column = instance.columns[local]
-        if column is not None and graph.value_of(new[node]) != 0:
-            Phi_q.append(Entry(first + row, column, new[node]))
-    vectors = {"Phi": kernel.Phi, "nu": kernel.nu, "gamma": kernel.gamma}
-    entries = {
-        name: tuple(Entry(first + row, 0, new[node]) for row, node in enumerate(nodes))
-        for name, nodes in vectors.items()
-    }
-    return {**entries, "Phi_q": tuple(sorted(Phi_q, key=lambda entry: (entry.row, entry.column)))}
+def _entries(
+    instance: Instance,
+    new: list[int],
+    graph: Graph,
+    shared: dict[str, dict[tuple[int, int], int]],
+) -> dict[str, tuple[Entry, ...]]:
+    """Return the entries of a constraint's own rows; what it adds to others goes into `shared`."""
+    entries = {}
+    for quantity in quantities.QUANTITIES:
+        is_own = quantity.rows == "equations" and not quantity.adds
+        found = {} if is_own else shared.setdefault(quantity.name, {})
+        for row, column, node in instance.kernel.outputs.get(quantity.name, ()):
+            place = instance.place(quantity, row, column)
+            if place is None or (quantity.is_matrix and graph.value_of(new[node]) == 0):
+                continue
+            before = found.get(place) if quantity.adds else None
+            found[place] = new[node] if before is None else graph.add(before, new[node])
+        entries[quantity.name] = _sorted(found) if is_own else ()
+    return entries
+
+
+def _sorted(found: Mapping[tuple[int, int], int]) -> tuple[Entry, ...]:
+    return tuple(Entry(*place, node) for place, node in sorted(found.items()))
+
+
+def _sums(
+    program: Program, graph: Graph, shared: Mapping[str, dict[tuple[int, int], int]]
+) -> dict[str, tuple[Entry, ...]]:
+    """Return the entries to which several constraints may contribute; a vector has all its rows."""
+    sums = {}
+    for name, found in shared.items():
+        quantity = quantities.quantity_named(name)
+        if not quantity.is_matrix:
+            for row in range(len(program.names_of(quantity.rows))):
+                found.setdefault((row, 0), graph.const(0))
+        sums[name] = _sorted(found)
+    return sums
 
 
 def _vector_name(hint: Hint, instance: Instance) -> str:

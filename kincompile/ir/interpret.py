@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import operator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile import quantities
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from kincompile.ir.graph import Node
     from kincompile.ir.program import Instance, Kernel, Program
     from kincompile.model.spline import SplineTable
+    from kincompile.quantities import Quantity
 
 Array = NDArray[Any]
 
@@ -32,8 +35,8 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
 
 def interpret(
     program: Program, q: Array, q_dot: Array, t: Any, p: Array | None = None
-) -> tuple[Array, Array, Array, Array]:
-    """Evaluate Phi, Phi_q, nu and gamma.
+) -> tuple[Array, ...]:
+    """Evaluate the quantities.
 
     Parameters
     ----------
@@ -47,7 +50,7 @@ def interpret(
     Returns
     -------
     tuple of arrays
-        Phi (..., m), Phi_q (..., m, n), nu (..., m), gamma (..., m).
+        In the order of the table: Phi (..., m), Phi_q (..., m, n), nu (..., m), gamma (..., m).
     """
     q, q_dot = np.asarray(q), np.asarray(q_dot)
     defaults = [item.default for item in program.parameters]
@@ -60,28 +63,56 @@ def interpret(
         inputs[rate(item.name)] = q_dot[..., column]
     values = run(program.values, inputs, program.tables)
 
-    shape, m, n = q.shape[:-1], len(program.equations), len(program.coordinates)
+    shape = q.shape[:-1]
     dtype = np.result_type(q, q_dot, t, float)
     every = np.empty((*shape, len(values)), dtype)
     for node, value in enumerate(values):
         every[..., node] = value
-    Phi, nu, gamma = (np.zeros((*shape, m), dtype) for _ in range(3))
-    Phi_q = np.zeros((*shape, m, n), dtype)
+    found = [np.zeros((*shape, *program.shape_of(item)), dtype) for item in quantities.QUANTITIES]
     for kernel, instances in _by_kernel(program):
         bindings = np.array([instance.bindings for instance in instances], dtype=np.intp)
         bound = {name: every[..., bindings[:, k]] for k, name in enumerate(kernel.inputs)}
         results = run(kernel.nodes, bound, program.tables)
-        rows = np.array([instance.first_row for instance in instances])
-        for vector, nodes in ((Phi, kernel.Phi), (nu, kernel.nu), (gamma, kernel.gamma)):
-            for row, node in enumerate(nodes):
-                vector[..., rows + row] = results[node]
+        placed = _Placed.of(instances)
+        for quantity, array in zip(quantities.QUANTITIES, found, strict=True):
+            for row, column, node in kernel.outputs.get(quantity.name, ()):
+                moving, index = placed.index(quantity, row, column)
+                entries = np.broadcast_to(results[node], (*shape, len(instances)))[..., moving]
+                at: Any = (..., *index)
+                if quantity.adds:
+                    np.add.at(array, at, entries)
+                else:
+                    array[at] = entries
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """First rows of the constraints of one kernel, by kind, and their columns, -1 on the ground."""
+
+    rows: Mapping[str, Array]
+    columns: Array
+
+    @classmethod
+    def of(cls, instances: Sequence[Instance]) -> _Placed:
+        """Collect the places of constraints."""
+        rows = {
+            "equations": np.array([instance.first_row for instance in instances]),
+            "outputs": np.array([instance.first_output for instance in instances]),
+        }
         grounded = [[-1 if c is None else c for c in instance.columns] for instance in instances]
-        columns = np.array(grounded, dtype=np.intp).reshape(len(instances), -1)
-        for row, local, node in kernel.Phi_q:
-            moving = np.flatnonzero(columns[:, local] >= 0)
-            entries = np.broadcast_to(results[node], (*shape, len(instances)))
-            Phi_q[..., rows[moving] + row, columns[moving, local]] = entries[..., moving]
-    return Phi, Phi_q, nu, gamma
+        return cls(rows, np.array(grounded, dtype=np.intp).reshape(len(instances), -1))
+
+    def index(self, quantity: Quantity, row: int, column: int) -> tuple[Array, tuple[Array, ...]]:
+        """Return which constraints have an entry, and the index of theirs in the system."""
+        at = (
+            self.columns[:, row]
+            if quantity.rows == "coordinates"
+            else self.rows[quantity.rows] + row
+        )
+        by = self.columns[:, column] if quantity.columns == "coordinates" else at * 0 + column
+        moving = np.flatnonzero((at >= 0) & (by >= 0))
+        return moving, (at[moving], by[moving])[: 1 + quantity.is_matrix]
 
 
 def _by_kernel(program: Program) -> list[tuple[Kernel, list[Instance]]]:

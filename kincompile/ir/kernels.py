@@ -172,29 +172,27 @@ def constraint_kernel(template: Template) -> Kernel:
     """Return the kernel of a constraint type."""
     environment = KernelEnvironment(template)
     expansion = Expansion(environment)
-    Phi: list[int] = []
-    nu: list[int] = []
-    gamma: list[int] = []
-    entries: list[tuple[int, int, int]] = []
+    outputs: dict[str, list[tuple[int, int, int]]] = {}
+    first = 0
     for block in derive(template):
         columns = [expansion.components(column) for column in block.Phi_q]
-        entries += [
-            (len(Phi) + row, column, item.node)
+        outputs.setdefault("Phi_q", []).extend(
+            (first + row, column, item.node)
             for column, items in enumerate(columns)
             for row, item in enumerate(items)
             if environment.graph.value_of(item.node) != 0
-        ]
-        Phi += [item.node for item in expansion.components(block.Phi)]
-        nu += [item.node for item in expansion.components(block.nu)]
-        gamma += [item.node for item in expansion.components(block.gamma)]
+        )
+        vectors = {"Phi": block.Phi, "nu": block.nu, "gamma": block.gamma}
+        for name, vector in vectors.items():
+            outputs.setdefault(name, []).extend(
+                (first + row, 0, item.node) for row, item in enumerate(expansion.components(vector))
+            )
+        first = len(outputs["Phi"])
     return Kernel(
         template.type_name,
         tuple(environment.inputs),
         tuple(environment.graph.nodes),
-        tuple(Phi),
-        tuple(sorted(entries)),
-        tuple(nu),
-        tuple(gamma),
+        {name: tuple(sorted(entries)) for name, entries in outputs.items()},
         _hints(template, expansion),
     )
 
@@ -270,14 +268,19 @@ def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> 
         for column, node in enumerate(found[row] for found in by_column)
         if graph.value_of(node) != 0
     ]
-    nodes, new = pruned(graph.nodes, [*Phi, *nu, *gamma, *(node for _, _, node in entries)])
+    vectors = {"Phi": Phi, "nu": nu, "gamma": gamma}
+    outputs = {
+        name: [(row, 0, node) for row, node in enumerate(found)] for name, found in vectors.items()
+    }
+    outputs["Phi_q"] = entries
+    nodes, new = pruned(graph.nodes, [node for found in outputs.values() for _, _, node in found])
     return Kernel(
         "Equation",
         tuple(node[1] for node in nodes if node[0] == "input"),
         tuple(nodes),
-        tuple(new[node] for node in Phi),
-        tuple((row, column, new[node]) for row, column, node in entries),
-        tuple(new[node] for node in nu),
-        tuple(new[node] for node in gamma),
+        {
+            name: tuple((row, column, new[node]) for row, column, node in found)
+            for name, found in outputs.items()
+        },
         (),
     )

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from kincompile.model.bodies import Coordinate, Parameter
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.spline import SplineTable
+    from kincompile.quantities import Columns, Quantity, Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,19 +106,18 @@ class BodyFrame:
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """Straight-line code for Phi, Phi_q, nu and gamma of one constraint type.
+    """Straight-line code for the quantities of one constraint type.
 
     Attributes
     ----------
     inputs
         What it reads; of a free equation the names that occur.
     nodes
-        The code; outputs below are numbers of nodes.
-    Phi, nu, gamma
-        One node an equation.
-    Phi_q
-        ``(row, column, node)`` of each entry that can differ from zero; the column counts the
-        type's own coordinates.
+        The code.
+    outputs
+        By quantity ``(row, column, node)`` of each entry: of a matrix those that can differ from
+        zero, of a vector all, with column 0. Rows and columns count the type's own equations and
+        coordinates; parameters are those of the mechanism.
     hints
         What some nodes are in the textbook's formula, for speaking names.
     """
@@ -125,10 +125,7 @@ class Kernel:
     name: str
     inputs: tuple[Input | str, ...]
     nodes: tuple[Node, ...]
-    Phi: tuple[int, ...]
-    Phi_q: tuple[tuple[int, int, int], ...]
-    nu: tuple[int, ...]
-    gamma: tuple[int, ...]
+    outputs: Mapping[str, tuple[tuple[int, int, int], ...]]
     hints: tuple[Hint, ...]
 
 
@@ -146,6 +143,8 @@ class Instance:
         Column of each of the kernel's coordinates, None on the ground.
     bindings
         Node of `Program.values` for each of the kernel's inputs.
+    first_output
+        Row offset in the outputs of the mechanism.
     """
 
     kernel: Kernel
@@ -153,6 +152,15 @@ class Instance:
     first_row: int
     columns: tuple[int | None, ...]
     bindings: tuple[int, ...]
+    first_output: int = 0
+
+    def place(self, quantity: Quantity, row: int, column: int) -> tuple[int, int] | None:
+        """Return where an entry of the kernel stands in the system, None on the ground."""
+        at: int | None = self.first_row + row
+        if quantity.rows != "equations":
+            at = self.columns[row] if quantity.rows == "coordinates" else self.first_output + row
+        by = self.columns[column] if quantity.columns == "coordinates" else column
+        return None if at is None or by is None else (at, by)
 
     @property
     def name(self) -> str:
@@ -182,6 +190,8 @@ class Program:
         Digest of all the above: two systems with the same code and data have the same.
     redundant
         Names of equations that repeat others at every assembled position, and agree with them.
+    outputs
+        Names of the outputs.
     end, points
         The mechanism's own time grid, for a target that solves too.
     """
@@ -198,3 +208,20 @@ class Program:
     end: float
     points: int
     redundant: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+
+    def names_of(self, kind: Rows | Columns) -> tuple[str, ...]:
+        """Return the names of what the rows or columns of a quantity belong to."""
+        names: dict[str, tuple[str, ...]] = {
+            "equations": self.equations,
+            "coordinates": tuple(item.name for item in self.coordinates),
+            "outputs": self.outputs,
+            "parameters": tuple(item.name for item in self.parameters),
+            "none": (),
+        }
+        return names[kind]
+
+    def shape_of(self, quantity: Quantity) -> tuple[int, ...]:
+        """Return the shape of a quantity: (rows,) or (rows, columns)."""
+        shape = (len(self.names_of(quantity.rows)),)
+        return (*shape, len(self.names_of(quantity.columns))) if quantity.is_matrix else shape

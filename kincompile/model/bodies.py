@@ -14,7 +14,7 @@ from kincompile.names import rate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from kincompile.model.expressions import Scalar
+    from kincompile.model.expressions import Scalars
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +61,8 @@ class Body:
     """
 
     name: str
-    guess: tuple[Scalar, Scalar, Scalar] = (0, 0, 0)
-    outline: tuple[tuple[Scalar, Scalar], ...] = ()
+    guess: Scalars = (0, 0, 0)
+    outline: Sequence[Scalars] = ()
     is_ground: bool = field(default=False, kw_only=True)
     kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
 

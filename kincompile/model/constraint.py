@@ -13,7 +13,7 @@ import sympy
 from kincompile.calculus.template import Template
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
-from kincompile.model.bodies import PLANAR, BodyKind
+from kincompile.model.bodies import GROUND, PLANAR, BodyKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -45,7 +45,7 @@ class Constraint:
     bodies: ClassVar[BodyKind] = PLANAR
     """The kind of bodies that it connects."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
-    """Contact parameters: coordinates that the constraint brings along."""
+    """Contact parameters: coordinates that belong to the constraint."""
     simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
     """Pairs: where this one of two equations depends on others, the type that keeps the other."""
     replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"
@@ -77,6 +77,25 @@ class Constraint:
     def owners(cls) -> dict[str, str]:
         """Return, by the symbol of each point and direction, that of the body it is fixed in."""
         return {item.symbol: item.on for item in cls.arguments().values() if item.on}
+
+    @classmethod
+    @cache
+    def partners(cls) -> dict[str, str]:
+        """Return, by the symbol of a point or an axis, the one that is easily taken for it.
+
+        Of two on one body each is the other's; else those of one kind on two bodies are.
+        """
+        found: dict[str, str] = {}
+        for kind in (Kind.POINT, Kind.AXIS):
+            by_body: dict[str, list[str]] = {}
+            for item in cls.arguments().values():
+                if item.kind is kind and item.on != GROUND.name:
+                    by_body.setdefault(item.on, []).append(item.symbol)
+            alone = [symbols[0] for symbols in by_body.values() if len(symbols) == 1]
+            for pair in (*by_body.values(), alone):
+                if len(pair) == 2:
+                    found |= {pair[0]: pair[1], pair[1]: pair[0]}
+        return found
 
     @classmethod
     @cache

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile import quantities
 from kincompile.errors import ContractError, InputError
 from kincompile.names import listed
 
@@ -13,23 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import ModuleType
 
-FORMAT = 1
-"""The format of emitted modules that this version reads."""
+FORMATS = (1, quantities.FORMAT)
+"""The formats of emitted modules that this version reads."""
 
 REMEDY = "Emit it again with `kincompile compile MODEL -o FILE` of this version."
-
-FUNCTIONS = (
-    "Phi",
-    "Phi_q",
-    "nu",
-    "gamma",
-    "Phi_q_nonzeros",
-    "position",
-    "velocity",
-    "acceleration",
-    "kinematics",
-)
-"""The functions of an emitted module."""
 
 _CONSTANTS: dict[str, type] = {
     "NAME": str,
@@ -44,7 +32,13 @@ _CONSTANTS: dict[str, type] = {
     "DEFAULTS": np.ndarray,
     "GUESS": np.ndarray,
     "PATTERN": np.ndarray,
+    "BODIES": tuple,
 }
+
+
+def functions() -> tuple[str, ...]:
+    """Return the functions of an emitted module."""
+    return (*quantities.functions(), "Phi_q_nonzeros")
 
 
 def check(module: ModuleType) -> None:
@@ -60,6 +54,8 @@ def check(module: ModuleType) -> None:
     ContractError
         With all that is wrong, and what to do.
     """
+    if getattr(module, "FORMAT", None) == 1 and not hasattr(module, "BODIES"):
+        module.__dict__["BODIES"] = _bodies(getattr(module, "COORDINATES", ()))
     # Each stage relies on what the stage before has found to be right.
     for stage in (_format, _missing, _names, _sizes, _numbers):
         problems = [
@@ -76,8 +72,19 @@ def _format(module: ModuleType) -> Iterator[str]:
     """Report a format that this version does not read; its names may well be others."""
     if not hasattr(module, "FORMAT"):
         yield "FORMAT is missing; a model is read by kc.read_model and compiled by kc.compile"
-    elif (given := module.FORMAT) != FORMAT:
-        yield f"its FORMAT is {given!r} and this version reads {FORMAT}"
+    elif (given := module.FORMAT) not in FORMATS:
+        yield f"its FORMAT is {given!r} and this version reads {listed(FORMATS)}"
+
+
+def _bodies(coordinates: object) -> tuple[tuple[str, int, int], ...]:
+    """Return the bodies of a module of format 1, which has them in the names of coordinates."""
+    names = coordinates if isinstance(coordinates, tuple) else ()
+    found = []
+    for k, name in enumerate(names):
+        body = str(name).removeprefix("x_")
+        if names[k : k + 3] == (f"x_{body}", f"y_{body}", f"phi_{body}"):
+            found.append((body, k, 3))
+    return tuple(found)
 
 
 def _missing(module: ModuleType) -> Iterator[str]:
@@ -88,7 +95,7 @@ def _missing(module: ModuleType) -> Iterator[str]:
         elif not isinstance(getattr(module, name), kind):
             given = type(getattr(module, name)).__name__
             yield f"{name} is of type {given}, not {kind.__name__}"
-    for name in FUNCTIONS:
+    for name in functions():
         if not callable(getattr(module, name, None)):
             yield f"the function {name} is missing"
 

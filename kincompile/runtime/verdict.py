@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.names import body_coordinates, listed
+from kincompile.names import listed
 from kincompile.runtime.singular.events import owner_of_coordinates
 from kincompile.runtime.status import Status
 
@@ -135,9 +135,10 @@ def _unmet(module: ModuleType, point: Point) -> str:
 def _places(module: ModuleType, q: Vector) -> Iterator[str]:
     """Yield where each body is, and the values of coordinates that belong to none."""
     values = dict(zip(module.COORDINATES, q.tolist(), strict=True))
-    for owner in dict.fromkeys(owner_of_coordinates(module.COORDINATES).values()):
-        if owner in values:
-            yield f"{owner} = {values[owner]:.4g}"
-        else:
-            x, y, phi = (values[name] for name in body_coordinates(owner))
+    columns = {body: slice(first, first + count) for body, first, count in module.BODIES}
+    for owner in dict.fromkeys(owner_of_coordinates(module).values()):
+        if owner in columns:
+            x, y, phi = q[columns[owner]].tolist()
             yield f"{owner} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+        else:
+            yield f"{owner} = {values[owner]:.4g}"

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile.quantities import FORMAT
 from kincompile.targets.lines import indented, quoted, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from kincompile.ir.inline import InlineProgram
-
-FORMAT = 1
-"""Version of the contract of an emitted module."""
 
 
 def constants(code: InlineProgram, level: int, pair: str) -> dict[str, object]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kincompile import quantities
 from kincompile.names import rate
 from kincompile.targets.schedule import Assignment, Scheduler
 
@@ -14,18 +15,6 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import Entry, InlineProgram, Section
     from kincompile.ir.program import Program
     from kincompile.targets.naming import NameTable
-
-EVALUATORS: Mapping[str, tuple[str, ...]] = {
-    "Phi": ("Phi",),
-    "Phi_q": ("Phi_q",),
-    "nu": ("nu",),
-    "gamma": ("gamma",),
-    "position": ("Phi", "Phi_q"),
-    "velocity": ("Phi_q", "nu"),
-    "acceleration": ("Phi_q", "gamma"),
-    "kinematics": ("Phi", "Phi_q", "nu", "gamma"),
-}
-"""The functions of a module and the quantities each returns; the last four share work."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,16 +57,16 @@ class Listing:
 
 
 def varying(inline: InlineProgram, section: Section, quantity: str) -> tuple[Entry, ...]:
-    """Return the entries a function computes: of Phi_q only those that are not plain numbers."""
+    """Return the entries a function computes: of a matrix those that are not plain numbers."""
     entries = section.entries[quantity]
-    if quantity != "Phi_q":
+    if all(item.name != quantity or not item.is_matrix for item in quantities.QUANTITIES):
         return entries
     return tuple(entry for entry in entries if inline.number(entry.node) is None)
 
 
 def schedule(
     inline: InlineProgram,
-    quantities: Sequence[str],
+    computed: Sequence[str],
     input_names: Mapping[str, str],
     table: NameTable,
 ) -> Listing:
@@ -85,8 +74,8 @@ def schedule(
 
     Parameters
     ----------
-    quantities
-        What it returns.
+    computed
+        The quantities that it returns.
     input_names
         Names of coordinates, rates and parameters in the target.
     table
@@ -94,7 +83,7 @@ def schedule(
     """
     results = tuple(
         (name, tuple((section, varying(inline, section, name)) for section in inline.sections))
-        for name in quantities
+        for name in computed
     )
     outputs = [entry.node for _, rows in results for _, entries in rows for entry in entries]
     scheduler = Scheduler(inline.nodes, outputs, {}, table.copy(), inline.hints)

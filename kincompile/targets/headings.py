@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile.quantities import quantity_named
 from kincompile.targets.lines import labelled, table
 
 if TYPE_CHECKING:
@@ -37,11 +38,12 @@ def title(section: Section, first: int = 0) -> str:
 
 
 def place(quantity: str, entry: Entry, code: InlineProgram) -> str:
-    """Return which entry of Phi_q a line is; nothing for a vector, whose rows are titled."""
-    if quantity != "Phi_q":
-        return ""
-    equation = code.program.equations[entry.row]
-    return f"{equation} by {code.program.coordinates[entry.column].name}"
+    """Return which entry of a matrix a line is; nothing for rows of equations, which are titled."""
+    found = quantity_named(quantity)
+    row = code.program.names_of(found.rows)[entry.row]
+    if found.is_matrix:
+        return f"{row} by {code.program.names_of(found.columns)[entry.column]}"
+    return "" if found.rows == "equations" else row
 
 
 def _unit(unit: str) -> str:

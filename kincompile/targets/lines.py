@@ -39,11 +39,13 @@ def labelled(label: str, items: Iterable[str]) -> list[str]:
     return [f"{label if k == 0 else '':<5} {line}" for k, line in enumerate(lines)]
 
 
-def table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return rows with their columns aligned."""
+def table(rows: Sequence[Sequence[str]], gap: int = 2) -> list[str]:
+    """Return rows with their columns aligned, so many blanks apart."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        (" " * gap)
+        .join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        .rstrip()
         for row in rows
     ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kincompile.quantities import quantity_named
 from kincompile.targets.evaluators import inputs_read
 from kincompile.targets.headings import header, place, title
 from kincompile.targets.lines import broken
@@ -94,7 +95,7 @@ class Layout:
             lines += [f"{self.comment} {title(section, self.first)}"] if entries else []
             for item in entries:
                 row, column = item.row + self.first, item.column + self.first
-                form = self.entry if quantity == "Phi_q" else self.element
+                form = self.entry if quantity_named(quantity).is_matrix else self.element
                 left = form.format(quantity, row, column)
                 lines += self.assigned(left, printer.text(item.node), place(quantity, item, code))
         return lines

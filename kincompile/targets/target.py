@@ -99,8 +99,9 @@ class Target(Protocol):
     """How it writes expressions."""
     RESERVED: tuple[str, ...]
     """Words of the language, and names that its functions use."""
-    EVALUATORS: Mapping[str, tuple[str, ...]]
-    """Its functions, and the quantities that each gives."""
+
+    def evaluators(self) -> Mapping[str, tuple[str, ...]]:
+        """Return its functions, and the quantities that each gives."""
 
     def function(
         self, name: str, code: InlineProgram, listing: Listing, printer: Printer

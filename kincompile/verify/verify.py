@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 import kincompile.compiler as compiler
 from kincompile.errors import InputError, RedundantConstraintWarning
+from kincompile.quantities import TOGETHER, functions, is_moving, quantity_named
 from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.newton import newton
 from kincompile.runtime.problem import problem
@@ -26,7 +27,7 @@ from kincompile.tables import indented, table
 from kincompile.verify.oracles import ORACLES, Oracle
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
@@ -51,19 +52,6 @@ LEGEND = (
 
 LARGEST = 10
 """How many of the largest errors of each quantity stand for all."""
-
-
-FORMS: Mapping[str, tuple[tuple[str, int], ...]] = {
-    "Phi": (("position", 0), ("kinematics", 0)),
-    "Phi_q": (("Phi_q", -1), ("position", 1), ("velocity", 0), ("acceleration", 0),
-              ("kinematics", 1)),
-    "nu": (("nu", -1), ("velocity", 1), ("kinematics", 2)),
-    "gamma": (("gamma", -1), ("acceleration", 1), ("kinematics", 3)),
-}  # fmt: skip
-"""The functions that give each quantity, and its place in what they return, -1 for all of it."""
-
-MOVING = {"gamma", "acceleration", "kinematics"}
-"""Functions that take q_dot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +253,7 @@ def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
         worst = np.argmax(errors / limit, axis=0)
         for row, equation in enumerate(module.EQUATIONS):
             at = worst[row], row
-            column = module.COORDINATES[columns[at]] if quantity == "Phi_q" else ""
+            column = module.COORDINATES[columns[at]] if quantity_named(quantity).is_matrix else ""
             yield Check(
                 quantity,
                 equation,
@@ -299,17 +287,24 @@ def _forms(module: ModuleType, states: list[State], quantity: str) -> Iterator[A
     """
     shape = len(states), len(module.EQUATIONS), -1
     q, q_dot, t = (np.array(part) for part in zip(*states, strict=True))
-    for name, place in FORMS[quantity]:
+    for name, given in functions().items():
+        if quantity not in given or name == "Phi":  # all else is judged by Phi
+            continue
 
-        def value(q: Array, q_dot: Array, t: Any, name: str = name, place: int = place) -> Array:
+        def value(
+            q: Array, q_dot: Array, t: Any, name: str = name, given: tuple[str, ...] = given
+        ) -> Array:
             function = getattr(module, name)
-            found = function(q, q_dot, t) if name in MOVING else function(q, t)
-            return np.asarray(found[place] if place >= 0 else found)
+            found = function(q, q_dot, t) if is_moving(given) else function(q, t)
+            return np.asarray(found if len(given) == 1 else found[given.index(quantity)])
 
         yield np.array([value(*state) for state in states]).reshape(shape)
         yield value(q, q_dot, t).reshape(shape)
-    found = module.kinematics_batch_last(q.T, q_dot.T, t)[list(FORMS).index(quantity)].T
-    if quantity != "Phi_q":
+    if quantity not in TOGETHER["kinematics"]:
+        return
+    place = TOGETHER["kinematics"].index(quantity)
+    found = module.kinematics_batch_last(q.T, q_dot.T, t)[place].T
+    if not quantity_named(quantity).is_matrix:
         yield found.reshape(shape)
         return
     Phi_q = np.zeros((len(states), len(module.EQUATIONS), len(module.COORDINATES)))

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 
 import kincompile as kc
-from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect, Operation
+from kincompile.quantities import singles
+from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
 from kincompile.targets.registry import TARGETS, Listed
 from kincompile.targets.statements import Layout
 from kincompile.targets.target import Target
@@ -37,13 +38,14 @@ class Plain:
 
     DIALECT = Dialect(
         "plain", {name: f"{name}({{}})" for name in ELEMENTARY},
-        square=Operation("{}**2", (ATOM,), POWER), select="({1} if {0} else {2})",
+        square=("{}**2", (ATOM,), POWER), select="({1} if {0} else {2})",
     )  # fmt: skip
     RESERVED: tuple[str, ...] = ("q", "q_dot", "t", "p", "pi", *ELEMENTARY)
-    EVALUATORS: Mapping[str, tuple[str, ...]] = {
-        name: (name,) for name in ("Phi", "Phi_q", "nu", "gamma")
-    }
     function, files = staticmethod(function), staticmethod(files)
+
+    def evaluators(self) -> Mapping[str, tuple[str, ...]]:
+        """Return a function for each quantity."""
+        return singles()
 
 
 PLAIN: Target = Plain()
@@ -57,7 +59,7 @@ def test_that_a_new_target_is_a_line_in_the_table(example, monkeypatch):
     module, found = example.module, SimpleNamespace(**names)
     q, q_dot = np.random.default_rng(1).uniform(0.1, 1, (2, module.N_COORDINATES))
     rest = 0.3, module.DEFAULTS.tolist()
-    for name, expected in zip(Plain.EVALUATORS, module.kinematics(q, q_dot, 0.3), strict=True):
+    for name, expected in zip(singles(), module.kinematics(q, q_dot, 0.3), strict=True):
         rates = [q_dot.tolist()] if name == "gamma" else []
         values = getattr(found, name)(q.tolist(), *rates, *rest)
         np.testing.assert_allclose(values, expected, rtol=1e-12, atol=1e-13)

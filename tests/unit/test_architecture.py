@@ -22,6 +22,7 @@ FLOORS = {
     "errors": 0,
     "names": 0,
     "html": 0,
+    "quantities": 0,
     "tables": 0,
     "writing": 0,
     "calculus": 1,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile import quantities
 from kincompile.errors import InputError
 from kincompile.runtime.memory import LINE, empty
 from kincompile.runtime.native.library import library
@@ -26,11 +27,11 @@ from kincompile.runtime.native.structures import (
     NUMBER,
     REAL,
     STATES,
-    Batch,
     Motion,
     Numbers,
     System,
     Variants,
+    batch_type,
     numbers_of_batch,
     numbers_of_times,
 )
@@ -45,19 +46,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Function = Callable[..., Any]
-
-QUANTITIES: Mapping[str, tuple[str, ...]] = {
-    "Phi": ("Phi",),
-    "Phi_q": ("Phi_q",),
-    "nu": ("nu",),
-    "gamma": ("gamma",),
-    "Phi_q_nonzeros": ("nonzeros",),
-    "position": ("Phi", "Phi_q"),
-    "velocity": ("Phi_q", "nu"),
-    "acceleration": ("Phi_q", "gamma"),
-    "kinematics": ("Phi", "Phi_q", "nu", "gamma"),
-}
-"""What each function of a module returns."""
 
 BATCH_LAST = ("Phi", "nonzeros", "nu", "gamma")
 """What `kinematics_batch_last` returns."""
@@ -87,7 +75,8 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     loaded = library(module.NAME, files, module.FINGERPRINT)
     functions = _Functions(module, loaded)
     names = vars(module)
-    compiled = {name: functions.evaluator(name) for name in QUANTITIES}
+    given = {**quantities.functions(), **_nonzeros()}
+    compiled = {name: functions.evaluator(name, results) for name, results in given.items()}
     compiled["kinematics_batch_last"] = functions.batch_last()
     if "solve" in names:
         compiled["solve"] = functions.solve()
@@ -100,45 +89,48 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     return module
 
 
+def _nonzeros() -> dict[str, tuple[str, ...]]:
+    """Return the functions that give the entries of a matrix, and what C calls their result."""
+    matrices = [item for item in quantities.QUANTITIES if item.is_matrix]
+    return {f"{item.name}_nonzeros": (quantities.nonzeros_of(item),) for item in matrices}
+
+
 class _Functions:
     """Makes the functions of a module from those of its library."""
 
     def __init__(self, module: ModuleType, loaded: ctypes.CDLL) -> None:
         self._module, self._library, self._name = module, loaded, module.NAME
         self._n, self._m = module.N_COORDINATES, module.N_EQUATIONS
-        self._shapes: dict[str, tuple[int, ...]] = {
-            "Phi": (self._m,),
-            "Phi_q": (self._m, self._n),
-            "nonzeros": (len(module.PATTERN),),
-            "nu": (self._m,),
-            "gamma": (self._m,),
-        }
+        self._shapes = _shapes(module)
+        self._batch_type = batch_type(tuple(self._shapes))
         self._run = getattr(loaded, f"{self._name}_evaluate")
 
-    def evaluator(self, name: str) -> Function:
-        """Return a function of points (..., n)."""
-        quantities = QUANTITIES[name]
-        places = Places(self._module, self._library, quantities, self._shapes)
-        make = function_of_states if "gamma" in quantities else function_of_positions
+    def evaluator(self, name: str, results: tuple[str, ...]) -> Function:
+        """Return a function of points (..., n) that gives some results."""
+        places = Places(self._module, self._library, results, self._shapes, self._batch_type)
+        moving = {item.name for item in quantities.QUANTITIES if item.is_moving}
+        make = function_of_positions if moving.isdisjoint(results) else function_of_states
         return make(places, self._batch, getattr(self._module, name))
 
-    def _batch(self, quantities: Sequence[str], states: tuple[Any, ...], t: Any, p: Any) -> Any:
+    def _batch(self, wanted: Sequence[str], states: tuple[Any, ...], t: Any, p: Any) -> Any:
         """Evaluate a batch whose axes are the first ones; None where numbers are complex."""
         batch = self._plain(states, t, p)
         if batch is not None:
-            results = self._fill(batch, quantities, states[0].shape[:-1])
+            results = self._fill(batch, wanted, states[0].shape[:-1])
             if results is not None:
                 return results
         # Broadcasting, conversion and what is to be said of bad arguments are the module's.
         rows, t, p, shape = vars(self._module)["_batch"](t, p, states)
         if rows[0].dtype != REAL:
             return None
-        batch = Batch(count=math.prod(shape), t=numbers_of_times(t), p=numbers_of_batch(p))
+        batch = self._batch_type(
+            count=math.prod(shape), t=numbers_of_times(t), p=numbers_of_batch(p)
+        )
         for name, state in zip(STATES, rows, strict=False):
             setattr(batch, name, numbers_of_batch(state))
-        return self._fill(batch, quantities, shape)
+        return self._fill(batch, wanted, shape)
 
-    def _plain(self, states: tuple[Any, ...], t: Any, p: Any) -> Batch | None:
+    def _plain(self, states: tuple[Any, ...], t: Any, p: Any) -> Any:
         """Return a batch of arrays that need no conversion; that they are finite C will see."""
         shape = getattr(states[0], "shape", ())
         if not (
@@ -148,16 +140,18 @@ class _Functions:
         ):
             return None
         time = np.asarray(t)
-        batch = Batch(count=math.prod(shape[:-1]), t=numbers_of_times(time), p=numbers_of_batch(p))
+        batch = self._batch_type(
+            count=math.prod(shape[:-1]), t=numbers_of_times(time), p=numbers_of_batch(p)
+        )
         batch.kept = time  # C reads through an address: the array must live as long as the batch
         for name, state in zip(STATES, states, strict=False):
             setattr(batch, name, Numbers(state.ctypes.data, 1, self._n))
         return batch if batch.count else None
 
-    def _fill(self, batch: Batch, quantities: Sequence[str], shape: tuple[int, ...]) -> Any:
+    def _fill(self, batch: Any, wanted: Sequence[str], shape: tuple[int, ...]) -> Any:
         """Run a batch into new arrays; None where a number is not finite."""
         results = []
-        for quantity in quantities:
+        for quantity in wanted:
             result = empty((*shape, *self._shapes[quantity]))
             size = math.prod(self._shapes[quantity])
             setattr(batch, quantity, Numbers(result.ctypes.data, 1, size))
@@ -186,7 +180,7 @@ class _Functions:
             if results is None:
                 results = tuple([_in_lines(size, shape[1]) for size in sizes])
             time = np.asarray(t)
-            batch = Batch(
+            batch = self._batch_type(
                 shape[1],
                 numbers_of_batch(q),
                 numbers_of_batch(q_dot),
@@ -301,6 +295,24 @@ class _Functions:
             return int(run(byref(motions)))
 
         return march_variants
+
+
+def _shapes(module: ModuleType) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each result of compiled code, in the order of its header."""
+    sizes = {
+        "equations": module.N_EQUATIONS,
+        "coordinates": module.N_COORDINATES,
+        "outputs": len(getattr(module, "OUTPUTS", ())),
+        "parameters": len(module.PARAMETERS),
+    }
+    shapes: dict[str, tuple[int, ...]] = {}
+    for item in quantities.QUANTITIES:
+        shapes[item.name] = (sizes[item.rows],)
+        if item.is_matrix:
+            shapes[item.name] += (sizes[item.columns],)
+            pattern = "PATTERN" if item.name == "Phi_q" else f"PATTERN_{item.name}"
+            shapes[quantities.nonzeros_of(item)] = (len(getattr(module, pattern)),)
+    return shapes
 
 
 def _is_real(value: Any, shape: tuple[int, ...]) -> bool:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.runtime.native.structures import REAL, Batch, Numbers, numbers_of_point
+from kincompile.runtime.native.structures import REAL, Numbers, numbers_of_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -43,9 +43,11 @@ class Places:
         loaded: ctypes.CDLL,
         quantities: Sequence[str],
         shapes: Mapping[str, tuple[int, ...]],
+        batch_type: type[Any],
     ) -> None:
         self.shape, self.defaults = module.GUESS.shape, module.DEFAULTS
         self.quantities, self.copied = quantities, COPIED[len(quantities)]
+        self._batch_type = batch_type
         self._shapes = [shapes[quantity] for quantity in quantities]
         # To give up the interpreter's lock for a point would take longer than the point.
         prototype = ctypes.PYFUNCTYPE(c_int, c_void_p)
@@ -62,7 +64,7 @@ class Places:
         results = [np.zeros(shape) for shape in self._shapes]
         batches = []
         for p in (self.defaults, parameters):
-            batch = Batch(
+            batch = self._batch_type(
                 1,
                 numbers_of_point(q),
                 numbers_of_point(q_dot),

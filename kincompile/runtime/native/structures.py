@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ctypes import Structure, c_double, c_int, c_size_t, c_ssize_t, c_void_p
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,15 +25,15 @@ class Numbers(Structure):
     _fields_ = (("first", c_void_p), ("entry", c_ssize_t), ("point", c_ssize_t))
 
 
-class Batch(Structure):
-    """What is to be evaluated, as the emitted header has it."""
-
-    _fields_ = (
+@cache
+def batch_type(results: tuple[str, ...]) -> type[Any]:
+    """Return the structure of what is to be evaluated, as the emitted header has it."""
+    fields = (
         ("count", c_size_t),
-        *((name, Numbers) for name in (*STATES, "t", "p")),
-        *((name, Numbers) for name in ("Phi", "Phi_q", "nonzeros", "nu", "gamma")),
+        *((name, Numbers) for name in (*STATES, "t", "p", *results)),
         ("varying_only", c_int),
     )
+    return type("Batch", (Structure,), {"_fields_": fields})
 
 
 class System(Structure):

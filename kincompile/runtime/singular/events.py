@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.names import body_coordinates, listed
+from kincompile.names import listed
 from kincompile.runtime.march import State, complete
 from kincompile.runtime.singular.curve import Bracket, Curve
 
@@ -239,19 +239,16 @@ def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
 def _involved(module: ModuleType, movement: Vector) -> tuple[str, ...]:
     """Return the bodies that take part in a movement, and coordinates that belong to none."""
     large = np.abs(movement) > INVOLVED * np.max(np.abs(movement), initial=0.0)
-    owners = owner_of_coordinates(module.COORDINATES)
+    owners = owner_of_coordinates(module)
     names = zip(module.COORDINATES, large.tolist(), strict=True)
     return tuple(dict.fromkeys(owners[name] for name, is_large in names if is_large))
 
 
-def owner_of_coordinates(coordinates: Sequence[str]) -> Mapping[str, str]:
+def owner_of_coordinates(module: ModuleType) -> Mapping[str, str]:
     """Return the body of each coordinate; one that belongs to none stands for itself."""
-    owners = {name: name for name in coordinates}
-    for k, name in enumerate(coordinates):
-        body = name.removeprefix("x_")
-        triple = body_coordinates(body)
-        if tuple(coordinates[k : k + 3]) == triple:
-            owners.update(dict.fromkeys(triple, body))
+    owners = {name: name for name in module.COORDINATES}
+    for body, first, count in module.BODIES:
+        owners.update(dict.fromkeys(module.COORDINATES[first : first + count], body))
     return owners
 
 

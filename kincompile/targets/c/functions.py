@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import operands_of
+from kincompile.quantities import quantity_named
 from kincompile.targets.c.dialect import C
 from kincompile.targets.headings import place, title
 from kincompile.targets.lines import wrapped
@@ -22,16 +23,10 @@ if TYPE_CHECKING:
 LAYOUT = Layout("//", "const double {}", "at->{}[{}][lane]", "")
 
 ABOUT = {
-    "Phi": "Constraint vector Phi(q, t).",
-    "Phi_q": "Jacobian of Phi by q: the entries that vary.",
-    "nu": "Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.",
-    "gamma": "Right side of the acceleration equation Phi_q q_ddot = gamma.",
     "position": "Phi and Phi_q in one go: a step of Newton's method.",
-    "velocity": "Phi_q and nu in one go: the velocity equation.",
-    "acceleration": "Phi_q and gamma in one go: the acceleration equation.",
     "kinematics": "Phi, Phi_q, nu and gamma in one go.",
 }
-"""What each function gives."""
+"""What the kernels of several quantities give."""
 
 ANGLE_FUNCTIONS = frozenset({"cos", "sin", "cos_sin"})
 """Functions whose fast form does not reach all angles."""
@@ -44,19 +39,22 @@ def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer
     body += LAYOUT.inputs(code.program, listing)
     body += ["const double t = at->t[lane];"] if "t" in listing.inputs else []
     body += _frames(listing, printer) + LAYOUT.steps(listing, printer)
-    entry_numbers = {place: k for k, place in enumerate(code.pattern())}
+    numbers = {
+        quantity: {place: k for k, place in enumerate(code.pattern(quantity))}
+        for quantity, _ in listing.results
+    }
     for quantity, rows in listing.results:
         for section, entries in rows:
             if entries:
                 body.append(f"// {title(section)}")
             for entry in entries:
                 index = entry.row
-                if quantity == "Phi_q":
-                    index = entry_numbers[entry.row, entry.column]
+                if quantity_named(quantity).is_matrix:
+                    index = numbers[quantity][entry.row, entry.column]
                 left, text = LAYOUT.element.format(quantity, index), printer.text(entry.node)
                 body += LAYOUT.assigned(left, text, place(quantity, entry, code))
     write = _with_angles if has_angles else _plain
-    return [f"// {ABOUT[name]}", *write(name, body)]
+    return [f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
 
 
 def _plain(name: str, body: list[str]) -> list[str]:

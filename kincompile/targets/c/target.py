@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from kincompile import criteria
+from kincompile import criteria, quantities
 from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
-from kincompile.targets import evaluators
+from kincompile.quantities import nonzeros_of
 from kincompile.targets.c.dialect import C
 from kincompile.targets.c.functions import LAYOUT, evaluator, solve_functions
-from kincompile.targets.lines import wrapped
+from kincompile.targets.lines import WIDTH, indented, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.printer import ELEMENTARY
@@ -20,13 +20,12 @@ if TYPE_CHECKING:
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
+    from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.planned_solve import SolveListing
     from kincompile.targets.printer import Printer
 
 DIALECT = C
-
-EVALUATORS = evaluators.EVALUATORS
 
 LANES = 32
 """Points in a block: enough for the widest registers, few enough for the nearest cache."""
@@ -55,6 +54,11 @@ RESERVED: tuple[str, ...] = (
 """Names that the functions of a mechanism use."""
 
 
+def evaluators() -> dict[str, tuple[str, ...]]:
+    """Return the kernels."""
+    return quantities.kernels()
+
+
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return the lines of a function of a point, and of the one for a block of points."""
     return ["", *evaluator(name, code, listing, printer)]
@@ -72,13 +76,13 @@ def files(
     about = _about(code, listing)
     lines = [line for own in functions.values() for line in own]
     body = [_block(code, lines, called, listing)]
-    body.append(fill("c/batch.c.jinja", _only(about, "name", "is_planned")))
+    body.append(fill("c/batch.c.jinja", {**_only(about, "name", "is_planned"), **_batch(code)}))
     if listing is not None:
         body.append(fill("c/march.c.jinja", {**_only(about, "name", "NAME"), **_scales(program)}))
     data = {**_without(about, "NAME"), **_tables(code, listing), "body": "".join(body)}
     source = fill("c/module.c.jinja", data)
     guard = f"{program.name.upper()}_H"
-    head = fill("c/module.h.jinja", {**about, "guard": guard})
+    head = fill("c/module.h.jinja", {**about, "guard": guard, "outputs": indented(_outputs(code))})
     return {f"{program.name}.c": source, f"{program.name}.h": head}
 
 
@@ -106,39 +110,104 @@ def _without(data: dict[str, Any], *keys: str) -> dict[str, Any]:
 
 
 def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
-    """Return the constants of the source file: names, numbers and the pattern of Phi_q."""
+    """Return the constants of the source file: names, numbers and the patterns of matrices."""
     program = code.program
-    values = [
-        code.number(entry.node) for section in code.sections for entry in section.entries["Phi_q"]
-    ]
-    constants = [
-        f"{{{k}, {float(value)!r}}}" for k, value in enumerate(values) if value is not None
-    ]
-    varying = [str(k) for k, value in enumerate(values) if value is None]
-    nu, gamma = _computed_rows(code, "nu"), _computed_rows(code, "gamma")
+    patterns, entries = [], []
+    for quantity in quantities.QUANTITIES:
+        values = [code.number(entry.node) for entry in code.entries(quantity.name)]
+        numbers = [f"{{{k}, {float(x)!r}}}" for k, x in enumerate(values) if x is not None]
+        computed = [str(k) for k, value in enumerate(values) if value is None]
+        if quantity.is_matrix:
+            places = [f"{{{row}, {column}}}" for row, column in code.pattern(quantity.name)]
+            kind = "const int" if quantity.name == "Phi_q" else "static const int"
+            patterns.append(_array(f"{kind} {_pattern_name(code, quantity)}[][2]", places))
+        entries += [
+            _array(f"static const constant {quantity.name}_constant[]", numbers, "{0, 0.0}"),
+            _array(f"static const int {quantity.name}_computed[]", computed),
+        ]
+        if quantity.is_matrix:
+            width = program.shape_of(quantity)[1]
+            flat = [str(row * width + column) for row, column in code.pattern(quantity.name)]
+            own = [flat[int(k)] for k in computed]
+            entries.append(_array(f"static const int {quantity.name}_place[]", own))
     return {
-        "nu": _array_lines(nu),
-        "n_nu": len(nu),
-        "gamma": _array_lines(gamma),
-        "n_gamma": len(gamma),
+        "patterns": "\n".join(patterns),
+        "entries": "\n".join(entries),
+        "numbers": sum(len(code.entries(item.name)) for item in quantities.QUANTITIES),
         "lanes": LANES,
         "n_factors": 0 if listing is None else len(listing.factors),
         "n_blocks": 0 if listing is None else len(listing.plan.determinants),
         "fingerprint": program.fingerprint,
         "defaults": _array_lines([repr(item.default) for item in program.parameters]),
         "guess": _array_lines([repr(item.guess) for item in program.coordinates]),
-        "pattern": _array_lines([f"{{{row}, {column}}}" for row, column in code.pattern()]),
-        "constants": _array_lines(constants, "{0, 0.0}"),
-        "n_constants": len(constants),
-        "varying": _array_lines(varying),
-        "n_varying": len(varying),
     }
 
 
-def _computed_rows(code: InlineProgram, quantity: str) -> list[str]:
-    """Return the rows of a vector that are not plain numbers."""
-    entries = [entry for section in code.sections for entry in section.entries[quantity]]
-    return [str(entry.row) for entry in entries if code.number(entry.node) is None]
+def _pattern_name(code: InlineProgram, quantity: Quantity) -> str:
+    return (
+        f"{code.program.name}_pattern" if quantity.name == "Phi_q" else f"{quantity.name}_pattern"
+    )
+
+
+def _array(declaration: str, items: Sequence[str], placeholder: str = "0") -> str:
+    lines = _array_lines(items, placeholder)
+    short = f"{declaration} = {{ {lines.strip().rstrip(',')} }};"
+    return (
+        short if "\n" not in lines and len(short) <= WIDTH else f"{declaration} = {{\n{lines}\n}};"
+    )
+
+
+def _batch(code: InlineProgram) -> dict[str, Any]:
+    """Return the tables of quantities and kernels by which a batch is evaluated."""
+    program, rows, matrices = code.program, [], 0
+    for quantity in quantities.QUANTITIES:
+        height, width = (*program.shape_of(quantity), 0)[:2]
+        entries, name = code.entries(quantity.name), quantity.name
+        constants = sum(code.number(entry.node) is not None for entry in entries)
+        nonzeros = f"offsetof({program.name}_batch, {nonzeros_of(quantity)})"
+        rows += [
+            f"{{offsetof(block, {name}), offsetof({program.name}_batch, {name}),",
+            f"    {nonzeros if quantity.is_matrix else 0}, {height}, {width}, {matrices},",
+            f"    {len(entries)}, {constants}, {len(entries) - constants},",
+            f"    {_pattern_name(code, quantity) if quantity.is_matrix else 'NULL'},",
+            f"    {name}_constant, {name}_computed, {f'{name}_place' if width else 'NULL'}}},",
+        ]
+        matrices += height * width
+    bits = {item.name: 1 << k for k, item in enumerate(quantities.QUANTITIES)}
+    kernels = quantities.kernels()
+    return {
+        "quantities": indented(rows),
+        "n_quantities": len(bits),
+        "writes": indented(
+            line
+            for k, bit in enumerate(bits.values())
+            for line in (
+                f"    if (wanted & {bit})",
+                f"        write_quantity(batch, &QUANTITY[{k}], &b, matrices, start, count,",
+                "            is_far);",
+            )
+        ),
+        "matrices": max(matrices, 1),
+        "kernels": indented(
+            f"{{{sum(bits[item] for item in given)}, {name}_of_block}},"
+            for name, given in kernels.items()
+        ),
+        "n_kernels": len(kernels),
+        "moving": sum(bits[item.name] for item in quantities.QUANTITIES if item.is_moving),
+    }
+
+
+def _outputs(code: InlineProgram) -> list[str]:
+    """Return the results of a batch as the header declares them."""
+    program, lines = code.program, []
+    for quantity in quantities.QUANTITIES:
+        size = " x ".join(map(str, program.shape_of(quantity)))
+        lines.append(f"{program.name}_output {quantity.name};  // {size}: {quantity.about}")
+        if quantity.is_matrix:
+            size = str(len(code.entries(quantity.name)))
+            about = f"{size} entries of {quantity.name}, in the order of the pattern"
+            lines.append(f"{program.name}_output {nonzeros_of(quantity)};  // {about}")
+    return lines
 
 
 def _array_lines(items: Sequence[str], placeholder: str = "0") -> str:
@@ -158,6 +227,10 @@ def _block(
         "is_planned": listing is not None,
         "elementary": _elementary(code.program, called, largest),
         "functions": "\n".join(lines),
+        "results": indented(
+            f"double {item.name}[{max(len(code.entries(item.name)), 1)}][LANES];"
+            for item in quantities.QUANTITIES
+        ),
     }
     return fill("c/block.c.jinja", data)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile import quantities
 from kincompile.targets.constants import constants
 from kincompile.targets.javascript.dialect import JAVASCRIPT
 from kincompile.targets.lines import indented, wrapped
@@ -26,16 +27,6 @@ DIALECT = JAVASCRIPT
 
 LAYOUT = Layout("//", "const {}", "{}[{}]", "{}[{}][{}]")
 
-ABOUT = {
-    "Phi": "Constraint vector Phi(q, t).",
-    "Phi_q": "Jacobian of Phi by q.",
-    "nu": "Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.",
-    "gamma": "Right side of the acceleration equation Phi_q q_ddot = gamma.",
-}
-"""The functions, and what each gives."""
-
-EVALUATORS: Mapping[str, tuple[str, ...]] = {name: (name,) for name in ABOUT}
-
 KEYWORDS = (
     "arguments", "await", "break", "case", "catch", "class", "const", "continue", "debugger",
     "default", "delete", "do", "else", "enum", "eval", "export", "extends", "false", "finally",
@@ -47,8 +38,8 @@ KEYWORDS = (
 """Words of the language, and names that it does not let be declared."""
 
 RESERVED: tuple[str, ...] = (
-    *KEYWORDS, *ABOUT, "q", "q_dot", "t", "p", "Array", "Math", "require_length", "square",
-    "spline", "DEFAULTS", "N_COORDINATES",
+    *KEYWORDS, *quantities.singles(), "q", "q_dot", "t", "p", "Array", "Math", "require_length",
+    "square", "spline", "DEFAULTS", "N_COORDINATES",
 )  # fmt: skip
 """Names that the functions use."""
 
@@ -58,9 +49,15 @@ TAKEN_BY_ENVIRONMENT = (
 """Names that a page or node does not let a script declare."""
 
 
+def evaluators() -> dict[str, tuple[str, ...]]:
+    """Return the functions: one a quantity."""
+    return quantities.singles()
+
+
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return the lines of a function of one point."""
-    vectors = ["q", "q_dot"] if name == "gamma" else ["q"]
+    quantity = quantities.quantity_named(name)
+    vectors = ["q", "q_dot"] if quantity.is_moving else ["q"]
     body = [f'require_length("{vector}", {vector}, N_COORDINATES);' for vector in vectors]
     body.append('require_length("p", p, DEFAULTS.length);')
     body += LAYOUT.inputs(code.program, listing)
@@ -69,7 +66,7 @@ def function(name: str, code: InlineProgram, listing: Listing, printer: Printer)
     body += LAYOUT.results(name, code, printer)
     return [
         "",
-        f"// {ABOUT[name]}",
+        f"// {quantity.about}",
         f"function {name}({', '.join(vectors)}, t, p = DEFAULTS) {{",
         *(f"    {line}" for line in body),
         f"    return {name};",
@@ -93,16 +90,17 @@ def files(
         "tables": indented(_tables(program)),
         "has_square": "square(" in text,
         "functions": text,
+        "returned": "".join(f", {name}" for name in functions),
     }
     return {f"{program.name}.js": fill("javascript/module.js.jinja", data)}
 
 
 def _zeros(quantity: str, program: Program) -> str:
     """Return a vector or a matrix of zeros, to be filled."""
-    n, m = len(program.coordinates), len(program.equations)
-    if quantity == "Phi_q":
-        return f"Array.from({{ length: {m} }}, () => new Array({n}).fill(0))"
-    return f"new Array({m}).fill(0)"
+    rows, *columns = program.shape_of(quantities.quantity_named(quantity))
+    if columns:
+        return f"Array.from({{ length: {rows} }}, () => new Array({columns[0]}).fill(0))"
+    return f"new Array({rows}).fill(0)"
 
 
 def _tables(program: Program) -> list[str]:

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile import quantities
+from kincompile.errors import UnsupportedError
 from kincompile.ir.inline import Entry, InlineProgram, Section
-from kincompile.targets.constants import FORMAT
+from kincompile.quantities import FORMAT, kernels
 from kincompile.targets.evaluators import input_names, inputs_read, schedule
 from kincompile.targets.lines import indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
@@ -26,22 +28,22 @@ from kincompile.targets.numpy.target import (
     RESERVED,
     array_functions,
     function_body,
+    public_functions,
     scalar_functions,
     shared_text,
+    tuple_text,
 )
 from kincompile.targets.printer import Printer
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from kincompile.ir.grouping import Group, GroupedProgram
-
-FUNCTIONS = {"position": ("Phi", "Phi_q"), "nu": ("nu",), "gamma": ("gamma",)}
-"""What is computed together; the right sides alone, because Phi_q is then already at hand."""
+    from kincompile.ir.program import Program
 
 
 def emit_grouped(grouped: GroupedProgram) -> Emitted:
@@ -60,6 +62,9 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
     for name, spline in program.tables.items():
         arrays[f"{name}.breaks"] = np.array(spline.breaks)
         arrays[f"{name}.coefficients"] = np.array(spline.coefficients)
+    arrays["bodies"] = _text([body.name for body in program.bodies])
+    columns_of = [(body.columns.start, len(body.columns)) for body in program.bodies]
+    arrays["body_columns"] = np.array(columns_of, dtype=np.intp).reshape(-1, 2)
     arrays["guess"] = np.array([item.guess for item in program.coordinates])
     code: list[str] = []
     called: set[str] = set()
@@ -82,7 +87,7 @@ def pattern_of(
     """Return rows, columns and constants of Phi_q row by row, and the order of its entries."""
     rows, columns, constants = [], [], []
     for item in grouped.groups:
-        for row, column, node in item.Phi_q:
+        for row, column, node in item.outputs["Phi_q"]:
             value = item.number(node)
             rows.append(item.rows + row)
             columns.append(item.columns[:, column])
@@ -102,7 +107,7 @@ def _entry_numbers(
     for item in grouped.groups:
         count = item.rows.size
         kept = []
-        for _, _, node in item.Phi_q:
+        for _, _, node in item.outputs["Phi_q"]:
             if item.number(node) is None:
                 kept.append(place[start : start + count])
             start += count
@@ -122,17 +127,22 @@ def _group_code(
     sections = (Section(item.sample, "", _local_entries(item)),)
     inline = InlineProgram(grouped.program, item.nodes, sections, item.hints)
     arrays[f"{item.name}.rows"] = item.rows
-    lines = [f'Group("{item.name}", {len(item.Phi)}, {{']
+    lines = [f'Group("{item.name}", {len(item.outputs["Phi"])}, {{']
     lines += [f'    "{names[name]}": "{source.kind}",' for name, source in item.inputs.items()]
     lines.append("}, {")
     for name, source in item.inputs.items():
         arrays[f"{item.name}.{names[name]}"] = source.index
-    for function, quantities in FUNCTIONS.items():
-        listing = schedule(inline, quantities, names, table)
+    for quantity in quantities.QUANTITIES:
+        if quantity.rows == "coordinates":
+            places = [item.columns[:, row] for row, _, _ in item.outputs[quantity.name]]
+            shape = len(places), item.rows.size
+            arrays[f"{item.name}.{quantity.name}"] = np.array(places, dtype=np.intp).reshape(shape)
+    for function, computed in _kernels().items():
+        listing = schedule(inline, computed, names, table)
         called |= set(listing.functions)
         read = [names[name] for name in item.inputs if name in listing.inputs]
         printer = Printer(NUMPY, inline.nodes, listing.names)
-        body = function_body(quantities, listing, inline, printer, titled=False)
+        body = function_body(inline, listing, printer, "plain")
         code += ["", "", f"def _{item.name}_{function}({', '.join(('f', *read))}):"]
         code += [f'    """{function} of {item.rows.size} constraints like "{item.sample.name}"."""']
         code += [f"    {line}" for line in body]
@@ -141,13 +151,28 @@ def _group_code(
     return [*lines, "}),"]
 
 
+def _kernels() -> dict[str, tuple[str, ...]]:
+    """Return what is computed together; right sides alone, because Phi_q is then at hand."""
+    found = {name: computed for name, computed in kernels().items() if name != "kinematics"}
+    for quantity in quantities.QUANTITIES:
+        if quantity.rows == "outputs" or (quantity.is_matrix and quantity.name != "Phi_q"):
+            raise UnsupportedError(f"the grouped form has no {quantity.name}; use form='inline'")
+    return found
+
+
+def _public(program: Program, nonzeros: int) -> Iterator[str]:
+    """Yield the public functions of the quantities."""
+    for quantity, name, lines in public_functions(program, nonzeros):
+        wanted = name.removeprefix("Phi_q_")
+        states = "q, q_dot" if quantity.is_moving else "q"
+        yield from lines
+        yield f'    return _evaluate(("{wanted}",), t, p, {states})[0]\n\n'
+
+
 def _local_entries(item: Group) -> dict[str, tuple[Entry, ...]]:
-    vectors = {"Phi": item.Phi, "nu": item.nu, "gamma": item.gamma}
-    entries = {
-        name: tuple(Entry(row, 0, node) for row, node in enumerate(nodes))
-        for name, nodes in vectors.items()
+    return {
+        name: tuple(Entry(*output) for output in outputs) for name, outputs in item.outputs.items()
     }
-    return {**entries, "Phi_q": tuple(Entry(row, column, node) for row, column, node in item.Phi_q)}
 
 
 def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
@@ -162,7 +187,7 @@ def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
     called |= set(listing.functions)
     unpack = [f"{name} = {vector}[{k}]" for vector, k, name in inputs_read(program, listing)]
     printer = Printer(NUMPY, inline.nodes, listing.names)
-    body = function_body(("values",), listing, inline, printer, titled=False)
+    body = function_body(inline, listing, printer, "plain")
     return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
 
 
@@ -186,22 +211,32 @@ def _data(
         "k": len(program.parameters),
         "redundant": indented(quoted(program.redundant)),
         "is_planned": bool(solving),
-        "parameters": indented(quoted([item.name for item in program.parameters])),
+        "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "parameter_units": indented(
-            [f"{item.name!r}: {item.unit!r}," for item in program.parameters]
+            wrapped(f'"{item.name}": "{item.unit}"' for item in program.parameters)
         ),
         "tables": "\n".join(
             f'{name} = _data["{name}.breaks"], _data["{name}.coefficients"]'
             for name in program.tables
         ),
-        "defaults": indented(wrapped([repr(item.default) for item in program.parameters])),
+        "defaults": tuple_text(repr(item.default) for item in program.parameters),
         "scalar_functions": indented(scalar_functions(called)),
         "array_functions": indented(array_functions(called)),
         "kernels": "\n".join(code),
+        "functions": "\n".join(_public(program, nonzeros)),
+        "sizes": indented(_sizes()),
         "groups": indented(line for lines in tables for line in lines),
         "stages": indented(solving),
         **shared_text(),
     }
+
+
+def _sizes() -> list[str]:
+    """Return the numbers of rows of the vectors; those whose rows are shared are sums."""
+    rows = {"equations": "N_EQUATIONS", "coordinates": "N_COORDINATES"}
+    vectors = [item for item in quantities.QUANTITIES if not item.is_matrix]
+    sizes = [f'"{item.name}": {rows[item.rows]},' for item in vectors]
+    return [*sizes, '"nonzeros": len(PATTERN),']
 
 
 def _text(names: Sequence[str]) -> NDArray[np.uint8]:

@@ -95,8 +95,10 @@ def _unpack(names: list[str], vector: str) -> list[str]:
     if not names:
         return []
     lines = wrapped(names)
+    if len(lines) == 1:
+        return [f"{lines[0] if len(names) == 1 else lines[0].rstrip(',')} = {vector}"]
     return ["(", *(f"    {line}" for line in lines), f") = {vector}"]
 
 
 def _tuple(texts: list[str]) -> list[str]:
-    return [f"    {text}," for text in texts]
+    return [f"    {line}" for line in wrapped(texts)]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import itertools
+import re
+from typing import TYPE_CHECKING, Any, Literal
 
+from kincompile import quantities
 from kincompile.ir.elimination import plan_solve
 from kincompile.names import rate
-from kincompile.targets.constants import constants
-from kincompile.targets.evaluators import EVALUATORS
+from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
+from kincompile.targets.evaluators import varying
 from kincompile.targets.headings import header, place, short_title, title
-from kincompile.targets.lines import WIDTH, broken, commented, indented, quoted, wrapped
+from kincompile.targets.lines import WIDTH, broken, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.solve import solve_functions
@@ -17,14 +20,17 @@ from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.inline import Entry, InlineProgram, Section
     from kincompile.ir.program import Program
+    from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.printer import Printer
 
 DIALECT = NUMPY
+
+Style = Literal["titled", "plain", "packed"]
 
 FUNCTIONS = {
     "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2",
@@ -48,55 +54,161 @@ RESERVED: tuple[str, ...] = (
 RESERVED_IN_SOLVE = ("f", "J", "F", "b")
 
 
+def evaluators() -> dict[str, tuple[str, ...]]:
+    """Return the kernels."""
+    return kernels()
+
+
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return the lines of a function of a point, or of arrays of points."""
-    quantities = EVALUATORS[name]
-    states = "q, q_dot" if "gamma" in quantities else "q"
-    body = [*_unpack(code.program, listing), *function_body(quantities, listing, code, printer)]
-    return ["", "", f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
+    """Return the lines of a kernel: code for a point, or for arrays of points."""
+    states = "q, q_dot" if is_moving(kernels()[name]) else "q"
+    body = [*_unpack(code.program, listing)]
+    body += function_body(code, listing, printer, "packed" if name == "kinematics" else "titled")
+    matrix = _matrix(code, printer) if name == "position" else []
+    return ["", "", *matrix, f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in body)]
 
 
 def files(
     code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
 ) -> Mapping[str, str]:
     """Return the module."""
-    kernels = [line for lines in functions.values() for line in lines]
-    lanes = list(EVALUATORS)
+    lines = [line for own in functions.values() for line in own]
+    keys = list(functions)
     plan = plan_solve(code)
     if plan is not None:
         solving = schedule_solve(code, plan, NameTable(RESERVED_IN_SOLVE))
-        kernels += ["", "", *solve_functions(code, solving)]
-        lanes += ["factor", "solve"]
-    data = _data(code, kernels, sorted(called))
-    data["lanes"] = indented(f'"{name}": _{name},' for name in lanes)
-    data["is_planned"] = plan is not None
-    data["has_large_blocks"] = plan is not None and plan.has_large_blocks
-    data |= shared_text()
+        lines += ["", "", *solve_functions(code, solving)]
+        keys += ["factor", "solve"]
+    data = {
+        **_constants(code),
+        "kernels": "\n".join(lines),
+        "functions": "\n".join(_functions(code)),
+        "results": "\n".join(_results()),
+        "lanes": indented(wrapped(f'"{name}": _{name}' for name in keys)),
+        "scalar_functions": indented(scalar_functions(sorted(called))),
+        "array_functions": indented(array_functions(sorted(called))),
+        "is_planned": plan is not None,
+        "has_large_blocks": plan is not None and plan.has_large_blocks,
+        "has_frames": "cos_sin" in called,
+        **shared_text(),
+    }
     return {f"{code.program.name}.py": fill("numpy/module.py.jinja", data)}
 
 
-def _data(code: InlineProgram, kernels: list[str], called: list[str]) -> dict[str, Any]:
+def _constants(code: InlineProgram) -> dict[str, Any]:
+    """Return what the head of the module says."""
     program = code.program
-    entries = [entry for section in code.sections for entry in section.entries["Phi_q"]]
-    values = [code.number(entry.node) for entry in entries]
-    numbers = [value for value in values if value is not None]
-    fixed = [k for k, value in enumerate(values) if value is not None]
-    moving = [k for k, value in enumerate(values) if value is None]
+    names = [item.name for item in program.coordinates]
+    units = {item.name: item.unit for item in program.coordinates}
+    units |= {item.name: item.unit for item in program.parameters}
     return {
-        **constants(code, 1, "({}, {})"),
         "title": program.name,
         "header": "\n".join(header(code)),
-        "nonzeros": len(entries),
-        "redundant": indented(quoted(program.redundant)),
-        "units": indented(_units(program)),
-        "constants": indented(wrapped(repr(float(value)) for value in numbers)),
-        "fixed": indented(wrapped(map(str, fixed))),
-        "varying": indented(wrapped(map(str, moving))),
+        "name": program.name,
+        "format": FORMAT,
+        "fingerprint": program.fingerprint,
+        "n": len(names),
+        "m": len(program.equations),
+        "k": len(program.parameters),
+        "nonzeros": len(code.pattern()),
+        "coordinates": tuple_text(f'"{name}"' for name in names),
+        "equations": tuple_text(f'"{name}"' for name in program.equations),
+        "redundant": tuple_text(f'"{name}"' for name in program.redundant),
+        "is_redundant": bool(program.redundant),
+        "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
+        "bodies": bodies_text(program),
+        "units": indented(wrapped([f'"{name}": "{unit}"' for name, unit in units.items()])),
+        "defaults": tuple_text(repr(item.default) for item in program.parameters),
+        "guess": tuple_text(repr(item.guess) for item in program.coordinates),
+        "patterns": "\n".join(_patterns(code)),
         "tables": "\n".join(_tables(program)),
-        "scalar_functions": indented(scalar_functions(called)),
-        "array_functions": indented(array_functions(called)),
-        "kernels": "\n".join(kernels),
     }
+
+
+def tuple_text(items: Iterable[str]) -> str:
+    """Return a tuple as text: on one line, or its elements on lines of their own."""
+    items = list(items)
+    text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
+    return text if len(text) <= WIDTH - 15 else f"(\n{indented(wrapped(items))}\n)"
+
+
+def bodies_text(program: Program) -> str:
+    """Return the bodies: name, first column and number of columns of each."""
+    return tuple_text(
+        f'("{body.name}", {body.columns.start}, {len(body.columns)})' for body in program.bodies
+    )
+
+
+def _pattern_name(quantity: Quantity) -> str:
+    return "PATTERN" if quantity.name == "Phi_q" else f"PATTERN_{quantity.name}"
+
+
+def _patterns(code: InlineProgram) -> Iterator[str]:
+    """Yield the places of the entries of each matrix, and its entries that never change."""
+    for quantity in quantities.QUANTITIES:
+        if not quantity.is_matrix:
+            continue
+        entries, name = code.entries(quantity.name), _pattern_name(quantity)
+        places = wrapped([f"({entry.row}, {entry.column})" for entry in entries])
+        values = {k: code.number(entry.node) for k, entry in enumerate(entries)}
+        constants = [f"{k}: {float(x)!r}" for k, x in values.items() if x is not None]
+        yield f"# row, column of the entries of {quantity.name} that are not identically zero"
+        yield f"{name} = np.array((\n{indented(places)}\n), dtype=int).reshape(-1, 2)"
+        yield "# number in the pattern and value of the entries that never change"
+        suffix = name.removeprefix("PATTERN")
+        yield f"_CONSTANTS{suffix} = {{\n{indented(wrapped(constants))}\n}}"
+
+
+def _results() -> Iterator[str]:
+    """Yield the lines that say what the functions return."""
+    sizes = {
+        "equations": "N_EQUATIONS",
+        "coordinates": "N_COORDINATES",
+        "outputs": "N_OUTPUTS",
+        "parameters": "len(PARAMETERS)",
+    }
+    results: dict[str, list[str]] = {}
+    for quantity in quantities.QUANTITIES:
+        rows, name = sizes[quantity.rows], f"_{quantity.name.upper()}"
+        if not quantity.is_matrix:
+            results.setdefault(f"({rows},), range({rows})", []).append(name)
+            continue
+        columns, pattern = sizes[quantity.columns], _pattern_name(quantity)
+        constants = f"_CONSTANTS{pattern.removeprefix('PATTERN')}"
+        places = f"{pattern} @ ({columns}, 1)"
+        results[f"({rows}, {columns}), {places}, {constants}"] = [name]
+        size = f"len({pattern})"
+        results[f"({size},), range({size}), {constants}"] = [f"{name}_NONZEROS"]
+    for arguments, names in results.items():
+        yield f"{' = '.join(names)} = _Quantity({arguments})"
+
+
+def _functions(code: InlineProgram) -> Iterator[str]:
+    """Yield the public functions of the quantities."""
+    for quantity, name, lines in public_functions(code.program, len(code.pattern())):
+        kernel, states = kernel_of((quantity.name,)), "q, q_dot" if quantity.is_moving else "q"
+        computed = kernels()[kernel]
+        before = computed[: computed.index(quantity.name)]
+        skip = sum(len(varying(code, part, item)) for item in before for part in code.sections)
+        result = f"_{name.upper()}"
+        yield from lines
+        yield f"    return _evaluate(_{kernel}, {skip}, {result}, t, p, {states})\n\n"
+
+
+def public_functions(
+    program: Program, nonzeros: int
+) -> Iterator[tuple[Quantity, str, tuple[str, ...]]]:
+    """Yield name and first lines of the functions of quantities, of a matrix also its nonzeros."""
+    for quantity in quantities.QUANTITIES:
+        shape = ", ".join(map(str, program.shape_of(quantity)))
+        texts = {quantity.name: f"{quantity.about.rstrip('.')}, shape (..., {shape})."}
+        if quantity.is_matrix:
+            size = nonzeros if quantity.name == "Phi_q" else "nonzeros"
+            order = f"Entries of {quantity.name} in the order of {_pattern_name(quantity)}"
+            texts[f"{quantity.name}_nonzeros"] = f"{order}, shape (..., {size})."
+        states = "q, q_dot" if quantity.is_moving else "q"
+        for name, text in texts.items():
+            yield quantity, name, (f"def {name}({states}, t, p=DEFAULTS):", f'    """{text}"""')
 
 
 def shared_text() -> dict[str, str]:
@@ -120,12 +232,6 @@ def array_functions(called: Iterable[str]) -> list[str]:
     return [f"{name} = {FUNCTIONS.get(name, f'np.{name}')}" for name in called]
 
 
-def _units(program: Program) -> list[str]:
-    units = {item.name: item.unit for item in program.coordinates}
-    units.update({item.name: item.unit for item in program.parameters})
-    return [f"{name!r}: {unit!r}," for name, unit in units.items()]
-
-
 def _tables(program: Program) -> list[str]:
     lines = []
     for name, spline in program.tables.items():
@@ -138,16 +244,16 @@ def _tables(program: Program) -> list[str]:
 
 
 def function_body(
-    quantities: Sequence[str],
-    listing: Listing,
-    code: InlineProgram,
-    printer: Printer,
-    *,
-    titled: bool = True,
+    code: InlineProgram, listing: Listing, printer: Printer, style: Style
 ) -> list[str]:
     """Return the lines of a function whose inputs have their names already.
 
-    Without `titled` there are no comments that name constraints: the code is for many.
+    Parameters
+    ----------
+    style
+        ``"titled"``: an entry a line, under comments that name constraints; ``"plain"``: without
+        such comments, since the code is for many constraints; ``"packed"``: entries that stand
+        elsewhere with comments, as many a line as fit.
     """
     body = []
     if listing.functions:
@@ -155,31 +261,95 @@ def function_body(
         body.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
     body += _frames(listing, printer)
     for section, assignments in listing.steps:
-        body += [f"# {short_title(section)}"] if titled else []
-        for item in assignments:
-            body += _assignment(item.name, printer.definition(item.node))
+        body += [f"# {short_title(section)}"] if style == "titled" else []
+        texts = [(item.name, printer.definition(item.node)) for item in assignments]
+        body += _pairs(texts) if style == "packed" else _assignments(texts)
     body.append("return (")
-    for quantity, rows in listing.results:
-        if len(quantities) > 1:
-            body.append(f"    # {quantity}")
+    for name, rows in listing.results:
+        body += [f"    # {name}"] if len(listing.results) > 1 else []
+        if style == "packed":
+            body += _packed([printer.text(entry.node) for _, own in rows for entry in own])
+            continue
         for section, entries in rows:
-            if titled and entries:
-                body += [f"    {line}" for line in commented(title(section))]
-            for entry in entries:
-                comment = place(quantity, entry, code) if titled else ""
-                body += _element(printer.text(entry.node), comment)
+            body += _section(name, section, entries, code, printer, style)
     body.append(")")
     if body[-2] == "return (":
         body[-2:] = ["return ()"]
     return body
 
 
-def _assignment(name: str, text: str) -> list[str]:
-    """Return a value with its name, a long one in parentheses."""
-    lines = broken(text)
-    if len(lines) == 1:
-        return [f"{name} = {text}"]
-    return [f"{name} = (", *(f"    {line}" for line in lines), ")"]
+def _section(
+    name: str,
+    section: Section,
+    entries: Sequence[Entry],
+    code: InlineProgram,
+    printer: Printer,
+    style: Style,
+) -> list[str]:
+    """Return the entries of a constraint; what is nothing but numbers on one line."""
+    texts = [printer.text(entry.node) for entry in entries]
+    if style == "plain" or not entries:
+        return [line for text in texts for line in _element(text, "")]
+    is_own = quantity_named(name).rows == "equations"
+    if is_own and all(code.number(entry.node) == 0 for entry in entries):
+        return [f"    {', '.join(texts)},  # {short_title(section)}"]
+    is_titled = is_own and not quantity_named(name).is_matrix  # of a matrix each entry is named
+    lines = [f"    {line}" for line in commented(title(section))] if is_titled else []
+    for entry, text in zip(entries, texts, strict=True):
+        lines += _element(text, place(name, entry, code))
+    return lines
+
+
+def _packed(texts: Sequence[str]) -> list[str]:
+    """Return the elements of a tuple, as many a line as fit."""
+    lines: list[str] = []
+    for is_long, group in itertools.groupby(texts, lambda text: len(text) > WIDTH - 8):
+        if is_long:
+            lines += [line for text in group for line in _element(text, "")]
+        else:
+            lines += [f"    {line}" for line in wrapped(group)]
+    return lines
+
+
+def _matrix(code: InlineProgram, printer: Printer) -> list[str]:
+    """Return Phi_q as a comment, with all its entries, where it is not wider than a line."""
+    coordinates = [item.name for item in code.program.coordinates]
+    rows = [[name, *("." for _ in coordinates)] for name in code.program.equations]
+    for entry in code.entries("Phi_q"):
+        rows[entry.row][entry.column + 1] = printer.text(entry.node)
+    for heads in (coordinates, [str(k) for k in range(len(coordinates))]):
+        lines = table([["", *heads], *rows], gap=1)
+        if max(map(len, lines)) <= WIDTH:
+            return [f"# {line}" for line in ("Phi_q with all its entries:", *lines)]
+    return []
+
+
+def _assignments(texts: Iterable[tuple[str, str]]) -> list[str]:
+    """Return values with their names, long ones in parentheses."""
+    lines: list[str] = []
+    for name, text in texts:
+        parts = broken(text)
+        if len(parts) == 1:
+            lines.append(f"{name} = {text}")
+        else:
+            lines += [f"{name} = (", *(f"    {line}" for line in parts), ")"]
+    return lines
+
+
+def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
+    """Return values with their names, two on a line where the second does not need the first."""
+    lines: list[str] = []
+    rest = list(texts)
+    while rest:
+        (name, text), *rest = rest
+        if rest and name not in re.findall(r"\w+", rest[0][1]):
+            pair = f"{name}, {rest[0][0]} = {text}, {rest[0][1]}"
+            if len(pair) <= WIDTH - 4:
+                lines.append(pair)
+                del rest[0]
+                continue
+        lines += _assignments([(name, text)])
+    return lines
 
 
 def _element(text: str, comment: str) -> list[str]:

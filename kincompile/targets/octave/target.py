@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from kincompile import quantities
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.targets.octave.dialect import NAMES, OCTAVE
 from kincompile.targets.statements import Layout
@@ -29,16 +30,6 @@ LAYOUT = Layout("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, con
 LONGEST_NAME = 63
 """Characters of a name; MATLAB drops those behind them."""
 
-ABOUT = {
-    "Phi": "Constraint vector Phi(q, t), a column.",
-    "Phi_q": "Jacobian of Phi by q.",
-    "nu": "Right side of the velocity equation Phi_q q_dot = nu = -Phi_t, a column.",
-    "gamma": "Right side of the acceleration equation Phi_q q_ddot = gamma, a column.",
-}
-"""The functions, and what each gives."""
-
-EVALUATORS: Mapping[str, tuple[str, ...]] = {name: (name,) for name in ABOUT}
-
 KEYWORDS = (
     "break", "case", "catch", "classdef", "continue", "do", "else", "elseif", "end", "endif",
     "endfor", "endfunction", "endwhile", "endswitch", "for", "function", "global", "if",
@@ -48,10 +39,15 @@ KEYWORDS = (
 """Words of MATLAB and of Octave."""
 
 RESERVED: tuple[str, ...] = (
-    *KEYWORDS, *ABOUT, *NAMES.values(), "q", "q_dot", "t", "p", "pi", "zeros", "nargin",
-    "either", "in_reals", "NaN", "isreal",
+    *KEYWORDS, *quantities.singles(), *NAMES.values(), "q", "q_dot", "t", "p", "pi", "zeros",
+    "nargin", "either", "in_reals", "NaN", "isreal",
 )  # fmt: skip
 """Names that the functions use."""
+
+
+def evaluators() -> dict[str, tuple[str, ...]]:
+    """Return the functions: one a quantity."""
+    return quantities.singles()
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
@@ -63,10 +59,10 @@ def function(name: str, code: InlineProgram, listing: Listing, printer: Printer)
         If a name is longer than MATLAB reads, or a function does not exist there.
     """
     _require_short(listing.names.values())
-    n, m = len(code.program.coordinates), len(code.program.equations)
+    rows, columns = (*code.program.shape_of(quantities.quantity_named(name)), 1)[:2]
     lines = LAYOUT.inputs(code.program, listing)
     values = LAYOUT.frames(listing, printer) + LAYOUT.steps(listing, printer)
-    zeros = f"{name} = zeros({m}, {n if name == 'Phi_q' else 1});"
+    zeros = f"{name} = zeros({rows}, {columns});"
     results = LAYOUT.results(name, code, printer)
     return [*lines, *values, *([""] if values else []), zeros, *results]
 
@@ -106,13 +102,14 @@ def _require_short(names: Iterable[str]) -> None:
 def _function_file(name: str, code: InlineProgram, body: str) -> str:
     """Return the file of one function."""
     program = code.program
-    arguments = ["q", "q_dot", "t", "p"] if name == "gamma" else ["q", "t", "p"]
+    quantity = quantities.quantity_named(name)
+    shape = "" if quantity.is_matrix else ", a column"
     data = {
         "quantity": name,
         "name": program.name,
-        "arguments": ", ".join(arguments),
-        "n_arguments": len(arguments),
-        "about": ABOUT[name],
+        "arguments": ", ".join(quantity.arguments),
+        "n_arguments": len(quantity.arguments),
+        "about": f"{quantity.about[:-1]}{shape}.",
         "header": LAYOUT.header(code),
         "fingerprint": program.fingerprint,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 2),

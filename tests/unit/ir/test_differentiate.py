@@ -136,7 +136,7 @@ def test_that_random_equations_have_the_derivatives_of_complex_steps(inner: symp
     step, h = 1e-30, 1e-4
 
     def Phi(**changed: Any) -> Any:
-        return run(kernel.nodes, at | changed, {})[kernel.Phi[0]]
+        return run(kernel.nodes, at | changed, {})[kernel.outputs["Phi"][0][2]]
 
     def rate_on_line(s: float) -> Any:
         """Return the velocity of Phi where the state has moved on by s."""
@@ -149,15 +149,15 @@ def test_that_random_equations_have_the_derivatives_of_complex_steps(inner: symp
     if inner.has(sympy.atan2):  # NumPy's has no complex numbers
         return
     values = run(kernel.nodes, at, {})
-    entries = {column: values[node] for _, column, node in kernel.Phi_q}
+    entries = {column: values[node] for _, column, node in kernel.outputs["Phi_q"]}
     for column, name in enumerate(("x", "y")):
         known = Phi(**{name: at[name] + 1j * step}).imag / step
         assert entries.get(column, 0.0) == pytest.approx(known, rel=1e-12, abs=1e-12)
     by_t = Phi(t=at["t"] + 1j * step).imag / step
-    assert values[kernel.nu[0]] == pytest.approx(-by_t, rel=1e-12, abs=1e-12)
+    assert values[kernel.outputs["nu"][0][2]] == pytest.approx(-by_t, rel=1e-12, abs=1e-12)
     slopes = [(rate_on_line(k * h) - rate_on_line(-k * h)) / (2 * k * h) for k in (1, 2)]
     by_line = (4 * slopes[0] - slopes[1]) / 3
-    assert values[kernel.gamma[0]] == pytest.approx(-by_line, rel=1e-6, abs=1e-6)
+    assert values[kernel.outputs["gamma"][0][2]] == pytest.approx(-by_line, rel=1e-6, abs=1e-6)
 
 
 def test_that_a_table_is_differentiated_by_its_own_polynomials() -> None:

@@ -308,7 +308,7 @@ def stages_of(link, count=12):
         [
             np.full(item.rows.size, np.nan if item.number(node) is None else item.number(node))
             for item in grouped.groups
-            for _, _, node in item.Phi_q
+            for _, _, node in item.outputs["Phi_q"]
         ]
     )
     order = np.lexsort((columns, rows))
