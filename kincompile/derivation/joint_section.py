@@ -182,9 +182,8 @@ def _rule_lines(
 def _blocks_step(on_page: _JointPage) -> Section:
     template = on_page.joint.template
     blocks: list[Block] = []
-    for index, columns in block_columns(template):
+    for variable, columns in block_columns(template):
         shown = Matrix(block_rows(template, columns))
-        variable = Glyph("q", index) if len(index) == 1 else Letter(index)
         symbol = Sub(Glyph("Phi", exponent=on_page.name), variable)
         blocks.append(Display(Equated((symbol, shown))))
     for frame, body in zip(template.frames, on_page.joint.bodies, strict=True):
@@ -204,7 +203,7 @@ def _nu_step(on_page: _JointPage) -> Section:
     blocks += _constant_note(on_page)
     lines: list[tuple[Run | Runs, ...]] = []
     for block in on_page.blocks:
-        lines += [(Math(PHI_T), *line) for line in _rule_lines(block.steps.Phi_t)]
+        lines += [(Math(PHI_T), *line) for line in _rule_lines(block.Phi_t_steps)]
     blocks += _fired(lines)
     return step(on_page.name, 5, "The right side of the velocity equation", "vector", *blocks)
 
@@ -225,7 +224,7 @@ def _gamma_step(on_page: _JointPage) -> Section:
     lines: list[tuple[Run | Runs, ...]] = []
     for k, block in enumerate(on_page.blocks):
         blocks += _gamma_lines(on_page, k, block)
-        for symbol, steps in zip(GAMMA_TERMS, block.steps.gamma_terms, strict=True):
+        for symbol, steps in zip(GAMMA_TERMS, block.gamma_steps, strict=True):
             lines += [(Math(symbol), *line) for line in _rule_lines(steps)]
     blocks += _constant_note(on_page)
     blocks += _fired(lines)
