@@ -102,22 +102,22 @@ def schedule(
     return Listing(frames, tuple(steps), results, inputs, input_names, functions, names)
 
 
+def vectors(program: Program) -> dict[str, list[str]]:
+    """Return the names of the elements of each vector that functions read."""
+    coordinates = [item.name for item in program.coordinates]
+    parameters = [item.name for item in program.parameters]
+    return {"q": coordinates, "q_dot": [rate(name) for name in coordinates], "p": parameters}
+
+
 def input_names(program: Program, table: NameTable) -> dict[str, str]:
-    """Return the names of t, coordinates, rates and parameters in a target, by the model's."""
-    wanted = [item.name for item in program.coordinates]
-    wanted += [*map(rate, wanted), *(item.name for item in program.parameters)]
-    return {"t": "t", **{name: table.take(name) for name in wanted}}
+    """Return the names of all inputs in a target, by the model's."""
+    names = [name for members in vectors(program).values() for name in members]
+    return {"t": "t", **{name: table.take(name) for name in names}}
 
 
 def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, str]]:
     """Yield vector, index and name in the target of each input that is read, t apart."""
-    coordinates = [item.name for item in program.coordinates]
-    vectors = {
-        "q": coordinates,
-        "q_dot": [rate(name) for name in coordinates],
-        "p": [item.name for item in program.parameters],
-    }
-    for vector, members in vectors.items():
+    for vector, members in vectors(program).items():
         for k, member in enumerate(members):
             if member in listing.inputs:
                 yield vector, k, listing.input_names[member]

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from kincompile import quantities
 from kincompile.ir.elimination import plan_solve
-from kincompile.names import rate
 from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
-from kincompile.targets.evaluators import varying
-from kincompile.targets.headings import header, place, short_title, title
+from kincompile.targets.evaluators import varying, vectors
+from kincompile.targets.headings import entry_title, header, short_title, title
 from kincompile.targets.lines import WIDTH, broken, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
-from kincompile.targets.numpy.solve import solve_functions
+from kincompile.targets.numpy.solve import assigned, solve_functions
 from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
@@ -294,7 +293,7 @@ def _section(
     is_titled = is_own and not quantity_named(name).is_matrix  # of a matrix each entry is named
     lines = [f"    {line}" for line in commented(title(section))] if is_titled else []
     for entry, text in zip(entries, texts, strict=True):
-        lines += _element(text, place(name, entry, code))
+        lines += _element(text, entry_title(name, entry, code))
     return lines
 
 
@@ -324,14 +323,7 @@ def _matrix(code: InlineProgram, printer: Printer) -> list[str]:
 
 def _assignments(texts: Iterable[tuple[str, str]]) -> list[str]:
     """Return values with their names, long ones in parentheses."""
-    lines: list[str] = []
-    for name, text in texts:
-        parts = broken(text)
-        if len(parts) == 1:
-            lines.append(f"{name} = {text}")
-        else:
-            lines += [f"{name} = (", *(f"    {line}" for line in parts), ")"]
-    return lines
+    return [line for name, text in texts for line in assigned(name, text)]
 
 
 def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
@@ -346,7 +338,7 @@ def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
                 lines.append(pair)
                 del rest[0]
                 continue
-        lines += _assignments([(name, text)])
+        lines += assigned(name, text)
     return lines
 
 
@@ -360,14 +352,8 @@ def _element(text: str, comment: str) -> list[str]:
 
 def _unpack(program: Program, listing: Listing) -> list[str]:
     """Return the lines that name the inputs: all of a vector, or the few that are read."""
-    coordinates = [item.name for item in program.coordinates]
-    vectors = {
-        "q": coordinates,
-        "q_dot": [rate(name) for name in coordinates],
-        "p": [item.name for item in program.parameters],
-    }
     lines, names = [], listing.input_names
-    for vector, members in vectors.items():
+    for vector, members in vectors(program).items():
         read = [k for k, name in enumerate(members) if name in listing.inputs]
         if 2 * len(read) > len(members):
             lines += _targets([names[name] for name in members], vector)
