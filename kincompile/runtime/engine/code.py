@@ -49,8 +49,6 @@ class Code:
         The module itself, for messages and for users.
     name, coordinates, equations, parameters, units
         Names and units, as in the contract.
-    bodies
-        Name, first coordinate and number of coordinates of each body.
     guess : ndarray, shape (n,)
         Where Newton starts.
     pattern : ndarray of int, shape (nnz, 2)
@@ -83,7 +81,6 @@ class Code:
     equations: tuple[str, ...]
     parameters: tuple[str, ...]
     units: Mapping[str, str]
-    bodies: tuple[tuple[str, int, int], ...]
     guess: Array
     pattern: NDArray[np.signedinteger[Any]]
     bodies: tuple[tuple[str, int, int], ...]
@@ -129,7 +126,6 @@ def attach(module: ModuleType) -> Code:
         equations=names["EQUATIONS"],
         parameters=names["PARAMETERS"],
         units=names["UNITS"],
-        bodies=names["BODIES"],
         guess=names["GUESS"],
         pattern=names["PATTERN"],
         bodies=names.get("BODIES", ()),

@@ -213,8 +213,8 @@ def test_numbers_that_all_constraints_share_stay_in_the_code():
     assert len(angles) == 1
     assert {source.kind for source in angles[0].inputs.values()} <= {"q", "value"}
     bearings = next(item for item in program.groups if item.sample.name == "B0")
-    assert bearings.inputs["s_i.x"].kind == "number"
-    assert "s_i.y" not in bearings.inputs
+    assert bearings.inputs["s_i_x"].kind == "number"
+    assert "s_i_y" not in bearings.inputs
 
 
 def motors(count):
