@@ -16,6 +16,9 @@ from kincompile.targets.printer import ELEMENTARY, Printer
 from kincompile.targets.registry import TARGETS, load_target
 from kincompile.targets.target import Target
 
+# One process evaluates each target once for all of them.
+pytestmark = pytest.mark.xdist_group("targets")
+
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 TOLERANCE = 1e-13
 
