@@ -66,11 +66,6 @@ def column_name(name: str) -> str:
     return f"{quantity.removesuffix(ending)}_{owner}{ending}"
 
 
-def body_coordinates(body: str) -> tuple[str, str, str]:
-    """Return the names of a body's coordinates."""
-    return f"x_{body}", f"y_{body}", f"phi_{body}"
-
-
 def listed(names: Iterable[object], most: int = 12) -> str:
     """Write names as a short list for a message."""
     written = [str(name) for name in names]

@@ -30,7 +30,7 @@ import numpy as np
 
 NAME = "cam_flat_follower"
 FORMAT = 2
-FINGERPRINT = "c5e9cdbff59840a5fae4eadaef840be0"
+FINGERPRINT = "b754e12faf3ede9e348c6d86fe905e76"
 N_COORDINATES, N_EQUATIONS = 7, 7
 COORDINATES = (
     "x_cam", "y_cam", "phi_cam", "x_follower", "y_follower", "phi_follower", "alpha_contact",

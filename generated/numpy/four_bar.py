@@ -31,7 +31,7 @@ import numpy as np
 
 NAME = "four_bar"
 FORMAT = 2
-FINGERPRINT = "bc8de2babb8ff908c92211c262b22615"
+FINGERPRINT = "cc0bd5779c29cb6873cf0b0a081eaf91"
 N_COORDINATES, N_EQUATIONS = 9, 9
 COORDINATES = (
     "x_crank", "y_crank", "phi_crank", "x_coupler", "y_coupler", "phi_coupler", "x_rocker",

@@ -31,7 +31,7 @@ import numpy as np
 
 NAME = "slider_crank"
 FORMAT = 2
-FINGERPRINT = "1897065efe5e7c757d9c91fbb69e0ca0"
+FINGERPRINT = "a527bb03116fe32da0a1d1f9e0aaa06b"
 N_COORDINATES, N_EQUATIONS = 9, 9
 COORDINATES = (
     "x_crank", "y_crank", "phi_crank", "x_rod", "y_rod", "phi_rod", "x_slider", "y_slider",

@@ -160,13 +160,12 @@ def _positive(reader: FieldReader, data: Row, key: str) -> float:
 
 def _document(path: Path, content: bytes) -> Document:
     """Return a JSON file; a file of Adams, which has the same ending, is refused by name."""
-    text = decoded(path, content)
-    if _ADAMS.match(text):
+    if _ADAMS.match(decoded(path, content)):
         raise ModelError(
             f"{path}, line 1: this is a file of MSC Adams, which uses the ending "
             f"{path.suffix} too; what is read here is JSON, as simEngine2D writes it"
         )
-    return read_json(path, text, has_fractions=True)
+    return read_json(path, content, has_fractions=True)
 
 
 class _AdmReader(FieldReader):

@@ -99,7 +99,7 @@ def decoded(path: Path, content: bytes) -> str:
         ) from None
 
 
-def read_toml(path: Path, text: str) -> Document:
+def read_toml(path: Path, content: bytes) -> Document:
     """Read TOML.
 
     Raises
@@ -107,6 +107,7 @@ def read_toml(path: Path, text: str) -> Document:
     ModelError
         If it is not TOML; the message has the line.
     """
+    text = decoded(path, content)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -136,13 +137,13 @@ def _toml_problem(message: str, text: str) -> tuple[str, int]:
     return f"{found[1]}, column {found[3]}", int(found[2])
 
 
-def read_json(path: Path, text: str, *, has_fractions: bool = False) -> Document:
+def read_json(path: Path, content: bytes, *, has_fractions: bool = False) -> Document:
     """Read JSON.
 
     Parameters
     ----------
-    path, text
-        The file, and its text.
+    path, content
+        The file, and its content.
     has_fractions
         Whether a number may be written 187/255; it is read as a text.
 
@@ -151,6 +152,7 @@ def read_json(path: Path, text: str, *, has_fractions: bool = False) -> Document
     ModelError
         If it is not JSON, a key is given twice, or a number is not finite; with the line.
     """
+    text = decoded(path, content)
     if has_fractions:
         text = _FRACTION.sub(_quoted, text)
     repeated: list[str] = []

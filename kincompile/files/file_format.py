@@ -45,12 +45,6 @@ _POINT: dict[str, Any] = {
     "type": "array", "items": _EXPRESSION, "minItems": 2, "maxItems": 2,
 }  # fmt: skip
 _NUMBERS: dict[str, Any] = {"type": "array", "items": _NUMBER, "minItems": 6}
-_TABLE: dict[str, Any] = {
-    "type": "object",
-    "properties": {"angles": _NUMBERS, "radii": _NUMBERS, "smoothness": {"const": SMOOTHNESS}},
-    "required": ["angles", "radii", "smoothness"],
-    "additionalProperties": False,
-}
 
 
 def _list(name: str) -> dict[str, Any]:
@@ -86,7 +80,11 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "outline": Field({"type": "array", "items": _POINT, "minItems": 3}, is_required=False),
     },
     "coordinate": {"name": Field(_NAME), "guess": Field(_EXPRESSION, is_required=False)},
-    "profile": {key: Field(_TABLE["properties"][key]) for key in ("angles", "radii", "smoothness")},
+    "profile": {
+        "angles": Field(_NUMBERS),
+        "radii": Field(_NUMBERS),
+        "smoothness": Field({"const": SMOOTHNESS}),
+    },
     "Equation": {
         "type": Field({"const": "Equation"}),
         "name": Field(_NAME),
@@ -99,7 +97,7 @@ _KINDS: Mapping[Kind, Mapping[str, Any]] = {
     Kind.BODY: _NAME,
     Kind.POINT: _POINT,
     Kind.AXIS: _POINT,
-    Kind.PROFILE: {"anyOf": [_EXPRESSION, _TABLE]},
+    Kind.PROFILE: {"anyOf": [_EXPRESSION, {"$ref": "#/$defs/profile"}]},
 }
 
 

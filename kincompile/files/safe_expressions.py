@@ -69,6 +69,12 @@ class Place:
     line: int = 1
     column: int = 1
 
+    def after(self, text: str) -> Place:
+        """Return where a text ends that begins here."""
+        lines = text.count("\n")
+        first = 1 if lines else self.column
+        return Place(self.line + lines, len(text) - (text.rfind("\n") + 1) + first)
+
 
 class ExpressionError(NotAnExpressionError):
     """A text that is not an expression.
@@ -189,10 +195,8 @@ class _Source:
 
     def error(self, problem: str, offset: int) -> ExpressionError:
         """Return an error at a place in the text."""
-        before = self.text[:offset]
-        line = before.count("\n")
-        column = offset - (before.rfind("\n") + 1) + (self._place.column if line == 0 else 1)
-        return ExpressionError(problem, self._place.line + line, column)
+        place = self._place.after(self.text[:offset])
+        return ExpressionError(problem, place.line, place.column)
 
     def node_error(self, problem: str, node: ast.AST) -> ExpressionError:
         """Return an error at a node."""

@@ -31,7 +31,7 @@ pi = sympy.pi
 alpha = sympy.Symbol("alpha")
 """The polar angle of a cam profile rho(alpha)."""
 
-Scalar = int | float | sympy.Expr
+Scalar: TypeAlias = int | float | sympy.Expr
 
 Scalars: TypeAlias = Sequence[Scalar] | NDArray[np.float64]
 """Several in order: a point (xi, eta), a guess (x, y, phi)."""

@@ -104,13 +104,15 @@ def _frames(listing: Listing, printer: Printer) -> list[str]:
         return []
     lines = ["// body frames: A = [[c, -s], [s, c]]"]
     for frame in listing.frames:
-        if len(frame.values) == 2:
+        if frame.angle is not None:
             c, s = (item.name for item in frame.values)
             angle = printer.text(frame.angle)
             lines += [f"double {c}, {s};", f"far |= cos_sin({angle}, exact, &{c}, &{s});"]
         else:
-            item = frame.values[0]
-            lines.append(f"const double {item.name} = {printer.definition(item.node)};")
+            lines += [
+                f"const double {item.name} = {printer.definition(item.node)};"
+                for item in frame.values
+            ]
     return lines
 
 

@@ -133,7 +133,9 @@ def tuple_text(items: Iterable[str]) -> str:
 
 def bodies_text(program: Program) -> str:
     """Return the bodies: name, first column and number of columns of each."""
-    return tuple_text(f'("{body}", {angle - 2}, 3)' for body, angle in program.frames)
+    return tuple_text(
+        f'("{body.name}", {body.columns.start}, {len(body.columns)})' for body in program.bodies
+    )
 
 
 def _pattern_name(quantity: Quantity) -> str:
@@ -378,8 +380,8 @@ def _frames(listing: Listing, printer: Printer) -> list[str]:
     lines = ["# body frames: A = [[c, -s], [s, c]]"]
     for frame in listing.frames:
         left = ", ".join(item.name for item in frame.values)
-        if len(frame.values) == 2:
+        if frame.angle is not None:
             lines.append(f"{left} = cos_sin({printer.text(frame.angle)})")
         else:
-            lines.append(f"{left} = {printer.definition(frame.values[0].node)}")
+            lines += [f"{item.name} = {printer.definition(item.node)}" for item in frame.values]
     return lines
