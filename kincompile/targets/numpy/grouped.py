@@ -31,8 +31,8 @@ from kincompile.targets.numpy.target import (
     public_functions,
     scalar_functions,
     shared_text,
-    tuple_text,
 )
+from kincompile.targets.numpy.text import tuple_text
 from kincompile.targets.printer import Printer
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
-from kincompile.targets.lines import broken, wrapped
+from kincompile.targets.lines import wrapped
 from kincompile.targets.numpy.dialect import NUMPY
+from kincompile.targets.numpy.text import assignments, tuple_text
 from kincompile.targets.planned_solve import components, explained
 from kincompile.targets.printer import Printer
 
@@ -21,12 +23,14 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
     printer, names = Printer(NUMPY, listing.plan.nodes, listing.names), listing.names
     factor = [*_unpack([names[node] for node in listing.entries], "J")]
     factor += _steps(listing.factor_steps, listing, printer)
-    factor += ["return (", *_tuple([names[node] for node in listing.factors]), "), ("]
-    factor += [*_tuple([printer.text(node) for node in listing.plan.determinants]), ")"]
+    kept = tuple_text(names[node] for node in listing.factors)
+    determinants = tuple_text(printer.text(node) for node in listing.plan.determinants)
+    factor += f"return {kept}, {determinants}".split("\n")
     solve = [*_unpack([names[node] for node in listing.factors], "F")]
     solve += _unpack([names[node] for node in listing.plan.right], "b")
     solve += _steps(listing.solve_steps, listing, printer)
-    solve += ["return (", *_tuple([printer.text(node) for node in listing.plan.solution]), ")"]
+    solution = tuple_text(printer.text(node) for node in listing.plan.solution)
+    solve += f"return {solution}".split("\n")
     return [
         f"def {prefix}_factor(f, J):",
         '    """Return what a solve needs of Phi_q, and the determinants of its blocks."""',
@@ -46,25 +50,17 @@ def _steps(nodes: Iterable[int], listing: SolveListing, printer: Printer) -> lis
     """Return an assignment for each node; a larger block's solution comes from one call."""
     lines: list[str] = []
     done: set[tuple[int, ...]] = set()
-    for node in nodes:
-        operation, *content = listing.plan.nodes[node]
-        if operation == "linear":
-            name, size, _, *operands = content
-            if (name, *operands) in done:
-                continue
-            done.add((name, *operands))
-            lines += _block_call(node, name, size, operands, listing, printer)
+    for is_linear, group in itertools.groupby(
+        nodes, lambda node: listing.plan.nodes[node][0] == "linear"
+    ):
+        if not is_linear:
+            lines += assignments([(listing.names[k], printer.definition(k)) for k in group])
             continue
-        first, *rest = broken(printer.definition(node))
-        if rest:
-            lines += [
-                f"{listing.names[node]} = (",
-                f"    {first}",
-                *(f"    {line}" for line in rest),
-                ")",
-            ]
-        else:
-            lines.append(f"{listing.names[node]} = {first}")
+        for node in group:
+            _, name, size, _, *operands = listing.plan.nodes[node]
+            if (name, *operands) not in done:
+                done.add((name, *operands))
+                lines += _block_call(node, name, size, operands, listing, printer)
     return lines
 
 
@@ -98,7 +94,3 @@ def _unpack(names: list[str], vector: str) -> list[str]:
     if len(lines) == 1:
         return [f"{lines[0] if len(names) == 1 else lines[0].rstrip(',')} = {vector}"]
     return ["(", *(f"    {line}" for line in lines), f") = {vector}"]
-
-
-def _tuple(texts: list[str]) -> list[str]:
-    return [f"    {line}" for line in wrapped(texts)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import re
 from typing import TYPE_CHECKING, Any, Literal
 
 from kincompile import quantities
@@ -12,10 +10,11 @@ from kincompile.names import rate
 from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
 from kincompile.targets.evaluators import varying
 from kincompile.targets.headings import header, place, short_title, title
-from kincompile.targets.lines import WIDTH, broken, commented, indented, table, wrapped
+from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.solve import solve_functions
+from kincompile.targets.numpy.text import assignments, element, packed, tuple_text
 from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
@@ -123,13 +122,6 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "patterns": "\n".join(_patterns(code)),
         "tables": "\n".join(_tables(program)),
     }
-
-
-def tuple_text(items: Iterable[str]) -> str:
-    """Return a tuple as text: on one line, or its elements on lines of their own."""
-    items = list(items)
-    text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
-    return text if len(text) <= WIDTH - 15 else f"(\n{indented(wrapped(items))}\n)"
 
 
 def bodies_text(program: Program) -> str:
@@ -258,15 +250,15 @@ def function_body(
         called = ", ".join(listing.functions)
         body.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
     body += _frames(listing, printer)
-    for section, assignments in listing.steps:
+    for section, own in listing.steps:
         body += [f"# {short_title(section)}"] if style == "titled" else []
-        texts = [(item.name, printer.definition(item.node)) for item in assignments]
-        body += _pairs(texts) if style == "packed" else _assignments(texts)
+        texts = [(item.name, printer.definition(item.node)) for item in own]
+        body += assignments(texts, is_titled=style != "packed")
     body.append("return (")
     for name, rows in listing.results:
         body += [f"    # {name}"] if len(listing.results) > 1 else []
         if style == "packed":
-            body += _packed([printer.text(entry.node) for _, own in rows for entry in own])
+            body += packed([printer.text(entry.node) for _, own in rows for entry in own])
             continue
         for section, entries in rows:
             body += _section(name, section, entries, code, printer, style)
@@ -284,28 +276,19 @@ def _section(
     printer: Printer,
     style: Style,
 ) -> list[str]:
-    """Return the entries of a constraint; what is nothing but numbers on one line."""
-    texts = [printer.text(entry.node) for entry in entries]
-    if style == "plain" or not entries:
-        return [line for text in texts for line in _element(text, "")]
-    is_own = quantity_named(name).rows == "equations"
-    if is_own and all(code.number(entry.node) == 0 for entry in entries):
-        return [f"    {', '.join(texts)},  # {short_title(section)}"]
-    is_titled = is_own and not quantity_named(name).is_matrix  # of a matrix each entry is named
-    lines = [f"    {line}" for line in commented(title(section))] if is_titled else []
+    """Return the entries of a constraint, right sides on one line where they fit."""
+    texts, quantity = [printer.text(entry.node) for entry in entries], None
+    if style == "titled" and entries:
+        quantity = quantity_named(name)
+    if quantity is None:
+        return [line for text in texts for line in element(text, "")]
+    is_own = quantity.rows == "equations" and not quantity.is_matrix
+    line = f"    {', '.join(texts)},  # {short_title(section)}"
+    if is_own and name != "Phi" and len(line) <= WIDTH - 4:
+        return [line]
+    lines = [f"    {line}" for line in commented(title(section))] if is_own else []
     for entry, text in zip(entries, texts, strict=True):
-        lines += _element(text, place(name, entry, code))
-    return lines
-
-
-def _packed(texts: Sequence[str]) -> list[str]:
-    """Return the elements of a tuple, as many a line as fit."""
-    lines: list[str] = []
-    for is_long, group in itertools.groupby(texts, lambda text: len(text) > WIDTH - 8):
-        if is_long:
-            lines += [line for text in group for line in _element(text, "")]
-        else:
-            lines += [f"    {line}" for line in wrapped(group)]
+        lines += element(text, place(name, entry, code))
     return lines
 
 
@@ -316,46 +299,10 @@ def _matrix(code: InlineProgram, printer: Printer) -> list[str]:
     for entry in code.entries("Phi_q"):
         rows[entry.row][entry.column + 1] = printer.text(entry.node)
     for heads in (coordinates, [str(k) for k in range(len(coordinates))]):
-        lines = table([["", *heads], *rows], gap=1)
+        lines = table([["Phi_q", *heads], *rows], gap=1)
         if max(map(len, lines)) <= WIDTH:
-            return [f"# {line}" for line in ("Phi_q with all its entries:", *lines)]
+            return [f"# {line}" for line in lines]
     return []
-
-
-def _assignments(texts: Iterable[tuple[str, str]]) -> list[str]:
-    """Return values with their names, long ones in parentheses."""
-    lines: list[str] = []
-    for name, text in texts:
-        parts = broken(text)
-        if len(parts) == 1:
-            lines.append(f"{name} = {text}")
-        else:
-            lines += [f"{name} = (", *(f"    {line}" for line in parts), ")"]
-    return lines
-
-
-def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
-    """Return values with their names, two on a line where the second does not need the first."""
-    lines: list[str] = []
-    rest = list(texts)
-    while rest:
-        (name, text), *rest = rest
-        if rest and name not in re.findall(r"\w+", rest[0][1]):
-            pair = f"{name}, {rest[0][0]} = {text}, {rest[0][1]}"
-            if len(pair) <= WIDTH - 4:
-                lines.append(pair)
-                del rest[0]
-                continue
-        lines += _assignments([(name, text)])
-    return lines
-
-
-def _element(text: str, comment: str) -> list[str]:
-    """Return an element of the returned tuple, a long one continued with deeper indentation."""
-    first, *rest = broken(text)
-    lines = [f"    {first}", *(f"        {line}" for line in rest)]
-    lines[-1] += f",  # {comment}" if comment else ","
-    return lines
 
 
 def _unpack(program: Program, listing: Listing) -> list[str]:
