@@ -228,7 +228,7 @@ def _data(
             f'{name} = _data["{name}.breaks"], _data["{name}.coefficients"]'
             for name in program.tables
         ),
-        "defaults": tuple_text(repr(item.default) for item in program.parameters),
+        "defaults": tuple_text((repr(item.default) for item in program.parameters), 62),
         "scalar_functions": indented(scalar_functions(called)),
         "array_functions": indented(array_functions(called)),
         "kernels": "\n".join(code),

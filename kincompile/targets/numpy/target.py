@@ -83,7 +83,7 @@ def files(
         "kernels": "\n".join(lines),
         "functions": "\n".join(_functions(code)),
         "results": "\n".join(_results()),
-        "lanes": indented(wrapped(f'"{name}": _{name}' for name in keys)),
+        "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
         "scalar_functions": indented(scalar_functions(sorted(called))),
         "array_functions": indented(array_functions(sorted(called))),
         "is_planned": plan is not None,
@@ -98,8 +98,8 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
     """Return what the head of the module says."""
     program = code.program
     names = [item.name for item in program.coordinates]
-    units = {item.name: item.unit for item in program.coordinates}
-    units |= {item.name: item.unit for item in program.parameters}
+    units = [item.unit for item in program.coordinates]
+    units += [item.unit for item in program.parameters]
     return {
         "title": program.name,
         "header": "\n".join(header(code)),
@@ -116,9 +116,9 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "is_redundant": bool(program.redundant),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
-        "units": indented(wrapped([f'"{name}": "{unit}"' for name, unit in units.items()])),
-        "defaults": tuple_text(repr(item.default) for item in program.parameters),
-        "guess": tuple_text(repr(item.guess) for item in program.coordinates),
+        "units": tuple_text((f'"{unit}"' for unit in units), WIDTH - 44),
+        "defaults": tuple_text((repr(item.default) for item in program.parameters), WIDTH - 34),
+        "guess": tuple_text((repr(item.guess) for item in program.coordinates), WIDTH - 34),
         "patterns": "\n".join(_patterns(code)),
         "tables": "\n".join(_tables(program)),
     }
@@ -246,12 +246,13 @@ def function_body(
         elsewhere with comments, as many a line as fit.
     """
     body = []
+    is_first = style == "titled" and listing.results[0][0] == "Phi"  # where a reader begins
     if listing.functions:
         called = ", ".join(listing.functions)
         body.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
-    body += _frames(listing, printer)
+    body += _frames(listing, printer, is_first)
     for section, own in listing.steps:
-        body += [f"# {short_title(section)}"] if style == "titled" else []
+        body += [f"# {short_title(section)}"] if is_first else []
         texts = [(item.name, printer.definition(item.node)) for item in own]
         body += assignments(texts, is_titled=style != "packed")
     body.append("return (")
@@ -286,6 +287,9 @@ def _section(
     line = f"    {', '.join(texts)},  # {short_title(section)}"
     if is_own and name != "Phi" and len(line) <= WIDTH - 4:
         return [line]
+    whole = f"    {texts[0]},  # {title(section)}"
+    if is_own and len(texts) == 1 and len(whole) <= WIDTH - 4:
+        return [whole]
     lines = [f"    {line}" for line in commented(title(section))] if is_own else []
     for entry, text in zip(entries, texts, strict=True):
         lines += element(text, place(name, entry, code))
@@ -332,11 +336,9 @@ def _targets(members: Sequence[str], vector: str) -> list[str]:
     return ["(", *(f"    {line}" for line in wrapped(members)), f") = {vector}"]
 
 
-def _frames(listing: Listing, printer: Printer) -> list[str]:
+def _frames(listing: Listing, printer: Printer, is_first: bool) -> list[str]:
     """Return the cosine and sine of each body's angle, a line a body."""
-    if not listing.frames:
-        return []
-    lines = ["# body frames: A = [[c, -s], [s, c]]"]
+    lines = ["# body frames: A = [[c, -s], [s, c]]"] if listing.frames and is_first else []
     for frame in listing.frames:
         left = ", ".join(item.name for item in frame.values)
         if len(frame.values) == 2:

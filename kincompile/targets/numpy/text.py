@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
 
-def tuple_text(items: Iterable[str]) -> str:
-    """Return a tuple as text: on one line, or its elements on lines of their own."""
+def tuple_text(items: Iterable[str], room: int = WIDTH - 15) -> str:
+    """Return a tuple as text: where there is room on one line, else its elements on others."""
     items = list(items)
     text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
-    return text if len(text) <= WIDTH - 15 else f"(\n{indented(wrapped(items))}\n)"
+    return text if len(text) <= room else f"(\n{indented(wrapped(items))}\n)"
 
 
 def packed(texts: Sequence[str]) -> list[str]:
