@@ -39,7 +39,7 @@ class _CollectedError(KincompileError):
         super().__init__(self.problems)
 
     def __str__(self) -> str:
-        """Give the message, or a count and one line per problem when there are several."""
+        """Return the message, or a count and one line per problem when there are several."""
         if len(self.problems) == 1:
             return self.problems[0]
         lines = "\n".join(f"  - {problem}" for problem in self.problems)
@@ -109,7 +109,7 @@ class SolveError(KincompileError, ArithmeticError):
         self.solution = solution
 
     def __str__(self) -> str:
-        """Give the message alone; the partial solution is in `solution`."""
+        """Return the message alone; the partial solution is in `solution`."""
         return str(self.args[0])
 
 
@@ -126,7 +126,7 @@ class InternalError(KincompileError):
         super().__init__(message)
 
     def __str__(self) -> str:
-        """Give the message and say that the fault is not the caller's."""
+        """Return the message, with the remark that the fault is not the caller's."""
         return f"{self.args[0]} This is a bug in kincompile: please report it with the model."
 
 

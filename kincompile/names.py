@@ -13,14 +13,14 @@ RESERVED = frozenset({"t", "pi", "alpha"})
 """Names with a meaning of their own in every expression."""
 
 SYMBOLS = frozenset({"a parameter", "a coordinate"})
-"""What has a name that stands in expressions."""
+"""What has a name that occurs in expressions."""
 
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _UNIT = re.compile(r"(?!.*\*/)[\w°%·*/^.()+ -]*")
 
 
 def name_problem(name: object, what: str) -> str | None:
-    """Say what is wrong with a name, or return None.
+    """Return a message about what is wrong with a name, or None.
 
     A name is a letter followed by letters, digits and underscores, so that it can appear in
     generated code of every target.
@@ -39,9 +39,9 @@ def name_problem(name: object, what: str) -> str | None:
 
 
 def unit_problem(unit: object, what: str) -> str | None:
-    """Say what is wrong with a unit, or return None.
+    """Return a message about what is wrong with a unit, or None.
 
-    Units stand in comments and docstrings of generated code, so nothing may end those: no quotes,
+    Units occur in comments and docstrings of generated code, so nothing may end those: no quotes,
     backslashes or line breaks, and no ``*/``.
     """
     if isinstance(unit, str) and _UNIT.fullmatch(unit):
@@ -64,11 +64,6 @@ def column_name(name: str) -> str:
         return name
     ending = next((end for end in ("_ddot", "_dot") if quantity.endswith(end)), "")
     return f"{quantity.removesuffix(ending)}_{owner}{ending}"
-
-
-def body_coordinates(body: str) -> tuple[str, str, str]:
-    """Return the names of a body's coordinates."""
-    return f"x_{body}", f"y_{body}", f"phi_{body}"
 
 
 def listed(names: Iterable[object], most: int = 12) -> str:

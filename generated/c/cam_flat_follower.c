@@ -38,7 +38,7 @@ enum {
     BLOCKS = 3,  // blocks of the planned solve
 };
 
-const char cam_flat_follower_fingerprint[] = "c5e9cdbff59840a5fae4eadaef840be0";
+const char cam_flat_follower_fingerprint[] = "b754e12faf3ede9e348c6d86fe905e76";
 const double cam_flat_follower_defaults[] = {
     0.04, 0.02, 6.283185307179586,
 };

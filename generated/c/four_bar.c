@@ -39,7 +39,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char four_bar_fingerprint[] = "bc8de2babb8ff908c92211c262b22615";
+const char four_bar_fingerprint[] = "cc0bd5779c29cb6873cf0b0a081eaf91";
 const double four_bar_defaults[] = {
     10.0, 26.0, 18.0, 20.0, 1.5,
 };

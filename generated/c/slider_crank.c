@@ -39,7 +39,7 @@ enum {
     BLOCKS = 1,  // blocks of the planned solve
 };
 
-const char slider_crank_fingerprint[] = "1897065efe5e7c757d9c91fbb69e0ca0";
+const char slider_crank_fingerprint[] = "a527bb03116fe32da0a1d1f9e0aaa06b";
 const double slider_crank_defaults[] = {
     0,
 };

@@ -21,7 +21,7 @@ const cam_flat_follower = (() => {
 
     const NAME = "cam_flat_follower";
     const FORMAT = 2;
-    const FINGERPRINT = "c5e9cdbff59840a5fae4eadaef840be0";
+    const FINGERPRINT = "b754e12faf3ede9e348c6d86fe905e76";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

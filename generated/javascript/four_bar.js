@@ -22,7 +22,7 @@ const four_bar = (() => {
 
     const NAME = "four_bar";
     const FORMAT = 2;
-    const FINGERPRINT = "bc8de2babb8ff908c92211c262b22615";
+    const FINGERPRINT = "cc0bd5779c29cb6873cf0b0a081eaf91";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

@@ -28,7 +28,7 @@ import numpy as np
 
 NAME = "cam_flat_follower"
 FORMAT = 2
-FINGERPRINT = "c5e9cdbff59840a5fae4eadaef840be0"
+FINGERPRINT = "b754e12faf3ede9e348c6d86fe905e76"
 N_COORDINATES, N_EQUATIONS = 7, 7
 COORDINATES = (
     "x_cam", "y_cam", "phi_cam", "x_follower", "y_follower", "phi_follower", "alpha_contact",
@@ -54,7 +54,6 @@ PATTERN = np.array((
 _CONSTANTS = {
     0: 1.0, 1: 1.0, 2: -1.0, 14: 1.0,
 }
-pi = math.pi
 
 
 def _position(f, q, t, p):

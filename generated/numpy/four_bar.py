@@ -29,7 +29,7 @@ import numpy as np
 
 NAME = "four_bar"
 FORMAT = 2
-FINGERPRINT = "bc8de2babb8ff908c92211c262b22615"
+FINGERPRINT = "cc0bd5779c29cb6873cf0b0a081eaf91"
 N_COORDINATES, N_EQUATIONS = 9, 9
 COORDINATES = (
     "x_crank", "y_crank", "phi_crank", "x_coupler", "y_coupler", "phi_coupler", "x_rocker",
@@ -57,7 +57,6 @@ _CONSTANTS = {
     0: 1.0, 2: 1.0, 4: 1.0, 6: -1.0, 8: 1.0, 10: -1.0, 12: 1.0, 14: -1.0, 16: 1.0, 18: -1.0,
     20: 1.0, 22: 1.0, 24: 1.0,
 }
-pi = math.pi
 
 
 # Phi_q x_crank y_crank phi_crank  x_coupler y_coupler phi_coupler  x_rocker y_rocker phi_rocker

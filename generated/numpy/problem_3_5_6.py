@@ -43,7 +43,6 @@ PATTERN = np.array((
 _CONSTANTS = {
     0: 1.0, 2: 1.0,
 }
-pi = math.pi
 
 
 # Phi_q      x2     y2     phi3

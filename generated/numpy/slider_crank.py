@@ -29,7 +29,7 @@ import numpy as np
 
 NAME = "slider_crank"
 FORMAT = 2
-FINGERPRINT = "1897065efe5e7c757d9c91fbb69e0ca0"
+FINGERPRINT = "a527bb03116fe32da0a1d1f9e0aaa06b"
 N_COORDINATES, N_EQUATIONS = 9, 9
 COORDINATES = (
     "x_crank", "y_crank", "phi_crank", "x_rod", "y_rod", "phi_rod", "x_slider", "y_slider",
@@ -55,7 +55,6 @@ _CONSTANTS = {
     0: 1.0, 2: 1.0, 4: 1.0, 6: -1.0, 8: 1.0, 10: -1.0, 12: 1.0, 14: -1.0, 15: 1.0, 17: -1.0,
     18: 1.0, 19: 1.0, 20: 1.0,
 }
-pi = math.pi
 
 
 # Phi_q          0 1 2                  3  4  5                6  7  8

@@ -55,7 +55,7 @@ for k = 1:points
             break
         end
     end
-    % Where a singular Phi_q sends q far away, the corrections are small beside it: Phi tells.
+    % Where a singular Phi_q sends q far away, the corrections are small beside it, but Phi is not.
     Phi_q = cam_flat_follower_Phi_q(q, t, p);
     is_met = abs(cam_flat_follower_Phi(q, t, p)) <= 10 * tolerance * extent * sum(abs(Phi_q), 2);
     if ~has_converged || ~all(is_met)

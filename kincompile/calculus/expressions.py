@@ -181,6 +181,9 @@ class Rotation(Protocol):
 
     letters: ClassVar[str]
     """How A and its derivatives are printed, by order."""
+    names: ClassVar[tuple[str, ...]]
+    symbols: ClassVar[tuple[str, ...]]
+    """Names and symbols of the entries."""
 
     @property
     def coordinates(self) -> tuple[Expression, ...]:

@@ -32,6 +32,8 @@ class PlaneRotation:
     angle: Scalar
 
     letters: ClassVar[str] = "AB"
+    names: ClassVar[tuple[str, ...]] = ("cos", "sin")
+    symbols: ClassVar[tuple[str, ...]] = ("c", "s")
     constraints: ClassVar[tuple[Scalar, ...]] = ()
 
     @property

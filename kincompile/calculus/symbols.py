@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from kincompile.calculus.expressions import (
     Basis,
@@ -28,6 +28,8 @@ class Frame:
     """The frame of a body in the plane: position r, angle phi, and its rotation."""
 
     index: str
+    letters: ClassVar[tuple[str, ...]] = ("x", "y", "phi")
+    """Letters of the coordinates, one a component."""
 
     @property
     def r(self) -> VectorSymbol:
@@ -78,6 +80,7 @@ class Contact:
     """The contact parameter of a cam profile in polar form, a(alpha) = rho(alpha) u(alpha)."""
 
     index: str
+    letters: ClassVar[tuple[str, ...]] = ("alpha",)
 
     @property
     def alpha(self) -> Symbol:

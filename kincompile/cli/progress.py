@@ -16,7 +16,7 @@ PATIENCE = 0.5
 
 @contextmanager
 def progress_bar() -> Iterator[Callable[[int, int], None] | None]:
-    """Give a bar on stderr that appears when work has lasted long; None where nobody looks."""
+    """Give a progress bar that appears when work has lasted long; None without a terminal."""
     if not sys.stderr.isatty():
         yield None
         return

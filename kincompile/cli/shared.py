@@ -38,7 +38,7 @@ def require_output(path: str | Path, read: str, what: str) -> None:
 
 
 def set_option(what: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return the option ``--set NAME=VALUE``; `what` says of which names."""
+    """Return the option ``--set NAME=VALUE``; `what` describes the names."""
     return click.option(
         "--set",
         "assignments",
@@ -63,7 +63,7 @@ def assigned(assignments: tuple[str, ...]) -> dict[str, float]:
 
 
 def print_data(text: str) -> None:
-    """Write data to stdout, or say why that is impossible."""
+    """Write data to stdout; an error of the system becomes an `InputError`."""
     try:
         click.echo(text, nl=False)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""When two numbers count as equal, and by what factor one row is a multiple of another.
+"""When two numbers count as equal, and the factor by which one row is a multiple of another.
 
 Formulas are compared in floating point. Their rounding errors are of the size of the terms that
 they add, times 1e-16; a slip of the pen differs by the size of a term. The tolerance lies between:
@@ -20,17 +20,17 @@ OF_ROW = 1e-12
 ABSOLUTE = 1e-13
 
 
-def tolerance(hand: Array, sizes: Array, generated: Array) -> Array:
+def tolerance(written: Array, sizes: Array, generated: Array) -> Array:
     """Return the difference that is rounding, entry by entry; arrays are (N, rows, columns)."""
     terms = np.nan_to_num(sizes, nan=0.0, posinf=0.0) + np.abs(np.nan_to_num(generated))
-    largest = np.max(np.abs(np.nan_to_num(hand)) + terms, axis=-1, keepdims=True, initial=0.0)
+    largest = np.max(np.abs(np.nan_to_num(written)) + terms, axis=-1, keepdims=True, initial=0.0)
     return np.asarray(OF_TERMS * terms + OF_ROW * largest + ABSOLUTE)
 
 
-def agrees(hand: Array, sizes: Array, generated: Array) -> Array:
+def agrees(written: Array, sizes: Array, generated: Array) -> Array:
     """Return for every state and entry whether the two are equal; NaN is equal to nothing."""
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(hand - generated) <= tolerance(hand, sizes, generated))
+        return np.asarray(np.abs(written - generated) <= tolerance(written, sizes, generated))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Multiple:
     Attributes
     ----------
     factor
-        By state, shape (N,): hand = factor * generated.
+        By state, shape (N,): written = factor * generated.
     share
         Share of the entries that are, 1 where the whole row is.
     """
@@ -49,46 +49,56 @@ class Multiple:
     share: float
 
 
-def multiple(hand: Array, sizes: Array, generated: Array, group: Array) -> Multiple:
-    """Return the factor between two rows, (N, columns) each, that explains the most entries.
+def multiple(
+    written: Array, sizes: Array, generated: Array, group: Array, may_scale: bool = True
+) -> Multiple:
+    """Return the factor between two rows that explains the most entries.
 
     A factor must be the same at all states with the same parameters. Where several explain as
     many entries, 1 is taken before -1, and these before any other.
+
+    Parameters
+    ----------
+    written, sizes, generated
+        Values by hand, the sizes of their terms, and generated values, shape (N, columns) each.
+        A column that is NaN in `generated` belongs to the ground and is not compared.
+    group
+        The set of parameters of each state, shape (N,).
+    may_scale
+        Whether the factor may differ from 1.
     """
-    count = len(group)
-    shape = (count, 1, -1)
-    h, s, g = hand.reshape(shape), sizes.reshape(shape), generated.reshape(shape)
-    best = Multiple(np.ones(count), -1.0)
-    for factor in (np.ones(count), -np.ones(count), *_ratios(hand, generated, group)):
-        equal = np.asarray(agrees(h, s, factor[:, None, None] * g)[:, 0].all(axis=0))
-        share = _share(equal, generated)
+    checked = ~np.isnan(generated).any(axis=0)
+    w, s, g = (array[:, None, checked] for array in (written, sizes, generated))
+    one = np.ones(len(group))
+    factors = [one, -one, *_ratios(w[:, 0], g[:, 0], group)] if may_scale else [one]
+    best = Multiple(one, -1.0)
+    for factor in factors:
+        equal = agrees(w, s, factor[:, None, None] * g)[:, 0].all(axis=0)
+        share = _share(np.asarray(equal), g[:, 0])
         if share > best.share:
             best = Multiple(factor, share)
-        if best.share == 1.0:
+        if share == 1.0:
             break
     return best
 
 
 def _share(equal: Array, generated: Array) -> float:
-    """Return the share of entries that agree; zeros agree under any factor and say nothing."""
-    telling = np.any(np.abs(generated) > ABSOLUTE, axis=0)
+    """Return the share of entries that agree; zeros agree under any factor and do not count."""
+    nonzero = np.any(np.abs(generated) > ABSOLUTE, axis=0)
     if equal.all():
         return 1.0
-    if not telling.any():
-        return 0.0
-    return min(float(np.mean(equal[telling])), 0.999)
+    return min(float(np.mean(equal[nonzero])), 0.999) if nonzero.any() else 0.0
 
 
-def _ratios(hand: Array, generated: Array, group: Array) -> list[Array]:
+def _ratios(written: Array, generated: Array, group: Array) -> list[Array]:
     """Return the ratios of entries that do not vary within a group of states."""
     found: list[Array] = []
     if np.min(np.bincount(group)[group]) < 2:
         return found  # one state says nothing about a factor: any two numbers have one
-    for h, g in zip(hand.T, generated.T, strict=True):
-        if not (np.all(np.abs(g) > ABSOLUTE) and np.all(np.abs(h) > ABSOLUTE)):
-            continue
-        ratio = h / g
-        first = np.array([ratio[np.argmax(group == k)] for k in group])
-        if np.all(np.abs(ratio - first) <= OF_TERMS * np.abs(first)):
-            found.append(first)
+    for w, g in zip(written.T, generated.T, strict=True):
+        if np.all(np.abs(g) > ABSOLUTE) and np.all(np.abs(w) > ABSOLUTE):
+            ratio = w / g
+            first = np.array([ratio[np.argmax(group == k)] for k in group])
+            if np.all(np.abs(ratio - first) <= OF_TERMS * np.abs(first)):
+                found.append(first)
     return found

@@ -37,20 +37,20 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
-    """One product of vectors, and what it is multiplied by: numbers, attributes and rates."""
+class CollectedTerm:
+    """A product of vectors times a sum of factors: numbers, attributes and rates."""
 
     product: Scalar
-    terms: tuple[Scalar, ...]
+    factors: tuple[Scalar, ...]
 
     @property
     def expression(self) -> Scalar:
-        """The group as a formula."""
-        return self.product * sum_of(self.terms)
+        """The term as a formula."""
+        return self.product * sum_of(self.factors)
 
 
-def collected(expression: Scalar) -> tuple[Group, ...]:
-    """Return the groups whose sum is the expression."""
+def collected(expression: Scalar) -> tuple[CollectedTerm, ...]:
+    """Return the terms whose sum is the expression."""
     found: dict[Scalar, Scalar] = {}
     for term in _terms(expression):
         number, factors = split_coefficient(term)
@@ -59,12 +59,9 @@ def collected(expression: Scalar) -> tuple[Group, ...]:
         rest = sorted((item for item in factors if not isinstance(item, Dot)), key=repr)
         key = product_of(tuple(vectors)) if vectors else ONE
         found[key] = found.get(key, ZERO) + product_of((Number(number), *rest))
-    groups = []
-    for key, factor in found.items():
-        terms = factor.terms if isinstance(factor, Sum) else (factor,)
-        if terms != (ZERO,):
-            groups.append(Group(key, terms))
-    return tuple(groups)
+    sums = {key: factor.terms if isinstance(factor, Sum) else (factor,)
+            for key, factor in found.items()}  # fmt: skip
+    return tuple(CollectedTerm(key, factors) for key, factors in sums.items() if factors != (ZERO,))
 
 
 def _terms(expression: Scalar) -> Iterator[Scalar]:
@@ -123,7 +120,7 @@ def _paired(left: Vector, right: Vector) -> Scalar:
 
 
 def _order(vector: Vector) -> tuple[int, str]:
-    """Sort what is not turned first, then by the angle, so that like products meet."""
+    """Return a key: vectors without a rotation first, then by angle, so that like products meet."""
     if not isinstance(vector, Rotated):
         return 0, repr(vector)
     (angle,) = vector.rotation.coordinates
@@ -137,8 +134,8 @@ def perfect_square(terms: tuple[Scalar, ...]) -> tuple[Symbol, Symbol, Scalar] |
     mixed: dict[frozenset[Scalar], Scalar] = {}
     for term in terms:
         number, factors = split_coefficient(term)
-        rates = [f for f in factors if _is_rate(f)]
-        rest = product_of((Number(number), *(f for f in factors if not _is_rate(f))))
+        rates = [f for f in factors if is_rate(f)]
+        rest = product_of((Number(number), *(f for f in factors if not is_rate(f))))
         if len(rates) == 1 and isinstance(rates[0], Power) and isinstance(rates[0].base, Symbol):
             squares[rates[0].base] = rest
         elif len(rates) == 2:
@@ -152,6 +149,7 @@ def perfect_square(terms: tuple[Scalar, ...]) -> tuple[Symbol, Symbol, Scalar] |
     return (a, b, c) if matches else None
 
 
-def _is_rate(factor: Scalar) -> bool:
+def is_rate(factor: Scalar) -> bool:
+    """Return whether a factor is an angular velocity or a power of one."""
     base = factor.base if isinstance(factor, Power) else factor
     return isinstance(base, Symbol) and base.name.endswith("_dot")

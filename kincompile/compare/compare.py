@@ -1,11 +1,11 @@
 """Comparison of hand-derived formulas with the generated ones.
 
-reference   what the compiler derives, evaluated at random states        reference.py, states.py
-hand        what the author derives: formulas, arrays, functions         hand.py, hand_file.py
-match       rows, columns, signs, scales that conventions leave open     conventions.py, layouts.py
-agree       entry by entry: equal, equal on the manifold, different      agreement.py
-diagnose    what fault of the catalogue gives the numbers that differ    faults.py, diagnosis.py
-report      entries with verdicts, for people and for machines           report.py, pages.py
+generated   the formulas the compiler derives, evaluated at random states   reference.py, states.py
+written     the formulas of the author: texts, arrays, functions            written.py, hand_file.py
+match       rows, columns, signs, scales that conventions leave open        matching.py, layouts.py
+agree       entry by entry: equal, equal on the manifold, different         agreement.py
+diagnose    the fault of the catalogue that gives the numbers that differ   diagnosis.py, *fault*.py
+report      entries with verdicts, for people and for machines              report.py
 
 Equality is decided by numbers at a dozen random states, never by simplification.
 """
@@ -15,32 +15,36 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from kincompile.compare.agreement import agrees
-from kincompile.compare.conventions import Matcher, Matching, Scope, conventions_found
+from kincompile.compare.comparison import ComparedEntry, Diagnosis, Difference, Verdict
+from kincompile.compare.conventions import conventions_found
 from kincompile.compare.dependence import Dependence
-from kincompile.compare.diagnosis import Diagnostician, Differing
-from kincompile.compare.entries import Diagnosis, Difference, Entry, Verdict
-from kincompile.compare.hand import Hand, read_hand, vocabulary
-from kincompile.compare.hand_file import HandFile, read_hand_file
+from kincompile.compare.diagnosis import Diagnostician
+from kincompile.compare.hand_file import read_hand_file
 from kincompile.compare.layouts import expected_widths, usual_layout
+from kincompile.compare.matching import Matcher, Matching, Subject
 from kincompile.compare.reference import QUANTITIES, Reference
 from kincompile.compare.report import Report
-from kincompile.compare.states import States, given_states
+from kincompile.compare.states import given_states
+from kincompile.compare.written import read_written, vocabulary
 from kincompile.errors import InputError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from kincompile.compare.faults import Place
-    from kincompile.compare.reference import Block
-    from kincompile.compare.states import Array
+    from numpy.typing import ArrayLike
+
+    from kincompile.compare.joint_faults import Index
+    from kincompile.compare.reference import ConstraintBlock
+    from kincompile.compare.states import Array, States
+    from kincompile.compare.written import Written
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
@@ -49,17 +53,20 @@ UNEXPLAINED = "not in the catalogue"
 ON_MANIFOLD = 1e-8
 """Relative; the states on the manifold are themselves accurate to 1e-12 only."""
 
+Spot = tuple[str, int, int]
+"""A quantity, and row and column of one of its entries as written."""
+
 
 def compare(
     model: Mechanism | ConstraintSystem | Reference,
-    Phi: Any = None,
-    Phi_q: Any = None,
-    nu: Any = None,
-    gamma: Any = None,
+    Phi: object = None,
+    Phi_q: object = None,
+    nu: object = None,
+    gamma: object = None,
     *,
     constraint: str | None = None,
-    aliases: Mapping[str, Any] | None = None,
-    states: Mapping[str, Any] | None = None,
+    aliases: Mapping[str, object] | None = None,
+    states: Mapping[str, ArrayLike] | None = None,
 ) -> Report:
     r"""Compare hand-derived Phi, Phi_q, nu and gamma with the generated ones.
 
@@ -71,10 +78,10 @@ def compare(
     model
         The mechanism or system; a `Reference` made of it, where many are compared with one model.
     Phi, Phi_q, nu, gamma
-        What was derived by hand: text such as ``[[1, 0, 0.25*cos(phi3)], ...]``, nested lists of
+        Formulas derived by hand: text such as ``[[1, 0, 0.25*cos(phi3)], ...]``, nested lists of
         numbers, texts and SymPy expressions, a SymPy matrix, an array, or a function ``f(q, t)``
-        (of gamma ``f(q, q_dot, t)``), which may take the parameters p as a last argument. Parts
-        that were not derived are left out.
+        (of gamma ``f(q, q_dot, t)``), which may take the parameters p as a last argument. At
+        least one.
     constraint
         Name of the one constraint that is checked alone. Phi_q then has the columns of the whole
         system, or of the constraint's bodies, i before j.
@@ -101,7 +108,15 @@ def compare(
     given = {name: value for name, value in given.items() if value is not None}
     if not given:
         raise InputError(f"there is nothing to compare: give at least one of {listed(QUANTITIES)}.")
-    return _compared(reference, given, constraint, aliases or {}, states)
+    block = None if constraint is None else reference.block(constraint)
+    written = _read(reference, block, given, aliases or {}, at_states=states is not None)
+    if states is not None:
+        at = given_states(states, reference.system)
+    elif all(item.takes_parameters for item in written.values()):
+        at = reference.random
+    else:
+        at = reference.random.with_default_parameters(reference.defaults)
+    return _Comparer(Subject(reference, block, at), written).report()
 
 
 def compare_file(
@@ -131,89 +146,102 @@ def compare_file(
     ModelError, InputError
         As `compare` does; a message begins with the file and the line.
     """
-    file: HandFile = read_hand_file(Path(path))
+    file = read_hand_file(Path(path))
     reference = model if isinstance(model, Reference) else Reference(model)
-    chosen = file.constraint if constraint is None else constraint
-    where = f"{file.name}, "
-    return _compared(reference, file.quantities, chosen, file.aliases, None, where)
-
-
-def _compared(
-    reference: Reference,
-    given: Mapping[str, Any],
-    constraint: str | None,
-    aliases: Mapping[str, Any],
-    states: Mapping[str, Any] | None,
-    where: str = "",
-) -> Report:
+    constraint = file.constraint if constraint is None else constraint
     block = None if constraint is None else reference.block(constraint)
-    words = vocabulary(reference, aliases, where)
-    hands: dict[str, Hand] = {}
+    try:
+        written = _read(reference, block, file.quantities, file.aliases)
+    except InputError as error:
+        raise InputError([f"{file.name}, {problem}" for problem in error.problems]) from error
+    return _Comparer(Subject(reference, block, reference.random), written).report()
+
+
+def _read(
+    reference: Reference,
+    block: ConstraintBlock | None,
+    given: Mapping[str, object],
+    aliases: Mapping[str, object],
+    at_states: bool = False,
+) -> dict[str, Written]:
+    """Read all quantities, or raise all problems at once."""
+    words = vocabulary(reference, aliases)
+    written: dict[str, Written] = {}
     problems: list[str] = []
     for name in QUANTITIES:
         if name in given:
             try:
-                hands[name] = read_hand(
-                    name, given[name], words, reference, at_states=states is not None, where=where
-                )
-                problems += _shape_problems(name, hands[name], reference, block, where)
+                written[name] = read_written(name, given[name], words, reference, at_states)
+                problems += _shape_problems(name, written[name], reference, block)
             except InputError as error:
                 problems += error.problems
     if problems:
         raise InputError(problems)
-    scope = Scope(reference, block, _chosen_states(reference, hands, states))
-    return _Comparison(scope, hands).report()
+    return written
 
 
 def _shape_problems(
-    name: str, hand: Hand, reference: Reference, block: Block | None, where: str
+    name: str, written: Written, reference: Reference, block: ConstraintBlock | None
 ) -> list[str]:
-    rows, columns = hand.shape
-    names = reference.equations
-    if block is not None:
-        names = block.constraint.equation_names
+    rows, columns = written.shape
+    names = reference.equations if block is None else block.constraint.equation_names
     found = []
     if rows != len(names):
         found.append(
-            f"{where}{name} has {rows} rows; expected {len(names)}, one for each of: "
-            f"{listed(names, 60)}"
+            f"{name} has {rows} rows; expected {len(names)}, one for each of: {listed(names, 60)}"
         )
     if name == "Phi_q" and usual_layout(reference, block, columns) is None:
         widths = expected_widths(reference, block)
-        found.append(f"{where}Phi_q has {columns} columns; expected {widths}")
+        found.append(f"Phi_q has {columns} columns; expected {widths}")
     if name != "Phi_q" and columns != 1:
-        found.append(f"{where}{name} has {columns} columns; it is a vector: expected one")
+        found.append(f"{name} has {columns} columns; it is a vector: expected one")
     return found
 
 
-def _chosen_states(
-    reference: Reference, hands: Mapping[str, Hand], states: Mapping[str, Any] | None
-) -> States:
-    if states is not None:
-        return given_states(states, reference.system)
-    if all(hand.takes_parameters for hand in hands.values()):
-        return reference.random
-    return reference.random.with_default_parameters(reference.defaults)
+class _Comparer:
+    """One comparison, from the matching to the report."""
 
-
-class _Comparison:
-    """One comparison under way."""
-
-    def __init__(self, scope: Scope, hands: Mapping[str, Hand]) -> None:
-        self._scope = scope
-        self._hands = hands
-        self._reference = scope.reference
-        self._matcher = Matcher(scope, hands)
-        self._take(self._matcher.match())
+    def __init__(self, subject: Subject, written: Mapping[str, Written]) -> None:
+        self._subject = subject
+        self._quantities = written
+        self._reference = subject.reference
+        self._matcher = Matcher(subject, written)
+        self._adopt(self._matcher.match())
         self._drop_doubtful_factors()
 
-    def _take(self, matching: Matching) -> None:
+    def _adopt(self, matching: Matching) -> None:
         """Compare under a matching."""
-        states = self._scope.states
         self._matching = matching
-        self._written = self._matcher.written(matching, states)
-        self._expected = self._matcher.expected(matching, states)
-        self._verdicts = {name: self._verdicts_of(name) for name in self._hands}
+        self._written = self._matcher.written(matching, self._subject.states)
+        self._expected = self._matcher.expected(matching, self._subject.states)
+        self._verdicts = {
+            spot: verdict for name in self._quantities for spot, verdict in self._judged(name)
+        }
+
+    def _judged(self, name: str) -> Iterator[tuple[Spot, Verdict]]:
+        """Yield the verdict of every entry that is compared, row by row."""
+        expected = self._expected[name]
+        equal = np.all(agrees(*self._written[name], expected), axis=0)
+        for row, columns in enumerate(equal):
+            is_plain = self._matching.is_plain(name, row)
+            right = Verdict.EQUAL if is_plain else Verdict.CONVENTION
+            for column, is_equal in enumerate(columns):
+                if not np.isnan(expected[:, row, column]).all():  # a column of the ground
+                    yield (name, row, column), right if is_equal else Verdict.DIFFERENT
+
+    def _wrong(self, block: ConstraintBlock | None = None) -> list[Spot]:
+        """Return the entries that are not right, of all constraints or of one."""
+        wrong = [spot for spot, verdict in self._verdicts.items() if not verdict.is_right]
+        return [spot for spot in wrong if block is None or self._index(spot)[0] in block.rows]
+
+    def _index(self, spot: Spot) -> Index:
+        """Return row and column in the system of an entry as written."""
+        name, row, column = spot
+        if name != "Phi_q":
+            return self._matching.rows[row], 0
+        system_column = self._matching.layout.columns[column]
+        assert system_column is not None
+        return self._matching.rows[row], system_column
 
     def _drop_doubtful_factors(self) -> None:
         """Prefer one fault in a constraint to a factor that explains its rows in part only.
@@ -221,206 +249,139 @@ class _Comparison:
         Blocks of two bodies that are swapped, for instance, have most entries right but for the
         sign: that is no row sign.
         """
-        usual = self._matching
-        for block in self._scope.blocks:
-            rows = [
-                row
-                for row, target in enumerate(usual.rows)
-                if self._scope.rows[target] in block.rows
-                and np.any(usual.factors[row] != 1)
-                and any(place[0] == row for name in self._hands for place in self._unequal(name))
-            ]
-            if not rows:
-                continue
+        for block in self._subject.blocks:
             before = self._matching
-            factors = before.factors.copy()
-            factors[rows] = 1.0
-            self._take(replace(before, factors=factors))
-            if not self._is_one_fault(block):
-                self._take(before)
+            rows = [row for row in {row for _, row, _ in self._wrong(block)}
+                    if np.any(before.factors[row] != 1)]  # fmt: skip
+            if rows:
+                factors = before.factors.copy()
+                factors[rows] = 1.0
+                self._adopt(replace(before, factors=factors))
+                if not self._is_one_fault(block):
+                    self._adopt(before)
 
-    def _is_one_fault(self, block: Block) -> bool:
+    def _is_one_fault(self, block: ConstraintBlock) -> bool:
         """Return whether one fault explains all that differs in the Jacobian of a constraint."""
-        own = {
-            self._target("Phi_q", *place): self._plain("Phi_q", *place)
-            for place in (self._unequal("Phi_q") if "Phi_q" in self._hands else [])
-            if self._target("Phi_q", *place)[0] in block.rows
-        }
-        diagnostician = _diagnostician(self._reference, self._scope.states)
-        differing = Differing("Phi_q", own)
-        return bool(own) and diagnostician.is_one_fault(block, differing, self._exchanged(block))
+        spots = [spot for spot in self._wrong(block) if spot[0] == "Phi_q"]
+        return bool(spots) and self._diagnostician.is_one_fault(
+            block, "Phi_q", self._in_system_terms(spots), self._is_exchanged(block)
+        )
 
-    def _exchanged(self, block: Block) -> bool:
-        first = self._scope.rows[0]
-        return self._matching.exchanged.issuperset(row - first for row in block.rows)
+    def _is_exchanged(self, block: ConstraintBlock) -> bool:
+        return self._matching.exchanged.issuperset(block.rows)
+
+    def _in_system_terms(self, spots: Sequence[Spot]) -> dict[Index, Array]:
+        """Return written entries of a quantity by place, with the conventions taken out."""
+        units = self._matching.units.column_factors(self._reference)
+        values = {}
+        for spot in spots:
+            name, row, column = spot
+            place = self._index(spot)
+            scale = self._matching.factors[row] * self._matching.sign(name)
+            if name == "Phi_q":
+                scale = scale * units[place[1]]
+            values[place] = self._written[name][0][:, row, column] / scale
+        return values
 
     def report(self) -> Report:
         """Return the outcome."""
         self._find_equal_on_manifold()
         diagnoses = self._diagnoses()
-        block = self._scope.block
-        names = [self._reference.equations[row] for row in self._scope.rows]
-        entries = [
-            self._entry(name, row, column, verdict, diagnoses.get((name, row, column), ()))
-            for name, verdicts in self._verdicts.items()
-            for (row, column), verdict in verdicts.items()
-        ]
+        block = self._subject.block
         return Report(
             self._reference.system.name,
             None if block is None else block.constraint.name,
-            tuple(entries),
-            conventions_found(self._matching, names),
+            tuple(self._entry(spot, diagnoses.get(spot, ())) for spot in self._verdicts),
+            tuple(conventions_found(self._matching, self._reference.equations)),
         )
 
-    def _verdicts_of(self, name: str) -> dict[tuple[int, int], Verdict]:
-        """Return the verdict of every entry that is compared, row by row."""
-        values, sizes = self._written[name]
-        expected = self._expected[name]
-        equal = np.asarray(agrees(values, sizes, expected).all(axis=0))
-        verdicts = {}
-        for row, column in np.ndindex(equal.shape):
-            if np.isnan(expected[:, row, column]).all():
-                continue  # a column of the ground
-            verdict = Verdict.DIFFERENT
-            if equal[row, column]:
-                plain = self._matching.is_plain(name, row)
-                verdict = Verdict.EQUAL if plain else Verdict.CONVENTION
-            verdicts[row, column] = verdict
-        return verdicts
-
-    def _unequal(self, name: str) -> list[tuple[int, int]]:
-        right = (Verdict.EQUAL, Verdict.CONVENTION)
-        return [place for place, verdict in self._verdicts[name].items() if verdict not in right]
-
-    def _target(self, name: str, row: int, column: int) -> Place:
-        """Return row and column in the system of an entry as written."""
-        system_row = self._scope.rows[self._matching.rows[row]]
-        if name != "Phi_q":
-            return system_row, 0
-        system_column = self._matching.layout.columns[column]
-        assert system_column is not None
-        return system_row, system_column
-
     def _find_equal_on_manifold(self) -> None:
-        """Look again at what differs, at states at which the constraint holds.
+        """Compare the entries that differ once more, at states at which the constraint holds.
 
         The constraint alone comes first; an entry may also need the other constraints to hold.
-        Phi itself is zero there, whatever it is.
+        Phi itself is zero there, right or wrong.
         """
-        open_entries = {name: self._unequal(name) for name in self._hands if name != "Phi"}
-        if not any(open_entries.values()) or not all(
-            hand.takes_states for hand in self._hands.values()
-        ):
+        if not all(item.takes_states for item in self._quantities.values()):
             return
-        for block in self._blocks_of(open_entries):
-            for rows in (block.rows, range(len(self._reference.equations))):
-                states = self._reference.consistent(self._scope.states, list(rows))
+        for block in self._subject.blocks:
+            spots = [spot for spot in self._wrong(block) if spot[0] != "Phi"]
+            for rows in (block.rows, range(len(self._reference.equations))) if spots else ():
+                states = self._reference.consistent(self._subject.states, rows)
                 if states is not None:
-                    self._compare_on_manifold(states, block, open_entries)
+                    self._compare_on_manifold(states, spots)
 
-    def _blocks_of(self, entries: Mapping[str, list[tuple[int, int]]]) -> list[Block]:
-        rows = {
-            self._target(name, *place)[0] for name, places in entries.items() for place in places
-        }
-        return [block for block in self._scope.blocks if rows.intersection(block.rows)]
-
-    def _compare_on_manifold(
-        self, states: States, block: Block, entries: Mapping[str, list[tuple[int, int]]]
-    ) -> None:
+    def _compare_on_manifold(self, states: States, spots: Sequence[Spot]) -> None:
         written = self._matcher.written(self._matching, states)
         expected = self._matcher.expected(self._matching, states)
-        for name, places in entries.items():
-            for row, column in places:
-                if self._target(name, row, column)[0] not in block.rows:
-                    continue
-                # What vanishes on the manifold is measured by its size elsewhere.
-                size = np.max(np.abs(self._expected[name][:, row, column]))
-                values, sizes = (item[:, row, column] for item in written[name])
-                off = np.abs(values - expected[name][:, row, column])
-                if np.all(off <= ON_MANIFOLD * (size + np.max(sizes))):
-                    self._verdicts[name][row, column] = Verdict.MANIFOLD
+        for name, row, column in spots:
+            # A value that vanishes on the manifold is measured by its size elsewhere.
+            size = np.max(np.abs(self._expected[name][:, row, column]))
+            values, sizes = (item[:, row, column] for item in written[name])
+            off = np.abs(values - expected[name][:, row, column])
+            if np.all(off <= ON_MANIFOLD * (size + np.max(sizes))):
+                self._verdicts[name, row, column] = Verdict.MANIFOLD
 
-    def _diagnoses(self) -> dict[tuple[str, int, int], tuple[Diagnosis, ...]]:
-        """Return what explains every entry that is not equal."""
-        diagnostician = _diagnostician(self._reference, self._scope.states)
-        found: dict[tuple[str, int, int], tuple[Diagnosis, ...]] = {}
-        for name in self._hands:
-            places = {self._target(name, *place): place for place in self._unequal(name)}
-            for block in self._scope.blocks:
-                own = {target: place for target, place in places.items() if target[0] in block.rows}
-                if not own:
-                    continue
-                values = {target: self._plain(name, *place) for target, place in own.items()}
-                differing = Differing(name, values)
-                explained = diagnostician.explain(block, differing, self._exchanged(block))
-                for target, diagnoses in explained.items():
-                    found[name, *own[target]] = diagnoses or self._unexplained(name, *own[target])
+    def _diagnoses(self) -> dict[Spot, tuple[Diagnosis, ...]]:
+        """Return the explanations of every entry that is not right."""
+        found: dict[Spot, tuple[Diagnosis, ...]] = {}
+        for block in self._subject.blocks:
+            wrong = self._wrong(block)
+            for name in dict.fromkeys(name for name, _, _ in wrong):
+                spots = [spot for spot in wrong if spot[0] == name]
+                explained = self._diagnostician.explain(
+                    block, name, self._in_system_terms(spots), self._is_exchanged(block)
+                )
+                for spot in spots:
+                    found[spot] = explained[self._index(spot)] or (self._unexplained(spot),)
         return found
 
-    def _plain(self, name: str, row: int, column: int) -> Array:
-        """Return what is written in an entry with the conventions taken out."""
-        values = self._written[name][0][:, row, column]
-        scale = self._matching.factors[row] * self._matching.sign(name)
-        if name == "Phi_q":
-            target = self._target(name, row, column)[1]
-            scale = scale * self._matching.units.column_factors(self._reference)[target]
-        return np.asarray(values / scale)
-
-    def _unexplained(self, name: str, row: int, column: int) -> tuple[Diagnosis, ...]:
-        if not self._hands[name].takes_states:
-            return (Diagnosis(UNEXPLAINED, "no fault of the catalogue fits."),)
-        return (Diagnosis(UNEXPLAINED, self._dependence.text(name, row, column)),)
+    def _unexplained(self, spot: Spot) -> Diagnosis:
+        if self._quantities[spot[0]].takes_states:
+            return Diagnosis(UNEXPLAINED, self._dependence.explanation(*spot))
+        return Diagnosis(UNEXPLAINED, "no fault of the catalogue fits.")
 
     @cached_property
     def _dependence(self) -> Dependence:
-        return Dependence(
-            self._reference,
-            self._scope.states,
-            lambda states: {
-                name: values
-                for name, (values, _) in self._matcher.written(self._matching, states).items()
-            },
-            lambda states: self._matcher.expected(self._matching, states),
-        )
+        def evaluate(states: States) -> tuple[dict[str, Array], dict[str, Array]]:
+            written = self._matcher.written(self._matching, states)
+            values = {name: item for name, (item, _) in written.items()}
+            return values, self._matcher.expected(self._matching, states)
 
-    def _entry(
-        self,
-        name: str,
-        row: int,
-        column: int,
-        verdict: Verdict,
-        diagnoses: tuple[Diagnosis, ...],
-    ) -> Entry:
-        system_row, system_column = self._target(name, row, column)
-        right = verdict in (Verdict.EQUAL, Verdict.CONVENTION)
-        return Entry(
+        return Dependence(self._reference, self._subject.states, evaluate)
+
+    @cached_property
+    def _diagnostician(self) -> Diagnostician:
+        """The catalogue of faults, kept where many are compared with one model."""
+        if self._subject.states is not self._reference.random:
+            return Diagnostician(self._reference, self._subject.states)
+        if self._reference not in _DIAGNOSTICIANS:
+            found = Diagnostician(self._reference, self._subject.states)
+            _DIAGNOSTICIANS[self._reference] = found
+        return _DIAGNOSTICIANS[self._reference]
+
+    def _entry(self, spot: Spot, diagnoses: tuple[Diagnosis, ...]) -> ComparedEntry:
+        name, row, column = spot
+        system_row, system_column = self._index(spot)
+        verdict = self._verdicts[spot]
+        return ComparedEntry(
             name,
             self._reference.equations[system_row],
             self._reference.coordinates[system_column] if name == "Phi_q" else None,
             self._reference.text(name, system_row, system_column),
-            self._hands[name].texts[row][column],
+            self._quantities[name].texts[row][column],
             verdict,
             diagnoses,
-            None if right else self._difference(name, row, column),
+            None if verdict.is_right else self._difference(spot),
         )
 
-    def _difference(self, name: str, row: int, column: int) -> Difference:
+    def _difference(self, spot: Spot) -> Difference:
         """Return the state at which an entry differs the most."""
+        name, row, column = spot
         written = self._written[name][0][:, row, column]
         expected = self._expected[name][:, row, column]
-        off = np.nan_to_num(np.abs(written - expected), nan=np.inf, posinf=np.inf)
-        k = int(np.argmax(off))
-        named = self._reference.named(self._scope.states, k)
-        return Difference(named, float(expected[k]), float(written[k]))
+        k = int(np.argmax(np.nan_to_num(np.abs(written - expected), nan=np.inf, posinf=np.inf)))
+        state = self._reference.named(self._subject.states, k)
+        return Difference(state, float(expected[k]), float(written[k]))
 
 
 _DIAGNOSTICIANS: WeakKeyDictionary[Reference, Diagnostician] = WeakKeyDictionary()
-
-
-def _diagnostician(reference: Reference, states: States) -> Diagnostician:
-    """Return the catalogue of a reference, kept where many are compared with one model."""
-    if states is not reference.random:
-        return Diagnostician(reference, states)
-    if reference not in _DIAGNOSTICIANS:
-        _DIAGNOSTICIANS[reference] = Diagnostician(reference, states)
-    return _DIAGNOSTICIANS[reference]

@@ -1,4 +1,4 @@
-"""Which symbols a formula depends on, found by changing one symbol at a time."""
+"""The symbols that a formula depends on, found by changing one symbol at a time."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from kincompile.names import listed, rate
 if TYPE_CHECKING:
     from kincompile.compare.reference import Reference
 
-Evaluate = Callable[[States], Mapping[str, Array]]
-"""Gives quantities by name, (N, rows, columns) each."""
+Evaluate = Callable[[States], tuple[Mapping[str, Array], Mapping[str, Array]]]
+"""Gives the written and the right values by quantity, (N, rows, columns) each."""
 
 CHANGE = 1.17  # any factor will do that is no symmetry of a formula
 SAME = 1e-9
+_ORDERS = {2.0: "linear", 4.0: "quadratic"}
 
 
 class Dependence:
-    """What two sets of formulas, and their difference, depend on.
+    """The symbols that written and right formulas, and their differences, depend on.
 
     Parameters
     ----------
@@ -30,66 +31,54 @@ class Dependence:
         The system whose coordinates, rates and parameters are changed.
     states
         Where to evaluate.
-    written, expected
-        The formulas as written and as they should be.
+    evaluate
+        Gives the formulas as written and as they should be.
     """
 
-    def __init__(
-        self, reference: Reference, states: States, written: Evaluate, expected: Evaluate
-    ) -> None:
-        self._evaluate = (written, expected)
-        self._states = states
-        self._base = self._all(states)
-        self._changed: dict[str, list[Mapping[str, Array]]] = {}
+    def __init__(self, reference: Reference, states: States, evaluate: Evaluate) -> None:
+        self._evaluate = evaluate
+        base = self._with_difference(states)
+        self._changed: dict[str, list[dict[str, Array]]] = {}
         for name, changed in _changes(reference, states):
-            now = self._all(changed)
+            now = self._with_difference(changed)
             self._changed[name] = [
                 {quantity: _differs(one[quantity], other[quantity]) for quantity in one}
-                for one, other in zip(self._base, now, strict=True)
+                for one, other in zip(base, now, strict=True)
             ]
-        faster = self._all(replace(states, q_dot=2 * states.q_dot))[2]
-        self._ratio = {name: _ratio(faster[name], self._base[2][name]) for name in faster}
+        faster = self._with_difference(replace(states, q_dot=2 * states.q_dot))[2]
+        self._growth = {name: _ratio(faster[name], base[2][name]) for name in faster}
 
-    def _all(self, states: States) -> list[Mapping[str, Array]]:
-        """Evaluate what is written, what should be, and the difference."""
-        written, expected = (evaluate(states) for evaluate in self._evaluate)
-        difference = {name: written[name] - expected[name] for name in written}
-        return [written, expected, difference]
+    def _with_difference(self, states: States) -> list[Mapping[str, Array]]:
+        written, right = self._evaluate(states)
+        return [written, right, {name: written[name] - right[name] for name in written}]
 
-    def text(self, quantity: str, row: int, column: int) -> str:
-        """Say which symbols are missing or extra in an entry, and what the difference is like."""
-        hand, generated, difference = (
+    def explanation(self, quantity: str, row: int, column: int) -> str:
+        """Return which symbols are missing or extra in an entry, and how the difference varies."""
+        written, right, difference = (
             {name for name, found in self._changed.items() if found[k][quantity][row, column]}
             for k in range(3)
         )
-        parts = []
-        if generated - hand:
-            parts.append(f"missing: {listed(sorted(generated - hand))}")
-        if hand - generated:
-            parts.append(f"extra: {listed(sorted(hand - generated))}")
-        parts.append(
-            f"the difference depends on {listed(sorted(difference))}"
-            if difference
-            else "the difference is a constant number"
-        )
-        order = _ORDERS.get(round(float(self._ratio[quantity][row, column]), 6))
+        parts = ["no fault of the catalogue fits"]
+        if right - written:
+            parts.append(f"missing: {listed(sorted(right - written))}")
+        if written - right:
+            parts.append(f"extra: {listed(sorted(written - right))}")
+        depends = f"depends on {listed(sorted(difference))}"
+        parts.append(f"the difference {depends if difference else 'is a constant number'}")
+        order = _ORDERS.get(round(float(self._growth[quantity][row, column]), 6))
         if quantity == "gamma" and order:
             parts.append(f"it is {order} in the velocities")
-        return f"no fault of the catalogue fits; {'; '.join(parts)}."
-
-
-_ORDERS = {2.0: "linear", 4.0: "quadratic"}
+        return f"{'; '.join(parts)}."
 
 
 def _changes(reference: Reference, states: States) -> list[tuple[str, States]]:
-    """Return the states with one symbol changed, by its name."""
-    found = []
+    """Return the states with one symbol changed, each with the symbol's name."""
+    found = [("t", replace(states, t=CHANGE * states.t))]
     for k, name in enumerate(reference.coordinates):
         found.append((name, replace(states, q=_scaled(states.q, k))))
         found.append((rate(name), replace(states, q_dot=_scaled(states.q_dot, k))))
     for k, item in enumerate(reference.system.parameters):
         found.append((item.name, replace(states, p=_scaled(states.p, k))))
-    found.append(("t", replace(states, t=CHANGE * states.t)))
     return found
 
 
@@ -107,7 +96,7 @@ def _differs(one: Array, other: Array) -> Array:
 
 
 def _ratio(faster: Array, base: Array) -> Array:
-    """Return by what a difference grows at twice the velocities; NaN where it is not one number."""
+    """Return the growth of a difference at twice the velocities; NaN if it varies by state."""
     with np.errstate(all="ignore"):
         ratios = faster / base
     same = np.ptp(ratios, axis=0) <= 1e-6

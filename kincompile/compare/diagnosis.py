@@ -1,28 +1,29 @@
-"""What explains entries that differ: a look-up in the catalogue of faults, by numbers.
+"""Explanations of entries that differ: a look-up in the catalogue of faults, by numbers.
 
-A fault explains a set of entries where it gives the author's numbers in each of them. One fault
-that explains all the entries of a constraint that differ comes first; then faults that explain
-some. Explanations that give the same numbers cannot be told apart, and are all named.
+A fault explains a set of entries if it gives the author's numbers in each of them. One fault that
+explains all the entries of a constraint that differ comes first; then faults that explain some.
+Explanations that give the same numbers are equivalent, and are all named.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.compare.agreement import ABSOLUTE
-from kincompile.compare.elementary import entry_faults
-from kincompile.compare.entries import Diagnosis
-from kincompile.compare.faults import LEFT_ZERO, Fault, Place, VectorFaults
+from kincompile.compare.comparison import Diagnosis
+from kincompile.compare.entry_faults import entry_faults
+from kincompile.compare.fault import LEFT_ZERO
+from kincompile.compare.joint_faults import Index, JointFaults, NumericFault
 from kincompile.compare.vectors import with_roles_exchanged
 from kincompile.model.resolve import Joint
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
-    from kincompile.compare.reference import Block, Reference
+    from kincompile.compare.reference import ConstraintBlock, Reference
     from kincompile.compare.states import Array, States
 
 CLOSE = 1e-8
@@ -33,23 +34,11 @@ MOST_NAMED = 6
 
 ROUNDED_NUMBER = "rounded number"
 NOT_DEFINED = "not defined"
-
-
-@dataclass(frozen=True, slots=True)
-class Differing:
-    """Entries of one quantity of one constraint that differ.
-
-    Attributes
-    ----------
-    quantity
-        Phi, Phi_q, nu or gamma.
-    values
-        By row and column of the system, what the author has there, with the conventions taken
-        out: comparable to the generated values as they are, shape (N,).
-    """
-
-    quantity: str
-    values: Mapping[Place, Array]
+_NOT_DEFINED = Diagnosis(
+    NOT_DEFINED,
+    "it has no finite value at some states where the right one has: it divides by zero, or "
+    "takes a root or logarithm of a negative number",
+)
 
 
 class Diagnostician:
@@ -66,84 +55,79 @@ class Diagnostician:
     def __init__(self, reference: Reference, states: States) -> None:
         self._reference = reference
         self._states = states
-        self._catalogues: dict[tuple[str, str, bool], list[Fault]] = {}
-        self._entries: dict[tuple[str, Place], list[Fault]] = {}
+        self._catalogues: dict[tuple[str, str, bool], list[NumericFault]] = {}
+        self._entries: dict[tuple[str, Index], list[NumericFault]] = {}
         self._generated = reference.values(states)
 
     def explain(
-        self, block: Block, differing: Differing, exchanged: bool = False
-    ) -> dict[Place, tuple[Diagnosis, ...]]:
-        """Return the explanations of every entry.
+        self, block: ConstraintBlock, quantity: str, written: Mapping[Index, Array], exchanged: bool
+    ) -> dict[Index, tuple[Diagnosis, ...]]:
+        """Return the explanations of every entry of a constraint that differs.
 
         Parameters
         ----------
         block
             The constraint.
-        differing
-            What differs in it.
+        quantity
+            Phi, Phi_q, nu or gamma.
+        written
+            Values by row and column of the system, shape (N,), with the author's conventions taken
+            out: comparable to the generated values as they are.
         exchanged
             Whether its author has the roles of bodies i and j exchanged.
         """
-        left = dict(differing.values)
-        found: dict[Place, tuple[Diagnosis, ...]] = {}
-        catalogue = self._catalogue(block, differing.quantity, exchanged)
+        left = {place: values for place, values in written.items() if np.isfinite(values).all()}
+        found: dict[Index, tuple[Diagnosis, ...]] = {}
+        found |= dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
+        catalogue = list(self._catalogue(block, quantity, exchanged))
         for place in left:
-            if not np.isfinite(left[place]).all():
-                found[place] = (_not_defined(),)
-        left = {place: values for place, values in left.items() if place not in found}
-        for place in left:
-            catalogue = [*catalogue, *self._entry_catalogue(differing.quantity, place)]
-        while left:
-            fitting = [fault for fault in catalogue if _fits(fault, left)]
-            if not fitting:
-                break
-            most = max(len(fault.values) for fault in fitting)
-            best = [fault for fault in fitting if len(fault.values) == most]
-            places = set(best[0].values)
-            same = [fault for fault in best if set(fault.values) == places]
-            named = _named(same)
-            found.update(dict.fromkeys(places, named))
-            left = {place: values for place, values in left.items() if place not in places}
+            catalogue += self._entry_catalogue(quantity, place)
+        while fitting := [fault for fault in catalogue if _fits(fault, left)]:
+            places = max(fitting, key=lambda fault: len(fault.result)).result.keys()
+            named = _named(fault for fault in fitting if fault.result.keys() == places)
+            for place in places:
+                del left[place]
+                found[place] = named
         for place, values in left.items():
-            found[place] = self._one_entry(differing.quantity, place, values, catalogue)
+            found[place] = self._one_entry(quantity, place, values, catalogue)
         return found
 
-    def is_one_fault(self, block: Block, differing: Differing, exchanged: bool) -> bool:
-        """Return whether a single fault in vectors explains all the entries."""
-        catalogue = self._catalogue(block, differing.quantity, exchanged)
+    def is_one_fault(
+        self, block: ConstraintBlock, quantity: str, written: Mapping[Index, Array], exchanged: bool
+    ) -> bool:
+        """Return whether a single fault in vectors explains all the entries; see `explain`."""
         return any(
-            len(fault.values) == len(differing.values) and _fits(fault, differing.values)
-            for fault in catalogue
+            len(fault.result) == len(written) and _fits(fault, written)
+            for fault in self._catalogue(block, quantity, exchanged)
         )
 
-    def _catalogue(self, block: Block, quantity: str, exchanged: bool) -> list[Fault]:
+    def _catalogue(
+        self, block: ConstraintBlock, quantity: str, exchanged: bool
+    ) -> list[NumericFault]:
         """Return the faults in vectors of a constraint, by row and column of the system."""
-        joint = block.constraint
-        if not isinstance(joint, Joint):
+        joint = block.constraint if isinstance(block.constraint, Joint) else None
+        if joint is not None and exchanged:
+            joint = with_roles_exchanged(joint)
+        if joint is None:
             return []
         key = (joint.name, quantity, exchanged)
         if key not in self._catalogues:
-            other = with_roles_exchanged(joint) if exchanged else joint
-            assert other is not None
-            faults = VectorFaults(other, quantity, self._reference, self._states).faults()
-            placed = (self._placed(fault, other, block, quantity) for fault in faults)
-            self._catalogues[key] = [fault for fault in placed if fault.values]
+            numbers: dict[str | None, int] = {
+                name: k for k, name in enumerate(self._reference.coordinates)
+            }
+            columns = [numbers.get(name) for name in joint.columns]
+            self._catalogues[key] = []
+            for fault in JointFaults(joint, quantity, self._reference, self._states).faults():
+                result = {
+                    (block.rows[row], target): values
+                    for (row, column), values in fault.result.items()
+                    if (target := columns[column] if quantity == "Phi_q" else 0) is not None
+                }
+                if result:  # a fault in the columns of the ground alone does not show
+                    self._catalogues[key].append(replace(fault, result=result))
         return self._catalogues[key]
 
-    def _placed(self, fault: Fault, joint: Joint, block: Block, quantity: str) -> Fault:
-        """Return a fault by row and column of the system, without the columns of the ground."""
-        if quantity != "Phi_q":
-            values = {(block.rows[row], 0): item for (row, _), item in fault.values.items()}
-        else:
-            number = {name: k for k, name in enumerate(self._reference.coordinates)}
-            values = {
-                (block.rows[row], number[name]): item
-                for (row, column), item in fault.values.items()
-                if (name := joint.columns[column]) is not None
-            }
-        return Fault(fault.kind, fault.text, values, fault.detail)
-
-    def _entry_catalogue(self, quantity: str, place: Place) -> list[Fault]:
+    def _entry_catalogue(self, quantity: str, place: Index) -> list[NumericFault]:
         key = (quantity, place)
         if key not in self._entries:
             row, column = place
@@ -153,44 +137,33 @@ class Diagnostician:
         return self._entries[key]
 
     def _one_entry(
-        self, quantity: str, place: Place, values: Array, catalogue: list[Fault]
+        self, quantity: str, place: Index, values: Array, catalogue: list[NumericFault]
     ) -> tuple[Diagnosis, ...]:
         """Explain an entry alone: by a fault that should show elsewhere too, or not at all."""
-        partly = [
+        partly = _named(
             fault
             for fault in catalogue
-            if place in fault.values and _close(fault.values[place], values)
-        ]
+            if place in fault.result and _close(fault.result[place], values)
+        )
         if partly:
             return tuple(
-                Diagnosis(item.kind, f"{item.text} (in this entry alone)", item.detail)
-                for item in _named(partly)
+                replace(item, text=f"{item.text} (in this entry alone)") for item in partly
             )
         right = self._generated.of(quantity)[:, place[0], place[1]]
-        size = np.max(np.abs(right))
-        if size > ABSOLUTE and np.max(np.abs(values - right)) <= ROUNDED * size:
-            return (
-                Diagnosis(
-                    ROUNDED_NUMBER,
-                    f"it is right to {np.max(np.abs(values - right)) / size:.1e} of its size: a "
-                    "number was rounded; write more digits, or a formula",
-                ),
+        size, off = np.max(np.abs(right)), np.max(np.abs(values - right))
+        if size > ABSOLUTE and off <= ROUNDED * size:
+            text = (
+                f"it is right to {off / size:.1e} of its size: a number was rounded; write more "
+                "digits, or a formula"
             )
+            return (Diagnosis(ROUNDED_NUMBER, text),)
         return ()
 
 
-def _not_defined() -> Diagnosis:
-    text = (
-        "it has no finite value at some states where the right one has: it divides by zero, or "
-        "takes a root or logarithm of a negative number"
-    )
-    return Diagnosis(NOT_DEFINED, text)
-
-
-def _fits(fault: Fault, left: Mapping[Place, Array]) -> bool:
+def _fits(fault: NumericFault, left: Mapping[Index, Array]) -> bool:
     """Return whether a fault shows in entries that differ only, with the author's numbers."""
     return all(
-        place in left and _close(values, left[place]) for place, values in fault.values.items()
+        place in left and _close(values, left[place]) for place, values in fault.result.items()
     )
 
 
@@ -199,19 +172,15 @@ def _close(one: Array, other: Array) -> bool:
     return bool(np.max(np.abs(one - other)) <= CLOSE * size + ABSOLUTE)
 
 
-def _named(faults: list[Fault]) -> tuple[Diagnosis, ...]:
+def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
     """Return one diagnosis for each kind of fault, the first of its kind."""
-    by_kind: dict[str, Fault] = {}
+    by_kind: dict[str, NumericFault] = {}
     for fault in faults:
         by_kind.setdefault(fault.kind, fault)
-    if LEFT_ZERO in by_kind and all(np.all(v == 0) for v in by_kind[LEFT_ZERO].values.values()):
-        # Zero is what was written; that it would also follow from a term missing says no more.
+    if LEFT_ZERO in by_kind and not any(map(np.any, by_kind[LEFT_ZERO].result.values())):
+        # Zero was written. That a missing term would also give zero is no further explanation.
         by_kind = {LEFT_ZERO: by_kind[LEFT_ZERO]}
     return tuple(
-        Diagnosis(fault.kind, _sentence(fault.text), fault.detail)
+        Diagnosis(fault.kind, f"{fault.text}.", fault.detail)
         for fault in list(by_kind.values())[:MOST_NAMED]
     )
-
-
-def _sentence(text: str) -> str:
-    return f"{text}."

@@ -13,9 +13,9 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from kincompile.compare.matrix_text import Cell, Rows, split_matrix
 from kincompile.compare.reference import QUANTITIES
@@ -25,7 +25,7 @@ from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
 MAX_BYTES = 2_000_000
 _STATEMENT = re.compile(r"[ \t]*([A-Za-z_]\w*)[ \t]*=[ \t]*")
@@ -35,7 +35,7 @@ _QUOTES = ('"""', "'''", '"', "'")
 
 @dataclass(frozen=True, slots=True)
 class HandFile:
-    """What a hand file says, still as text.
+    """The content of a hand file, still as text.
 
     Attributes
     ----------
@@ -52,52 +52,53 @@ class HandFile:
     name: str
     quantities: Mapping[str, Rows]
     aliases: Mapping[str, Cell]
-    constraint: str | None = None
+    constraint: str | None
 
 
-@dataclass
 class _Draft:
-    """What has been read so far, and the problems found."""
+    """The part of a hand file that has been read, and the problems found."""
 
-    name: str
-    quantities: dict[str, Rows] = field(default_factory=dict)
-    aliases: dict[str, Cell] = field(default_factory=dict)
-    constraint: str | None = None
-    problems: list[str] = field(default_factory=list)
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._quantities: dict[str, Rows] = {}
+        self._aliases: dict[str, Cell] = {}
+        self._problems: list[str] = []
+        self.constraint: str | None = None
 
     def problem(self, place: Place, text: str) -> None:
-        self.problems.append(f"{self.name}, line {place.line}, column {place.column}: {text}")
+        """Add a problem."""
+        self._problems.append(f"{self._name}, line {place.line}, column {place.column}: {text}")
 
-    def add_matrix(self, name: str, text: str, place: Place) -> None:
-        """Add a quantity written as text."""
-        if name in self.quantities:
+    def add_matrix(self, name: str, value: str | Rows, place: Place) -> None:
+        """Add a quantity."""
+        if name in self._quantities:
             self.problem(place, f"{name} is given twice; keep one of them")
         try:
-            self.quantities[name] = split_matrix(text, place)
+            self._quantities[name] = split_matrix(value, place) if isinstance(value, str) else value
         except ExpressionError as error:
             self.problem(Place(error.line, error.column), f"{name}: {error.problem}")
 
     def add_alias(self, name: str, text: str, place: Place) -> None:
         """Add an alias."""
-        if name in self.aliases:
+        if name in self._aliases:
             self.problem(place, f"{name!r} is given twice; keep one of them")
-        self.aliases[name] = Cell(text, place)
+        self._aliases[name] = Cell(text, place)
 
     def unknown(self, name: str, place: Place) -> None:
-        """Report a key that means nothing."""
+        """Add the problem of a key that means nothing."""
         keys = (*QUANTITIES, "constraint", "aliases")
         hint = suggestion(name, keys)
         self.problem(place, f"there is no quantity {name!r}{hint}; expected: {listed(keys)}")
 
     def finished(self) -> HandFile:
         """Return the file, or raise all the problems at once."""
-        if not self.problems and not self.quantities:
+        if not self._problems and not self._quantities:
             self.problem(
                 Place(), f"the file compares nothing; give at least one of: {listed(QUANTITIES)}"
             )
-        if self.problems:
-            raise InputError(self.problems)
-        return HandFile(self.name, self.quantities, self.aliases, self.constraint)
+        if self._problems:
+            raise InputError(self._problems)
+        return HandFile(self._name, self._quantities, self._aliases, self.constraint)
 
 
 def read_hand_file(path: str | os.PathLike[str]) -> HandFile:
@@ -121,13 +122,17 @@ def read_hand_file(path: str | os.PathLike[str]) -> HandFile:
     suffix = file.suffix.lower()
     if suffix == ".json":
         return _from_data(file.name, text, _json(file.name, text))
-    if suffix == ".toml":
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            return _from_lines_or(file.name, text, str(error))
-        return _from_data(file.name, text, data)
-    return _from_lines(file.name, text)
+    if suffix != ".toml":
+        return _from_lines(file.name, text)
+    try:
+        return _from_data(file.name, text, tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        toml_problem = f"{file.name} is not TOML either: {error}"
+    # TOML forbids matrices without quotes, and people write them.
+    try:
+        return _from_lines(file.name, text)
+    except InputError as error:
+        raise InputError([*error.problems, toml_problem]) from error
 
 
 def _text(file: Path) -> str:
@@ -142,7 +147,7 @@ def _text(file: Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _json(name: str, text: str) -> Any:
+def _json(name: str, text: str) -> object:
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
@@ -154,76 +159,43 @@ def _json(name: str, text: str) -> Any:
         raise InputError(f"{name}: the file is nested too deeply.") from error
 
 
-def _from_lines_or(name: str, text: str, toml_problem: str) -> HandFile:
-    """Read matrices without quotes, which TOML forbids and people write."""
-    try:
-        return _from_lines(name, text)
-    except InputError as error:
-        raise InputError([*error.problems, f"{name} is not TOML either: {toml_problem}"]) from error
-
-
-def _from_lines(name: str, text: str) -> HandFile:
+def _from_lines(file: str, text: str) -> HandFile:
     """Read statements ``name = value``, each as many lines long as its brackets need."""
-    draft = _Draft(name)
-    for statement in _statements(text, draft):
-        if statement.name in QUANTITIES:
-            draft.add_matrix(statement.name, statement.value, statement.place)
-        elif statement.section is None and statement.name == "constraint":
-            draft.constraint = statement.value.strip()
-        elif statement.section != "aliases" and statement.value.lstrip().startswith("["):
-            draft.unknown(statement.name, statement.place)
-        else:
-            draft.add_alias(statement.name, statement.value.strip(), statement.place)
-    return draft.finished()
-
-
-@dataclass(frozen=True, slots=True)
-class _Statement:
-    section: str | None
-    name: str
-    value: str
-    place: Place
-
-
-def _statements(text: str, draft: _Draft) -> Iterator[_Statement]:
-    text = _without_comments(text)
+    draft = _Draft(file)
+    # Comments and quotes are blanked out, so that every offset stays.
+    text = re.sub(r"[#%][^\n]*", lambda found: " " * len(found[0]), text)
     section: str | None = None
     offset = 0
     while offset < len(text):
-        line_end = _line_end(text, offset)
-        if not text[offset:line_end].strip(" \t;"):
-            offset = line_end + 1
-        elif header := _SECTION.match(text, offset):
+        end = text.find("\n", offset)
+        line = text[offset : end if end >= 0 else None]
+        if header := _SECTION.match(text, offset):
             section = header[1]
             offset = header.end()
         elif found := _STATEMENT.match(text, offset):
-            start = found.end()
-            end = _value_end(text, start)
-            value = _without_quotes(text[start:end]).rstrip("; \t\n")
-            yield _Statement(section, found[1], value, _place(text, start))
-            offset = end
+            start, offset = found.end(), _value_end(text, found.end())
+            value = re.sub(r"[\"']", " ", text[start:offset]).rstrip("; \t\n")
+            _add_statement(draft, section, found[1], value, Place().after(text[:start]))
         else:
-            draft.problem(
-                _place(text, offset),
-                f"expected 'name = value', found {text[offset:line_end].strip()[:40]!r}; names are "
-                f"{listed(QUANTITIES)}, and your own for aliases",
-            )
-            offset = line_end + 1
+            if line.strip(" \t;"):
+                draft.problem(
+                    Place().after(text[:offset]),
+                    f"expected 'name = value', found {line.strip()[:40]!r}; names are "
+                    f"{listed(QUANTITIES)}, and your own for aliases",
+                )
+            offset += len(line) + 1
+    return draft.finished()
 
 
-def _without_comments(text: str) -> str:
-    """Blank out what follows # or %, keeping every offset."""
-    return re.sub(r"[#%][^\n]*", lambda found: " " * len(found[0]), text)
-
-
-def _without_quotes(value: str) -> str:
-    """Blank out quotes, keeping every offset."""
-    return re.sub(r"[\"']", " ", value)
-
-
-def _line_end(text: str, offset: int) -> int:
-    end = text.find("\n", offset)
-    return len(text) if end < 0 else end
+def _add_statement(draft: _Draft, section: str | None, name: str, value: str, place: Place) -> None:
+    if name in QUANTITIES:
+        draft.add_matrix(name, value, place)
+    elif section is None and name == "constraint":
+        draft.constraint = value.strip()
+    elif section != "aliases" and value.lstrip().startswith("["):
+        draft.unknown(name, place)
+    else:
+        draft.add_alias(name, value.strip(), place)
 
 
 def _value_end(text: str, start: int) -> int:
@@ -243,16 +215,11 @@ def _value_end(text: str, start: int) -> int:
     return len(text)
 
 
-def _place(text: str, offset: int) -> Place:
-    before = text[:offset]
-    return Place(before.count("\n") + 1, offset - (before.rfind("\n") + 1) + 1)
-
-
-def _from_data(name: str, text: str, data: Any) -> HandFile:
-    """Take the values of TOML or JSON; a text is found again in the file for its place."""
-    draft = _Draft(name)
+def _from_data(file: str, text: str, data: object) -> HandFile:
+    """Read the values of TOML or JSON; a text is found again in the file for its place."""
+    draft = _Draft(file)
     if not isinstance(data, dict):
-        raise InputError(f"{name}: expected names and values, not {type(data).__name__}.")
+        raise InputError(f"{file}: expected names and values, not {type(data).__name__}.")
     for key, value in data.items():
         locate = _Locator(text, key)
         if key in QUANTITIES:
@@ -261,40 +228,33 @@ def _from_data(name: str, text: str, data: Any) -> HandFile:
             draft.constraint = value
         elif key == "aliases" and isinstance(value, dict):
             for alias, expression in value.items():
-                inner = _Locator(text, alias)
-                draft.add_alias(alias, str(expression), inner.place(str(expression)))
+                written = str(expression)
+                draft.add_alias(alias, written, _Locator(text, alias).place(written))
         else:
             draft.unknown(key, locate.place(""))
     return draft.finished()
 
 
-def _add_data(draft: _Draft, name: str, value: Any, locate: _Locator) -> None:
+def _add_data(draft: _Draft, name: str, value: object, locate: _Locator) -> None:
+    """Add a quantity given as a text, as a list of rows that are texts, or as lists of elements."""
     if isinstance(value, str):
         draft.add_matrix(name, value, locate.place(value))
         return
     rows = value if isinstance(value, list) else [value]
-    if not any(isinstance(row, list) for row in rows):
-        if any(isinstance(row, str) and row.strip().startswith("[") for row in rows):
-            # A list of rows, each a text of its own.
-            draft.add_matrix(name, "[" + ",\n".join(map(str, rows)) + "]", locate.place(""))
-            return
-        rows = [[row] for row in rows]
+    is_flat = not any(isinstance(row, list) for row in rows)
+    if is_flat and any(isinstance(row, str) and row.strip().startswith("[") for row in rows):
+        draft.add_matrix(name, "[" + ",\n".join(map(str, rows)) + "]", locate.place(""))
+        return
     cells = []
     for row in rows:
         elements = row if isinstance(row, list) else [row]
-        wrong = [item for item in elements if not _is_element(item)]
-        if wrong:
-            draft.problem(
-                locate.place(""),
-                f"{name}: {wrong[0]!r} is not an element; expected a number or a text",
-            )
-            return
+        for item in elements:
+            if not isinstance(item, str | int | float) or isinstance(item, bool):
+                text = f"{name}: {item!r} is not an element; expected a number or a text"
+                draft.problem(locate.place(""), text)
+                return
         cells.append(tuple(Cell(str(item), locate.place(str(item))) for item in elements))
-    draft.quantities[name] = tuple(cells)
-
-
-def _is_element(item: Any) -> bool:
-    return isinstance(item, str | int | float) and not isinstance(item, bool)
+    draft.add_matrix(name, tuple(cells), locate.place(""))
 
 
 class _Locator:
@@ -306,8 +266,8 @@ class _Locator:
         self._cursor = found.end() if found else 0
 
     def place(self, fragment: str) -> Place:
-        """Return where a fragment begins; where it is written differently, the last place."""
+        """Return where a fragment begins; the last place if it is not found."""
         found = self._text.find(fragment, self._cursor) if fragment else -1
         if found >= 0:
             self._cursor = found
-        return _place(self._text, self._cursor)
+        return Place().after(self._text[: self._cursor])

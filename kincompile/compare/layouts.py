@@ -6,43 +6,48 @@ from dataclasses import dataclass
 from itertools import permutations
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
-    from kincompile.compare.reference import Block, Reference
+    from kincompile.compare.reference import ConstraintBlock, Reference
+    from kincompile.compare.states import Array
 
 Columns = tuple[int | None, ...]
 _MOST_PERMUTED = 5  # 120 orders; with more bodies only the reversed order is tried
+_WITH_GROUND = "columns of the ground are present (they are not checked)"
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Which generated column each hand-written column is; None where it belongs to the ground.
+    """The generated column of each hand-written column; None where it belongs to the ground.
 
-    `convention` says in words how this differs from the order of the system, "" where it does not.
+    `convention` is the difference from the order of the system in words, "" where there is none.
     """
 
     columns: Columns
     convention: str = ""
 
+    def arranged(self, values: Array) -> Array:
+        """Return values by column of the system, (..., n), in this order; NaN for the ground."""
+        last = np.full((*values.shape[:-1], 1), np.nan)
+        order = [-1 if column is None else column for column in self.columns]
+        return np.concatenate([values, last], axis=-1)[..., order]
 
-def usual_layout(reference: Reference, block: Block | None, width: int) -> Layout | None:
+
+def usual_layout(reference: Reference, block: ConstraintBlock | None, width: int) -> Layout | None:
     """Return the layout of the system's own order for a matrix of a width, None where none fits."""
     every = tuple(range(len(reference.coordinates)))
-    if width == len(every):
-        return Layout(every)
+    layouts = [Layout(every)]
     if block is not None:
-        own = tuple(column for column in block.columns if column is not None)
-        if width == len(own):
-            return Layout(own)
-        if width == len(block.columns):
-            return Layout(block.columns, _GROUND)
-    ground = _ground(reference)
-    if width == len(every) + len(ground) and ground:
-        return Layout((*ground, *every), _GROUND)
-    return None
+        layouts.append(Layout(tuple(column for column in block.columns if column is not None)))
+        layouts.append(Layout(block.columns, _WITH_GROUND))
+    if reference.system.bodies:
+        layouts.append(Layout((*_ground(reference), *every), _WITH_GROUND))
+    return next((layout for layout in layouts if len(layout.columns) == width), None)
 
 
 def _ground(reference: Reference) -> Columns:
@@ -50,54 +55,48 @@ def _ground(reference: Reference) -> Columns:
     return (None,) * len(next(iter(reference.system.body_columns), ()))
 
 
-_GROUND = "columns of the ground are present (they are not checked)"
-
-
-def expected_widths(reference: Reference, block: Block | None) -> str:
-    """Say how many columns a Jacobian may have."""
-    every = len(reference.coordinates)
-    names = listed(reference.coordinates, 60)
-    text = f"{every} columns, one for each of: {names}"
+def expected_widths(reference: Reference, block: ConstraintBlock | None) -> str:
+    """Return in words how many columns a Jacobian may have."""
+    every = reference.coordinates
+    text = f"{len(every)} columns, one for each of: {listed(every, 60)}"
     if block is not None:
-        own = [reference.coordinates[k] for k in block.columns if k is not None]
+        own = [every[k] for k in block.columns if k is not None]
         text += f"; or {len(own)}, those of the constraint: {listed(own)}"
     return text
 
 
 def other_layouts(reference: Reference, usual: Layout, row_count: int) -> Iterator[Layout]:
     """Yield layouts in other orders: of the bodies, of their coordinates, of the ground."""
-    groups, rest = _groups(reference, usual.columns)
-    ground = [group for group in groups if None in group]
-    bodies = [group for group in groups if group not in ground]
+    groups, rest = _split(reference, usual.columns)
+    bodies = [group for group in groups if None not in group]
+    ground = _ground(reference) if len(bodies) < len(groups) else ()
     seen = {usual.columns}
     for order in _orders(bodies):
-        for layout in _arranged(order, rest, moved=list(order) != bodies):
-            for columns in _with_ground(layout.columns, ground):
-                if columns not in seen:
-                    seen.add(columns)
-                    words = [layout.convention] if layout.convention else []
-                    yield Layout(columns, "; ".join([*words, *([_GROUND] if ground else [])]))
-    # One row alone cannot tell an order from a slip.
+        for words, columns in _arrangements(order, is_moved=list(order) != bodies):
+            for placed in _with_ground((*columns, *rest), ground):
+                if placed not in seen:
+                    seen.add(placed)
+                    text = [*words, _WITH_GROUND] if ground else words
+                    yield Layout(placed, "; ".join(text))
+    # One row alone cannot distinguish an order from a slip.
     if not groups and row_count > 1 and len(rest) <= _MOST_PERMUTED:
-        for columns in permutations(rest):
-            if columns not in seen:
-                yield Layout(columns, "the coordinates have another order")
+        for other in permutations(rest):
+            if other != usual.columns:
+                yield Layout(other, "the coordinates have another order")
 
 
-def _groups(reference: Reference, columns: Columns) -> tuple[list[Columns], Columns]:
+def _split(reference: Reference, columns: Columns) -> tuple[list[Columns], Columns]:
     """Return the columns of each body, ground included, and the other columns."""
-    of_bodies = reference.system.body_columns
-    starts: dict[int | None, int] = {own[0]: len(own) for own in of_bodies}
-    starts[None] = len(_ground(reference))
+    widths: dict[int | None, int] = {own[0]: len(own) for own in reference.system.body_columns}
+    widths[None] = len(_ground(reference))
     groups: list[Columns] = []
-    k = 0
-    while k < len(columns) and (width := starts.get(columns[k], 0)):
-        groups.append(columns[k : k + width])
-        k += width
-    return groups, columns[k:]
+    while columns and (width := widths.get(columns[0], 0)):
+        groups.append(columns[:width])
+        columns = columns[width:]
+    return groups, columns
 
 
-def _orders(bodies: list[Columns]) -> Iterator[tuple[Columns, ...]]:
+def _orders(bodies: Sequence[Columns]) -> Iterator[tuple[Columns, ...]]:
     if len(bodies) <= _MOST_PERMUTED:
         yield from permutations(bodies)
     else:
@@ -105,27 +104,22 @@ def _orders(bodies: list[Columns]) -> Iterator[tuple[Columns, ...]]:
         yield tuple(reversed(bodies))
 
 
-def _arranged(order: tuple[Columns, ...], rest: Columns, moved: bool) -> Iterator[Layout]:
-    """Yield the ways to write the coordinates of bodies in a given order."""
-    words = ["the bodies have another order"] if moved else []
-    by_kind = list(zip(*order, strict=True))
-    arrangements = {
-        "": [column for x, y, phi in order for column in (x, y, phi)],
-        "each body has its angle first": [c for x, y, phi in order for c in (phi, x, y)],
-        "all x come first, then all y, then all angles": [c for kind in by_kind for c in kind],
-        "the positions come first, then the angles": [
-            *(column for x, y, _ in order for column in (x, y)),
-            *(phi for _, _, phi in order),
-        ],
-    }
-    for text, columns in arrangements.items():
-        yield Layout((*columns, *rest), "; ".join([*words, *([text] if text else [])]))
+def _arrangements(
+    order: tuple[Columns, ...], is_moved: bool
+) -> Iterator[tuple[list[str], list[int | None]]]:
+    """Yield the ways to write the coordinates of bodies in a given order, each with its name."""
+    words = ["the bodies have another order"] if is_moved else []
+    yield words, [column for triple in order for column in triple]
+    angle_first = [column for x, y, phi in order for column in (phi, x, y)]
+    yield [*words, "each body has its angle first"], angle_first
+    by_kind = [column for kind in zip(*order, strict=True) for column in kind]
+    yield [*words, "all x come first, then all y, then all angles"], by_kind
+    positions = [column for triple in order for column in triple[:2]]
+    angles = [triple[2] for triple in order]
+    yield [*words, "the positions come first, then the angles"], [*positions, *angles]
 
 
-def _with_ground(columns: Columns, ground: list[Columns]) -> Iterator[Columns]:
+def _with_ground(columns: Columns, ground: Columns) -> Iterator[Columns]:
     """Yield the columns with those of the ground at every place between two bodies."""
-    if not ground:
-        yield columns
-        return
-    for k in range(0, len(columns) + 1, len(ground[0])):
-        yield (*columns[:k], *ground[0], *columns[k:])
+    for k in range(0, len(columns) + 1, len(ground)) if ground else (0,):
+        yield (*columns[:k], *ground, *columns[k:])

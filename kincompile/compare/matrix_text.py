@@ -1,14 +1,15 @@
 """A matrix as people write it, split into its elements, each with its place in the file.
 
 Nested lists (``[[1, 0], [0, 1]]``) and the rows of MATLAB (``[1 0; 0 1]``, rows also on lines of
-their own, ``...`` to continue one) are understood. The elements stay text: reading them is
-`safe_expressions`' task.
+their own, ``...`` to continue one) are understood. The elements stay text: `safe_expressions`
+reads them.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from kincompile.files.safe_expressions import ExpressionError, Place, unbalanced_bracket
@@ -28,6 +29,8 @@ class Cell:
 
 
 Rows = tuple[tuple[Cell, ...], ...]
+Span = tuple[int, int]
+"""Begin and end of a part of the text."""
 
 
 def split_matrix(text: str, place: Place) -> Rows:
@@ -45,129 +48,105 @@ def split_matrix(text: str, place: Place) -> Rows:
     ExpressionError
         If brackets do not match, or an element is missing.
     """
-    splitter = _Splitter(text, place)
-    unmatched = unbalanced_bracket(text)
-    if unmatched is not None:
-        raise splitter.error(*unmatched)
-    return splitter.rows()
+    return _Splitter(text, place).rows()
 
 
 class _Splitter:
-    """One text; spans are pairs of offsets into it."""
+    """A text to be split."""
 
     def __init__(self, text: str, place: Place) -> None:
-        # Same length, so that offsets stay: x.*y, x./y, x.^y of MATLAB; its continued lines.
-        self._text = re.sub(r"(?<![0-9])\.(?=[*/^])", " ", text)
-        self._text = re.sub(r"\.\.\.[ \t]*\n", lambda found: " " * len(found[0]), self._text)
         self._place = place
+        # Same length, so that offsets stay: x.*y, x./y, x.^y of MATLAB; its continued lines.
+        text = re.sub(r"(?<![0-9])\.(?=[*/^])", " ", text)
+        self._text = re.sub(r"\.\.\.[ \t]*\n", lambda found: " " * len(found[0]), text)
+        if unmatched := unbalanced_bracket(text):
+            raise self._error(*unmatched)
+        steps = ((character in "([") - (character in ")]") for character in text)
+        # Number of brackets open before each character, and at the end.
+        self._depth = list(accumulate(steps, initial=0))
 
     def rows(self) -> Rows:
-        inner = self._inner(self._trimmed(0, len(self._text)))
-        start, end = inner
+        start, end = self._inner((0, len(self._text)))
         if self._text.startswith("[", start):
-            spans = [self._inner(span) for span in self._nested(start, end)]
+            spans = [self._inner(span) for span in self._bracketed_rows(start, end)]
         else:
-            spans = self._split(start, end, self._ends_row)
+            spans = self._split((start, end), self._ends_row)
         return tuple(self._row(span) for span in spans)
 
-    def error(self, problem: str, offset: int) -> ExpressionError:
-        place = self._at(offset)
+    def _error(self, problem: str, offset: int) -> ExpressionError:
+        place = self._place.after(self._text[:offset])
         return ExpressionError(problem, place.line, place.column)
 
-    def _at(self, offset: int) -> Place:
-        before = self._text[:offset]
-        line = before.count("\n")
-        first = self._place.column if line == 0 else 1
-        return Place(self._place.line + line, offset - (before.rfind("\n") + 1) + first)
+    def _trimmed(self, span: Span) -> Span:
+        text = self._text[slice(*span)]
+        start = span[0] + len(text) - len(text.lstrip())
+        return start, max(start, span[0] + len(text.rstrip()))
 
-    def _trimmed(self, start: int, end: int) -> tuple[int, int]:
-        while start < end and self._text[start].isspace():
-            start += 1
-        while end > start and self._text[end - 1].isspace():
-            end -= 1
+    def _inner(self, span: Span) -> Span:
+        """Return a span without the brackets around it."""
+        start, end = self._trimmed(span)
+        if self._text.startswith("[", start) and self._after_bracket(start) == end:
+            return self._trimmed((start + 1, end - 1))
         return start, end
 
-    def _inner(self, span: tuple[int, int]) -> tuple[int, int]:
-        """Take off the brackets around a span."""
-        start, end = self._trimmed(*span)
-        if self._text.startswith("[", start) and self._closing(start) == end - 1:
-            return self._trimmed(start + 1, end - 1)
-        return start, end
+    def _after_bracket(self, start: int) -> int:
+        """Return the offset after the closing partner of a bracket."""
+        return self._depth.index(self._depth[start], start + 1)
 
-    def _closing(self, start: int) -> int:
-        depth = 0
-        for k in range(start, len(self._text)):
-            depth += (self._text[k] in "([") - (self._text[k] in ")]")
-            if depth == 0:
-                return k
-        raise AssertionError("brackets were balanced before")
-
-    def _nested(self, start: int, end: int) -> list[tuple[int, int]]:
-        """Return the bracketed rows of a nested list."""
+    def _bracketed_rows(self, start: int, end: int) -> list[Span]:
+        """Return the rows of a nested list."""
         spans = []
-        k = start
-        while k < end:
-            if self._text[k] == "[":
-                close = self._closing(k)
-                spans.append((k, close + 1))
-                k = close
-            elif not (self._text[k].isspace() or self._text[k] in ",;"):
-                raise self.error(
-                    f"found {self._text[k]!r}, where the next row in brackets was expected", k
+        while start < end:
+            if self._text[start] == "[":
+                spans.append((start, self._after_bracket(start)))
+                start = spans[-1][1]
+            elif self._text[start].isspace() or self._text[start] in ",;":
+                start += 1
+            else:
+                found = self._text[start]
+                raise self._error(
+                    f"found {found!r}, where the next row in brackets was expected", start
                 )
-            k += 1
         return spans
 
-    def _row(self, span: tuple[int, int]) -> tuple[Cell, ...]:
-        start, end = span
-        spans = self._split(start, end, self._is_comma)
+    def _row(self, span: Span) -> tuple[Cell, ...]:
+        spans = self._split(span, lambda k, _: self._text[k] == ",")
         if len(spans) == 1:
-            spans = self._split(*spans[0], self._separates)
-        return tuple(self._cell(*item) for item in spans)
+            spans = self._split(spans[0], self._separates)
+        return tuple(self._cell(self._trimmed(item)) for item in spans)
 
-    def _cell(self, start: int, end: int) -> Cell:
-        start, end = self._trimmed(start, end)
+    def _cell(self, span: Span) -> Cell:
+        start, end = span
         if start == end:
-            raise self.error("an element is missing here", start)
-        return Cell(self._text[start:end], self._at(start))
+            raise self._error("an element is missing here", start)
+        return Cell(self._text[start:end], self._place.after(self._text[:start]))
 
-    def _split(
-        self, start: int, end: int, is_end: Callable[[int, int], bool]
-    ) -> list[tuple[int, int]]:
-        """Split a span outside of brackets, where `is_end(offset, start)` says so."""
-        spans = []
-        depth, first = 0, start
+    def _split(self, span: Span, is_end: Callable[[int, int], bool]) -> list[Span]:
+        """Split a span outside of brackets, wherever `is_end(offset, start of the part)` holds."""
+        start, end = span
+        spans: list[Span] = []
+        level = self._depth[start]
         for k in range(start, end):
-            depth += (self._text[k] in "([") - (self._text[k] in ")]")
-            if depth == 0 and is_end(k, first):
-                spans.append((first, k))
-                first = k + 1
-        rest = self._trimmed(first, end)
-        if rest[0] < rest[1] or not spans:
-            spans.append((first, end))
+            if self._depth[k + 1] == level and is_end(k, start):
+                spans.append((start, k))
+                start = k + 1
+        if not spans or self._text[start:end].strip():
+            spans.append((start, end))
         return spans
-
-    def _is_comma(self, k: int, first: int) -> bool:
-        del first
-        return self._text[k] == ","
 
     def _ends_row(self, k: int, first: int) -> bool:
-        """Tell whether a row ends here: at a semicolon, or at a line end where it is complete."""
-        if self._text[k] == ";":
-            return True
+        """Return whether a row ends here: at a semicolon, or at a line end if it is complete."""
         before = self._text[first:k].strip()
-        return self._text[k] == "\n" and before != "" and before[-1] not in _OPERATORS + ",("
+        is_complete = before != "" and before[-1] not in _OPERATORS + ",("
+        return self._text[k] == ";" or (self._text[k] == "\n" and is_complete)
 
     def _separates(self, k: int, first: int) -> bool:
-        """Tell whether a blank separates two elements, by the rule of MATLAB.
+        """Return whether a blank separates two elements, by the rule of MATLAB.
 
         ``a - b`` and ``a-b`` are one element, ``a -b`` is two.
         """
-        if not self._text[k].isspace():
-            return False
         before, after = self._text[first:k].rstrip(), self._text[k + 1 :]
-        if not before or before[-1] in _OPERATORS or not after or after[0].isspace():
+        if not self._text[k].isspace() or not before or not after or after[0].isspace():
             return False
-        if after[0] in "*/^":
-            return False
-        return not (after[0] in "+-" and after[1:2].isspace())
+        is_sign = after[0] in "+-" and not after[1:2].isspace()
+        return before[-1] not in _OPERATORS and (after[0] not in _OPERATORS or is_sign)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
@@ -28,9 +28,8 @@ from kincompile.model.mechanism import system_of
 from kincompile.names import listed, rate, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    from kincompile.ir.graph import Node
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.system import ConstraintSystem
@@ -55,7 +54,7 @@ class Values:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class ConstraintBlock:
     """The rows and columns of one constraint; a column is None where it belongs to the ground."""
 
     constraint: Joint | FreeEquation
@@ -64,7 +63,7 @@ class Block:
 
 
 class Reference:
-    """What the compiler derives from a model, ready to be evaluated anywhere.
+    """The formulas that the compiler derives from a model, ready to be evaluated anywhere.
 
     Parameters
     ----------
@@ -84,15 +83,16 @@ class Reference:
         self.equations = self.system.equations
         self.angular = is_angular(self.system)
         self.defaults = default_parameters(self.system)
+        self._latest: tuple[States, Values] | None = None
         self._consistent: dict[tuple[int, ...], States | None] = {}
         self._texts: dict[tuple[str, int, int], str] = {}
 
     @cached_property
-    def blocks(self) -> tuple[Block, ...]:
+    def blocks(self) -> tuple[ConstraintBlock, ...]:
         """The blocks of the constraints, in order."""
         number = {name: k for k, name in enumerate(self.coordinates)}
         return tuple(
-            Block(
+            ConstraintBlock(
                 item,
                 tuple(range(first, first + len(item.equation_names))),
                 tuple(None if name is None else number[name] for name in item.columns),
@@ -100,28 +100,27 @@ class Reference:
             for first, item in zip(self.system.row_offsets, self.system.constraints, strict=True)
         )
 
-    def block(self, name: str) -> Block:
+    def block(self, name: str) -> ConstraintBlock:
         """Return the block of a constraint by its name."""
-        for block in self.blocks:
-            if block.constraint.name == name:
-                return block
-        names = [block.constraint.name for block in self.blocks]
-        raise InputError(
-            f"there is no constraint {name!r} in {self.system.name!r}{suggestion(name, names)}; "
-            f"constraints are: {listed(names, 40)}."
-        )
+        blocks = {block.constraint.name: block for block in self.blocks}
+        if name not in blocks:
+            raise InputError(
+                f"there is no constraint {name!r} in {self.system.name!r}"
+                f"{suggestion(name, blocks)}; constraints are: {listed(blocks, 40)}."
+            )
+        return blocks[name]
 
     @cached_property
-    def rows(self) -> list[Row]:
-        """The rows as SymPy expressions, for what people read."""
+    def _rows(self) -> list[Row]:
+        """The rows as SymPy expressions, which people read."""
         return assemble(self.system)
 
     def expression(self, quantity: str, row: int, column: int) -> sympy.Expr:
         """Return an entry as a SymPy expression."""
         if quantity == "Phi_q":
-            entry = self.rows[row].Phi_q.get(self.coordinates[column], sympy.Integer(0))
+            entry = self._rows[row].Phi_q.get(self.coordinates[column], 0)
         else:
-            entry = getattr(self.rows[row], quantity)
+            entry = getattr(self._rows[row], quantity)
         expression: sympy.Expr = sympy.sympify(entry)
         return expression
 
@@ -129,14 +128,16 @@ class Reference:
         """Return an entry as people type it."""
         key = (quantity, row, column)
         if key not in self._texts:
-            self._texts[key] = str(self.expression(quantity, row, column))
+            self._texts[key] = str(self.expression(*key))
         return self._texts[key]
 
     def values(self, states: States) -> Values:
-        """Evaluate the generated quantities."""
-        with np.errstate(all="ignore"):
-            found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
-        return Values(dict(zip(QUANTITIES, found, strict=True)))
+        """Evaluate the generated quantities; those of the latest states are kept."""
+        if self._latest is None or self._latest[0] is not states:
+            with np.errstate(all="ignore"):
+                found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
+            self._latest = states, Values(dict(zip(QUANTITIES, found, strict=True)))
+        return self._latest[1]
 
     @cached_property
     def random(self) -> States:
@@ -155,75 +156,61 @@ class Reference:
         Those near the random states are kept: many comparisons with one model need them.
         """
         if start is not self.random:
-            return self._moved_to_manifold(start, rows)
+            return self._on_manifold(start, list(rows))
         key = tuple(rows)
         if key not in self._consistent:
-            self._consistent[key] = self._moved_to_manifold(start, rows)
+            self._consistent[key] = self._on_manifold(start, list(rows))
         return self._consistent[key]
 
-    def _moved_to_manifold(self, start: States, rows: Sequence[int]) -> States | None:
-        chosen = list(rows)
-
+    def _on_manifold(self, start: States, rows: list[int]) -> States | None:
         def constraints(states: States) -> tuple[Array, Array, Array]:
             found = self.values(states)
-            Phi, Phi_q, nu = (found[name][:, chosen] for name in ("Phi", "Phi_q", "nu"))
+            Phi, Phi_q, nu = (found[name][:, rows] for name in ("Phi", "Phi_q", "nu"))
             return Phi, Phi_q, nu
 
         return consistent_states(start, constraints)
 
-    def compiled(self, expressions: Sequence[sympy.Expr]) -> Compiled:
-        """Prepare SymPy expressions of coordinates, rates, parameters and time for evaluation."""
+    def compiled(
+        self, expressions: Sequence[sympy.Expr]
+    ) -> Callable[[States], tuple[Array, Array]]:
+        """Prepare SymPy expressions of coordinates, rates, parameters and time for evaluation.
+
+        Returns
+        -------
+        callable
+            Gives, at states, the values and the sizes of their terms: the sum of the absolute
+            values of the terms on the topmost level. Both of shape (N, number of expressions).
+        """
         graph = Graph()
         convert = Converter(graph, graph.input).convert
-        terms = [
-            [convert(term) for term in sympy.Add.make_args(expression)]
-            for expression in expressions
-        ]
-        return Compiled(self, tuple(graph.nodes), terms)
+        terms = [[convert(term) for term in sympy.Add.make_args(item)] for item in expressions]
+
+        def evaluate(states: States) -> tuple[Array, Array]:
+            values, sizes = np.zeros((2, len(states), len(terms)))
+            with np.errstate(all="ignore"):
+                results = run(graph.nodes, self.inputs(states), self.program.tables)
+                for k, nodes in enumerate(terms):
+                    for node in nodes:
+                        values[:, k] += results[node]
+                        sizes[:, k] += np.abs(results[node])
+            return values, sizes
+
+        return evaluate
 
     def evaluate(self, expressions: Sequence[sympy.Expr], states: States) -> tuple[Array, Array]:
-        """Evaluate SymPy expressions once; see `Compiled.evaluate`."""
-        return self.compiled(expressions).evaluate(states)
+        """Evaluate SymPy expressions once; see `compiled`."""
+        return self.compiled(expressions)(states)
 
     def named(self, states: States, k: int) -> dict[str, float]:
         """Return one of the states as numbers by name."""
-        return {name: float(np.broadcast_to(value, len(states))[k])
-                for name, value in self.inputs(states).items()}  # fmt: skip
+        return {name: float(value[k]) for name, value in self.inputs(states).items()}
 
-    def inputs(self, states: States) -> dict[str, Any]:
+    def inputs(self, states: States) -> dict[str, Array]:
         """Return the values of coordinates, rates, parameters and t by name, (N,) each."""
-        inputs: dict[str, Any] = {"t": states.t}
+        inputs = {"t": states.t}
         for k, item in enumerate(self.system.parameters):
             inputs[item.name] = states.p[:, k]
         for k, name in enumerate(self.coordinates):
             inputs[name] = states.q[:, k]
             inputs[rate(name)] = states.q_dot[:, k]
         return inputs
-
-
-@dataclass(frozen=True, slots=True)
-class Compiled:
-    """SymPy expressions as straight-line code; `terms` are the nodes that each expression adds."""
-
-    reference: Reference
-    nodes: tuple[Node, ...]
-    terms: list[list[int]]
-
-    def evaluate(self, states: States) -> tuple[Array, Array]:
-        """Evaluate the expressions.
-
-        Returns
-        -------
-        tuple of arrays
-            Values, and the sizes of their terms: the sum of the absolute values of what is added
-            on the topmost level. Both of shape (N, number of expressions).
-        """
-        shape = (len(self.terms), len(states))
-        values, sizes = np.zeros(shape), np.zeros(shape)
-        with np.errstate(all="ignore"):
-            results = run(self.nodes, self.reference.inputs(states), self.reference.program.tables)
-            for k, nodes in enumerate(self.terms):
-                for node in nodes:
-                    values[k] += results[node]
-                    sizes[k] += np.abs(results[node])
-        return values.T, sizes.T

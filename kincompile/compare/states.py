@@ -8,7 +8,7 @@ coordinate, rate and parameter differs from zero and none is related to another.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,8 @@ from kincompile.names import listed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
 
     from kincompile.model.system import ConstraintSystem
 
@@ -48,20 +50,17 @@ class States:
 
     def take(self, chosen: Array) -> States:
         """Return some of the states."""
-        return States(*(item[chosen] for item in self._fields()))
-
-    def _fields(self) -> tuple[Array, ...]:
-        return self.q, self.q_dot, self.t, self.p, self.group
+        return States(*(item[chosen] for item in (self.q, self.q_dot, self.t, self.p, self.group)))
 
     def with_default_parameters(self, defaults: Array) -> States:
         """Return the same states, all with the parameters' default values."""
         p = np.broadcast_to(defaults, self.p.shape)
-        return States(self.q, self.q_dot, self.t, p, np.zeros_like(self.group))
+        return replace(self, p=p, group=np.zeros_like(self.group))
 
     def in_degrees(self, angular: Array) -> States:
         """Return the states with angles and their rates as numbers of degrees."""
         factor = np.where(angular, 180 / np.pi, 1.0)
-        return States(self.q * factor, self.q_dot * factor, self.t, self.p, self.group)
+        return replace(self, q=self.q * factor, q_dot=self.q_dot * factor)
 
 
 def is_angular(system: ConstraintSystem) -> Array:
@@ -82,7 +81,7 @@ def random_states(system: ConstraintSystem, is_usable: Callable[[States], Array]
     system
         The system; its guess gives the size of lengths.
     is_usable
-        Says of each state whether it can be used, shape (N,). Far from the guess a root or a
+        Returns for each state whether it can be used, shape (N,). Far from the guess a root or a
         logarithm may not exist; then states near the guess serve.
 
     Raises
@@ -92,7 +91,10 @@ def random_states(system: ConstraintSystem, is_usable: Callable[[States], Array]
     """
     wanted = GROUPS * STATES_PER_GROUP
     random = np.random.default_rng(SEED)
-    parameters = _random_parameters(system, random)
+    defaults = default_parameters(system)
+    factors = random.uniform(0.8, 1.25, (GROUPS, defaults.size))
+    # A parameter that is zero by default is not zero here.
+    parameters = np.where(defaults == 0, factors, factors * defaults)
     for spread in (1.0, 0.3, 0.05):
         states = _spread_states(system, parameters, random, 4 * wanted, spread)
         found = states.take(np.flatnonzero(is_usable(states)))
@@ -105,13 +107,6 @@ def random_states(system: ConstraintSystem, is_usable: Callable[[States], Array]
     )
 
 
-def _random_parameters(system: ConstraintSystem, random: np.random.Generator) -> Array:
-    """Return sets of parameters near their defaults; one whose default is zero is not zero here."""
-    defaults = default_parameters(system)
-    factors = random.uniform(0.8, 1.25, (GROUPS, defaults.size))
-    return np.asarray(np.where(defaults == 0, factors, factors * defaults))
-
-
 def _spread_states(
     system: ConstraintSystem,
     parameters: Array,
@@ -119,24 +114,24 @@ def _spread_states(
     count: int,
     spread: float,
 ) -> States:
+    """Return random states about zero, or about the guess where the spread is less than 1."""
     angular = is_angular(system)
     guess = np.array([item.guess for item in system.coordinates])
     size = size_of(angular, guess) or 1.0
-    scale = np.where(angular, 1.3, size)
-    shape = (count, guess.size)
-    q = spread * scale * _generic(random, shape) + (guess if spread < 1 else 0.0)
-    q_dot = np.where(angular, 1.0, size) * _generic(random, shape)
+
+    def generic() -> Array:
+        """Return numbers of size 0.4 to 1.6 and either sign."""
+        shape = (count, guess.size)
+        return np.asarray(random.uniform(0.4, 1.6, shape) * random.choice((-1.0, 1.0), shape))
+
+    q = spread * np.where(angular, 1.3, size) * generic() + (guess if spread < 1 else 0.0)
+    q_dot = np.where(angular, 1.0, size) * generic()
     t = system.end * random.uniform(0.1, 0.9, count)
     group = np.arange(count) % GROUPS
-    return States(q, q_dot, t, parameters[group], np.asarray(group))
+    return States(q, q_dot, t, parameters[group], group)
 
 
-def _generic(random: np.random.Generator, shape: tuple[int, int]) -> Array:
-    """Return numbers of size 0.4 to 1.6 and either sign."""
-    return np.asarray(random.uniform(0.4, 1.6, shape) * random.choice((-1.0, 1.0), shape))
-
-
-def given_states(given: Mapping[str, Any], system: ConstraintSystem) -> States:
+def given_states(given: Mapping[str, ArrayLike], system: ConstraintSystem) -> States:
     """Return states that the user gives.
 
     Parameters
@@ -152,22 +147,20 @@ def given_states(given: Mapping[str, Any], system: ConstraintSystem) -> States:
     InputError
         If a key is unknown, `q` is missing, a shape does not fit or a number is not finite.
     """
-    names = ("q", "q_dot", "t", "p")
-    unknown = [key for key in given if key not in names]
-    if unknown or "q" not in given:
+    n, defaults = len(system.coordinates), default_parameters(system)
+    values = {"q": np.zeros(n), "q_dot": np.zeros(n), "t": 0.0, "p": defaults, **given}
+    if len(values) > 4 or "q" not in given:
         raise InputError(
             f"states has {listed(given)}; give 'q', and where they matter 'q_dot', 't' and 'p'."
         )
-    n, defaults = len(system.coordinates), default_parameters(system)
-    q = np.atleast_2d(np.asarray(given["q"], dtype=float))
-    shapes = {"q": (len(q), n), "q_dot": (len(q), n), "t": (len(q),), "p": (len(q), defaults.size)}
-    values = {"q": q, "q_dot": np.zeros(n), "t": 0.0, "p": defaults, **given}
-    arrays = {name: _shaped(values[name], name, shapes[name]) for name in names}
+    count = len(np.atleast_2d(np.asarray(given["q"], dtype=float)))
+    shapes = {"q": (count, n), "q_dot": (count, n), "t": (count,), "p": (count, defaults.size)}
+    arrays = {name: _shaped(values[name], name, shape) for name, shape in shapes.items()}
     _, group = np.unique(arrays["p"], axis=0, return_inverse=True)
-    return States(**arrays, group=np.asarray(group).reshape(len(q)))
+    return States(**arrays, group=np.asarray(group).reshape(count))
 
 
-def _shaped(value: Any, name: str, shape: tuple[int, ...]) -> Array:
+def _shaped(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
     try:
         array = np.broadcast_to(np.asarray(value, dtype=float), shape)
     except (TypeError, ValueError):
@@ -192,7 +185,7 @@ def consistent_states(start: States, constraints: Linearised) -> States | None:
     Returns
     -------
     States or None
-        Those of the states that got there; None where fewer than two did.
+        The states for which this converged; None where fewer than two did.
     """
     states = start
     for _ in range(MAX_ITERATIONS):
@@ -201,18 +194,17 @@ def consistent_states(start: States, constraints: Linearised) -> States | None:
         length = np.sqrt(np.sum(step**2, axis=-1))
         longest = 1 + np.abs(states.q).max(axis=-1)
         step = step / np.maximum(1.0, length / longest)[:, None]
-        states = States(states.q - step, states.q_dot, states.t, states.p, states.group)
+        states = replace(states, q=states.q - step)
         if np.all(length <= 1e-14):
             break
     Phi, Phi_q, nu = constraints(states)
     rates = states.q_dot - _least_squares(Phi_q, _times(Phi_q, states.q_dot) - nu)
-    moved = States(states.q, rates, states.t, states.p, states.group)
     size = 1 + np.max(np.abs(Phi_q), axis=(-2, -1)) * (1 + np.max(np.abs(states.q), axis=-1))
-    off = np.max(np.abs(_times(Phi_q, rates) - nu), axis=-1)
-    reached = np.asarray(np.max(np.abs(Phi), axis=-1) <= ON_MANIFOLD * size)
-    reached &= off <= ON_MANIFOLD * (1 + np.max(np.abs(rates), axis=-1) * size)
-    chosen = np.flatnonzero(reached)
-    return moved.take(chosen) if len(chosen) >= 2 else None
+    residual = np.max(np.abs(_times(Phi_q, rates) - nu), axis=-1)
+    converged = np.max(np.abs(Phi), axis=-1) <= ON_MANIFOLD * size
+    converged &= residual <= ON_MANIFOLD * (1 + np.max(np.abs(rates), axis=-1) * size)
+    found = replace(states, q_dot=rates).take(np.flatnonzero(converged))
+    return found if len(found) >= 2 else None
 
 
 def _times(matrix: Array, vector: Array) -> Array:

@@ -1,20 +1,22 @@
 """A joint's formulas in vectors, evaluated in numbers: the leaves of an expansion are arrays.
 
-The walk is the compiler's own (`Expansion`); only what the leaves stand for differs. So a formula
-with a fault in it, written in vectors, gets its numbers in the same way as the right one.
+The expansion is the compiler's own (`Expansion`), with other leaves. So a formula with a fault in
+it, written in vectors, gets its numbers in the same way as the right one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import VectorSymbol
+from kincompile.compare.reference import Values
 from kincompile.derive.derivation import derive
 from kincompile.model.matrices import SymbolicEnvironment
+from kincompile.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
         Components,
         Expression,
         Profile,
+        Rotation,
         Symbol,
         TimeFunction,
         Value,
@@ -41,11 +44,11 @@ class Exchanged(VectorSymbol):
     __slots__ = ()
 
 
-class NumericEnvironment(SymbolicEnvironment):
+class NumericEnvironment:
     """The leaves of a joint's template as arrays over states."""
 
     def __init__(self, joint: Joint, reference: Reference, states: States) -> None:
-        super().__init__(joint)
+        self._symbolic = SymbolicEnvironment(joint)
         self._reference = reference
         self._states = states
 
@@ -63,21 +66,25 @@ class NumericEnvironment(SymbolicEnvironment):
 
     def symbol(self, symbol: Symbol) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
-        return self._number(super().symbol(symbol))
+        return self._number(self._symbolic.symbol(symbol))
 
     def vector(self, symbol: VectorSymbol) -> Components:
         """Return a position, a velocity or a body-fixed vector; its components may be exchanged."""
         plain = VectorSymbol(symbol.name, symbol.size)
-        components = tuple(self._number(item) for item in super().vector(plain))
+        components = tuple(self._number(item) for item in self._symbolic.vector(plain))
         return components[::-1] if isinstance(symbol, Exchanged) else components
 
     def time_function(self, function: TimeFunction) -> Value:
         """Return C(t) or one of its derivatives."""
-        return self._number(super().time_function(function))
+        return self._number(self._symbolic.time_function(function))
 
     def profile(self, profile: Profile) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
-        return self._number(super().profile(profile))
+        return self._number(self._symbolic.profile(profile))
+
+    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
+        """Return the numbers of a rotation that all vectors share."""
+        return expand.entries(rotation)
 
     def call(self, function: str, value: Value) -> Value:
         """Return an elementary function."""
@@ -85,7 +92,7 @@ class NumericEnvironment(SymbolicEnvironment):
 
 
 def numeric_expansion(joint: Joint, reference: Reference, states: States) -> Expansion:
-    """Return what expands expressions of a joint's template to arrays over states."""
+    """Return the expansion of a joint's template to arrays over states."""
     return Expansion(NumericEnvironment(joint, reference, states))
 
 
@@ -99,32 +106,19 @@ def column_values(columns: Iterable[Expression], expansion: Expansion) -> Array:
     return np.stack([component_values(column, expansion) for column in columns], axis=-1)
 
 
-@dataclass(frozen=True, slots=True)
-class JointValues:
-    """Phi, nu, gamma (N, rows) and Phi_q (N, rows, columns of the template) of one joint."""
-
-    Phi: Array
-    Phi_q: Array
-    nu: Array
-    gamma: Array
-
-
-def joint_values(joint: Joint, reference: Reference, states: States) -> JointValues:
+def joint_values(joint: Joint, reference: Reference, states: States) -> Values:
     """Evaluate a joint by itself."""
     expansion = numeric_expansion(joint, reference, states)
-    blocks = derive(joint.template)
-    Phi_q = [column_values(block.Phi_q, expansion) for block in blocks]
-    Phi, nu, gamma = (
-        np.concatenate(
-            [component_values(getattr(block, name), expansion) for block in blocks], axis=-1
-        )
-        for name in ("Phi", "nu", "gamma")
-    )
-    return JointValues(Phi, np.concatenate(Phi_q, axis=1), nu, gamma)
+    arrays = {}
+    for quantity in QUANTITIES:
+        formulas = [getattr(block, quantity.name) for block in derive(joint.template)]
+        values = column_values if quantity.is_matrix else component_values
+        arrays[quantity.name] = np.concatenate([values(item, expansion) for item in formulas], 1)
+    return Values(arrays)
 
 
 def with_roles_exchanged(joint: Joint) -> Joint | None:
-    """Return the joint with bodies i and j in each other's place, or None where that is none.
+    """Return the joint with bodies i and j in each other's place, or None if there is none.
 
     Every attribute of body i must have its counterpart on body j: an axis on body i alone makes
     the other order another type of joint.

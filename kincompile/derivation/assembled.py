@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.derivation.derivation_page import anchor, counted, is_number, row_range, table
 from kincompile.derivation.document import (
     Code,
     Display,
@@ -15,8 +14,11 @@ from kincompile.derivation.document import (
     Pattern,
     Section,
     Verbatim,
+    row_range,
+    table,
     text,
 )
+from kincompile.derivation.evaluation import anchor, is_number
 from kincompile.derivation.formulas import (
     DELTA_Q,
     GAMMA,
@@ -33,12 +35,13 @@ from kincompile.derivation.formulas import (
     decimals,
 )
 from kincompile.structure.report import gruebler
+from kincompile.tables import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from kincompile.derivation.derivation_page import Page
     from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.derivation.evaluation import Evaluation
     from kincompile.ir.inline import Entry
     from kincompile.runtime.newton import NewtonResult
 
@@ -56,32 +59,32 @@ MOST_COORDINATES = 12
 ITERATE_DIGITS = 10
 
 
-def assembled_section(page: Page) -> Section:
+def assembled_section(evaluation: Evaluation) -> Section:
     """Return the part of the page on the whole system."""
     parts = (
-        _offsets(page),
-        _pattern(page),
-        _mobility(page),
-        _vectors(page),
-        _jacobian(page),
-        _newton(page),
-        _rates(page),
+        _offsets(evaluation),
+        _pattern(evaluation),
+        _mobility(evaluation),
+        _vectors(evaluation),
+        _jacobian(evaluation),
+        _newton(evaluation),
+        _rates(evaluation),
     )
     return Section("assembled", ("The assembled system",), (), parts)
 
 
-def unknowns_section(page: Page) -> Section:
+def unknowns_section(evaluation: Evaluation) -> Section:
     """Return the coordinates and parameters, with the chosen state."""
-    values, q = page.situation.values, page.shown["q"]
+    values, q = evaluation.values, evaluation.shown["q"]
     rows: Rows = [
         (str(k), Verbatim(item.name), item.unit, _math(item.guess), _math(q[k]))
-        for k, item in enumerate(page.system.coordinates)
+        for k, item in enumerate(evaluation.system.coordinates)
     ]
     blocks: list[Block] = [table(("column", "coordinate", "unit", "guess", "chosen state"), rows)]
-    if page.system.parameters:
+    if evaluation.system.parameters:
         known: Rows = [
             (Verbatim(item.name), item.unit, _math(values[item.name]))
-            for item in page.system.parameters
+            for item in evaluation.system.parameters
         ]
         blocks.append(table(("parameter", "unit", "value"), known))
     return Section("unknowns", ("Coordinates and parameters",), tuple(blocks))
@@ -91,9 +94,12 @@ def _math(value: float, digits: int = 6) -> Math:
     return Math(Decimal(value, digits))
 
 
-def _offsets(page: Page) -> Section:
+def _offsets(evaluation: Evaluation) -> Section:
+    system = evaluation.system
     rows: Rows = []
-    for item, first in zip(page.system.constraints, page.system.row_offsets, strict=True):
+    for item, first in zip(
+        evaluation.system.constraints, evaluation.system.row_offsets, strict=True
+    ):
         count = len(item.equation_names)
         name = Link(f"constraint-{item.name}", Verbatim(item.name))
         rows.append((name, str(count), str(first), row_range(first, count), str(first + 1)))
@@ -105,7 +111,7 @@ def _offsets(page: Page) -> Section:
     header = ("constraint", "equations", "row offset", "rows from 0", "first row from 1")
     columns: Rows = [
         (Verbatim(body.name), str(own[0]), row_range(own[0], len(own)))
-        for body, own in zip(page.system.bodies, page.system.body_columns, strict=True)
+        for body, own in zip(system.bodies, system.body_columns, strict=True)
     ]
     blocks: list[Block] = [note, table(header, rows)]
     if columns:
@@ -113,26 +119,26 @@ def _offsets(page: Page) -> Section:
     return Section("offsets", ("Row and column offsets",), tuple(blocks), (), "expanded")
 
 
-def _pattern(page: Page) -> Section:
+def _pattern(evaluation: Evaluation) -> Section:
     entries = {
         (entry.row, entry.column): anchor("Phi_q", entry)
-        for section in page.situation.code.sections
+        for section in evaluation.code.sections
         for entry in section.entries["Phi_q"]
     }
-    counts = (len(item.equation_names) for item in page.system.constraints)
-    bands = tuple(zip(page.system.row_offsets, counts, strict=True))
-    m, n = len(page.equations), len(page.coordinates)
+    counts = (len(item.equation_names) for item in evaluation.system.constraints)
+    bands = tuple(zip(evaluation.system.row_offsets, counts, strict=True))
+    m, n = len(evaluation.system.equations), len(evaluation.coordinates)
     note = text(
         f"{len(entries)} of the {m} \N{MULTIPLICATION SIGN} {n} entries of ", Math(PHI_Q),
         " can differ from zero.",
     )  # fmt: skip
-    picture = Pattern(page.equations, tuple(page.coordinates), entries, bands)
+    picture = Pattern(evaluation.system.equations, tuple(evaluation.coordinates), entries, bands)
     title = ("The pattern of the Jacobian",)
     return Section("pattern", title, (note, picture), (), "expanded")
 
 
-def _mobility(page: Page) -> Section:
-    mobility = gruebler(page.system)
+def _mobility(evaluation: Evaluation) -> Section:
+    mobility = gruebler(evaluation.system)
     rows: Rows = [
         ("coordinates", f"3 \N{MULTIPLICATION SIGN} {mobility.bodies} + {mobility.others}",
          str(mobility.coordinates)),
@@ -142,75 +148,82 @@ def _mobility(page: Page) -> Section:
         ("left undriven", "", str(mobility.undriven)),
     ]  # fmt: skip
     blocks: list[Block] = [table(("what", "count", "number"), rows)]
-    if page.situation.problem:
-        blocks.append(text(page.situation.problem))
+    if evaluation.problem:
+        blocks.append(text(evaluation.problem))
     return Section("mobility", ("Mobility",), tuple(blocks))
 
 
-def _vectors(page: Page) -> Section:
+def _vectors(evaluation: Evaluation) -> Section:
     rows: Rows = []
-    for section in page.situation.code.sections:
+    for section in evaluation.code.sections:
         quantities = (section.entries[name] for name in ("Phi", "nu", "gamma"))
         for Phi, nu, gamma in zip(*quantities, strict=True):
-            row: list[Run | Runs] = [str(Phi.row), Verbatim(page.equations[Phi.row])]
+            row: list[Run | Runs] = [str(Phi.row), Verbatim(evaluation.system.equations[Phi.row])]
             for quantity, entry in (("Phi", Phi), ("nu", nu), ("gamma", gamma)):
-                shown = page.brief(quantity, entry)
-                row += [Link(anchor(quantity, entry), shown), _math(page.value(quantity, entry))]
+                shown = evaluation.brief(quantity, entry)
+                row += [
+                    Link(anchor(quantity, entry), shown),
+                    _math(evaluation.value(quantity, entry)),
+                ]
             rows.append(tuple(row))
     header: tuple[Run, ...] = (
         "row", "equation", Math(PHI), "number", Math(NU), "number", Math(GAMMA), "number",
     )  # fmt: skip
     title = ("The arrays ", Math(PHI), ", ", Math(NU), " and ", Math(GAMMA))
-    note = text(f"Numbers at {page.situation.origin}. Each formula leads to its derivation.")
+    note = text(f"Numbers at {evaluation.origin}. Each formula leads to its derivation.")
     return Section("arrays", title, (note, table(header, rows)), (), "expanded")
 
 
-def _jacobian(page: Page) -> Section:
+def _jacobian(evaluation: Evaluation) -> Section:
     found = {
         (entry.row, entry.column): entry
-        for section in page.situation.code.sections
+        for section in evaluation.code.sections
         for entry in section.entries["Phi_q"]
     }
-    is_wide = len(page.coordinates) > WIDEST_TABLE
-    entries = _listed_entries(page, found) if is_wide else _square_entries(page, found)
+    is_wide = len(evaluation.coordinates) > WIDEST_TABLE
+    entries = _listed_entries(evaluation, found) if is_wide else _square_entries(evaluation, found)
     note = text(
         "Each entry leads to its derivation, where its line in the emitted module stands. ",
-        f"Numbers at {page.situation.origin}.",
+        f"Numbers at {evaluation.origin}.",
     )
     check = Code("print(np.round(Phi_q(q, t, p), 6))")
     title = ("The Jacobian ", Math(PHI_Q))
     return Section("jacobian", title, (note, entries, check), (), "expanded")
 
 
-def _square_entries(page: Page, found: Mapping[tuple[int, int], Entry]) -> Block:
+def _square_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> Block:
     """Return the entries as a matrix with named rows and columns."""
     rows: Rows = []
-    for row, name in enumerate(page.equations):
+    for row, name in enumerate(evaluation.system.equations):
         line: list[Run | Runs] = [Verbatim(name)]
-        for column in range(len(page.coordinates)):
+        for column in range(len(evaluation.coordinates)):
             entry = found.get((row, column))
-            line.append("" if entry is None else _cell(page, entry))
+            line.append("" if entry is None else _cell(evaluation, entry))
         rows.append(tuple(line))
-    return table(("", *(Verbatim(name) for name in page.coordinates)), rows)
+    return table(("", *(Verbatim(name) for name in evaluation.coordinates)), rows)
 
 
-def _listed_entries(page: Page, found: Mapping[tuple[int, int], Entry]) -> Block:
+def _listed_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> Block:
     """Return the entries one below the other."""
     rows: Rows = [
-        (Verbatim(page.equations[row]), Verbatim(page.coordinates[column]), _cell(page, entry))
+        (
+            Verbatim(evaluation.system.equations[row]),
+            Verbatim(evaluation.coordinates[column]),
+            _cell(evaluation, entry),
+        )
         for (row, column), entry in found.items()
     ]
     return table(("row", "column", "entry"), rows)
 
 
-def _cell(page: Page, entry: Entry) -> Runs:
-    shown, number = page.brief("Phi_q", entry), _math(page.value("Phi_q", entry))
-    if is_number(page.expanded(entry)):
+def _cell(evaluation: Evaluation, entry: Entry) -> Runs:
+    shown, number = evaluation.brief("Phi_q", entry), _math(evaluation.value("Phi_q", entry))
+    if is_number(evaluation.expanded(entry)):
         return (Link(anchor("Phi_q", entry), shown),)
     return (Link(anchor("Phi_q", entry), shown), " = ", number)
 
 
-def _newton(page: Page) -> Section:
+def _newton(evaluation: Evaluation) -> Section:
     blocks: list[Block] = [
         text(
             "From the guess, each step solves ",
@@ -219,17 +232,17 @@ def _newton(page: Page) -> Section:
             "been applied.",
         )
     ]
-    result = page.situation.assembly
+    result = evaluation.assembly
     if result is None:
-        blocks.append(text(page.situation.problem))
+        blocks.append(text(evaluation.problem))
     else:
-        blocks += _iterations(page, result)
-        blocks += _first_step(page, result)
+        blocks += _iterations(evaluation, result)
+        blocks += _first_step(evaluation, result)
     return Section("newton", ("Position: Newton's method",), tuple(blocks), (), "numeric")
 
 
-def _iterations(page: Page, result: NewtonResult) -> Iterator[Block]:
-    names = page.coordinates if len(page.coordinates) <= MOST_COORDINATES else []
+def _iterations(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]:
+    names = evaluation.coordinates if len(evaluation.coordinates) <= MOST_COORDINATES else []
     rows: Rows = []
     for k, (q, residual) in enumerate(zip(result.iterates, result.residuals, strict=True)):
         correction = _math(result.corrections[k], 7) if k < len(result.corrections) else ""
@@ -241,18 +254,18 @@ def _iterations(page: Page, result: NewtonResult) -> Iterator[Block]:
     yield text(f"{counted(result.iterations, 'correction')}; the outcome: {outcome}.")
 
 
-def _first_step(page: Page, result: NewtonResult) -> Iterator[Block]:
+def _first_step(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]:
     """Yield the first correction with all its numbers."""
     if result.iterations == 0:
         return
-    situation, guess = page.situation, result.iterates[0]
-    Phi, Phi_q = situation.module.position(guess, situation.t, situation.p)
+    guess = result.iterates[0]
+    Phi, Phi_q = evaluation.module.position(guess, evaluation.t, evaluation.p)
     correction = result.iterates[1] - guess
     yield text("The first step in numbers:")
     if guess.size <= LARGEST_MATRIX:
         product = Row((decimals(Phi_q, 4), decimals(correction)))
         yield Display(Equated((Row((PHI_Q, DELTA_Q)), product, decimals(-Phi))))
-    columns = zip(page.coordinates, guess, correction, result.iterates[1], strict=True)
+    columns = zip(evaluation.coordinates, guess, correction, result.iterates[1], strict=True)
     rows: Rows = [
         (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
         for name, *values in columns
@@ -264,27 +277,27 @@ def _first_step(page: Page, result: NewtonResult) -> Iterator[Block]:
     )
 
 
-def _rates(page: Page) -> Section:
-    situation, shown = page.situation, page.shown
+def _rates(evaluation: Evaluation) -> Section:
+    shown = evaluation.shown
     title = ("Velocity and acceleration",)
-    if not situation.is_assembled:
-        note = text(f"Not solved: the numbers on this page are those of {situation.origin}.")
+    if not evaluation.is_assembled:
+        note = text(f"Not solved: the numbers on this page are those of {evaluation.origin}.")
         return Section("rates", title, (note,), (), "numeric")
     velocity = Equated((Row((PHI_Q, Q_DOT)), NU))
     acceleration = Equated((Row((PHI_Q, Q_DDOT)), GAMMA))
-    determinant = float(np.linalg.det(situation.Phi_q))
+    determinant = float(np.linalg.det(evaluation.Phi_q))
     rows: Rows = [
         (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
         for name, *values in zip(
-            page.coordinates, shown["q"], shown["q_dot"], shown["q_ddot"], strict=True
+            evaluation.coordinates, shown["q"], shown["q_dot"], shown["q_ddot"], strict=True
         )
     ]
     blocks: list[Block] = [
-        text("With ", Math(PHI_Q), f" at {situation.origin}, two linear solves give the rates:"),
+        text("With ", Math(PHI_Q), f" at {evaluation.origin}, two linear solves give the rates:"),
         Display(velocity),
         Display(acceleration),
     ]
-    if situation.q.size <= LARGEST_MATRIX:
+    if evaluation.q.size <= LARGEST_MATRIX:
         blocks += [
             Display(Equated((Row((decimals(shown["Phi_q"], 4), Q_DOT)), decimals(shown["nu"])))),
             Display(Equated((Q_DOT, decimals(shown["q_dot"])))),

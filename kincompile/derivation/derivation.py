@@ -1,7 +1,7 @@
 """`kc.derivation`: how Phi_q, nu and gamma of a mechanism follow from Phi, step by step.
 
 model     -> system()     ConstraintSystem  checked
-system    -> situation    Situation         the emitted module and a state, for the numbers
+system    -> evaluation   Evaluation        the emitted module at a state, for the numbers
 each type -> derive       RowBlock          the very blocks that are expanded into emitted code,
                                             with the rules that fired while they were derived
 blocks    -> sections     Derivation        the page as data
@@ -14,12 +14,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.assembled import assembled_section, unknowns_section
-from kincompile.derivation.derivation_page import Page, counted
 from kincompile.derivation.document import Document, Section
 from kincompile.derivation.equation_section import equation_section
+from kincompile.derivation.evaluation import Evaluation, evaluation
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
-from kincompile.derivation.situation import Situation, situation
 from kincompile.derivation.to_html import as_html
 from kincompile.derivation.to_latex import as_tex
 from kincompile.derivation.to_markdown import as_markdown
@@ -29,6 +28,7 @@ from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
 from kincompile.names import listed
+from kincompile.tables import counted
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -141,12 +141,11 @@ def derivation(
         If the state has unknown names, or the formulas have no finite values there.
     """
     system = system_of(model)
-    chosen = situation(system, state)
-    page = Page(chosen)
+    chosen = evaluation(system, state)
     sections = tuple(
-        joint_section(page, item, rows)
+        joint_section(chosen, item, rows)
         if isinstance(item, Joint)
-        else equation_section(page, item, rows)
+        else equation_section(chosen, item, rows)
         for item, rows in zip(system.constraints, chosen.code.sections, strict=True)
     )
     names: dict[Expression, Glyph] = {}
@@ -157,14 +156,14 @@ def derivation(
     return Derivation(
         system.name,
         _summary(chosen),
-        (unknowns_section(page), constraints, assembled_section(page)),
+        (unknowns_section(chosen), constraints, assembled_section(chosen)),
         names,
         chosen.source,
         _state_code(chosen),
     )
 
 
-def _summary(chosen: Situation) -> str:
+def _summary(chosen: Evaluation) -> str:
     system = chosen.system
     sizes = ", ".join(
         (
@@ -176,7 +175,7 @@ def _summary(chosen: Situation) -> str:
     return f"{sizes}; numbers at {chosen.origin}"
 
 
-def _state_code(chosen: Situation) -> str:
+def _state_code(chosen: Evaluation) -> str:
     """Return the state as Python code, exact to the last digit."""
     lines = [f"t = {chosen.t!r}"]
     for name, values in (("q", chosen.q), ("q_dot", chosen.q_dot), ("p", chosen.p)):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
     from kincompile.derivation.formulas import Formula, Glyph
@@ -196,3 +196,15 @@ def text(*runs: Run) -> Text:
 def cells(*items: Run | Runs) -> tuple[Runs, ...]:
     """Return a row of cells, each a run or several."""
     return tuple(item if isinstance(item, tuple) else (item,) for item in items)
+
+
+def table(
+    header: tuple[Run, ...], rows: Sequence[tuple[Run | Runs, ...]], folded: str = ""
+) -> Table:
+    """Return a table from runs."""
+    return Table(cells(*header), tuple(cells(*row) for row in rows), folded)
+
+
+def row_range(first: int, count: int) -> str:
+    """Return rows from a first one, for instance 3-4 with a dash."""
+    return str(first) if count == 1 else f"{first}\N{EN DASH}{first + count - 1}"

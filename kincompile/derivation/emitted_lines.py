@@ -1,4 +1,4 @@
-"""Where the emitted module computes each number: read off its syntax tree, in order of emission."""
+"""The lines of the emitted module that compute each entry, found in its syntax tree."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ if TYPE_CHECKING:
 
     from kincompile.ir.inline import Entry, InlineProgram
 
-Place = tuple[str, int, int]
+EntryKey = tuple[str, int, int]
 """A quantity, a row and a column; the column of a vector is 0."""
 
 
-def emitted_lines(code: InlineProgram, source: str) -> dict[Place, SourceLine]:
+def emitted_lines(code: InlineProgram, source: str) -> dict[EntryKey, SourceLine]:
     """Return the lines of the emitted module that compute each entry of Phi, Phi_q, nu and gamma.
 
-    Entries whose line cannot be told, in code that treats many constraints at once, are absent.
+    Entries without a line of their own, in code that treats many constraints at once, are absent.
     """
     tree = ast.parse(source)
     lines = source.splitlines()
     functions = {item.name: item for item in tree.body if isinstance(item, ast.FunctionDef)}
-    found: dict[Place, SourceLine] = {}
+    found: dict[EntryKey, SourceLine] = {}
     for kernel, computed in kernels().items():
-        if kernel == "kinematics":  # what the others compute once more
+        if kernel == "kinematics":  # repeats the others
             continue
         entries = {name: code.entries(name) for name in computed}
         if "Phi_q" in entries:
@@ -35,24 +35,24 @@ def emitted_lines(code: InlineProgram, source: str) -> dict[Place, SourceLine]:
             entries["Phi_q"] = [x for x in entries["Phi_q"] if code.number(x.node) is None]
         function = functions.get(f"_{kernel}")
         if function is not None:
-            places = [(name, x.row, x.column) for name, own in entries.items() for x in own]
-            found |= _lines(places, function, lines)
+            keys = [(name, x.row, x.column) for name, own in entries.items() for x in own]
+            found |= _lines(keys, function, lines)
     return found
 
 
 def _lines(
-    places: Sequence[Place], function: ast.FunctionDef, lines: Sequence[str]
-) -> dict[Place, SourceLine]:
+    keys: Sequence[EntryKey], function: ast.FunctionDef, lines: Sequence[str]
+) -> dict[EntryKey, SourceLine]:
     returned = function.body[-1]
     if not (isinstance(returned, ast.Return) and isinstance(returned.value, ast.Tuple)):
         return {}
     elements = returned.value.elts
-    if len(elements) != len(places):
+    if len(elements) != len(keys):
         return {}
     definitions = _definitions(function)
     return {
-        place: _source_line(element, definitions, lines)
-        for place, element in zip(places, elements, strict=True)
+        key: _source_line(element, definitions, lines)
+        for key, element in zip(keys, elements, strict=True)
     }
 
 
@@ -98,8 +98,8 @@ def _text(node: ast.stmt | ast.expr, lines: Sequence[str]) -> str:
     return " ".join(line.strip() for line in lines[node.lineno - 1 : last])
 
 
-def _constant_lines(tree: ast.Module, entries: Sequence[Entry]) -> dict[Place, SourceLine]:
-    """Return where the constant entries of Phi_q stand: the numbers of `_CONSTANTS`."""
+def _constant_lines(tree: ast.Module, entries: Sequence[Entry]) -> dict[EntryKey, SourceLine]:
+    """Return the lines of the constant entries of Phi_q: the numbers of `_CONSTANTS`."""
     for node in tree.body:
         match node:
             case ast.Assign([ast.Name("_CONSTANTS")], ast.Dict(keys, values)):

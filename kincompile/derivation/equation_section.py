@@ -2,88 +2,97 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.derivation.derivation_page import table
-from kincompile.derivation.document import Display, Math, Section, Verbatim, text
-from kincompile.derivation.formulas import GAMMA_TERMS, PHI_T, VELOCITY_TERM, Equated, Partial, Row
-from kincompile.derivation.rows_steps import (
-    expansion_step,
-    placement_step,
-    result_blocks,
-    state_table,
-    step,
-)
-from kincompile.derive.equations import derive_equation
+from kincompile.derivation.document import Display, Math, Section, Verbatim, table, text
+from kincompile.derivation.formulas import Equated, Partial
+from kincompile.derivation.steps import Steps
+from kincompile.derive.equations import EquationDerivatives, derive_equation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.derivation.derivation_page import Page
-    from kincompile.derivation.document import Block, Run, Runs
-    from kincompile.derivation.formulas import Formula
-    from kincompile.derive.equations import EquationDerivatives
+    from kincompile.derivation.document import Run, Runs
+    from kincompile.derivation.evaluation import Evaluation
+    from kincompile.derivation.formulas import Glyph
     from kincompile.ir.inline import Section as Rows
     from kincompile.model.resolve import FreeEquation
 
 
-def equation_section(page: Page, equation: FreeEquation, rows: Rows) -> Section:
+def equation_section(evaluation: Evaluation, equation: FreeEquation, rows: Rows) -> Section:
     """Return the derivation of a free equation."""
-    name = equation.name
     found = [derive_equation(item, equation.columns) for item in equation.expressions]
-    first = rows.instance.first_row
-    kind = "Free equation (driver) " if equation.is_driver else "Free equation "
-    return Section(
-        f"constraint-{name}",
-        (kind, Verbatim(name)),
-        (),
-        (
-            _coordinates_step(page, equation),
-            _constraint_step(page, name, found, first),
-            _rules_step(page, equation, found, first),
-            _rows_step(page, equation, found, first),
-            _nu_step(page, name, found, first),
-            _gamma_step(page, name, found, first),
-            expansion_step(page, name, rows),
-            placement_step(page, name, rows),
-            _numbers_step(page, equation, rows),
-        ),
+    steps = _EquationSteps(
+        evaluation, rows, equation.name, equation.columns, found, "expanded", equation
+    )
+    gammas = [block for k in range(len(found)) for block in steps.gamma_terms(k)]
+    return steps.section(
+        "Free equation",
+        equation.is_driver,
+        steps.coordinates(),
+        steps.constraint(),
+        steps.rules(),
+        steps.jacobian(),
+        steps.nu(),
+        steps.gamma(*gammas),
+        steps.expansion(),
+        steps.placement(),
+        steps.numbers(),
     )
 
 
-def _coordinates_step(page: Page, equation: FreeEquation) -> Section:
-    parameters = {item.name for item in page.system.parameters}
-    occurring = {str(symbol) for item in equation.expressions for symbol in item.free_symbols}
-    names: list[Run] = []
-    for name in (*equation.columns, *sorted(parameters & occurring)):
-        names += [", " if names else "", Verbatim(name)]
-    note = text("An equation in ", *names, ", and in time." if equation.is_driver else ".")
-    return step(equation.name, 1, "The equation and what occurs in it", "", note)
+@dataclass(frozen=True, slots=True)
+class _EquationSteps(Steps[EquationDerivatives]):
+    """The steps of a free equation, which SymPy has differentiated."""
 
+    equation: FreeEquation
 
-def _constraint_step(
-    page: Page, name: str, found: list[EquationDerivatives], first: int
-) -> Section:
-    lines = [
-        Display(Equated((page.symbol("Phi", first + k), item.Phi, sympy.Integer(0))))
-        for k, item in enumerate(found)
-    ]
-    return step(name, 2, "The constraint", "expanded", *lines)
+    def symbol(self, letter: str, k: int) -> Glyph:
+        return self.evaluation.symbol(letter, self.rows.instance.first_row + k)
 
+    def _partial(self, k: int, name: str) -> Partial:
+        return Partial(self.symbol("Phi", k), sympy.Symbol(name))
 
-def _rules_step(
-    page: Page, equation: FreeEquation, found: list[EquationDerivatives], first: int
-) -> Section:
-    rows: list[tuple[Run | Runs, ...]] = []
-    for k, item in enumerate(found):
-        for name in equation.columns:
-            label = Math(Partial(page.symbol("Phi", first + k), sympy.Symbol(name)))
-            rows += [(label, *line) for line in _term_lines(item.Phi, name)]
-    note = text("The sum rule first: each term by itself, with the product and chain rule in it.")
-    header = ("derivative", "of the term", "gives")
-    return step(equation.name, 3, "The rules used", "expanded", note, table(header, rows))
+    def coordinates(self) -> Section:
+        parameters = {item.name for item in self.evaluation.system.parameters}
+        expressions = self.equation.expressions
+        occurring = {str(symbol) for item in expressions for symbol in item.free_symbols}
+        names: list[Run] = []
+        for name in (*self.columns, *sorted(parameters & occurring)):
+            names += [", " if names else "", Verbatim(name)]
+        end = ", and in time." if self.equation.is_driver else "."
+        note = text("An equation in ", *names, end)
+        return self.step(1, "The equation and what occurs in it", note, level="")
+
+    def constraint(self) -> Section:
+        lines = [
+            Display(Equated((self.symbol("Phi", k), item.Phi, sympy.Integer(0))))
+            for k, item in enumerate(self.derivatives)
+        ]
+        return self.step(2, "The constraint", *lines)
+
+    def rules(self) -> Section:
+        rows: list[tuple[Run | Runs, ...]] = []
+        for k, item in enumerate(self.derivatives):
+            for name in self.columns:
+                label = Math(self._partial(k, name))
+                rows += [(label, *line) for line in _term_lines(item.Phi, name)]
+        note = text(
+            "The sum rule first: each term by itself, with the product and chain rule in it."
+        )
+        header = ("derivative", "of the term", "gives")
+        return self.step(3, "The rules used", note, table(header, rows))
+
+    def jacobian(self) -> Section:
+        lines = [
+            Display(Equated((self._partial(k, name), entry)))
+            for k, item in enumerate(self.derivatives)
+            for name, entry in zip(self.columns, item.Phi_q, strict=True)
+        ]
+        return self.step(4, "The rows of the Jacobian", *lines)
 
 
 def _term_lines(expression: sympy.Expr, name: str) -> Iterator[tuple[Run, Run]]:
@@ -91,45 +100,3 @@ def _term_lines(expression: sympy.Expr, name: str) -> Iterator[tuple[Run, Run]]:
     for term in sympy.Add.make_args(expression):
         if term.has(symbol):
             yield Math(term), Math(term.diff(symbol))
-
-
-def _rows_step(
-    page: Page, equation: FreeEquation, found: list[EquationDerivatives], first: int
-) -> Section:
-    blocks: list[Block] = []
-    for k, item in enumerate(found):
-        for name, entry in zip(equation.columns, item.Phi_q, strict=True):
-            symbol = Partial(page.symbol("Phi", first + k), sympy.Symbol(name))
-            blocks.append(Display(Equated((symbol, entry))))
-    return step(equation.name, 4, "The rows of the Jacobian", "expanded", *blocks)
-
-
-def _nu_step(page: Page, name: str, found: list[EquationDerivatives], first: int) -> Section:
-    lines = [
-        Display(Equated((page.symbol("nu", first + k), Row(("-", PHI_T)), item.nu)))
-        for k, item in enumerate(found)
-    ]
-    return step(name, 5, "The right side of the velocity equation", "expanded", *lines)
-
-
-def _gamma_step(page: Page, name: str, found: list[EquationDerivatives], first: int) -> Section:
-    blocks: list[Block] = []
-    for k, item in enumerate(found):
-        terms: list[tuple[Formula, Formula]] = [(VELOCITY_TERM, item.velocity)]
-        terms += zip(GAMMA_TERMS, item.gamma_terms, strict=True)
-        terms.append((page.symbol("gamma", first + k), item.gamma))
-        blocks += [Display(Equated(pair)) for pair in terms]
-    title = "The right side of the acceleration equation, term by term"
-    return step(name, 6, title, "expanded", *blocks)
-
-
-def _numbers_step(page: Page, equation: FreeEquation, rows: Rows) -> Section:
-    return step(
-        equation.name,
-        9,
-        "In numbers",
-        "numeric",
-        text(f"At {page.situation.origin}:"),
-        state_table(page, list(equation.columns)),
-        *result_blocks(page, equation.name, rows),
-    )

@@ -5,117 +5,197 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 import sympy
 
+from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
-from kincompile.derivation.derivation_page import table
-from kincompile.derivation.document import Display, Math, Section, Text, Verbatim, text
+from kincompile.derivation.document import Display, Math, Section, Verbatim, table, text
 from kincompile.derivation.formulas import (
     GAMMA_TERMS,
+    PHI_Q,
     PHI_T,
-    VELOCITY_TERM,
     ZERO_BLOCK,
+    Decimal,
     Equated,
     Glyph,
     Matrix,
     Partial,
-    Row,
     Sub,
+    column,
+    decimals,
 )
-from kincompile.derivation.joint_numbers import numbers_step, values_of
 from kincompile.derivation.joint_terms import (
     RULES,
     abbreviations,
     block_columns,
     block_entry,
     block_rows,
+    known_vectors,
     parts,
     telling,
 )
-from kincompile.derivation.rows_steps import expansion_step, placement_step, step
-from kincompile.derive.derivation import derive
+from kincompile.derivation.steps import Steps
+from kincompile.derive.derivation import RowBlock, derive
 from kincompile.derive.partials import partials
 from kincompile.model.arguments import Kind
-from kincompile.model.expressions import depends_on
+from kincompile.model.expressions import depends_on, evaluate
+from kincompile.model.matrices import SymbolicEnvironment
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
-    from kincompile.derivation.derivation_page import Page
     from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.derivation.evaluation import Evaluation
     from kincompile.derivation.formulas import Formula
-    from kincompile.derive.derivation import RowBlock
     from kincompile.derive.rules import Step
     from kincompile.ir.inline import Section as Rows
+    from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
 
 
+def joint_section(evaluation: Evaluation, joint: Joint, rows: Rows) -> Section:
+    """Return the derivation of a joint."""
+    columns = [name for name in joint.columns if name is not None]
+    blocks = derive(joint.template)
+    steps = _JointSteps(evaluation, rows, joint.name, columns, blocks, "vector", joint)
+    return steps.section(
+        joint.template.type_name,
+        joint.is_driver,
+        steps.attributes(),
+        steps.constraint(),
+        steps.rules(),
+        steps.jacobian(),
+        steps.nu(*steps.nu_notes()),
+        steps.gamma(*steps.gamma_blocks()),
+        steps.expansion(),
+        steps.placement(),
+        steps.numbers(*steps.matrices(), *steps.vectors()),
+    )
+
+
 @dataclass(frozen=True, slots=True)
-class _JointPage:
-    """A joint, its derivation, and the page it is on."""
+class _JointSteps(Steps[RowBlock]):
+    """The steps of a joint or a driver, derived in vectors."""
 
-    page: Page
     joint: Joint
-    rows: Rows
-    blocks: tuple[RowBlock, ...]
-
-    @property
-    def name(self) -> str:
-        """Name of the joint."""
-        return self.joint.name
 
     def symbol(self, letter: str, k: int) -> Glyph:
-        """Return the symbol of a row block: Phi with the joint's name, and a number of several."""
-        index = str(k + 1) if len(self.blocks) > 1 else ""
+        """Return the symbol of a row block, numbered where there are several."""
+        index = str(k + 1) if len(self.derivatives) > 1 else ""
         return Glyph(letter, index, exponent=self.name)
 
+    def attributes(self) -> Section:
+        written = type(self.joint.written)
+        meaning = (written.__doc__ or "").strip().splitlines()[0]
+        rows: list[tuple[Run | Runs, ...]] = []
+        for name, argument in written.arguments().items():
+            symbol = _attribute_symbol(argument.symbol, argument.kind)
+            shown: tuple[Run, Run]
+            if argument.kind is Kind.BODY:
+                shown = Verbatim(self.joint.bodies["ij".index(argument.symbol)].name), ""
+            else:
+                shown = Math(_attribute(self.joint, argument.symbol)), self._number(argument.symbol)
+            rows.append((Verbatim(name), Math(symbol), *shown))
+        source = text(f"{meaning} Source: {self.joint.source}.")
+        header = ("attribute", "symbol", "as written", "number")
+        return self.step(1, "The joint and its attributes", source, table(header, rows), level="")
 
-def joint_section(page: Page, joint: Joint, rows: Rows) -> Section:
-    """Return the derivation of a joint: nine steps, each in its place."""
-    on_page = _JointPage(page, joint, rows, derive(joint.template))
-    kind = f"{joint.template.type_name} (driver)" if joint.is_driver else joint.template.type_name
-    return Section(
-        f"constraint-{joint.name}",
-        (f"{kind} ", Verbatim(joint.name)),
-        (),
-        (
-            _attributes_step(on_page),
-            _constraint_step(on_page),
-            _rules_step(on_page),
-            _blocks_step(on_page),
-            _nu_step(on_page),
-            _gamma_step(on_page),
-            expansion_step(page, joint.name, rows),
-            placement_step(page, joint.name, rows),
-            numbers_step(page, joint, rows),
-        ),
-    )
+    def _number(self, symbol: str) -> Run:
+        """Return an attribute in numbers; a profile has none."""
+        joint, values = self.joint, self.evaluation.values
+        if symbol in joint.points:
+            return Math(_column(joint.points[symbol], values))
+        if symbol in joint.scalars:
+            return Math(_decimal(joint.scalars[symbol], values))
+        return ""
 
+    def constraint(self) -> Section:
+        blocks: list[Block] = []
+        for k, block in enumerate(self.derivatives):
+            zero = ZERO_BLOCK if isinstance(block.Phi, Vector) else ZERO
+            blocks.append(Display(Equated((self.symbol("Phi", k), block.Phi, zero))))
+        names = abbreviations(self.joint.template)
+        if names:
+            blocks.append(text("with"))
+            blocks += [Display(Equated((glyph, item))) for item, glyph in names.items()]
+        return self.step(2, "The constraint in vectors", *blocks)
 
-def _attributes_step(on_page: _JointPage) -> Section:
-    joint = on_page.joint
-    written = type(joint.written)
-    meaning = (written.__doc__ or "").strip().splitlines()[0]
-    rows: list[tuple[Run | Runs, ...]] = []
-    values = on_page.page.situation.values
-    for name, argument in written.arguments().items():
-        symbol = _attribute_symbol(argument.symbol, argument.kind)
-        if argument.kind is Kind.BODY:
-            body = joint.bodies["ij".index(argument.symbol)].name
-            rows.append((Verbatim(name), Math(symbol), Verbatim(body), ""))
-            continue
-        written_as, number = (
-            _attribute(joint, argument.symbol),
-            values_of(joint, argument.symbol, values),
-        )
-        rows.append((Verbatim(name), Math(symbol), Math(written_as), number))
-    source = f"{meaning} Source: {joint.source}."
-    header = ("attribute", "symbol", "as written", "number")
-    return step(
-        on_page.name, 1, "The joint and its attributes", "", text(source), table(header, rows)
-    )
+    def rules(self) -> Section:
+        rows = []
+        for k, row in enumerate(partials(self.joint.template)):
+            for item in row:
+                label = Math(Partial(self.symbol("Phi", k), item.coordinate))
+                rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
+        note = text(
+            "Every rule that fired while ", Math(PHI_Q), " was derived, from the inside out. "
+            "Whatever the coordinate does not occur in is constant."
+        )  # fmt: skip
+        if not rows:
+            note = text("Nothing but constants and coordinates themselves: no rule is needed.")
+            return self.step(3, "The rules used", note)
+        header = ("derivative", "rule", "applied to", "gives")
+        return self.step(3, "The rules used", note, table(header, rows))
+
+    def jacobian(self) -> Section:
+        template = self.joint.template
+        blocks: list[Block] = []
+        for index, columns in block_columns(template):
+            shown = Matrix(block_rows(template, columns))
+            variable = Glyph("q", index) if len(index) == 1 else Letter(index)
+            symbol = Sub(Glyph("Phi", exponent=self.name), variable)
+            blocks.append(Display(Equated((symbol, shown))))
+        blocks += [
+            text(f"Body {frame.index} is the ground: its coordinates are zero and not unknown, so "
+                 "this block has no columns.")
+            for frame, body in zip(template.frames, self.joint.bodies, strict=True)
+            if body.is_ground
+        ]  # fmt: skip
+        return self.step(4, "The blocks of the Jacobian in vectors", *blocks)
+
+    def nu_notes(self) -> list[Block]:
+        lines: list[tuple[Run | Runs, ...]] = []
+        for block in self.derivatives:
+            lines += [(Math(PHI_T), *line) for line in _rule_lines(block.steps.Phi_t)]
+        return [*self._constant_note(), *_fired(lines)]
+
+    def gamma_blocks(self) -> list[Block]:
+        blocks: list[Block] = []
+        lines: list[tuple[Run | Runs, ...]] = []
+        for k, block in enumerate(self.derivatives):
+            if len(self.derivatives) > 1:
+                blocks.append(text("For ", Math(self.symbol("Phi", k)), ":"))
+            blocks += self.gamma_terms(k)
+            for symbol, steps in zip(GAMMA_TERMS, block.steps.gamma_terms, strict=True):
+                lines += [(Math(symbol), *line) for line in _rule_lines(steps)]
+        return [*blocks, *self._constant_note(), *_fired(lines)]
+
+    def _constant_note(self) -> list[Block]:
+        """Return the note that the rates of a constant C vanish."""
+        expressions = [item for block in self.derivatives for item in parts(block.Phi)]
+        if TimeFunction("C") not in expressions or depends_on(self.joint.scalars["C"], ("t",)):
+            return []
+        value, rate, second = (Math(TimeFunction("C", order)) for order in range(3))
+        return [text("Here ", value, " is constant: ", rate, " = ", second, " = 0.")]
+
+    def matrices(self) -> Iterator[Block]:
+        for frame, body in zip(self.joint.template.frames, self.joint.bodies, strict=True):
+            angle = evaluate(body.phi, self.evaluation.values) or 0.0
+            c, s = np.cos(angle), np.sin(angle)
+            for letter, matrix in (("A", [[c, -s], [s, c]]), ("B", [[-s, -c], [c, -s]])):
+                yield Display(Equated((Glyph(letter, frame.index), decimals(np.array(matrix)))))
+
+    def vectors(self) -> Iterator[Block]:
+        template, values = self.joint.template, self.evaluation.values
+        expansion = Expansion(SymbolicEnvironment(self.joint))
+        named: list[tuple[Formula, Vector]] = [(item, item) for item in known_vectors(template)]
+        for item, glyph in abbreviations(template).items():
+            if isinstance(item, Vector):
+                named.append((glyph, item))
+        for symbol, vector in named:
+            yield Display(Equated((symbol, _column(expansion.vector(vector), values))))
 
 
 def _attribute_symbol(symbol: str, kind: Kind) -> Formula:
@@ -136,39 +216,6 @@ def _attribute(joint: Joint, symbol: str) -> Formula:
     return written
 
 
-def _constraint_step(on_page: _JointPage) -> Section:
-    blocks: list[Block] = []
-    for k, block in enumerate(on_page.blocks):
-        zero = ZERO_BLOCK if isinstance(block.Phi, Vector) else ZERO
-        blocks.append(Display(Equated((on_page.symbol("Phi", k), block.Phi, zero))))
-    names = abbreviations(on_page.joint.template)
-    if names:
-        blocks.append(text("with"))
-        blocks += [Display(Equated((glyph, item))) for item, glyph in names.items()]
-    return step(on_page.name, 2, "The constraint in vectors", "vector", *blocks)
-
-
-def _rules_step(on_page: _JointPage) -> Section:
-    rows = []
-    for k, row in enumerate(partials(on_page.joint.template)):
-        for item in row:
-            label = Math(Partial(on_page.symbol("Phi", k), item.coordinate))
-            rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
-    note = text(
-        "Every rule that fired while ", Math(_phi_q()), " was derived, from the inside out. "
-        "Whatever the coordinate does not occur in is constant."
-    )  # fmt: skip
-    if not rows:
-        note = text("Nothing but constants and coordinates themselves: no rule is needed.")
-        return step(on_page.name, 3, "The rules used", "vector", note)
-    header = ("derivative", "rule", "applied to", "gives")
-    return step(on_page.name, 3, "The rules used", "vector", note, table(header, rows))
-
-
-def _phi_q() -> Formula:
-    return Glyph("Phi", "q")
-
-
 def _rule_lines(
     steps: Sequence[Step], coordinate: Expression | None = None
 ) -> Iterator[tuple[Runs, Run, Run]]:
@@ -179,70 +226,17 @@ def _rule_lines(
         yield RULES[item.rule], Math(item.expression), Math(gives)
 
 
-def _blocks_step(on_page: _JointPage) -> Section:
-    template = on_page.joint.template
-    blocks: list[Block] = []
-    for index, columns in block_columns(template):
-        shown = Matrix(block_rows(template, columns))
-        variable = Glyph("q", index) if len(index) == 1 else Letter(index)
-        symbol = Sub(Glyph("Phi", exponent=on_page.name), variable)
-        blocks.append(Display(Equated((symbol, shown))))
-    for frame, body in zip(template.frames, on_page.joint.bodies, strict=True):
-        if body.is_ground:
-            blocks.append(
-                text(f"Body {frame.index} is the ground: its coordinates are zero and not unknown, "
-                     "so this block has no columns.")
-            )  # fmt: skip
-    return step(on_page.name, 4, "The blocks of the Jacobian in vectors", "vector", *blocks)
-
-
-def _nu_step(on_page: _JointPage) -> Section:
-    blocks: list[Block] = [
-        Display(Equated((on_page.symbol("nu", k), Row(("-", PHI_T)), block.nu)))
-        for k, block in enumerate(on_page.blocks)
-    ]
-    blocks += _constant_note(on_page)
-    lines: list[tuple[Run | Runs, ...]] = []
-    for block in on_page.blocks:
-        lines += [(Math(PHI_T), *line) for line in _rule_lines(block.steps.Phi_t)]
-    blocks += _fired(lines)
-    return step(on_page.name, 5, "The right side of the velocity equation", "vector", *blocks)
-
-
-def _constant_note(on_page: _JointPage) -> list[Block]:
-    """Say that the rates of a constant C vanish."""
-    expressions = [item for block in on_page.blocks for item in parts(block.Phi)]
-    if TimeFunction("C") not in expressions or depends_on(on_page.joint.scalars["C"], ("t",)):
-        return []
-    rates = [Math(TimeFunction("C", order)) for order in (1, 2)]
-    return [
-        text("Here ", Math(TimeFunction("C")), " is constant: ", rates[0], " = ", rates[1], " = 0.")
-    ]
-
-
-def _gamma_step(on_page: _JointPage) -> Section:
-    blocks: list[Block] = []
-    lines: list[tuple[Run | Runs, ...]] = []
-    for k, block in enumerate(on_page.blocks):
-        blocks += _gamma_lines(on_page, k, block)
-        for symbol, steps in zip(GAMMA_TERMS, block.steps.gamma_terms, strict=True):
-            lines += [(Math(symbol), *line) for line in _rule_lines(steps)]
-    blocks += _constant_note(on_page)
-    blocks += _fired(lines)
-    title = "The right side of the acceleration equation, term by term"
-    return step(on_page.name, 6, title, "vector", *blocks)
-
-
 def _fired(lines: list[tuple[Run | Runs, ...]]) -> list[Block]:
     """Return the rules that fired as a table that can be folded away."""
     header = ("for", "rule", "applied to", "gives")
     return [table(header, lines, "The rules that fired")] if lines else []
 
 
-def _gamma_lines(on_page: _JointPage, k: int, block: RowBlock) -> Iterator[Block]:
-    if len(on_page.blocks) > 1:
-        yield Text(("For ", Math(on_page.symbol("Phi", k)), ":"))
-    yield Display(Equated((VELOCITY_TERM, block.velocity)))
-    for symbol, term in zip(GAMMA_TERMS, block.gamma_terms, strict=True):
-        yield Display(Equated((symbol, term)))
-    yield Display(Equated((on_page.symbol("gamma", k), block.gamma)))
+def _column(values: Sequence[Scalar], known: Mapping[str, float]) -> Matrix:
+    """Return expressions in numbers, as a column."""
+    return column(tuple(_decimal(value, known) for value in values))
+
+
+def _decimal(value: Scalar, known: Mapping[str, float]) -> Decimal:
+    number = evaluate(value, dict(known))
+    return Decimal(float("nan") if number is None else number)

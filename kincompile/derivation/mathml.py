@@ -53,12 +53,10 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
             element.appendChild(node)
         return element
 
-    def row(self, parts: Sequence[Element]) -> Element:
-        """Return things side by side."""
+    def _row(self, parts: Sequence[Element]) -> Element:
         return parts[0] if len(parts) == 1 else self._element("mrow", *parts)
 
-    def letter(self, name: str, *, bold: bool = False) -> Element:
-        """Return a letter, a Greek letter by its name, or a word."""
+    def _letter(self, name: str, *, bold: bool = False) -> Element:
         text = VARTHETA if name == "vartheta" else greek_unicode.get(name, name)
         if bold:
             return self._element("mi", text, class_="v", mathvariant="normal")
@@ -66,87 +64,67 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
             return self._element("mi", text, class_="w", mathvariant="normal")
         return self._element("mi", text)
 
-    def index_text(self, index: str) -> Element:
-        """Return the text of an index."""
+    def _index_text(self, index: str) -> Element:
         if index.isdigit():
-            return self.numeral(index)
+            return self._numeral(index)
         if len(index) == 1:
             return self._element("mi", index)
         kind = "u" if len(index) > 2 else "i"
         return self._element("mi", index, class_=kind, mathvariant="normal")
 
-    def operator(self, text: str) -> Element:
-        """Return an operator or a bracket."""
+    def _operator(self, text: str) -> Element:
         text = OPERATORS.get(text, text)
         return self._element("mo", text)
 
-    def leading(self, text: str) -> Element:
-        """Return an operator at the beginning of a continued line, spaced as within one."""
+    def _leading(self, text: str) -> Element:
         return self._element("mo", OPERATORS.get(text, text), form="infix")
 
-    def numeral(self, text: str) -> Element:
-        """Return a number."""
+    def _numeral(self, text: str) -> Element:
         return self._element("mn", text)
 
-    def dotted(self, base: Element, dots: int) -> Element:
-        """Return something with dots over it."""
+    def _dotted(self, base: Element, dots: int) -> Element:
         mark = DOTS[dots] if dots < len(DOTS) else f"({dots})"
         dot = self._element("mo", mark, stretchy="false")
         return self._element("mover", base, dot, accent="true")
 
-    def scripts(self, base: Element, index: Element | None, exponent: Element | None) -> Element:
-        """Return something with an index, an exponent, or both."""
+    def _scripts(self, base: Element, index: Element | None, exponent: Element | None) -> Element:
         if index is not None and exponent is not None:
             return self._element("msubsup", base, index, exponent)
         if index is not None:
             return self._element("msub", base, index)
         return base if exponent is None else self._element("msup", base, exponent)
 
-    def fraction(self, numerator: Element, denominator: Element) -> Element:
-        """Return a fraction."""
+    def _fraction(self, numerator: Element, denominator: Element) -> Element:
         return self._element("mfrac", numerator, denominator)
 
-    def function(self, name: str) -> Element:
-        """Return the name of a function."""
+    def _function(self, name: str) -> Element:
         text = self._element("mi", name, class_="w", mathvariant="normal")
         space = self._element("mspace", width="0.17em")
         return self._element("mrow", text, space)
 
-    def root(self, value: Element) -> Element:
-        """Return a square root."""
+    def _root(self, value: Element) -> Element:
         return self._element("msqrt", value)
 
-    def thin_space(self) -> Element:
-        """Return what stands between factors."""
+    def _thin_space(self) -> Element:
         return self._element("mspace", width="0.14em")
 
-    def array(self, rows: Sequence[Sequence[Element]]) -> Element:
-        """Return a matrix in brackets, which are borders: they need no font that stretches."""
+    def _array(self, rows: Sequence[Sequence[Element]]) -> Element:
         lines = [self._element("mtr", *(self._element("mtd", x) for x in row)) for row in rows]
         return self._element("mtable", *lines, class_="m")
 
     def _print_Integer(self, expr: Any) -> Element:
-        minus = [self.operator("-")] if expr < 0 else []
-        return self.row([*minus, self.numeral(str(abs(expr)))])
+        minus = [self._operator("-")] if expr < 0 else []
+        return self._row([*minus, self._numeral(str(abs(expr)))])
 
     def _print_Function(self, expr: Any) -> Element:
-        parts: list[Element] = []
-        for k, item in enumerate(expr.args):
-            parts += [self.operator(",")] if k else []
-            parts.append(self._print(item))
-        return self.row([self.function(expr.func.__name__), self._fenced(self.row(parts))])
+        return self._row([self._function(expr.func.__name__), self._listed(expr.args)])
 
     def _print_exp(self, expr: Any) -> Element:
-        return self.scripts(self._print_Exp1(expr), None, self._print(expr.args[0]))
+        return self._scripts(self._print_Exp1(expr), None, self._print(expr.args[0]))
 
     def _print_Exp1(self, expr: Any) -> Element:
         del expr
         return self._element("mi", "e", class_="u", mathvariant="normal")
-
-    def _print_PeriodicSpline(self, expr: Any) -> Element:
-        name = self.letter(expr.table_name)
-        primes = self.operator("\N{PRIME}" * expr.order) if expr.order else None
-        return self.row([self.scripts(name, None, primes), self._fenced(self._print(expr.args[0]))])
 
 
 def _xml(element: Element) -> str:

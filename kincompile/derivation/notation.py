@@ -8,7 +8,6 @@ primitives: a row, an index, a fraction, a matrix.
 from __future__ import annotations
 
 import re
-from abc import abstractmethod
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -51,7 +50,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
 Printed = Any
-"""What a language makes of a formula: text, or an element of a document."""
+"""A printed formula: text, or an element of a document."""
 
 GREEK = frozenset(
     (
@@ -65,7 +64,7 @@ _NAME = re.compile(r"([A-Za-z]+?)(\d*)(?:_(\w+))?")
 _RATE = re.compile(r"(\w+?)_(d+)ot")
 CONNECTIVES = {"&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}"}
 LONGEST_NUMERATOR = 24
-"""Nodes above a fraction bar: within a fraction no line can be broken."""
+"""Most nodes above a fraction bar, since no line can be broken within a fraction."""
 
 _BODY_FIXED = ("s", "v")
 
@@ -94,60 +93,47 @@ class Notation:
 
     abbreviations: Mapping[Any, Glyph]
 
-    @abstractmethod
-    def row(self, parts: Sequence[Printed]) -> Printed:
+    def _row(self, parts: Sequence[Printed]) -> Printed:
         """Return things side by side."""
 
-    @abstractmethod
-    def letter(self, name: str, *, bold: bool = False) -> Printed:
+    def _letter(self, name: str, *, bold: bool = False) -> Printed:
         """Return a letter, a Greek letter by its name, or a word."""
 
-    @abstractmethod
-    def index_text(self, index: str) -> Printed:
+    def _index_text(self, index: str) -> Printed:
         """Return the text of an index."""
 
-    @abstractmethod
-    def operator(self, text: str) -> Printed:
+    def _operator(self, text: str) -> Printed:
         """Return an operator or a bracket."""
 
-    @abstractmethod
-    def leading(self, text: str) -> Printed:
+    def _leading(self, text: str) -> Printed:
         """Return an operator at the beginning of a continued line."""
 
-    @abstractmethod
-    def numeral(self, text: str) -> Printed:
+    def _numeral(self, text: str) -> Printed:
         """Return a number."""
 
-    @abstractmethod
-    def dotted(self, base: Printed, dots: int) -> Printed:
+    def _dotted(self, base: Printed, dots: int) -> Printed:
         """Return something with dots over it."""
 
-    @abstractmethod
-    def scripts(self, base: Printed, index: Printed | None, exponent: Printed | None) -> Printed:
+    def _scripts(self, base: Printed, index: Printed | None, exponent: Printed | None) -> Printed:
         """Return something with an index, an exponent, or both."""
 
-    @abstractmethod
-    def fraction(self, numerator: Printed, denominator: Printed) -> Printed:
+    def _fraction(self, numerator: Printed, denominator: Printed) -> Printed:
         """Return a fraction."""
 
-    @abstractmethod
-    def function(self, name: str) -> Printed:
+    def _function(self, name: str) -> Printed:
         """Return the name of a function."""
 
-    @abstractmethod
-    def root(self, value: Printed) -> Printed:
+    def _root(self, value: Printed) -> Printed:
         """Return a square root."""
 
-    def fenced_with(self, value: Printed, exponent: Printed) -> Printed:
+    def _fenced_with(self, value: Printed, exponent: Printed) -> Printed:
         """Return something in brackets with an exponent."""
-        return self.scripts(self._fenced(value), None, exponent)
+        return self._scripts(self._fenced(value), None, exponent)
 
-    @abstractmethod
-    def thin_space(self) -> Printed:
+    def _thin_space(self) -> Printed:
         """Return what stands between factors."""
 
-    @abstractmethod
-    def array(self, rows: Sequence[Sequence[Printed]]) -> Printed:
+    def _array(self, rows: Sequence[Sequence[Printed]]) -> Printed:
         """Return a matrix in brackets."""
 
     if TYPE_CHECKING:
@@ -157,13 +143,13 @@ class Notation:
 
     def _named(self, name: str, *, is_vector: bool) -> Printed:
         letter, index, dots = split_name(name)
-        prime = self.operator("\N{PRIME}") if is_vector and letter in _BODY_FIXED else None
-        base = self.letter(letter, bold=is_vector)
-        base = self.dotted(base, dots) if dots else base
-        return self.scripts(base, self.index_text(index) if index else None, prime)
+        prime = self._operator("\N{PRIME}") if is_vector and letter in _BODY_FIXED else None
+        base = self._letter(letter, bold=is_vector)
+        base = self._dotted(base, dots) if dots else base
+        return self._scripts(base, self._index_text(index) if index else None, prime)
 
     def _fenced(self, value: Printed) -> Printed:
-        return self.row([self.operator("("), value, self.operator(")")])
+        return self._row([self._operator("("), value, self._operator(")")])
 
     def _print_Symbol(self, expr: Any, style: str = "plain") -> Printed:
         del style
@@ -173,62 +159,60 @@ class Notation:
         return self._named(expr.name, is_vector=True)
 
     def _print_TimeFunction(self, expr: TimeFunction) -> Printed:
-        base = self.letter(expr.name)
-        return self.dotted(base, expr.order) if expr.order else base
+        base = self._letter(expr.name)
+        return self._dotted(base, expr.order) if expr.order else base
 
     def _print_Profile(self, expr: Profile) -> Printed:
         letter, index, _ = split_name(expr.name)
-        primes = self.operator("\N{PRIME}" * expr.order) if expr.order else None
-        base = self.letter(letter)
-        return self.scripts(base, self.index_text(index), primes)
+        return self._primed(self._letter(letter), self._index_text(index), expr.order)
 
     def _print_Pi(self, expr: Any) -> Printed:
         del expr
-        return self.letter("pi")
+        return self._letter("pi")
 
     def _print_Basis(self, expr: Basis) -> Printed:
         del expr
         return self._unit("x")
 
     def _unit(self, axis: str) -> Printed:
-        return self.scripts(self.letter("e", bold=True), self.index_text(axis), None)
+        return self._scripts(self._letter("e", bold=True), self._index_text(axis), None)
 
     def _print_Perpendicular(self, expr: Perpendicular) -> Printed:
         if isinstance(expr.vector, Basis):
             return self._unit("y")
-        turn = self.letter("R", bold=True)
-        return self.row([turn, self._factor(expr.vector)])
+        turn = self._letter("R", bold=True)
+        return self._row([turn, self._factor(expr.vector)])
 
     def _print_Rotated(self, expr: Rotated) -> Printed:
         (angle,) = expr.rotation.coordinates
         if isinstance(expr.vector, Basis):
-            unit = self.row([self.letter("u", bold=True), self._fenced(self._short(angle))])
-            turn = [self.letter("R", bold=True)] if expr.along else []
-            return self.row([*turn, unit])
+            unit = self._row([self._letter("u", bold=True), self._fenced(self._short(angle))])
+            turn = [self._letter("R", bold=True)] if expr.along else []
+            return self._row([*turn, unit])
         index = split_name(angle.name)[1] if isinstance(angle, Symbol) else ""
-        base = self.letter(expr.rotation.letters[expr.order], bold=True)
-        matrix = self.scripts(base, self.index_text(index), None)
-        return self.row([matrix, self._factor(expr.vector)])
+        base = self._letter(expr.rotation.letters[expr.order], bold=True)
+        matrix = self._scripts(base, self._index_text(index), None)
+        return self._row([matrix, self._factor(expr.vector)])
 
     def _print_Norm(self, expr: Norm) -> Printed:
-        return self.row([self.operator("|"), self._short(expr.vector), self.operator("|")])
+        return self._row([self._operator("|"), self._short(expr.vector), self._operator("|")])
 
     def _print_Dot(self, expr: Dot) -> Printed:
-        return self.row([self._transposed(expr.left), self._factor(expr.right)])
+        return self._row([self._transposed(expr.left), self._factor(expr.right)])
 
     def _print_Transposed(self, expr: Transposed) -> Printed:
         is_negative, magnitude = _signed(expr.vector)
-        minus = [self.operator("-")] if is_negative else []
-        return self.row([*minus, self._transposed(magnitude)])
+        minus = [self._operator("-")] if is_negative else []
+        return self._row([*minus, self._transposed(magnitude)])
 
     def _transposed(self, vector: Any) -> Printed:
-        return self._raised(vector, self.letter("T"))
+        return self._raised(vector, self._letter("T"))
 
     def _raised(self, base: Any, exponent: Printed) -> Printed:
         """Return something with an exponent, in brackets where it needs them."""
         if self._is_atom(base):
-            return self.scripts(self._short(base), None, exponent)
-        return self.fenced_with(self._short(base), exponent)
+            return self._scripts(self._short(base), None, exponent)
+        return self._fenced_with(self._short(base), exponent)
 
     def _is_atom(self, expr: Any) -> bool:
         """Return whether something needs no brackets under an exponent."""
@@ -249,57 +233,56 @@ class Notation:
 
     def _print_Number(self, expr: Any) -> Printed:
         value = expr.value
-        minus = [self.operator("-")] if value < 0 else []
-        return self.row([*minus, self._magnitude(abs(value))])
+        minus = [self._operator("-")] if value < 0 else []
+        return self._row([*minus, self._magnitude(abs(value))])
 
     def _magnitude(self, value: Fraction) -> Printed:
-        top, bottom = self.numeral(str(value.numerator)), self.numeral(str(value.denominator))
-        return top if value.denominator == 1 else self.fraction(top, bottom)
+        top, bottom = self._numeral(str(value.numerator)), self._numeral(str(value.denominator))
+        return top if value.denominator == 1 else self._fraction(top, bottom)
 
     def _print_Decimal(self, expr: Decimal) -> Printed:
         text = f"{expr.value + 0.0:.{expr.digits}g}"
         mantissa, _, exponent = text.lstrip("-").partition("e")
-        parts = [self.operator("-")] if text.startswith("-") else []
-        parts.append(self.numeral(mantissa))
+        parts = [self._operator("-")] if text.startswith("-") else []
+        parts.append(self._numeral(mantissa))
         if exponent:
-            power = self.numeral(str(int(exponent)).replace("-", "\N{MINUS SIGN}"))
-            parts += [self.operator("\N{MULTIPLICATION SIGN}")]
-            parts += [self.scripts(self.numeral("10"), None, power)]
-        return self.row(parts)
+            power = self._numeral(str(int(exponent)).replace("-", "\N{MINUS SIGN}"))
+            parts += [self._operator("\N{MULTIPLICATION SIGN}")]
+            parts += [self._scripts(self._numeral("10"), None, power)]
+        return self._row(parts)
 
     def _print_Sum(self, expr: Any) -> Printed:
         return self._sum(expr.terms)
 
-    def _print_VectorSum(self, expr: VectorSum) -> Printed:
-        return self._sum(expr.terms)
+    _print_VectorSum = _print_Sum
 
     def _sum(self, terms: Sequence[Any]) -> Printed:
         if not terms:
-            return self.numeral("0")
+            return self._numeral("0")
         parts: list[Printed] = []
         for k, term in enumerate(terms):
             is_negative, magnitude = _signed(term)
             if is_negative or k:
-                parts.append(self.operator("-" if is_negative else "+"))
+                parts.append(self._operator("-" if is_negative else "+"))
             # A sum inside a sum comes from the code, where the order of addition matters.
             parts.append(self._factor(magnitude))
-        return self.row(parts)
+        return self._row(parts)
 
     def _print_Product(self, expr: Any) -> Printed:
         is_negative, magnitude = _signed(expr)
         if is_negative:
-            return self.row([self.operator("-"), self._factor(magnitude)])
+            return self._row([self._operator("-"), self._factor(magnitude)])
         return self._product(expr.factors)
 
     def _print_Scaled(self, expr: Scaled) -> Printed:
         is_negative, magnitude = _signed(expr)
         if is_negative:
-            return self.row([self.operator("-"), self._factor(magnitude)])
+            return self._row([self._operator("-"), self._factor(magnitude)])
         factors = expr.factor.factors if isinstance(expr.factor, Product) else (expr.factor,)
         return self._product((*factors, expr.vector))
 
     def _product(self, factors: Sequence[Any]) -> Printed:
-        """Return a product: numbers in front, rates behind, reciprocals below the line."""
+        """Return a product: numbers first, rates last, reciprocals below the fraction bar."""
         below = [item.base for item in factors if _is_reciprocal(item)]
         above = [item for item in factors if not _is_reciprocal(item)]
         above.sort(key=_place)
@@ -307,104 +290,111 @@ class Notation:
             return self._juxtaposed(above)
         divisor = self._juxtaposed(below)
         if size(tuple(above)) <= LONGEST_NUMERATOR:
-            return self.fraction(self._juxtaposed(above), divisor)
-        inverse = self.fraction(self.numeral("1"), divisor)
-        return self.row([inverse, self.thin_space(), *(self._factor(item) for item in above)])
+            return self._fraction(self._juxtaposed(above), divisor)
+        inverse = self._fraction(self._numeral("1"), divisor)
+        return self._row([inverse, self._thin_space(), *(self._factor(item) for item in above)])
 
     def _juxtaposed(self, factors: Sequence[Any]) -> Printed:
         if not factors:
-            return self.numeral("1")
+            return self._numeral("1")
         if len(factors) == 1:
             return self._short(factors[0])
         parts: list[Printed] = []
         for k, item in enumerate(factors):
             if k and isinstance(item, Number | Decimal):
-                parts.append(self.operator("\N{DOT OPERATOR}"))
+                parts.append(self._operator("\N{DOT OPERATOR}"))
             elif k:
-                parts.append(self.thin_space())
+                parts.append(self._thin_space())
             parts.append(self._factor(item))
-        return self.row(parts)
+        return self._row(parts)
 
     def _print_Power(self, expr: Any) -> Printed:
         base, exponent = expr.base, str(expr.exponent).replace("-", "\N{MINUS SIGN}")
         if isinstance(base, Call) and base.function != "sqrt":
-            head = self.scripts(self.function(base.function), None, self.numeral(exponent))
-            return self.row([head, self._arguments(base)])
-        return self._raised(base, self.numeral(exponent))
+            head = self._scripts(self._function(base.function), None, self._numeral(exponent))
+            return self._row([head, self._arguments(base)])
+        return self._raised(base, self._numeral(exponent))
 
     def _print_Quotient(self, expr: Quotient) -> Printed:
-        return self.fraction(self._print(expr.numerator), self._print(expr.denominator))
+        return self._fraction(self._print(expr.numerator), self._print(expr.denominator))
 
     def _print_Call(self, expr: Call) -> Printed:
         if expr.function == "sqrt":
-            return self.root(self._print(expr.arguments[0]))
+            return self._root(self._print(expr.arguments[0]))
         if expr.function == "pow":
             base, exponent = expr.arguments
-            return self.scripts(self._fenced(self._print(base)), None, self._print(exponent))
-        return self.row([self.function(expr.function), self._arguments(expr)])
+            return self._scripts(self._fenced(self._print(base)), None, self._print(exponent))
+        return self._row([self._function(expr.function), self._arguments(expr)])
 
     def _arguments(self, expr: Call) -> Printed:
         simple = len(expr.arguments) == 1 and isinstance(expr.arguments[0], Symbol)
         if simple and expr.function in ("sin", "cos", "tan"):
             return self._print(expr.arguments[0])
-        parts: list[Printed] = []
-        for k, item in enumerate(expr.arguments):
-            parts += [self.operator(",")] if k else []
-            parts.append(self._print(item))
-        return self._fenced(self.row(parts))
+        return self._listed(expr.arguments)
+
+    def _listed(self, items: Sequence[Any]) -> Printed:
+        """Return things in brackets, with commas between them."""
+        return self._fenced(self._joined(",", items))
+
+    def _joined(self, operator: str, items: Sequence[Any]) -> Printed:
+        """Return things side by side, with an operator between them."""
+        parts = [part for item in items for part in (self._operator(operator), self._print(item))]
+        return self._row(parts[1:])
+
+    def _print_PeriodicSpline(self, expr: Any) -> Printed:
+        name = self._letter(expr.table_name)
+        return self._row([self._primed(name, None, expr.order), self._listed(expr.args[:1])])
+
+    def _primed(self, base: Printed, index: Printed | None, order: int) -> Printed:
+        """Return something with as many primes as it is differentiated."""
+        return self._scripts(base, index, self._operator("\N{PRIME}" * order) if order else None)
 
     def _print_Choice(self, expr: Choice) -> Printed:
         rows = [
             [self._print(expr.first), self._print(expr.condition)],
-            [self._print(expr.second), self.function("otherwise")],
+            [self._print(expr.second), self._function("otherwise")],
         ]
-        return self.array(rows)
+        return self._array(rows)
 
     def _print_Relation(self, expr: Relation) -> Printed:
-        relation = self.operator(CONNECTIVES.get(expr.relation, expr.relation))
-        return self.row([self._print(expr.left), relation, self._print(expr.right)])
+        relation = self._operator(CONNECTIVES.get(expr.relation, expr.relation))
+        return self._row([self._print(expr.left), relation, self._print(expr.right)])
 
     def _print_Glyph(self, expr: Glyph) -> Printed:
-        base = self.letter(expr.letter, bold=expr.bold)
-        base = self.dotted(base, expr.dots) if expr.dots else base
-        index = self.index_text(expr.index) if expr.index else None
-        exponent = self.index_text(expr.exponent) if expr.exponent else None
-        return self.scripts(base, index, exponent)
+        base = self._letter(expr.letter, bold=expr.bold)
+        base = self._dotted(base, expr.dots) if expr.dots else base
+        index = self._index_text(expr.index) if expr.index else None
+        exponent = self._index_text(expr.exponent) if expr.exponent else None
+        return self._scripts(base, index, exponent)
 
     def _print_Row(self, expr: Row) -> Printed:
-        return self.row([self._part(part) for part in expr.parts])
+        return self._row([self._part(part) for part in expr.parts])
 
     def _part(self, part: Any) -> Printed:
         if not isinstance(part, str):
             return self._print(part)
         if part.isdigit():
-            return self.numeral(part)
-        return self.function(part) if part.isalpha() else self.operator(part)
+            return self._numeral(part)
+        return self._function(part) if part.isalpha() else self._operator(part)
 
     def _print_Sub(self, expr: Sub) -> Printed:
         index = self._print(expr.index)
         if isinstance(expr.base, Glyph) and expr.base.exponent and not expr.base.index:
             bare = self._print(replace(expr.base, exponent=""))
-            return self.scripts(bare, index, self.index_text(expr.base.exponent))
-        return self.scripts(self._print(expr.base), index, None)
+            return self._scripts(bare, index, self._index_text(expr.base.exponent))
+        return self._scripts(self._print(expr.base), index, None)
 
     def _print_Partial(self, expr: Partial) -> Printed:
-        parts = (
-            [self._sign(expr.sign), self._print(item)]
-            for item in (expr.numerator, expr.denominator)
+        top = self._row([self._sign(expr.sign), self._print(expr.numerator)])
+        return self._fraction(
+            top, self._row([self._sign(expr.sign), self._print(expr.denominator)])
         )
-        top, bottom = (self.row(part) for part in parts)
-        return self.fraction(top, bottom)
 
     def _sign(self, sign: str) -> Printed:
-        return self.letter("d") if sign == "d" else self.operator(sign)
+        return self._letter("d") if sign == "d" else self._operator(sign)
 
     def _print_Equated(self, expr: Equated) -> Printed:
-        parts: list[Printed] = []
-        for k, part in enumerate(expr.parts):
-            parts += [self.operator("=")] if k else []
-            parts.append(self._print(part))
-        return self.row(parts)
+        return self._joined("=", expr.parts)
 
     def pieces(self, formula: Any) -> list[Printed]:
         """Return a formula in pieces between which a line may be broken: at = and at + and -."""
@@ -412,10 +402,10 @@ class Notation:
             return [self._print(formula)]
         pieces: list[Printed] = []
         for k, part in enumerate(formula.parts):
-            lead = [self.leading("=")] if k else []
+            lead = [self._leading("=")] if k else []
             for sign, magnitude in self._terms(part):
-                signs = [self.leading(sign) if pieces else self.operator(sign)] if sign else []
-                pieces.append(self.row([*lead, *signs, magnitude]))
+                signs = [self._leading(sign) if pieces else self._operator(sign)] if sign else []
+                pieces.append(self._row([*lead, *signs, magnitude]))
                 lead = []
         return pieces
 
@@ -433,7 +423,7 @@ class Notation:
         return found
 
     def _print_Matrix(self, expr: Matrix) -> Printed:
-        return self.array([[self._short(cell) for cell in row] for row in expr.rows])
+        return self._array([[self._short(cell) for cell in row] for row in expr.rows])
 
 
 def _signed(term: Any) -> tuple[bool, Any]:

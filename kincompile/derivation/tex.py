@@ -56,78 +56,60 @@ class TexPrinter(Notation, LatexPrinter):
         """Return a formula, without dollar signs."""
         return str(self._print(formula))
 
-    def row(self, parts: Sequence[str]) -> str:
-        """Return things side by side."""
+    def _row(self, parts: Sequence[str]) -> str:
         return " ".join(parts)
 
-    def letter(self, name: str, *, bold: bool = False) -> str:
-        """Return a letter, a Greek letter by its name, or a word."""
+    def _letter(self, name: str, *, bold: bool = False) -> str:
         if name in GREEK:
             return rf"\boldsymbol{{\{name}}}" if bold else rf"\{name}"
         if bold:
             return rf"\mathbf{{{name}}}"
         return name if len(name) == 1 else rf"\mathrm{{{escape(name)}}}"
 
-    def index_text(self, index: str) -> str:
-        """Return the text of an index."""
+    def _index_text(self, index: str) -> str:
         return index if len(index) <= 2 or index.isdigit() else rf"\mathrm{{{escape(index)}}}"
 
-    def operator(self, text: str) -> str:
-        """Return an operator or a bracket."""
+    def _operator(self, text: str) -> str:
         if text.startswith("\N{PRIME}"):
             return r"\prime" * len(text)
         return OPERATORS.get(text, text)
 
-    def leading(self, text: str) -> str:
-        """Return an operator at the beginning of a continued line."""
-        return f"{{}} {self.operator(text)}"
+    def _leading(self, text: str) -> str:
+        return f"{{}} {self._operator(text)}"
 
-    def numeral(self, text: str) -> str:
-        """Return a number."""
+    def _numeral(self, text: str) -> str:
         return text.replace("\N{MINUS SIGN}", "-")
 
-    def dotted(self, base: str, dots: int) -> str:
-        """Return something with dots over it."""
+    def _dotted(self, base: str, dots: int) -> str:
         return rf"{DOTS[dots]}{{{base}}}" if dots < len(DOTS) else rf"{base}^{{({dots})}}"
 
-    def scripts(self, base: str, index: str | None, exponent: str | None) -> str:
-        """Return something with an index, an exponent, or both."""
+    def _scripts(self, base: str, index: str | None, exponent: str | None) -> str:
         below = "" if index is None else f"_{{{index}}}"
         above = "" if exponent is None else f"^{{{exponent}}}"
         return f"{{{base}}}{below}{above}" if below or above else base
 
-    def fenced_with(self, value: str, exponent: str) -> str:
+    def _fenced_with(self, value: str, exponent: str) -> str:
         """Return something in brackets with an exponent, which is put on the bracket.
 
         What stands within the brackets can then be broken into lines.
         """
         return f"( {value} )^{{{exponent}}}"
 
-    def fraction(self, numerator: str, denominator: str) -> str:
-        """Return a fraction."""
+    def _fraction(self, numerator: str, denominator: str) -> str:
         return rf"\frac{{{numerator}}}{{{denominator}}}"
 
-    def function(self, name: str) -> str:
-        """Return the name of a function."""
+    def _function(self, name: str) -> str:
         return rf"\{name}" if name in FUNCTIONS else rf"\operatorname{{{escape(name)}}}"
 
-    def root(self, value: str) -> str:
-        """Return a square root."""
+    def _root(self, value: str) -> str:
         return rf"\sqrt{{{value}}}"
 
-    def thin_space(self) -> str:
-        """Return what stands between factors."""
+    def _thin_space(self) -> str:
         return self._space
 
-    def array(self, rows: Sequence[Sequence[str]]) -> str:
-        """Return a matrix in brackets."""
+    def _array(self, rows: Sequence[Sequence[str]]) -> str:
         lines = r" \\ ".join(" & ".join(row) for row in rows)
         return rf"\begin{{bmatrix}} {lines} \end{{bmatrix}}"
 
     def _print_Integer(self, expr: Any) -> str:
         return str(expr)
-
-    def _print_PeriodicSpline(self, expr: Any) -> str:
-        name = self.letter(expr.table_name)
-        primes = self.operator("\N{PRIME}" * expr.order) if expr.order else None
-        return self.row([self.scripts(name, None, primes), self._fenced(self._print(expr.args[0]))])

@@ -4,8 +4,8 @@ simEngine2D is the engine of the course ME451. Its model has bodies with absolut
 constraints by type; here it becomes a `Mechanism`. What only dynamics or drawing needs, masses,
 forces, gravity, shapes, is left out, and the log says so where motion could depend on it.
 
-MSC Adams uses the same two endings for text formats of its own; they are told apart by what they
-begin with.
+MSC Adams uses the same two endings for text formats of its own; their first characters
+distinguish them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from kincompile.model.relative import Distance, RelativeX, RelativeY
 from kincompile.names import listed, name_problem, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Mapping
     from pathlib import Path
 
     from kincompile.files.data_lines import Address
@@ -160,13 +160,12 @@ def _positive(reader: FieldReader, data: Row, key: str) -> float:
 
 def _document(path: Path, content: bytes) -> Document:
     """Return a JSON file; a file of Adams, which has the same ending, is refused by name."""
-    text = decoded(path, content)
-    if _ADAMS.match(text):
+    if _ADAMS.match(decoded(path, content)):
         raise ModelError(
             f"{path}, line 1: this is a file of MSC Adams, which uses the ending "
             f"{path.suffix} too; what is read here is JSON, as simEngine2D writes it"
         )
-    return read_json(path, text, has_fractions=True)
+    return read_json(path, content, has_fractions=True)
 
 
 class _AdmReader(FieldReader):
@@ -210,8 +209,8 @@ class _AdmReader(FieldReader):
             self.problem(address, "no q0, the start values [x, y, phi]")
         guess = self.expressions(row.get("q0", [0, 0, 0]), (*address, "q0"), {}, "[x, y, phi]", 3)
         self._bodies[identity] = self._mechanism.body(name, (guess[0], guess[1], guess[2]))
-        self.stands(f"guess of x_{name}", (*address, "q0"))
-        self.stands(f"body {name!r}", address)
+        self.remember(f"guess of x_{name}", (*address, "q0"))
+        self.remember(f"body {name!r}", address)
 
     def _take_id(self, address: Address, row: Row, taken: dict[Any, Any]) -> Any:
         """Return the id of a row, which need not be its place; a wrong one is noted."""
@@ -251,7 +250,7 @@ class _AdmReader(FieldReader):
             text = f"there is {given}{hint}; types are: {listed(_CONSTRAINTS)}"
             self.problem((*address, "type"), text)
             return None
-        make, keys = _CONSTRAINTS[kind]
+        constraint, keys = _CONSTRAINTS[kind]
         what = f"constraint_{row.get('id', address[1]) if type(row.get('id')) is int else 0}"
         name = self._speaking(row.get("name", ""), what, address, self._names)
         required = [key for key in keys if key not in ("body2", "fun")]
@@ -260,12 +259,11 @@ class _AdmReader(FieldReader):
             self.problem(address, f"{kind} has no {listed(missing)}; its fields: {listed(keys)}")
             return None
         before = len(self.problems)
-        values = {key: self._value(key, row, address) for key in keys}
+        values: list[Any] = [self._value(key, row, address) for key in keys]
         if len(self.problems) > before:
             return None
-        found = make(name, values)
-        self.stands(f"{type(found).__name__} {name!r}", address)
-        return found
+        self.remember(f"{constraint.__name__} {name!r}", address)
+        return constraint(name, *values)
 
     def _value(self, key: str, row: Row, address: Address) -> Any:
         """Return the value of a field: a body, a point, a direction, a number or a function."""
@@ -312,46 +310,20 @@ class _AdmReader(FieldReader):
         return self.expression(text, place, {"t": t})
 
 
-_ONE = ("body1", "sP1", "fun")
-_TWO = ("body1", "sP1", "body2", "sP2")
+_TWO_POINTS = ("body1", "sP1", "body2", "sP2")
 
-_CONSTRAINTS: dict[str, tuple[Callable[[str, Row], Constraint], tuple[str, ...]]] = {
-    "AbsoluteX": (lambda name, v: AbsoluteX(name, v["body1"], v["sP1"], v["fun"]), _ONE),
-    "AbsoluteY": (lambda name, v: AbsoluteY(name, v["body1"], v["sP1"], v["fun"]), _ONE),
-    "AbsoluteAngle": (
-        lambda name, v: AbsoluteAngle(name, v["body1"], v["fun"]), ("body1", "fun"),
-    ),
-    "AbsoluteDistance": (
-        lambda name, v: AbsoluteDistance(name, v["body1"], v["sP1"], v["sP2"], v["fun"]),
-        ("body1", "sP1", "sP2", "fun"),
-    ),
-    "RelativeX": (
-        lambda name, v: RelativeX(name, v["body1"], v["sP1"], v["body2"], v["sP2"], v["fun"]),
-        (*_TWO, "fun"),
-    ),
-    "RelativeY": (
-        lambda name, v: RelativeY(name, v["body1"], v["sP1"], v["body2"], v["sP2"], v["fun"]),
-        (*_TWO, "fun"),
-    ),
-    "RelativeDistance": (
-        lambda name, v: Distance(name, v["body1"], v["sP1"], v["body2"], v["sP2"], v["fun"]),
-        (*_TWO, "fun"),
-    ),
-    "RevoluteJoint": (
-        lambda name, v: Revolute(name, v["body1"], v["sP1"], v["body2"], v["sP2"]), _TWO,
-    ),
-    "TranslationalJoint": (
-        lambda name, v: Translational(
-            name, v["body1"], v["sP1"], v["vP1"], v["body2"], v["sP2"], v["vP2"]
-        ),
-        ("body1", "sP1", "vP1", "body2", "sP2", "vP2"),
-    ),
+_CONSTRAINTS: Mapping[str, tuple[type[Constraint], tuple[str, ...]]] = {
+    "AbsoluteX": (AbsoluteX, ("body1", "sP1", "fun")),
+    "AbsoluteY": (AbsoluteY, ("body1", "sP1", "fun")),
+    "AbsoluteAngle": (AbsoluteAngle, ("body1", "fun")),
+    "AbsoluteDistance": (AbsoluteDistance, ("body1", "sP1", "sP2", "fun")),
+    "RelativeX": (RelativeX, (*_TWO_POINTS, "fun")),
+    "RelativeY": (RelativeY, (*_TWO_POINTS, "fun")),
+    "RelativeDistance": (Distance, (*_TWO_POINTS, "fun")),
+    "RevoluteJoint": (Revolute, _TWO_POINTS),
+    "TranslationalJoint": (Translational, ("body1", "sP1", "vP1", "body2", "sP2", "vP2")),
     "RackPinion": (
-        lambda name, v: RackAndPinion(
-            name, v["body1"], v["sP1"], v["sQ1"], v["theta1"],
-            v["body2"], v["sP2"], v["R2"], v["theta2"],
-        ),
-        ("body1", "sP1", "sQ1", "theta1", "body2", "sP2", "theta2", "R2"),
+        RackAndPinion, ("body1", "sP1", "sQ1", "theta1", "body2", "sP2", "R2", "theta2"),
     ),
 }  # fmt: skip
-"""Constraint types of simEngine2D: what each becomes, and its fields."""
+"""Constraint types of simEngine2D: what each becomes, and the fields that are its arguments."""

@@ -1,4 +1,4 @@
-"""In which line each value of a TOML or JSON text stands.
+"""The line of each value in a TOML or JSON text.
 
 The texts have been read before, so they are known to be well formed: what is scanned here is their
 outline, strings, brackets, keys and line ends.

@@ -1,4 +1,4 @@
-"""The text of a data file, TOML or JSON, as nested values that know the lines they stand in.
+"""The text of a data file, TOML or JSON, as nested values with their lines.
 
 Nothing in a data file is run. Python's own readers give the values and no places; the lines are
 looked up in the text when a message needs them, so that a good file does not pay for them.
@@ -41,7 +41,7 @@ class Document:
     file
         Its name, for messages.
     text
-        What stands in it.
+        Its text.
     data
         Its values: dicts, lists, texts, numbers, truth values.
     is_toml
@@ -99,7 +99,7 @@ def decoded(path: Path, content: bytes) -> str:
         ) from None
 
 
-def read_toml(path: Path, text: str) -> Document:
+def read_toml(path: Path, content: bytes) -> Document:
     """Read TOML.
 
     Raises
@@ -107,6 +107,7 @@ def read_toml(path: Path, text: str) -> Document:
     ModelError
         If it is not TOML; the message has the line.
     """
+    text = decoded(path, content)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -127,7 +128,7 @@ def _too_long(path: Path, text: str) -> ModelError:
 
 
 def _toml_problem(message: str, text: str) -> tuple[str, int]:
-    """Return what tomllib says, and the line."""
+    """Return the message of tomllib, and the line."""
     found = re.fullmatch(r"(.*) \(at line (\d+), column (\d+)\)", message, re.DOTALL)
     if found is None:
         return message.replace(" (at end of document)", ", the file ends here"), (
@@ -136,13 +137,13 @@ def _toml_problem(message: str, text: str) -> tuple[str, int]:
     return f"{found[1]}, column {found[3]}", int(found[2])
 
 
-def read_json(path: Path, text: str, *, has_fractions: bool = False) -> Document:
+def read_json(path: Path, content: bytes, *, has_fractions: bool = False) -> Document:
     """Read JSON.
 
     Parameters
     ----------
-    path, text
-        The file, and what stands in it.
+    path, content
+        The file, and its content.
     has_fractions
         Whether a number may be written 187/255; it is read as a text.
 
@@ -151,6 +152,7 @@ def read_json(path: Path, text: str, *, has_fractions: bool = False) -> Document
     ModelError
         If it is not JSON, a key is given twice, or a number is not finite; with the line.
     """
+    text = decoded(path, content)
     if has_fractions:
         text = _FRACTION.sub(_quoted, text)
     repeated: list[str] = []
@@ -194,7 +196,7 @@ def _only_once(pairs: list[tuple[str, Any]], repeated: list[str]) -> dict[str, A
 
 
 def _repetitions(document: Document) -> list[str]:
-    """Return a message for each key that stands in an object twice."""
+    """Return a message for each key that an object has twice."""
     first: dict[Address, int] = {}
     problems = []
     for address, line in json_lines(document.text):

@@ -45,8 +45,8 @@ class FieldReader:
         self.document = document
         self.problems: list[str] = []
         self._places: dict[str, Address] = {}
-        # A large mechanism says "-a/2" thousands of times. Names only come along, but for alpha,
-        # which profiles alone have, and t, which some places do not have.
+        # A large mechanism has "-a/2" thousands of times. Names are only added, except for alpha,
+        # which is for profiles alone, and t, which is not allowed everywhere.
         self._parsed: dict[tuple[str, bool, bool], sympy.Expr] = {}
 
     def problem(self, address: Address, text: str) -> None:
@@ -55,8 +55,8 @@ class FieldReader:
         message = f"{where}: {text}" if where else text
         self.problems.append(self.document.problem(address, message))
 
-    def stands(self, words: str, address: Address) -> None:
-        """Remember where something stands that the checks of the whole system call by words."""
+    def remember(self, words: str, address: Address) -> None:
+        """Remember the address of what the checks of the whole system call by these words."""
         self._places[words] = address
 
     def located(self, problem: str) -> str:
@@ -66,7 +66,7 @@ class FieldReader:
         return self.document.problem(address, problem)
 
     def _field(self, address: Address) -> str:
-        """Say in words what an address is: ``constraint 'A', point_i, entry 2``."""
+        """Return an address in words: ``constraint 'A', point_i, entry 2``."""
         words: list[str] = []
         data = self.document.data
         for part in address:
@@ -132,7 +132,7 @@ class FieldReader:
         return ""
 
     def number(self, value: Any, address: Address) -> float:
-        """Return a finite number; a text is not one. Where it is none, 1."""
+        """Return a finite number. On a problem, report it and return 1.0 as a placeholder."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             hint = "; write the number itself, without quotes" if isinstance(value, str) else ""
             self.problem(address, f"expected a number, not {shown(value)}{hint}")
@@ -148,7 +148,7 @@ class FieldReader:
     def expression(
         self, value: Any, address: Address, names: Mapping[str, sympy.Expr]
     ) -> float | sympy.Expr:
-        """Return a number, or a formula in declared names; 1 where it is neither."""
+        """Return a number, or a formula in declared names; 1.0 as a placeholder on a problem."""
         if not isinstance(value, str):
             if isinstance(value, bool) or not isinstance(value, int | float):
                 self.problem(address, f"expected a number or a formula, not {shown(value)}")

@@ -1,4 +1,4 @@
-"""The format of a model file, in one place: what the reader checks and the JSON Schema says."""
+"""The format of a model file, in one place: for the reader, the writer and the JSON Schema."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Field:
     Attributes
     ----------
     schema
-        What JSON Schema says of its value.
+        JSON Schema of its value.
     is_required
         Whether it must be there.
     """
@@ -45,12 +45,6 @@ _POINT: dict[str, Any] = {
     "type": "array", "items": _EXPRESSION, "minItems": 2, "maxItems": 2,
 }  # fmt: skip
 _NUMBERS: dict[str, Any] = {"type": "array", "items": _NUMBER, "minItems": 6}
-_TABLE: dict[str, Any] = {
-    "type": "object",
-    "properties": {"angles": _NUMBERS, "radii": _NUMBERS, "smoothness": {"const": SMOOTHNESS}},
-    "required": ["angles", "radii", "smoothness"],
-    "additionalProperties": False,
-}
 
 
 def _list(name: str) -> dict[str, Any]:
@@ -86,7 +80,11 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "outline": Field({"type": "array", "items": _POINT, "minItems": 3}, is_required=False),
     },
     "coordinate": {"name": Field(_NAME), "guess": Field(_EXPRESSION, is_required=False)},
-    "profile": {key: Field(_TABLE["properties"][key]) for key in ("angles", "radii", "smoothness")},
+    "profile": {
+        "angles": Field(_NUMBERS),
+        "radii": Field(_NUMBERS),
+        "smoothness": Field({"const": SMOOTHNESS}),
+    },
     "Equation": {
         "type": Field({"const": "Equation"}),
         "name": Field(_NAME),
@@ -99,7 +97,7 @@ _KINDS: Mapping[Kind, Mapping[str, Any]] = {
     Kind.BODY: _NAME,
     Kind.POINT: _POINT,
     Kind.AXIS: _POINT,
-    Kind.PROFILE: {"anyOf": [_EXPRESSION, _TABLE]},
+    Kind.PROFILE: {"anyOf": [_EXPRESSION, {"$ref": "#/$defs/profile"}]},
 }
 
 
@@ -117,7 +115,7 @@ def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
 def model_schema() -> dict[str, Any]:
     """Return the JSON Schema of a model file.
 
-    What it cannot say, whether a formula can be read and a body exists, `kincompile inspect` says.
+    Whether a formula can be read and a body exists is checked by `kincompile inspect`.
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
     kinds = [_object(constraint_fields(item)) for item in CONSTRAINTS.values()]

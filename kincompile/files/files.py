@@ -1,4 +1,4 @@
-"""A model from a file; the suffix says how to read it."""
+"""A model from a file; the suffix decides how it is read."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from kincompile.errors import InputError
 from kincompile.files.adm_file import read_acf, read_adm
 from kincompile.files.data_text import MAX_BYTES
-from kincompile.files.model_file import read_json_model, read_toml_model
+from kincompile.files.model_file import read_data_model
 from kincompile.files.python_file import read_python
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
 _DATA: dict[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]] = {
-    ".toml": read_toml_model,
-    ".json": read_json_model,
+    ".toml": read_data_model,
+    ".json": read_data_model,
     ".adm": read_adm,
 }
 _READERS: Mapping[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]] = {

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from kincompile.errors import ModelError
-from kincompile.files.data_text import decoded, listed_problems, read_json, read_toml
+from kincompile.files.data_text import listed_problems, read_json, read_toml
 from kincompile.files.file_fields import FieldReader, shown
 from kincompile.files.file_format import (
     FIELDS,
@@ -35,7 +35,6 @@ from kincompile.files.file_format import (
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.catalogue import CONSTRAINTS
-from kincompile.model.constraint import CamConstraint
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import alpha, t
 from kincompile.model.mechanism import Mechanism
@@ -49,35 +48,20 @@ if TYPE_CHECKING:
     from kincompile.files.data_text import Document
     from kincompile.model.arguments import Argument
     from kincompile.model.constraint import Constraint
+    from kincompile.model.expressions import Scalars
 
 Row = dict[str, Any]
 
 
-def read_toml_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
-    """Read a model from TOML.
+def read_data_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
+    """Read a model from TOML or JSON.
 
     Parameters
     ----------
     path
-        The file, for messages.
+        The file: its suffix, and its name in messages.
     content
-        What the file holds.
-
-    Raises
-    ------
-    ModelError
-        If it is not a model; every problem with line and field.
-    """
-    return model_of(read_toml(path, decoded(path, content)))
-
-
-def read_json_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
-    """Read a model from JSON; otherwise as `read_toml_model`."""
-    return model_of(read_json(path, decoded(path, content)))
-
-
-def model_of(document: Document) -> Mechanism | ConstraintSystem:
-    """Return the model that a document describes.
+        Its content.
 
     Returns
     -------
@@ -87,9 +71,10 @@ def model_of(document: Document) -> Mechanism | ConstraintSystem:
     Raises
     ------
     ModelError
-        If it does not describe one; every problem with line and field.
+        If it is not a model; every problem with line and field.
     """
-    reader = _ModelReader(document)
+    read = read_toml if path.suffix.lower() == ".toml" else read_json
+    reader = _ModelReader(read(path, content))
     model = reader.read()
     if reader.problems or model is None:
         raise listed_problems(reader.problems)
@@ -103,7 +88,7 @@ class _ModelReader(FieldReader):
         super().__init__(document)
         self._names: dict[str, sympy.Expr] = {"t": t}
         self._bodies: dict[str, Address] = {}
-        self._taken: dict[str, Address] = {}
+        self._taken: dict[tuple[str, str], Address] = {}
 
     def read(self) -> Mechanism | ConstraintSystem | None:
         """Return the model as far as it could be read, None where nothing is left of it."""
@@ -187,11 +172,11 @@ class _ModelReader(FieldReader):
         self.problem(("analysis", "points"), text)
         return found
 
-    def _is_free(self, name: str, address: Address) -> bool:
-        """Return whether a name is new, and take it."""
+    def _is_free(self, name: str, address: Address, kind: str = "symbol") -> bool:
+        """Return whether a name is new among its kind, and take it."""
         if not name:
             return False
-        other = self._taken.setdefault(name, address)
+        other = self._taken.setdefault((kind, name), address)
         if other is not address:
             line = self.document.line(other)
             self.problem((*address, "name"), f"{name!r} is the name in line {line} already")
@@ -204,7 +189,7 @@ class _ModelReader(FieldReader):
         unit = self.unit(row.get("unit", ""), (*address, "unit"), f"parameter {name!r}")
         if name:
             self._names[name] = sympy.Symbol(name)
-            self.stands(f"parameter {name!r}", address)
+            self.remember(f"parameter {name!r}", address)
         return Parameter(name, default, unit) if self._is_free(name, address) and complete else None
 
     def _body(self, address: Address, row: Row) -> Body | None:
@@ -221,25 +206,22 @@ class _ModelReader(FieldReader):
             self.problem((*address, "name"), f"{name!r} is the name {whose} already")
             return None
         self._bodies[name] = address
-        body = Body(name, (start[0], start[1], start[2]), outline)
+        body = Body(name, tuple(start), outline)
         for coordinate in body.coordinates:
             self._names[coordinate] = sympy.Symbol(coordinate)
-            self.stands(f"guess of {coordinate}", (*address, "guess"))
-        self.stands(f"outline of {name}", (*address, "outline"))
+            self.remember(f"guess of {coordinate}", (*address, "guess"))
+        self.remember(f"outline of {name}", (*address, "outline"))
         return body
 
-    def _outline(
-        self, given: Any, address: Address
-    ) -> tuple[tuple[float | sympy.Expr, float | sympy.Expr], ...]:
+    def _outline(self, given: Any, address: Address) -> tuple[Scalars, ...]:
         """Return the corners of a body's outline."""
         if not isinstance(given, list):
             self.problem(address, f"expected a list of corners [xi, eta], not {shown(given)}")
             return ()
-        corners = [
-            self.expressions(corner, (*address, k), self._names, "[xi, eta]", 2)
+        return tuple(
+            tuple(self.expressions(corner, (*address, k), self._names, "[xi, eta]", 2))
             for k, corner in enumerate(given)
-        ]
-        return tuple((xi, eta) for xi, eta in corners)
+        )
 
     def _coordinate(self, address: Address, row: Row) -> tuple[str, float | sympy.Expr] | None:
         self.has_fields(address, row, FIELDS["coordinate"])
@@ -247,20 +229,15 @@ class _ModelReader(FieldReader):
         guess = self.expression(row.get("guess", 0.0), (*address, "guess"), self._names)
         if name:
             self._names[name] = sympy.Symbol(name)
-            self.stands(f"guess of {name}", address)
+            self.remember(f"guess of {name}", address)
         return (name, guess) if self._is_free(name, address) else None
 
     def _declare_contacts(self, row: Row) -> None:
-        """Make the contact parameters of a cam known, which any equation may name."""
-        kind = CONSTRAINTS.get(row["type"]) if isinstance(row.get("type"), str) else None
-        if (
-            kind is not None
-            and issubclass(kind, CamConstraint)
-            and isinstance(row.get("name"), str)
-        ):
-            count = len(kind.arguments())
-            for name in kind(row["name"], *[None] * count).contact_names:
-                self._names[name] = sympy.Symbol(name)
+        """Declare the contact parameters of a cam, which any equation may name."""
+        kind, name = row.get("type"), row.get("name")
+        if isinstance(kind, str) and kind in CONSTRAINTS and isinstance(name, str):
+            contacts = CONSTRAINTS[kind].contacts_of(name)
+            self._names |= {contact: sympy.Symbol(contact) for contact in contacts}
 
     def _constraint(self, address: Address, row: Row) -> Constraint | Equation | None:
         """Return a joint, a driver or a free equation, None where something is wrong with it."""
@@ -283,12 +260,9 @@ class _ModelReader(FieldReader):
 
     def _remember_constraint(self, kind: str, name: str, address: Address) -> None:
         """Note how the checks of the system call a constraint and its arguments."""
-        other = self._taken.setdefault(f"constraint {name}", address)
-        if name and other is not address:
-            line = self.document.line(other)
-            self.problem((*address, "name"), f"{name!r} is the name in line {line} already")
+        self._is_free(name, address, "constraint")
         for title in (f"{kind} {name!r}", f"equation {name!r}", f"equation '{name}."):
-            self.stands(title, address)
+            self.remember(title, address)
 
     def _equation(self, address: Address, row: Row, name: str) -> Equation:
         self.has_fields(address, row, FIELDS["Equation"])
@@ -298,7 +272,9 @@ class _ModelReader(FieldReader):
             name, *self.expressions(given, place, self._names, "a list of formulas", count)
         )
 
-    def _joint(self, address: Address, row: Row, kind: type[Constraint], name: str) -> Constraint:
+    def _joint(
+        self, address: Address, row: Row, kind: type[Constraint], name: str
+    ) -> Constraint | None:
         fields = constraint_fields(kind)
         self.has_fields(address, row, fields)
         arguments = {
@@ -307,9 +283,9 @@ class _ModelReader(FieldReader):
             if key in row
         }
         for key in arguments:
-            self.stands(f"{kind.__name__} {name!r}, {key}", (*address, key))
+            self.remember(f"{kind.__name__} {name!r}, {key}", (*address, key))
         if len(arguments) < len(kind.arguments()):
-            return kind(name, *[None] * len(kind.arguments()))
+            return None
         if "guess" in row and "guess" in fields:
             arguments["guess"] = self._contact_guess(kind, row["guess"], (*address, "guess"))
         return kind(name, **arguments)

@@ -28,7 +28,7 @@ MODULE_NAME = "kincompile_model"
 """The `__name__` of a file while it runs: not "__main__", so that its script part does not run."""
 
 _NUMBERS_ONLY = ("Cannot convert expression to float", "loop of ufunc does not support argument")
-"""What Python and NumPy say to a function of `kc.t` or a parameter that takes numbers only."""
+"""Messages of Python and NumPy where a function that takes numbers only gets a symbol."""
 
 _COMPILED = ("FORMAT", "FINGERPRINT", "N_COORDINATES")
 
@@ -80,7 +80,7 @@ def _run(path: Path, content: bytes) -> dict[str, Any]:
 
 @contextmanager
 def _importable(module: ModuleType, path: Path) -> Iterator[None]:
-    """Let a file import its neighbours, and be found by what looks up the module of a class."""
+    """Let a file import its neighbours, and be found where the module of a class is looked up."""
     before = sys.path.copy()
     sys.modules[module.__name__] = module
     sys.path.insert(0, str(path.absolute().parent))

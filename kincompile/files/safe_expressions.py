@@ -1,9 +1,9 @@
 """Text as people write formulas, read into SymPy through a whitelist; nothing in it is executed.
 
 Python's own grammar does the reading (`ast.parse`, which builds a tree and runs nothing); every
-node of the tree is then rebuilt by hand, and a node that is not on the list is an error that says
-where it stands, what may stand there and which names exist. `eval`, `exec`, `sympify` and
-`parse_expr` are not used on a text: each of them runs code that a file brings along.
+node of the tree is then rebuilt by hand, and a node that is not on the list is an error with
+its position, the alternatives and the names that exist. `eval`, `exec`, `sympify` and
+`parse_expr` are not used on a text: each of them runs code in the text.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MAX_NODES = 2_000
 MAX_DEPTH = 60
 """Levels of nesting; a sum or product of many terms is one level."""
 MAX_EXPONENT = 64
-"""Largest number that may stand as an exponent."""
+"""Largest exponent."""
 MAX_BITS = 1024
 """Bits of a whole number or fraction: as large as a double can be."""
 
@@ -69,6 +69,12 @@ class Place:
     line: int = 1
     column: int = 1
 
+    def after(self, text: str) -> Place:
+        """Return where a text ends that begins here."""
+        lines = text.count("\n")
+        first = 1 if lines else self.column
+        return Place(self.line + lines, len(text) - (text.rfind("\n") + 1) + first)
+
 
 class ExpressionError(NotAnExpressionError):
     """A text that is not an expression.
@@ -106,7 +112,7 @@ def parse_expression(
     place
         Where the text begins in its file, for messages.
     refused
-        Names that exist and may not stand here, each with the reason.
+        Names that exist and are not allowed here, each with the reason.
 
     Returns
     -------
@@ -189,10 +195,8 @@ class _Source:
 
     def error(self, problem: str, offset: int) -> ExpressionError:
         """Return an error at a place in the text."""
-        before = self.text[:offset]
-        line = before.count("\n")
-        column = offset - (before.rfind("\n") + 1) + (self._place.column if line == 0 else 1)
-        return ExpressionError(problem, self._place.line + line, column)
+        place = self._place.after(self.text[:offset])
+        return ExpressionError(problem, place.line, place.column)
 
     def node_error(self, problem: str, node: ast.AST) -> ExpressionError:
         """Return an error at a node."""
@@ -212,7 +216,7 @@ class _Source:
 
 
 def unbalanced_bracket(text: str) -> tuple[str, int] | None:
-    """Say which bracket has no partner and at which offset it stands, or return None."""
+    """Return a message about an unbalanced bracket and its offset, or None."""
     pairs = {")": "(", "]": "[", "}": "{"}
     open_brackets: list[tuple[str, int]] = []
     for k, character in enumerate(text):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.errors import ModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
 Node = tuple[Any, ...]
 Constant = int | float | Fraction
@@ -67,7 +67,7 @@ class Graph:
         """Return pi."""
         return self._intern(("pi",))
 
-    def input(self, name: str) -> int:
+    def input(self, name: Hashable) -> int:
         """Return a named input."""
         return self._intern(("input", name))
 
@@ -247,7 +247,7 @@ class Graph:
         kind, *name = operation
         return int(getattr(self, kind)(*name, *operands))
 
-    def instantiate(self, nodes: Sequence[Node], inputs: dict[str, int]) -> list[int]:
+    def instantiate(self, nodes: Sequence[Node], inputs: Mapping[Any, int]) -> list[int]:
         """Copy code into this graph with its inputs bound; return the new number of each node.
 
         Copying runs through the folding constructors: this is where an attribute that is zero

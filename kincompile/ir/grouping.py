@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile import quantities
+from kincompile.calculus.rotations import PlaneRotation
 from kincompile.ir.graph import Graph, Node, number_of, operands_of
+from kincompile.ir.program import FrameEntry
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -116,7 +118,7 @@ class GroupedProgram:
         return np.concatenate(parts) if parts else np.empty((0, 2), dtype=np.intp)
 
 
-KINDS = ("q", "q_dot", "cos", "sin", "number", "value")
+KINDS = ("q", "q_dot", *PlaneRotation.names, "number", "value")
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +147,11 @@ def _classify(program: Program) -> _Nodes:
     names = [item.name for item in program.coordinates]
     places = {name: (0, k) for k, name in enumerate(names)}
     places.update({rate(name): (1, k) for k, name in enumerate(names)})
-    angle_number = {names[column]: k for k, (_, column) in enumerate(program.frames)}
+    frames = {
+        node: (KINDS.index(name), k)
+        for k, body in enumerate(program.bodies)
+        for name, node in zip(PlaneRotation.names, body.entries, strict=True)
+    }
     nodes = program.values
     kind = np.full(len(nodes), KINDS.index("value"))
     index = np.arange(len(nodes))
@@ -157,10 +163,8 @@ def _classify(program: Program) -> _Nodes:
             number[node] = operands[0]
         elif operation == "neg":
             number[node] = -number[operands[0]]
-        elif operation == "call" and operands[0] in ("cos", "sin"):
-            inner = nodes[operands[1]]
-            if inner[0] == "input" and inner[1] in angle_number:
-                kind[node], index[node] = KINDS.index(operands[0]), angle_number[inner[1]]
+        elif node in frames:
+            kind[node], index[node] = frames[node]
     kind[~np.isnan(number)] = KINDS.index("number")
     return _Nodes(kind, index, number, _structures(nodes, kind))
 
@@ -195,7 +199,7 @@ def group(program: Program) -> GroupedProgram:
         tuple(groups),
         np.array(builder.numbers),
         tuple(builder.values),
-        tuple(column for _, column in program.frames),
+        tuple(body.columns[-1] for body in program.bodies),
     )
 
 
@@ -241,8 +245,8 @@ class _Builder:
         rows = np.array([instance.first_row for instance in instances])
         numbers = self._nodes.number[bindings]
         # What shapes the code: attributes that are zero, and the ground, whose cosine is one.
-        cosine = np.array([name.startswith("cos ") for name in instances[0].kernel.inputs])
-        shapes = np.where((numbers == 0) | ((numbers == 1) & cosine), numbers, -1)
+        of_frame = np.array([isinstance(item, FrameEntry) for item in instances[0].kernel.inputs])
+        shapes = np.where((numbers == 0) | ((numbers == 1) & of_frame), numbers, -1)
         expressions = np.stack([self._expressions(nodes) for nodes in bindings.T], axis=1)
         expressions = expressions[:, expressions.any(axis=0)]
         # One byte string a constraint compares faster than a row of numbers.
@@ -276,8 +280,8 @@ class _Builder:
         kernel = sample.kernel
         graph, sources = Graph(), _Sources()
         inputs = {
-            name: self._input(name, nodes, graph, sources)
-            for name, nodes in zip(kernel.inputs, bindings.T, strict=True)
+            item: self._input(item if isinstance(item, str) else item.name, nodes, graph, sources)
+            for item, nodes in zip(kernel.inputs, bindings.T, strict=True)
         }
         new = graph.instantiate(kernel.nodes, inputs)
         self._counts[kernel.name] = self._counts.get(kernel.name, 0) + 1
@@ -298,9 +302,9 @@ class _Builder:
             rows,
             columns,
             {
-                new[node]: stem.replace(".", "_").replace(" ", "_")
-                for node, stem in kernel.hints
-                if graph.nodes[new[node]][0] not in ("neg", "const", "input")
+                new[hint.node]: hint.name
+                for hint in kernel.hints
+                if graph.nodes[new[hint.node]][0] not in ("neg", "const", "input")
             },
         )
 
@@ -318,7 +322,7 @@ class _Builder:
                 sources.known[key] = graph.const(float(numbers[0]))
             elif (operation := self._shared_operation(nodes)) is not None:
                 operands = [
-                    self._input(f"{name}.{k}", column, graph, sources)
+                    self._input(f"{name}_{k}", column, graph, sources)
                     for k, column in enumerate(self._operands(nodes))
                 ]
                 sources.known[key] = graph.apply(operation, operands)

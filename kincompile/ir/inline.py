@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from kincompile import quantities
 from kincompile.ir.graph import Constant, Graph, Node, number_of
+from kincompile.ir.program import Function
 from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from kincompile.ir.program import Instance, Program
+    from kincompile.ir.program import Hint, Instance, Program
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +55,15 @@ class InlineProgram:
         One a constraint, in order of rows.
     hints
         Speaking names of nodes.
+    frames
+        What the frames of bodies give, a tuple of nodes a body.
     """
 
     program: Program
     nodes: tuple[Node, ...]
     sections: tuple[Section, ...]
     hints: Mapping[int, str]
+    frames: tuple[tuple[int, ...], ...] = ()
 
     def entries(self, quantity: str) -> list[Entry]:
         """Return the entries of a quantity, row by row."""
@@ -78,10 +82,8 @@ def inline(program: Program) -> InlineProgram:
     """Write a program out as one graph."""
     graph = Graph(program.values)
     hints: dict[int, str] = {}
-    for body, column in program.frames:
-        angle = graph.input(program.coordinates[column].name)
-        hints[graph.call("cos", angle)] = f"c_{body}"
-        hints[graph.call("sin", angle)] = f"s_{body}"
+    for body in program.bodies:
+        hints.update(zip(body.entries, body.labels, strict=True))
     for item in program.coordinates:
         hints[graph.square(graph.input(rate(item.name)))] = f"{rate(item.name)}_sq"
     sections: list[Section] = []
@@ -90,18 +92,23 @@ def inline(program: Program) -> InlineProgram:
         kernel = instance.kernel
         inputs = dict(zip(kernel.inputs, instance.bindings, strict=True))
         new = graph.instantiate(kernel.nodes, inputs)
-        spoken = [(inputs[name], _spoken_value(name, instance)) for name in inputs]
-        spoken += [(new[node], _spoken(stem, instance)) for node, stem in kernel.hints]
-        for node, said in spoken:
-            # A hint on a call says that it is the cosine or sine of a body frame.
-            if said and graph.nodes[node][0] not in ("neg", "const", "input", "call"):
-                hints.setdefault(node, said)
+        named = [
+            (node, _function_name(item, instance))
+            for item, node in inputs.items()
+            if isinstance(item, Function)
+        ]
+        named += [(new[hint.node], _vector_name(hint, instance)) for hint in kernel.hints]
+        for node, name in named:
+            # A call is named by its function and argument.
+            if graph.nodes[node][0] not in ("neg", "const", "input", "call"):
+                hints.setdefault(node, name)
         entries = _entries(instance, new, graph, shared)
         sections.append(Section(instance, instance.constraint.text, entries))
     if shared:  # a sum is complete where the last constraint has contributed
         sums = _sums(program, graph, shared)
         sections[-1] = replace(sections[-1], entries={**sections[-1].entries, **sums})
-    return InlineProgram(program, tuple(graph.nodes), tuple(sections), hints)
+    frames = tuple(sorted(body.entries for body in program.bodies))
+    return InlineProgram(program, tuple(graph.nodes), tuple(sections), hints, frames)
 
 
 def _entries(
@@ -143,33 +150,24 @@ def _sums(
     return sums
 
 
-def _spoken(stem: str, instance: Instance) -> str:
+def _vector_name(hint: Hint, instance: Instance) -> str:
     """Return the name of a vector component.
 
     ``B_crank_x`` is A s of joint B on the crank, ``B_crank_w2_x`` the same times the square of the
     angular velocity, ``B_axis_crank_x`` an axis, ``B_d_x`` the vector d, ``B_u_cam_x`` the unit
-    vector towards the contact on a cam. The stem is the textbook's symbol and the component:
-    ``s_i.x``, ``s_i w2.x``, ``v_j.y``, ``d_dot.x``, ``u_i.x``.
+    vector towards the contact on a cam.
     """
-    vector, axis = stem.split(".")
-    symbol, *factor = vector.split()
-    letter, _, index = symbol.partition("_")
-    if index in ("i", "j") and letter in ("s", "v", "u"):
-        body = instance.bodies["ij".index(index)]
-        symbol = {"s": body, "v": f"axis_{body}", "u": f"u_{body}"}[letter]
-    return "_".join((instance.name, symbol, *factor, axis))
+    body = "" if hint.owner is None else instance.bodies[hint.owner]
+    return f"{instance.name}_{hint.stem.format(body)}"
 
 
-def _spoken_value(name: str, instance: Instance) -> str | None:
+def _function_name(item: Function, instance: Instance) -> str:
     """Return the name of a driver's value or of a cam's radius, or of one of their derivatives.
 
     ``lift_C_dot`` is the rate of the driver C(t) of ``lift``, ``contact_rho_cam_1`` the first
     derivative of the radius of the cam by the polar angle.
     """
-    symbol, order = name.rstrip("'"), name.count("'")
-    if symbol == "C":
-        return f"{instance.name}_C{('', '_dot', '_ddot')[order]}"
-    if symbol in ("rho_i", "rho_j"):
-        body = instance.bodies["ij".index(symbol[-1])]
-        return f"{instance.name}_rho_{body}{f'_{order}' if order else ''}"
-    return None
+    if item.body is None:
+        return f"{instance.name}_{item.symbol}{('', '_dot', '_ddot')[item.order]}"
+    ending = f"_{item.order}" if item.order else ""
+    return f"{instance.name}_rho_{instance.bodies[item.body]}{ending}"

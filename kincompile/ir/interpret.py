@@ -124,7 +124,7 @@ def _by_kernel(program: Program) -> list[tuple[Kernel, list[Instance]]]:
 
 
 def run(
-    nodes: Sequence[Node], inputs: Mapping[str, Any], tables: Mapping[str, SplineTable]
+    nodes: Sequence[Node], inputs: Mapping[Any, Any], tables: Mapping[str, SplineTable]
 ) -> list[Any]:
     """Evaluate straight-line code and return the value of every node."""
     values: list[Any] = []
@@ -137,7 +137,7 @@ def _apply(
     operation: str,
     operands: list[Any],
     values: list[Any],
-    inputs: Mapping[str, Any],
+    inputs: Mapping[Any, Any],
     tables: Mapping[str, SplineTable],
 ) -> Any:
     match operation, operands:

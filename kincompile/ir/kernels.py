@@ -17,11 +17,13 @@ from kincompile.calculus.expressions import (
     VectorSum,
     VectorSymbol,
 )
+from kincompile.calculus.symbols import s_i, s_j, v_i, v_j
+from kincompile.calculus.template import Template
 from kincompile.derive.derivation import derive
 from kincompile.ir.differentiate import negated_tangents, tangents
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph, pruned
-from kincompile.ir.program import Kernel
+from kincompile.ir.program import Attribute, FrameEntry, Function, Hint, Input, Kernel, Motion
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -29,7 +31,9 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from kincompile.calculus.expressions import Components, Profile, Rotation, TimeFunction, Value
-    from kincompile.calculus.template import Template
+    from kincompile.calculus.symbols import CoordinateSymbol, Frame
+    from kincompile.ir.graph import Node
+    from kincompile.model.bodies import BodyKind
     from kincompile.model.resolve import FreeEquation
 
 
@@ -57,15 +61,17 @@ class Code:
 
 
 class KernelEnvironment:
-    """The leaves of a template as inputs of its kernel, each named as in the textbook."""
+    """The leaves of a template as inputs of its kernel."""
 
     def __init__(self, template: Template) -> None:
         self.graph = Graph()
-        self.inputs: dict[str, int] = {}
+        self.inputs: dict[Input, int] = {}
+        self._motion = _motion(template)
         self._frames = {frame.rotation: frame for frame in template.frames}
+        self._template = template
 
-    def _input(self, name: str) -> Code:
-        node = self.inputs[name] = self.graph.input(name)
+    def _input(self, item: Input) -> Code:
+        node = self.inputs[item] = self.graph.input(item)
         return Code(self.graph, node)
 
     def number(self, value: Fraction) -> Value:
@@ -78,35 +84,87 @@ class KernelEnvironment:
 
     def symbol(self, symbol: Symbol) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
-        return self._input(symbol.name)
+        (own,) = self._motion.get(symbol, (Attribute(symbol.name, 0, symbol.name),))
+        return self._input(own)
 
     def vector(self, symbol: VectorSymbol) -> Components:
         """Return the components of a vector as inputs."""
-        return tuple(self._input(f"{symbol.name}.{axis}") for axis in "xy"[: symbol.size])
+        own = self._motion.get(symbol) or attributes(symbol.name, symbol.size)
+        return tuple(map(self._input, own))
 
     def time_function(self, function: TimeFunction) -> Value:
         """Return C(t) or one of its derivatives."""
-        return self._input(derivative_name(function.name, function.order))
+        return self._input(Function(function.name, function.order))
 
     def profile(self, profile: Profile) -> Value:
         """Return rho(alpha) or one of its derivatives."""
-        return self._input(derivative_name(profile.name, profile.order))
+        (contact,) = self._motion[profile.argument]
+        indices = [owner.index for owner in self._template.owners]
+        body = indices.index(indices[contact.owner])
+        return self._input(Function(profile.name, profile.order, contact.owner, body))
 
     def entries(self, rotation: Rotation, expand: Expansion) -> Components:
-        """Return cosine and sine: inputs for a body's angle, whose frame is shared, else code."""
+        """Return inputs for a body's frame, which is shared, else code."""
         frame = self._frames.get(rotation)
         if frame is None:
             return expand.entries(rotation)
-        return tuple(self._input(f"{name} {frame.phi.name}") for name in ("cos", "sin"))
+        return tuple(map(self._input, frame_entries(self._template, frame)))
 
     def call(self, function: str, value: Value) -> Value:
         """Return an elementary function."""
         return Code(self.graph, self.graph.call(function, value.node))
 
 
-def derivative_name(name: str, order: int) -> str:
-    """Return the name of a derivative as a kernel's input: C, C', C''."""
-    return name + "'" * order
+AXES = "xyz"
+
+
+def attributes(symbol: str, size: int) -> tuple[Attribute, ...]:
+    """Return the components of a point or direction as inputs."""
+    return tuple(Attribute(symbol, k, f"{symbol}_{AXES[k]}") for k in range(size))
+
+
+def frame_entries(template: Template, frame: Frame) -> tuple[FrameEntry, ...]:
+    """Return what a body's frame gives as inputs."""
+    owner = template.owners.index(frame)
+    names = frame.rotation.names
+    return tuple(FrameEntry(owner, k, f"{name}_{frame.index}") for k, name in enumerate(names))
+
+
+def motion_of(template: Template, owner: int, order: int) -> tuple[Motion, ...]:
+    """Return the coordinates of an owner, or their rates, as inputs."""
+    item, ending = template.owners[owner], "_dot" * order
+    return tuple(
+        Motion(owner, k, order, f"{letter}_{item.index}{ending}")
+        for k, letter in enumerate(item.letters)
+    )
+
+
+def _motion(template: Template) -> dict[CoordinateSymbol, tuple[Motion, ...]]:
+    """Return the inputs of each coordinate and rate of a template."""
+    found = {}
+    for owner, item in enumerate(template.owners):
+        for order, symbols in enumerate((item.coordinates, item.rates)):
+            own = iter(motion_of(template, owner, order))
+            for symbol in symbols:
+                found[symbol] = tuple(next(own) for _ in range(symbol.size))
+    return found
+
+
+@cache
+def frame_kernel(kind: BodyKind) -> tuple[tuple[Node, ...], tuple[int, ...]]:
+    """Return the code of the frame of a kind of body, and its entries.
+
+    Its inputs are the numbers of the coordinates. In the plane: cosine and sine of the angle.
+    """
+    own = kind.frame("i")
+    environment = KernelEnvironment(Template("Frame", (own,), (), ()))
+    found = Expansion(environment).entries(own.rotation)
+    graph = Graph()
+    numbers = {
+        item: graph.input(item.component) for item in environment.inputs if isinstance(item, Motion)
+    }
+    new = graph.instantiate(environment.graph.nodes, numbers)
+    return tuple(graph.nodes), tuple(new[item.node] for item in found)
 
 
 @cache
@@ -139,39 +197,51 @@ def constraint_kernel(template: Template) -> Kernel:
     )
 
 
-def _hints(template: Template, expansion: Expansion) -> tuple[tuple[int, str], ...]:
+def _hints(template: Template, expansion: Expansion) -> tuple[Hint, ...]:
     """Name the components of vectors that a reader knows from the textbook.
 
     They are A_i s_i, the centripetal A_i s_i w_i^2, d and its rate, and A_i u(alpha_i) of a cam.
     """
     found = []
-    for vector, pair in expansion.vectors.items():
-        stem = _stem(template, vector)
-        if stem is not None:
-            found += [(item.node, f"{stem}.{axis}") for axis, item in zip("xy", pair, strict=True)]
+    for vector, components in expansion.vectors.items():
+        spoken = _spoken(template, vector)
+        if spoken is not None:
+            owner, stem, name = spoken
+            found += [
+                Hint(item.node, owner, f"{stem}_{axis}", f"{name}_{axis}")
+                for axis, item in zip(AXES, components, strict=False)
+            ]
     return tuple(found)
 
 
-def _stem(template: Template, vector: Vector) -> str | None:
+STEMS = {s_i: "{}", s_j: "{}", v_i: "axis_{}", v_j: "axis_{}"}
+"""Names of turned points and directions, with that of the body; others have their symbol."""
+
+
+def _spoken(template: Template, vector: Vector) -> tuple[int | None, str, str] | None:
+    """Return the body in the name of a vector, its name, and that in the type's own symbols."""
+    rotations = [item.rotation for item in template.owners]
     match vector:
-        case Rotated(_, VectorSymbol(name), ()):
-            return name
-        case Scaled(Power(Symbol(), 2), Rotated(_, VectorSymbol(name), ())):
-            return f"{name} w2"
-        case Rotated(_, Rotated(inner, Basis(), ()), ()):
-            indices = [item.index for item in template.contacts if inner == item.rotation]
-            return f"u_{indices[0]}" if indices else None
+        case Rotated(rotation, VectorSymbol(name) as symbol, ()) if rotation in rotations:
+            return rotations.index(rotation), STEMS.get(symbol, name), name
+        case Scaled(Power(Symbol(), 2), Rotated() as inner):
+            found = _spoken(template, inner)
+            return found and (found[0], f"{found[1]}_w2", f"{found[2]}_w2")
+        case Rotated(rotation, Rotated(inner_rotation, Basis(), ()), ()):
+            if inner_rotation in rotations and rotation in rotations:
+                owner = rotations.index(rotation)
+                return owner, "u_{}", f"u_{template.owners[owner].index}"
         case VectorSum():
             return _separation(template, vector)
     return None
 
 
-def _separation(template: Template, vector: VectorSum) -> str | None:
-    """Return whether a sum is a distance vector d, which leads to body j, or the rate of one."""
+def _separation(template: Template, vector: VectorSum) -> tuple[None, str, str] | None:
+    """Return the names of a distance vector d, which leads to body j, or of its rate."""
     *others, last = template.frames
     if last.r_dot in vector.terms:
-        return "d_dot"
-    return "d" if others and last.r in vector.terms else None
+        return None, "d_dot", "d_dot"
+    return (None, "d", "d") if others and last.r in vector.terms else None
 
 
 def equation_kernel(equation: FreeEquation) -> Kernel:

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import hashlib
-from functools import cache
 from typing import TYPE_CHECKING
 
 import sympy
 
+from kincompile.calculus.symbols import Frame
 from kincompile.errors import ModelError
 from kincompile.ir.differentiate import derivative_code
 from kincompile.ir.equation_shapes import EquationShapes
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
-from kincompile.ir.kernels import constraint_kernel, derivative_name, equation_kernel
-from kincompile.ir.program import Instance, Kernel, Program
+from kincompile.ir.kernels import (
+    attributes,
+    constraint_kernel,
+    equation_kernel,
+    frame_entries,
+    frame_kernel,
+    motion_of,
+)
+from kincompile.ir.program import Attribute, BodyFrame, Function, Input, Instance, Kernel, Program
 from kincompile.model.expressions import alpha, t
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.spline import PeriodicSpline, SplineTable
-from kincompile.names import body_coordinates, rate
+from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from kincompile.calculus.template import Template
     from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
     from kincompile.model.expressions import Scalar
@@ -47,13 +53,16 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
         tables.update(_tables(constraint))
         own = tuple(None if name is None else columns[name] for name in names)
         instances.append(Instance(kernel, constraint, first_row, own, bindings))
-    frames = tuple((body.name, columns[body_coordinates(body.name)[2]]) for body in system.bodies)
+    bodies = tuple(
+        binder.frame_of(body, own)
+        for body, own in zip(system.bodies, system.body_columns, strict=True)
+    )
     return Program(
         system.name,
         system.coordinates,
         system.parameters,
         system.equations,
-        frames,
+        bodies,
         tuple(graph.nodes),
         tuple(instances),
         tables,
@@ -125,7 +134,7 @@ class _Binder:
         self._convert = Converter(graph, graph.input).convert
         self._bodies: dict[str, tuple[int, ...]] = {}
         self._numbers: dict[float, int] = {}
-        self._orders: dict[int, tuple[Kernel, tuple[tuple[int, ...], list[str]]]] = {}
+        self._orders: dict[int, tuple[Kernel, tuple[tuple[int, ...], list[Function]]]] = {}
 
     def bound(
         self, constraint: Joint | FreeEquation
@@ -144,20 +153,20 @@ class _Binder:
         """Return the node of each of the kernel's inputs."""
         known = self._known(joint)
         places, functions = self._order(joint, kernel)
-        known += [self._function(joint, name) for name in functions]
+        known += [self._function(joint, item) for item in functions]
         return tuple(map(known.__getitem__, places))
 
-    def _function(self, joint: Joint, name: str) -> int:
+    def _function(self, joint: Joint, item: Function) -> int:
         """Return the node of C, C', C'', or of rho and its derivatives at the contact."""
-        symbol, order = name.rstrip("'"), name.count("'")
-        assert derivative_name(symbol, order) == name
-        if symbol in joint.profiles:
-            contact = _contact_names(joint.template, joint.columns)[symbol]
-            return self._derivative(joint.profiles[symbol], alpha.name, order, contact)
-        value = joint.scalars[symbol]
+        if item.owner is not None:
+            # The columns of contacts are the last, one each, as they are the last owners.
+            contact = joint.columns[item.owner - len(joint.template.owners)]
+            assert contact is not None
+            return self._derivative(joint.profiles[item.symbol], alpha.name, item.order, contact)
+        value = joint.scalars[item.symbol]
         if not isinstance(value, sympy.Expr):
-            return self._value(0.0 if order else value)
-        return self._derivative(value, t.name, order, t.name)
+            return self._value(0.0 if item.order else value)
+        return self._derivative(value, t.name, item.order, t.name)
 
     def _derivative(self, value: sympy.Expr, variable: str, order: int, at: str) -> int:
         """Return the node of a derivative by a variable that stands for the input `at`."""
@@ -180,24 +189,32 @@ class _Binder:
     def _known(self, joint: Joint) -> list[int]:
         """Return the nodes of coordinates, rates and frames, then of scalars and points."""
         known = [node for body in joint.bodies for node in self._body(body)]
-        for name in joint.columns[3 * len(joint.bodies) :]:
+        for name in joint.columns[len(joint.columns) - len(joint.template.contacts) :]:
             assert name is not None
             known += self._graph.input(name), self._graph.input(rate(name))
         known += [self._value(value) for symbol, value in joint.scalars.items() if symbol != "C"]
         known += [self._value(value) for point in joint.points.values() for value in point]
         return known
 
-    def _order(self, joint: Joint, kernel: Kernel) -> tuple[tuple[int, ...], list[str]]:
-        """Return where each of the kernel's inputs stands in `_known`, and what comes after it."""
+    def _order(self, joint: Joint, kernel: Kernel) -> tuple[tuple[int, ...], list[Function]]:
+        """Return where each of the kernel's inputs stands in `_known`, and the functions after it.
+
+        What stands there is the same for all joints of a type.
+        """
         if id(kernel) not in self._orders:
-            names = [name for item in joint.template.frames for name in _frame_inputs(item.index)]
-            for contact in joint.template.contacts:
-                names += contact.alpha.name, contact.alpha_dot.name
-            names += [symbol for symbol in joint.scalars if symbol != "C"]
-            names += [f"{symbol}.{axis}" for symbol in joint.points for axis in "xy"]
-            functions = [name for name in kernel.inputs if name not in names]
-            places = {name: place for place, name in enumerate((*names, *functions))}
-            order = tuple(places[name] for name in kernel.inputs), functions
+            template = joint.template
+            known: list[Input] = []
+            for owner, item in enumerate(template.owners):
+                known += motion_of(template, owner, 0) + motion_of(template, owner, 1)
+                known += frame_entries(template, item) if isinstance(item, Frame) else ()
+            known += [Attribute(symbol, 0, symbol) for symbol in joint.scalars if symbol != "C"]
+            for symbol, point in joint.points.items():
+                known += attributes(symbol, len(point))
+            functions = [item for item in kernel.inputs if isinstance(item, Function)]
+            places: dict[Input | str, int] = {
+                item: place for place, item in enumerate((*known, *functions))
+            }
+            order = tuple(places[item] for item in kernel.inputs), functions
             self._orders[id(kernel)] = kernel, order
         return self._orders[id(kernel)][1]
 
@@ -212,35 +229,26 @@ class _Binder:
 
     def bind_equation(self, equation: SharedEquation) -> tuple[int, ...]:
         """Return the node of each of the inputs of a shared kernel."""
-        return tuple(self._named(equation.values[name]) for name in equation.kernel.inputs)
+        return tuple(self._named(equation.values[str(name)]) for name in equation.kernel.inputs)
 
     def _body(self, body: Body) -> tuple[int, ...]:
-        """Return a body's coordinates, rates, cosine and sine; of the ground they are numbers."""
+        """Return a body's coordinates, rates and frame entries; the ground's are numbers."""
         if body.name not in self._bodies:
-            graph, coordinates = self._graph, body_coordinates(body.name)
+            graph, kind = self._graph, body.kind
             if body.is_ground:
-                nodes = [graph.const(0)] * 6
+                nodes = [graph.const(value) for value in kind.ground]
+                rates = [graph.const(0)] * len(nodes)
             else:
-                rates = [rate(name) for name in coordinates]
-                nodes = [graph.input(name) for name in (*coordinates, *rates)]
-            angle = nodes[2]
-            self._bodies[body.name] = (*nodes, graph.call("cos", angle), graph.call("sin", angle))
+                nodes = [graph.input(name) for name in body.coordinates]
+                rates = [graph.input(rate(name)) for name in body.coordinates]
+            code, entries = frame_kernel(kind)
+            new = graph.instantiate(code, dict(enumerate(nodes)))
+            self._bodies[body.name] = *nodes, *rates, *(new[node] for node in entries)
         return self._bodies[body.name]
 
-
-@cache
-def _frame_inputs(index: str) -> tuple[str, ...]:
-    """Return the names of a body's coordinates, rates, cosine and sine as a kernel's inputs."""
-    coordinates = f"r_{index}.x", f"r_{index}.y", f"phi_{index}"
-    rates = f"r_{index}_dot.x", f"r_{index}_dot.y", f"phi_{index}_dot"
-    return *coordinates, *rates, f"cos phi_{index}", f"sin phi_{index}"
-
-
-def _contact_names(template: Template, columns: tuple[str | None, ...]) -> dict[str, str]:
-    """Return the coordinate at which each profile is taken."""
-    names = columns[3 * len(template.frames) :]
-    return {
-        contact.rho().name: name
-        for contact, name in zip(template.contacts, names, strict=True)
-        if name is not None
-    }
+    def frame_of(self, body: Body, columns: range) -> BodyFrame:
+        """Return a body with the nodes that its frame gives."""
+        entries = self._body(body)[2 * len(columns) :]
+        symbols = body.kind.frame("i").rotation.symbols
+        labels = tuple(f"{symbol}_{body.name}" for symbol in symbols)
+        return BodyFrame(body.name, columns, entries, labels)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -16,14 +16,102 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
+class Motion:
+    """A coordinate of an owner, a body or a contact of the type, or its rate (order 1)."""
+
+    owner: int
+    component: int
+    order: int
+    name: str = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameEntry:
+    """A number that the frame of body i or j gives: the cosine or sine of its angle."""
+
+    owner: int
+    entry: int
+    name: str = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """A scalar attribute, or a component of a point or direction."""
+
+    symbol: str
+    component: int
+    name: str = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """The value C(t), or rho(alpha) of a body at the contact that is the owner, or a derivative."""
+
+    symbol: str
+    order: int
+    owner: int | None = None
+    body: int | None = None
+
+    @property
+    def name(self) -> str:
+        """The symbol, with a prime for each derivative."""
+        return self.symbol + "_prime" * self.order
+
+
+Input = Motion | FrameEntry | Attribute | Function
+"""What a kernel of a constraint type reads; `name` is for people, in the type's own symbols."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hint:
+    """What a node is in the textbook's formula: a component of A_i s_i, of d, of u(alpha_i).
+
+    Attributes
+    ----------
+    owner
+        Number of the body that is named in it, None if none is.
+    stem
+        Its name, ``{}`` for that of the body.
+    name
+        Its name in the type's own symbols.
+    """
+
+    node: int
+    owner: int | None
+    stem: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class BodyFrame:
+    """A body: the frame kernel bound to its coordinates.
+
+    Attributes
+    ----------
+    name
+        Name of the body.
+    columns
+        Columns of its coordinates.
+    entries
+        Nodes of `Program.values` that its frame gives: cosine and sine of its angle.
+    labels
+        Their names in emitted code, ``c_crank`` and ``s_crank``.
+    """
+
+    name: str
+    columns: range
+    entries: tuple[int, ...]
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Kernel:
     """Straight-line code for the quantities of one constraint type.
 
     Attributes
     ----------
     inputs
-        Names of what it reads: coordinates, rates, cosine and sine of body angles, attributes,
-        C(t), rho(alpha).
+        What it reads; of a free equation the names that occur.
     nodes
         The code.
     outputs
@@ -31,14 +119,14 @@ class Kernel:
         zero, of a vector all, with column 0. Rows and columns count the type's own equations and
         coordinates; parameters are those of the mechanism.
     hints
-        ``(node, stem)``: what a vector component is in the textbook's formula, for speaking names.
+        What some nodes are in the textbook's formula, for speaking names.
     """
 
     name: str
-    inputs: tuple[str, ...]
+    inputs: tuple[Input | str, ...]
     nodes: tuple[Node, ...]
     outputs: Mapping[str, tuple[tuple[int, int, int], ...]]
-    hints: tuple[tuple[int, str], ...]
+    hints: tuple[Hint, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +179,8 @@ class Program:
 
     Attributes
     ----------
-    frames
-        ``(body, column of its angle)`` of each body: cosine and sine are computed once a body.
+    bodies
+        The bodies; what a frame gives is computed once a body.
     values
         Shared code in coordinates, rates, parameters and t that feeds the instances: attributes,
         drivers, profiles, frames.
@@ -112,7 +200,7 @@ class Program:
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Parameter, ...]
     equations: tuple[str, ...]
-    frames: tuple[tuple[str, int], ...]
+    bodies: tuple[BodyFrame, ...]
     values: tuple[Node, ...]
     instances: tuple[Instance, ...]
     tables: Mapping[str, SplineTable]

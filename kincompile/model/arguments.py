@@ -18,14 +18,15 @@ import sympy
 from numpy.typing import NDArray
 
 from kincompile.model.bodies import GROUND, Body
+from kincompile.model.expressions import Scalar, Scalars
 
 BodyLike: TypeAlias = Body | str
 """A body or its name; `Mechanism.ground`, or ``"ground"``, is the fixed frame."""
 
-ValueLike: TypeAlias = float | sympy.Expr
+ValueLike: TypeAlias = Scalar
 """A number, or an expression of parameters; of `t` too, where it is the value of a driver."""
 
-PointLike: TypeAlias = Sequence[ValueLike] | NDArray[np.float64]
+PointLike: TypeAlias = Scalars
 """A pair (xi, eta)."""
 
 ProfileLike: TypeAlias = (
@@ -108,9 +109,9 @@ def distance() -> Any:
     return _declared(Kind.DISTANCE, "C", f"C > 0 [length], {_DRIVEN}")
 
 
-def radius(symbol: str) -> Any:
-    """Declare the radius of a pitch circle."""
-    text = "Pitch radius [length], a number or an expression of parameters, not zero."
+def radius(symbol: str, what: str = "Pitch radius") -> Any:
+    """Declare a length that is not zero, fixed in its body: a radius, a semi-axis."""
+    text = f"{what} [length], a number or an expression of parameters, not zero."
     return _declared(Kind.RADIUS, symbol, text)
 
 

@@ -12,9 +12,9 @@ from kincompile.calculus.symbols import Frame
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from kincompile.model.expressions import Scalar
+    from kincompile.model.expressions import Scalars
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,31 +23,32 @@ class BodyKind:
 
     Attributes
     ----------
-    letters
-        Letter of each coordinate; its name is the letter and the body's.
+    frame
+        The frame of a body i or j in the calculus, by its index.
     units
-        Unit of each, None for that of lengths.
+        Unit of each coordinate, None for that of lengths.
     ground
         Values of the ground's.
     drivers
         Name of the constraint type that drives each.
-    frame
-        The frame of a body i or j in the calculus, by its index.
     """
 
-    letters: tuple[str, ...]
+    frame: type[Frame]
     units: tuple[str | None, ...]
     ground: tuple[int, ...]
     drivers: tuple[str, ...]
-    frame: Callable[[str], Frame]
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Letter of each coordinate; its name is the letter and the body's."""
+        return self.frame.letters
 
 
 PLANAR = BodyKind(
-    letters=("x", "y", "phi"),
+    frame=Frame,
     units=(None, None, "rad"),
     ground=(0, 0, 0),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteAngle"),
-    frame=Frame,
 )
 
 
@@ -60,8 +61,8 @@ class Body:
     """
 
     name: str
-    guess: tuple[Scalar, Scalar, Scalar] = (0, 0, 0)
-    outline: tuple[tuple[Scalar, Scalar], ...] = ()
+    guess: Scalars = (0, 0, 0)
+    outline: Sequence[Scalars] = ()
     is_ground: bool = field(default=False, kw_only=True)
     kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
 

@@ -1,4 +1,4 @@
-"""The constraint types of the package: whoever needs to know them all asks here.
+"""The catalogue of constraint types: the one place that lists them all.
 
 From this list come the public names, the types in model files and their JSON Schema, the tables in
 the documentation, and the lists of the tests: of drawings, and of textbook oracles.

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar, dataclass_transform
 
 import sympy
 
+from kincompile.calculus.symbols import Contact  # noqa: TC001 - type hints are there at run time
 from kincompile.calculus.template import Template
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
-from kincompile.model.bodies import PLANAR, BodyKind
+from kincompile.model.bodies import GROUND, PLANAR, BodyKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from kincompile.calculus.expressions import Expression
-    from kincompile.calculus.symbols import Contact
 
     Numbers = Callable[[str], tuple[float | None, ...]]
     """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
@@ -45,7 +45,7 @@ class Constraint:
     bodies: ClassVar[BodyKind] = PLANAR
     """The kind of bodies that it connects."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
-    """Contact parameters: coordinates that the constraint brings along."""
+    """Contact parameters: coordinates that belong to the constraint."""
     simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
     """Pairs: where this one of two equations depends on others, the type that keeps the other."""
     replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"
@@ -80,31 +80,52 @@ class Constraint:
 
     @classmethod
     @cache
+    def partners(cls) -> dict[str, str]:
+        """Return, by the symbol of a point or an axis, the one that is easily taken for it.
+
+        Of two on one body each is the other's; else those of one kind on two bodies are.
+        """
+        found: dict[str, str] = {}
+        for kind in (Kind.POINT, Kind.AXIS):
+            by_body: dict[str, list[str]] = {}
+            for item in cls.arguments().values():
+                if item.kind is kind and item.on != GROUND.name:
+                    by_body.setdefault(item.on, []).append(item.symbol)
+            alone = [symbols[0] for symbols in by_body.values() if len(symbols) == 1]
+            for pair in (*by_body.values(), alone):
+                if len(pair) == 2:
+                    found |= {pair[0]: pair[1], pair[1]: pair[0]}
+        return found
+
+    @classmethod
+    @cache
     def template(cls) -> Template:
         """Return the template of this type, made once."""
         bodies = [item.symbol for item in cls.arguments().values() if item.kind is Kind.BODY]
         frames = tuple(cls.bodies.frame(symbol) for symbol in bodies)
         return Template(cls.__name__, frames, cls.contacts, cls.Phi())
 
+    @classmethod
+    def equations_of(cls, name: str) -> tuple[str, ...]:
+        """Return the names of its equations: its own, or with the row appended."""
+        return tuple(f"{name}.{row}" for row in cls.row_names) or (name,)
+
+    @classmethod
+    def contacts_of(cls, name: str) -> tuple[str, ...]:
+        """Return the names of contact parameters: ``alpha_<name>``; of two ``alpha_i_<name>``."""
+        if len(cls.contacts) == 1:
+            return (f"alpha_{name}",)
+        return tuple(f"alpha_{contact.index}_{name}" for contact in cls.contacts)
+
     @property
     def equation_names(self) -> tuple[str, ...]:
-        """Names of the constraint's equations: its own, or with the row appended."""
-        return _equation_names(self.name, type(self))
+        """Names of the constraint's equations."""
+        return self.equations_of(self.name)
 
     @property
     def contact_names(self) -> tuple[str, ...]:
-        """Names of the contact parameters, `alpha_<name>` or `alpha_i_<name>`, `alpha_j_<name>`."""
-        return _contact_names(self.name, type(self))
-
-
-def _equation_names(name: str, cls: type[Constraint]) -> tuple[str, ...]:
-    return tuple(f"{name}.{row}" for row in cls.row_names) or (name,)
-
-
-def _contact_names(name: str, cls: type[Constraint]) -> tuple[str, ...]:
-    if len(cls.contacts) == 1:
-        return (f"alpha_{name}",)
-    return tuple(f"alpha_{contact.index}_{name}" for contact in cls.contacts)
+        """Names of the contact parameters."""
+        return self.contacts_of(self.name)
 
 
 @dataclass_transform(
@@ -126,12 +147,12 @@ def _documentation(cls: type[Constraint]) -> str:
     given = cls.arguments()
     bodies = {item.symbol: name for name, item in given.items() if item.kind is Kind.BODY}
     ground = "; one of the two may be the ground" if len(bodies) > 1 else ""
-    equations = _listed("equation", _equation_names("name", cls))
+    equations = _listed("equation", cls.equations_of("name"))
     entries = {"name": f"Name of the constraint; its {equations}."}
     for name, item in given.items():
         entries[name] = item.text.format(on=bodies.get(item.on, ""), ground=ground)
     if cls.contacts:
-        contacts = _listed("contact parameter", _contact_names("name", cls))
+        contacts = _listed("contact parameter", cls.contacts_of("name"))
         entries["guess"] = f"Where Newton's method begins [rad], 0 if not given; the {contacts}."
     lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]
     for name, text in entries.items():

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy
+
+    from kincompile.model.expressions import Scalar
 
 
 @dataclass(frozen=True, init=False)
@@ -19,9 +24,9 @@ class Equation:
     """
 
     name: str
-    expressions: tuple[Any, ...]
+    expressions: tuple[Scalar | sympy.Eq, ...]
 
-    def __init__(self, name: str, *expressions: Any) -> None:
+    def __init__(self, name: str, *expressions: Scalar | sympy.Eq) -> None:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "expressions", expressions)
 

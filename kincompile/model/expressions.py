@@ -1,13 +1,16 @@
-"""Numbers and SymPy expressions as users give them, and what may stand in them."""
+"""Numbers and SymPy expressions as users give them, and which of them are allowed."""
 
 from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from numbers import Integral, Rational, Real
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, TypeAlias, cast
 
+import numpy as np
 import sympy
+from numpy.typing import NDArray
 from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
 from sympy.functions.elementary.piecewise import ExprCondPair
@@ -28,7 +31,10 @@ pi = sympy.pi
 alpha = sympy.Symbol("alpha")
 """The polar angle of a cam profile rho(alpha)."""
 
-Scalar = int | float | sympy.Expr
+Scalar: TypeAlias = int | float | sympy.Expr
+
+Scalars: TypeAlias = Sequence[Scalar] | NDArray[np.float64]
+"""Several in order: a point (xi, eta), a guess (x, y, phi)."""
 
 SMOOTH = (
     sympy.sin, sympy.cos, sympy.tan, sympy.cot, sympy.sec, sympy.csc,
@@ -137,7 +143,7 @@ _ELEMENTARY = "write it with elementary functions"
 
 
 def smoothness_problem(value: Scalar) -> str | None:
-    """Say which function in an expression cannot be differentiated or emitted, or return None."""
+    """Return a message about a function that cannot be differentiated or emitted, or None."""
     if not isinstance(value, sympy.Expr):
         return None
     if value.has(sympy.Derivative):
@@ -172,7 +178,7 @@ def _has_value_everywhere(node: sympy.Piecewise) -> bool:
 
 
 def unknown_problem(value: Scalar, declared: Collection[str], what: str) -> str | None:
-    """Say which symbols nobody declared, or return None."""
+    """Return a message about undeclared symbols, or None."""
     unknown = sorted(name for name in symbol_names(value) if name not in declared)
     if not unknown:
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import sympy
 
@@ -13,6 +13,11 @@ from kincompile.model.equation import Equation
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import TextViews
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.model.expressions import Scalars
 
 Item = TypeVar("Item", bound=Constraint | Equation)
 
@@ -65,7 +70,7 @@ class Mechanism(MatrixViews, TextViews):
         self.parameters.append(Parameter(name, default, unit))
         return sympy.Symbol(str(name))
 
-    def body(self, name: str, guess: Any = (0, 0, 0), outline: Any = ()) -> Body:
+    def body(self, name: str, guess: Scalars = (0, 0, 0), outline: Sequence[Scalars] = ()) -> Body:
         """Add a body with coordinates (x, y, phi) and return it.
 
         Parameters

@@ -23,7 +23,7 @@ _REMEDY = "let the pieces meet with equal value and slope"
 
 
 def gap_problem(value: sympy.Expr) -> str | None:
-    """Say where an expression made of pieces jumps or turns a corner.
+    """Return a message about a jump or a corner between pieces, or None.
 
     Velocities and accelerations need the first derivative to be continuous. A breakpoint or a
     difference that is not a plain number, since it depends on parameters, is not looked at.

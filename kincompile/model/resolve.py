@@ -217,7 +217,7 @@ def _columns(body: Body) -> tuple[str | None, ...]:
 
 
 def _body(given: Any, where: str, scope: Scope) -> Body | None:
-    """Return the body that is meant, None where there is none."""
+    """Return the body with the given name, None where there is none."""
     name = given.name if isinstance(given, Body) else given
     if isinstance(name, str) and name == GROUND.name:
         return GROUND

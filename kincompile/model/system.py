@@ -163,7 +163,7 @@ def _written(equations: Iterable[Any], problems: list[str]) -> list[Constraint |
 
 
 def _bodies(given: Iterable[Any], problems: list[str]) -> tuple[Body, ...]:
-    """Return the bodies among what was given as such."""
+    """Return the valid bodies; report everything else as a problem."""
     found = _items(given, "bodies", problems)
     problems += [
         f"{item!r} is not a body; make one with Mechanism.body"
@@ -345,7 +345,7 @@ def _check_names(
     named += [("a constraint", item.name) for item in constraints]
     problems += [problem for what, text in named if (problem := name_problem(text, what))]
     if not all(isinstance(text, str) for _, text in named):
-        raise ModelError(problems)  # without names nothing more can be said
+        raise ModelError(problems)  # further checks need names
     problems += [
         f"body {body.name!r}: this is the name of the fixed frame; use m.ground, or another name"
         for body in bodies

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from kincompile.runtime.lanes import LaneCode, Lanes
+    from kincompile.runtime.engine.lanes import LaneCode, Lanes
 
 TARGET_ERROR = 0.0006
 """Error of the prediction aimed at, in radians or sizes of the mechanism. It falls with the third

@@ -8,7 +8,7 @@ import numpy as np
 
 from kincompile import quantities
 from kincompile.errors import ContractError, InputError
-from kincompile.names import body_coordinates, listed
+from kincompile.names import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -82,7 +82,7 @@ def _bodies(coordinates: object) -> tuple[tuple[str, int, int], ...]:
     found = []
     for k, name in enumerate(names):
         body = str(name).removeprefix("x_")
-        if names[k : k + 3] == body_coordinates(body):
+        if names[k : k + 3] == (f"x_{body}", f"y_{body}", f"phi_{body}"):
             found.append((body, k, 3))
     return tuple(found)
 

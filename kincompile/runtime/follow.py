@@ -9,200 +9,245 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
+from kincompile.runtime.engine.dense import Dense
+from kincompile.runtime.engine.engine import Point
+from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
-from kincompile.runtime.march import (
-    Outcome,
-    State,
-    advance,
-    complete,
-    leaves_branch,
-    start,
-)
-from kincompile.runtime.problem import Point, problem
+from kincompile.runtime.march import March, Outcome, State, give_up, leaves_branch, start
+from kincompile.runtime.problem import problem
 from kincompile.runtime.singular.events import branch_switch, locate, singular_start
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.engine import Engine
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.motion import Motion, Progress
-    from kincompile.runtime.problem import Problem
     from kincompile.runtime.singular.events import Passage
+
+LARGEST_CAREFUL = 1000
+"""Coordinates up to which a large mechanism is left to dense matrices where the stages fail: there
+a step takes a fraction of a second."""
 
 
 def follow(
     inputs: Inputs, motion: Motion, on_grid: bool, smooth: bool, progress: Progress | None
 ) -> Outcome:
-    """Go through the grid up to its end, or to the first point that fails."""
-    t = float(inputs.t[0])
-    at_guess = problem(inputs.module, inputs.p, inputs.guess, t, inputs.guess)
-    outcome = start(at_guess, t, inputs)
-    motion.put(0, outcome)
-    if progress:
-        progress(1, inputs.t.size)
-    motion.note = other_branch(at_guess, inputs, outcome.position)
-    # The guess may be rough: from here on the assembled mechanism gives the size.
-    assembled = inputs.guess if outcome.position is None else outcome.position.q
-    equations = problem(inputs.module, inputs.p, assembled, t, inputs.guess)
-    return go_on(equations, inputs, motion, 1, outcome, on_grid, smooth, progress)
+    """Go through the grid up to its end, or to the first point that fails.
 
-
-def other_branch(equations: Problem, inputs: Inputs, position: Point | None) -> str:
-    """Say so where the first position lies on another branch than the guess."""
-    time = float(inputs.t[0])
-    guess = equations.at(inputs.guess, time)
-    if guess is None or position is None or not leaves_branch(equations, time, guess, position):
-        return ""
-    return (
-        f" The position at t = {time:.10g} is on another branch than the guess: kc.assemblies "
-        "gives all of them, and each serves as a guess."
-    )
-
-
-def go_on(
-    equations: Problem,
-    inputs: Inputs,
-    motion: Motion,
-    index: int,
-    outcome: Outcome,
-    on_grid: bool,
-    smooth: bool,
-    progress: Progress | None,
-) -> Outcome:
-    """Go from the point before an index to the end, or to the first point that fails."""
-    index, outcome = _run(equations, inputs, motion, index, outcome, on_grid, progress)
+    What ends a motion is found and noted; with `smooth` it goes on past a bifurcation.
+    """
+    way = _Way(inputs, motion, on_grid, progress)
+    outcome = way.run(way.start())
     while outcome.status is not Status.CONVERGED:
-        passage = _explain(equations, inputs, motion, index - 1, outcome)
+        passage = way.explain(outcome)
         if passage is None or not smooth:
             break
-        motion.passed.append(motion.events[-1])
-        index, outcome = _pass(equations, inputs, motion, index - 1, passage)
-        index, outcome = _run(equations, inputs, motion, index, outcome, on_grid, progress)
-    motion.forget(index)
+        outcome = way.run(way.go_through(passage))
+    way.end()
     return outcome
 
 
-def _run(
-    equations: Problem,
-    inputs: Inputs,
-    motion: Motion,
-    index: int,
-    outcome: Outcome,
-    on_grid: bool,
-    progress: Progress | None,
-) -> tuple[int, Outcome]:
-    """Follow a motion from the point before an index as far as it goes; return the next index."""
-    times = inputs.t
-    trusted = np.zeros(len(times), dtype=bool)
-    if on_grid and outcome.state is not None and outcome.state.t == times[index - 1]:
-        trusted[index - 1 :] = _grid(equations, inputs, motion, outcome.state, index - 1)
-    while index < len(times) and outcome.status is Status.CONVERGED:
-        state = outcome.state
+class _Way:
+    """How far a motion was followed: `index` is the next point, found by `march`."""
+
+    def __init__(
+        self, inputs: Inputs, motion: Motion, on_grid: bool, progress: Progress | None
+    ) -> None:
+        self._inputs, self._motion, self._on_grid = inputs, motion, on_grid
+        self._progress = progress or (lambda done, total: None)
+        self._times = inputs.t
+        self._index = 0
+        self._march = self._march_at(inputs.guess, None)
+
+    def start(self) -> Outcome:
+        """Assemble the mechanism at the first time."""
+        inputs, time = self._inputs, float(self._times[0])
+        outcome = start(self._march, time, inputs)
+        if self._is_staged and (outcome.state is None or self._is_on_other_branch(outcome)):
+            self._leave_stages(inputs.guess)
+            outcome = start(self._march, time, inputs)
+        self._put(outcome)
+        if self._may_be_dense and self._is_on_other_branch(outcome):
+            self._motion.note = (
+                f" The position at t = {time:.10g} is on another branch than the guess: "
+                "kc.assemblies gives all of them, and each serves as a guess."
+            )
+        if outcome.position is not None:
+            # The guess may be rough: from here on the assembled mechanism gives the size.
+            self._march = self._march_at(outcome.position.q, self._march.engine)
+        return outcome
+
+    def run(self, outcome: Outcome) -> Outcome:
+        """Follow the motion as far as it goes."""
+        trusted = self._solve_grid(outcome)
+        while self._index < len(self._times) and outcome.status is Status.CONVERGED:
+            state = outcome.state
+            assert state is not None
+            stop = _end_of_run(trusted, self._index)
+            if stop > self._index and self._continues(state):
+                outcome = self._take_up(stop)
+            else:
+                outcome = self._advance(state)
+            self._progress(self._index, len(self._times))
+        return outcome
+
+    def explain(self, outcome: Outcome) -> Passage | None:
+        """Find the event that ends the motion; return the way through it if there is one."""
+        motion, equations, state = self._motion, self._march.equations, outcome.state
+        t = float(self._times[self._index - 1])
+        if not self._may_be_dense:
+            return None
         if state is None:
-            break
-        stop = _end_of_run(trusted, index)
-        if stop > index and _continues(equations, motion, state, index):
-            motion.status[index:stop] = Status.CONVERGED
-            outcome = taken_up(equations, motion, float(times[stop - 1]), stop - 1)
-            index = stop
-        else:
-            outcome = advance(equations, state, float(times[index]), inputs)
-            motion.put(index, outcome)
-            motion.statistics["marched"] += 1
-            index += 1
-            # Rates near a singularity are too uncertain to predict from: the point before serves.
-            if outcome.state and outcome.state.sensitivity > max(TOO_NEAR, state.sensitivity):
-                outcome = replace(outcome, state=state)
-        if progress:
-            progress(index, len(times))
-    return index, outcome
-
-
-def _explain(
-    equations: Problem, inputs: Inputs, motion: Motion, index: int, outcome: Outcome
-) -> Passage | None:
-    """Find the event that ends the motion at a point; return the way through it if there is one."""
-    t, state = float(inputs.t[index]), outcome.state
-    if state is None:
-        if outcome.status is Status.SINGULAR and outcome.position is not None:
-            motion.events += filter(None, [singular_start(equations, outcome.position, t)])
+            if outcome.status is Status.SINGULAR and outcome.position is not None:
+                motion.events += filter(None, [singular_start(equations, outcome.position, t)])
+            return None
+        found = locate(self._march, state, t, abs(t - float(self._times[0])))
+        if found is not None:
+            motion.events.append(found[0])
+            return found[1]
+        if outcome.attempt is not None and outcome.attempt.status is Status.CONVERGED:
+            q = outcome.attempt.last.q
+            motion.events.append(branch_switch(equations.code, state, t, q, equations.spread(q)))
         return None
-    duration = abs(t - float(inputs.t[0]))
-    found = locate(equations, state, t, duration)
-    if found is not None:
-        motion.events.append(found[0])
-        return found[1]
-    if outcome.attempt is not None and outcome.attempt.status is Status.CONVERGED:
-        q = outcome.attempt.last.q
-        motion.events.append(branch_switch(inputs.module, state, t, q, equations.spread(q)))
-    return None
 
+    def go_through(self, passage: Passage) -> Outcome:
+        """Fill the points within the passage through a bifurcation, and take the next one."""
+        self._motion.passed.append(self._motion.events[-1])
+        equations, times, after = self._march.equations, self._times, passage.after
+        self._index -= 1
+        forward = math.copysign(1.0, after.t - passage.before.t)
+        while self._index < len(times) and (times[self._index] - after.t) * forward <= 0:
+            t = float(times[self._index])
+            q, q_dot, q_ddot = passage.at(t)
+            point = equations.at(q, t)
+            if point is None or not equations.holds(point, RESIDUAL_FACTOR * self._march.tolerance):
+                self._index += 1
+                return Outcome(Status.SINGULAR, 0, passage.before, None)
+            state = State(t, point, q_dot, q_ddot, after.determinants)
+            self._put(Outcome(Status.CONVERGED, 0, state, point))
+        if self._index == len(times):
+            return Outcome(Status.CONVERGED, 0, after, after.point)
+        return self._advance(after)
 
-def _pass(
-    equations: Problem, inputs: Inputs, motion: Motion, index: int, passage: Passage
-) -> tuple[int, Outcome]:
-    """Fill the points within the passage through a bifurcation, and take the next one."""
-    times, after = inputs.t.tolist(), passage.after
-    forward = math.copysign(1.0, after.t - passage.before.t)
-    while index < len(times) and (times[index] - after.t) * forward <= 0:
-        q, q_dot, q_ddot = passage.at(times[index])
-        point = equations.at(q, times[index])
-        if point is None or not equations.holds(point, RESIDUAL_FACTOR * inputs.tolerance):
-            return index + 1, Outcome(Status.SINGULAR, 0, passage.before, None)
-        motion.put(
-            index,
-            Outcome(Status.CONVERGED, 0, State(times[index], point, q_dot, q_ddot, ()), point),
+    def end(self) -> None:
+        """Clear what a grid left behind the last point reached."""
+        self._motion.forget(self._index)
+        self._count_pivoted()
+
+    def _count_pivoted(self) -> None:
+        engine = self._march.engine
+        if isinstance(engine, Staged) and engine.pivoted:
+            self._motion.statistics["pivoted"] = engine.pivoted
+
+    @property
+    def _is_staged(self) -> bool:
+        """Whether the stages solve, and dense matrices may take over."""
+        return isinstance(self._march.engine, Staged) and self._may_be_dense
+
+    @property
+    def _may_be_dense(self) -> bool:
+        return not (
+            isinstance(self._march.engine, Staged) and self._inputs.guess.size > LARGEST_CAREFUL
         )
-        index += 1
-    if index == len(times):
-        return index, Outcome(Status.CONVERGED, 0, after, after.point)
-    outcome = advance(equations, after, times[index], inputs)
-    motion.put(index, outcome)
-    motion.statistics["marched"] += 1
-    return index + 1, outcome
 
+    def _march_at(self, q: NDArray[np.float64], engine: Engine | None) -> March:
+        """Return the march of the mechanism, whose size is told by the guess and a position."""
+        inputs, time = self._inputs, float(self._times[0])
+        equations = problem(
+            inputs.module, inputs.p, q, time, inputs.guess, staged=True, engine=engine
+        )
+        return March(equations, equations.engine, inputs.tolerance)
 
-def _grid(
-    equations: Problem, inputs: Inputs, motion: Motion, first: State, index: int
-) -> NDArray[np.bool_]:
-    """Solve all points from an index on together, and tell which of them can be trusted."""
-    times = inputs.t[index:]
-    trusted = np.zeros(times.size, dtype=bool)
-    q, q_dot, q_ddot = (values[index:].T for values in (motion.q, motion.q_dot, motion.q_ddot))
-    result = GridResult(q, q_dot, q_ddot, motion.residual[index:], trusted)
-    motion.statistics["coarse"] += solve_grid(equations, times, first, inputs.tolerance, result)
-    motion.iterations[index + 1 :] = CORRECTIONS_ON_GRID
-    return trusted
+    def _leave_stages(self, q: NDArray[np.float64]) -> None:
+        """Solve dense matrices from here on: they have the last word."""
+        self._count_pivoted()
+        self._march = self._march_at(q, Dense(self._inputs.code, self._inputs.p))
+
+    def _is_on_other_branch(self, outcome: Outcome) -> bool:
+        """Say whether a first position lies on another branch than the guess."""
+        guess = self._march.equations.at(self._inputs.guess, float(self._times[0]))
+        if guess is None or outcome.position is None:
+            return False
+        return leaves_branch(self._march.equations, guess, outcome.position)
+
+    def _put(self, outcome: Outcome) -> None:
+        self._motion.put(self._index, outcome)
+        self._index += 1
+        if self._index == 1:
+            self._progress(1, len(self._times))
+
+    def _advance(self, state: State) -> Outcome:
+        """Go to the next time point by point."""
+        march, most = self._march, self._inputs.max_iterations
+        t = float(self._times[self._index])
+        outcome = march.advance(state, t, most)
+        doubtful = outcome.state is None or outcome.state.sensitivity > TOO_NEAR
+        if self._is_staged and (doubtful or outcome.status is not Status.CONVERGED):
+            self._leave_stages(state.point.q)
+            known = self._state(state.point.q, state.t)
+            return known if known.state is None else self._advance(known.state)
+        if outcome.position is None and self._may_be_dense:
+            outcome = give_up(march, outcome, t, self._inputs)
+        self._put(outcome)
+        self._motion.statistics["marched"] += 1
+        # Rates near a singularity are too uncertain to predict from: the point before serves.
+        if outcome.state and outcome.state.sensitivity > max(TOO_NEAR, state.sensitivity):
+            return replace(outcome, state=state)
+        return outcome
+
+    def _solve_grid(self, outcome: Outcome) -> NDArray[np.bool_]:
+        """Solve all points from the last one on together; return which can be trusted."""
+        motion, index, first = self._motion, self._index - 1, outcome.state
+        trusted = np.zeros(len(self._times), dtype=bool)
+        if not self._on_grid or outcome.status is not Status.CONVERGED or first is None:
+            return trusted
+        if first.t == self._times[index]:
+            q, q_dot, q_ddot = (
+                values[index:].T for values in (motion.q, motion.q_dot, motion.q_ddot)
+            )
+            result = GridResult(q, q_dot, q_ddot, motion.residual[index:], trusted[index:])
+            times = self._inputs.t[index:]
+            motion.statistics["coarse"] += solve_grid(self._march, times, first, result)
+            motion.iterations[index + 1 :] = CORRECTIONS_ON_GRID
+        return trusted
+
+    def _continues(self, state: State) -> bool:
+        """Say whether a point of the grid lies on the branch that the march came by.
+
+        After trusted points it does. Where the march went on by itself, the grid's next point must
+        be near its prediction.
+        """
+        motion, index = self._motion, self._index
+        if motion.status[index - 1] == Status.CONVERGED and motion.statistics["marched"] == 0:
+            return True
+        spread = self._march.equations.spread(state.point.q)
+        return bool(np.max(np.abs(motion.q[index] - state.point.q) / spread) <= SMALL_ERROR)
+
+    def _take_up(self, stop: int) -> Outcome:
+        """Take the points of the grid up to one; return the last as one to go on from."""
+        motion, last = self._motion, stop - 1
+        motion.status[self._index : stop] = Status.CONVERGED
+        self._index = stop
+        if stop < len(self._times):
+            return self._state(np.ascontiguousarray(motion.q[last]), float(self._times[last]))
+        nothing = np.empty(0)
+        point = Point(motion.q[last], float(self._times[last]), nothing, nothing)
+        state = State(point.t, point, motion.q_dot[last], motion.q_ddot[last], nothing)
+        return Outcome(Status.CONVERGED, 0, state, point)
+
+    def _state(self, q: NDArray[np.float64], t: float) -> Outcome:
+        """Return a good position as a state from which the march can go on."""
+        point = self._march.equations.at(q, t)
+        assert point is not None  # it was evaluated before
+        following = self._march.state(point)
+        if isinstance(following, Status):
+            return Outcome(following, 0, None, point)
+        return Outcome(Status.CONVERGED, 0, following, point)
 
 
 def _end_of_run(trusted: NDArray[np.bool_], index: int) -> int:
     """Return where a run of trusted points that begins at an index ends."""
     rest = trusted[index:]
     return index + (rest.size if rest.all() else int(np.argmin(rest)))
-
-
-def _continues(equations: Problem, motion: Motion, state: State, index: int) -> bool:
-    """Say whether a point of the grid lies on the branch that the march came by.
-
-    After trusted points it does. Where the march went on by itself, the grid's next point must be
-    near its prediction.
-    """
-    if motion.status[index - 1] == Status.CONVERGED and motion.statistics["marched"] == 0:
-        return True
-    distance = np.abs(motion.q[index] - state.point.q) / equations.spread(state.point.q)
-    return bool(np.max(distance) <= SMALL_ERROR)
-
-
-def taken_up(equations: Problem, motion: Motion, t: float, index: int) -> Outcome:
-    """Return a point of the grid as one from which the march can go on."""
-    if index == motion.status.size - 1:
-        point = Point(motion.q[index], np.empty(0), np.empty((0, 0)), 0.0)
-        state = State(t, point, motion.q_dot[index], motion.q_ddot[index], ())
-        return Outcome(Status.CONVERGED, 0, state, point)
-    at = equations.at(np.ascontiguousarray(motion.q[index]), t)
-    assert at is not None  # it was evaluated on the grid
-    following = complete(equations, t, at)
-    if isinstance(following, Status):
-        return Outcome(following, 0, None, at)
-    return Outcome(Status.CONVERGED, 0, following, at)

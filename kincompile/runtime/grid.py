@@ -10,24 +10,24 @@ interpolation, and the determinant of every block of Phi_q kept its sign.
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import LAST_CORRECTION, RESIDUAL_FACTOR, ROUNDING, SMALLEST_DETERMINANT
+from kincompile.criteria import SMALLEST_DETERMINANT
 from kincompile.runtime.coarse import Node, coarse_march
-from kincompile.runtime.lanes import LaneCode
+from kincompile.runtime.engine.lanes import LaneCode
+from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.march import March
+from kincompile.runtime.problem import largest, within
 
 if TYPE_CHECKING:
     from typing import TypeAlias
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.lanes import Lane
     from kincompile.runtime.march import State
-    from kincompile.runtime.problem import Problem
 
     Array: TypeAlias = NDArray[np.float64]
 
@@ -62,63 +62,40 @@ class GridResult:
     good: NDArray[np.bool_]
 
 
-def solve_grid(
-    equations: Problem, times: Array, first: State, tolerance: float, result: GridResult
-) -> int:
+def solve_grid(march: March, times: Array, first: State, result: GridResult) -> int:
     """Solve as much of a time grid as can be trusted, into the arrays of `result`.
 
     Parameters
     ----------
-    equations
-        A module with a planned solve, its parameters and scales.
+    march
+        That of a module with a planned solve.
     times : ndarray, shape (N,)
         The grid.
     first
         The point at its start.
-    tolerance
-        Bound of the last correction.
 
     Returns
     -------
     int
         Number of points in the coarse march.
     """
-    module, p = equations.module, equations.p.tolist()
-    code = LaneCode(module, module.FLOATS, p)
-    q = first.point.q.tolist()
-    determinants = code.position(q, first.t).determinants
-    node = Node(0, q, first.q_dot.tolist(), first.q_ddot.tolist(), determinants)
+    equations, code = march.equations, march.equations.code
+    assert code.lanes is not None
     spread = equations.spread(first.point.q)
-    nodes = coarse_march(code, node, times, spread.tolist(), tolerance)
+    floats = LaneCode(code, code.lanes.floats, equations.p.tolist())
+    q, q_dot, q_ddot = (x.tolist() for x in (first.point.q, first.q_dot, first.q_ddot))
+    node = Node(0, q, q_dot, q_ddot, first.determinants.tolist())
+    nodes = coarse_march(floats, node, times, spread.tolist(), march.tolerance)
     reached = nodes[-1].index + 1
     _interpolate(nodes, times[:reached], result.q)
-    blocks = [
-        math.copysign(SMALLEST_DETERMINANT * max(map(abs, values)), values[0])
-        for values in zip(*(node.determinants for node in nodes), strict=True)
-    ]
-    farthest = np.max(np.abs([node.q for node in nodes]), axis=0)
-    limits = _Limits(
-        min(tolerance, LAST_CORRECTION) * spread + ROUNDING * farthest,
-        LARGEST_DISPLACEMENT * spread,
-        RESIDUAL_FACTOR * tolerance * equations.magnitude,
-        blocks,
-    )
-    code = LaneCode(module, module.ARRAYS, p)
+    signed = np.array([node.determinants for node in nodes])
+    smallest = np.copysign(SMALLEST_DETERMINANT * np.max(np.abs(signed), axis=0), signed[0])
+    batch = March(equations, Planned(code, equations.p), march.tolerance)
     parts = max(1, round(reached / BLOCK))
     edges = np.linspace(0, reached, parts + 1).astype(int).tolist()
     for start, stop in itertools.pairwise(edges):
-        _solve_block(code, times[start:stop], result, slice(start, stop), limits)
+        _solve_block(batch, times[start:stop], result, slice(start, stop), smallest, spread)
     return len(nodes)
-
-
-@dataclass(frozen=True, slots=True)
-class _Limits:
-    """What a point must keep to be trusted."""
-
-    correction: Array
-    displacement: Array
-    residual: Array
-    determinants: list[float]
 
 
 def _interpolate(nodes: list[Node], times: Array, q: Array) -> None:
@@ -158,49 +135,19 @@ def _hermite(s: Array) -> Array:
 
 
 def _solve_block(
-    code: LaneCode, t: Array, result: GridResult, block: slice, limits: _Limits
+    march: March, t: Array, result: GridResult, block: slice, smallest: Array, spread: Array
 ) -> None:
     """Correct a block of interpolated positions twice, and solve for velocity and acceleration."""
-    q = result.q[:, block]
-    good = result.good[block]
-    good[:] = True
-    at = code.position(q, t)
-    for row, change, limit in zip(
-        q, code.solve(at, at.Phi), limits.displacement.tolist(), strict=True
-    ):
-        row -= change
-        if not _squared(change) <= limit**2:
-            good &= np.abs(change) <= limit
-    at = code.position(q, t)
-    changes = code.solve(at, at.Phi)
-    for row, change, limit in zip(q, changes, limits.correction.tolist(), strict=True):
-        row -= change
-        if not _squared(change) <= limit**2:
-            good &= np.abs(change) <= limit
-    residual = result.residual[block]
-    residual[:] = 0.0
-    for value, limit in zip(at.Phi, limits.residual.tolist(), strict=True):
-        size = np.abs(value)
-        np.maximum(residual, size, out=residual)
-        if not _squared(value) <= limit**2:
-            good &= size <= limit
-    for value, smallest in zip(at.determinants, limits.determinants, strict=True):
-        relative = value / smallest
-        if not np.min(relative) > 1:
-            good &= relative > 1
-    total: Any = 0.0
-    for rows, values in zip((result.q_dot, result.q_ddot), code.rates(at, q, t), strict=True):
-        for row, value in zip(rows, values, strict=True):
-            row[block] = value
-            total = total + value
-    if not np.isfinite(np.sum(total)):
-        good &= np.isfinite(total)
-
-
-def _squared(lane: Lane) -> Any:
-    """Return the sum of the squares of all points of a block.
-
-    Nearly always all points together meet what each must meet, and one number costs less than a
-    mask.
-    """
-    return np.dot(lane, lane)
+    interpolated, engine = result.q[:, block], march.engine
+    assert isinstance(engine, Planned)
+    found = march.correct(interpolated, t, CORRECTIONS_ON_GRID)
+    point = found.point
+    q_dot, q_ddot = result.q_dot[:, block], result.q_ddot[:, block]
+    engine.put_rates(point, q_dot, q_ddot)
+    displacements = (row - other for row, other in zip(point.q, interpolated, strict=True))
+    good = found.good & within(displacements, LARGEST_DISPLACEMENT * spread)
+    for values, least in zip(engine.determinants(point, point), smallest, strict=True):
+        good = good & (values / least > 1)
+    result.residual[block] = largest(point.Phi, t.size)
+    interpolated[:] = point.q
+    result.good[block] = good & np.isfinite(sum(q_dot) + sum(q_ddot))

@@ -13,6 +13,7 @@ import numpy as np
 
 from kincompile.errors import InputError, StructuralError
 from kincompile.names import listed, suggestion
+from kincompile.runtime.engine.code import Code, code_of
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -28,8 +29,8 @@ class Inputs:
 
     Attributes
     ----------
-    module
-        An emitted module with as many equations as coordinates, or more that agree.
+    code
+        A module with as many equations as coordinates, or more that agree.
     t : ndarray, shape (N,)
         The time grid, finite and monotone.
     p : ndarray, shape (k,)
@@ -42,12 +43,17 @@ class Inputs:
         Newton iterations after which an attempt is given up.
     """
 
-    module: ModuleType
+    code: Code
     t: NDArray[np.float64]
     p: NDArray[np.float64]
     guess: NDArray[np.float64]
     tolerance: float
     max_iterations: int
+
+    @property
+    def module(self) -> ModuleType:
+        """The emitted module."""
+        return self.code.module
 
 
 def read_inputs(
@@ -63,10 +69,11 @@ def read_inputs(
         When the module has not as many equations as coordinates.
     """
     _require_module(module)
-    _require_square(module)
+    code = code_of(module)
+    _require_square(code)
     problems: list[str] = []
     inputs = Inputs(
-        module,
+        code,
         _times(t, problems),
         _values("parameter", module.PARAMETERS, module.DEFAULTS, p, problems),
         _values("coordinate", module.COORDINATES, module.GUESS, guess, problems),
@@ -89,17 +96,17 @@ def _require_module(module: object) -> None:
     raise InputError(f"expected a compiled module, got a {type(module).__name__}: {remedy}.")
 
 
-def _require_square(module: ModuleType) -> None:
+def _require_square(code: Code) -> None:
     """Refuse a module whose equations cannot determine its coordinates."""
-    m, n = module.N_EQUATIONS, module.N_COORDINATES
-    if m == n or (m > n and getattr(module, "REDUNDANT", ())):
+    m, n = len(code.equations), len(code.coordinates)
+    if m == n or (m > n and code.redundant):
         return
     if m < n:
         remedy = f"add {n - m} more (joints or drivers), or hold coordinates that are free"
     else:
-        remedy = f"remove {m - n} of them: {listed(module.EQUATIONS)}"
+        remedy = f"remove {m - n} of them: {listed(code.equations)}"
     raise StructuralError(
-        f"{module.NAME} has {m} equations for {n} coordinates ({listed(module.COORDINATES)}), "
+        f"{code.name} has {m} equations for {n} coordinates ({listed(code.coordinates)}), "
         f"and the motion needs as many equations as coordinates: {remedy}."
     )
 

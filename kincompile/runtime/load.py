@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.errors import ContractError, InputError
 from kincompile.runtime.contract import REMEDY, check
+from kincompile.runtime.engine.code import attach
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.html import module_html
 
@@ -146,5 +147,6 @@ def _fill(
         ) from error
     check(module)
     module.__dict__["_empty"] = empty
+    attach(module)
     module.__dict__["_repr_html_"] = partial(module_html, module)
     return module

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kincompile.criteria import TOO_NEAR
-from kincompile.runtime.staged import is_staged
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.status import Status
 from kincompile.runtime.verdict import unassembled
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.march import Outcome
-    from kincompile.runtime.problem import Vector
     from kincompile.runtime.singular.events import Event
 
+    Vector: TypeAlias = NDArray[np.float64]
     Progress: TypeAlias = Callable[[int, int], object]
 
 
@@ -61,7 +61,7 @@ class Motion:
     def over(cls, inputs: Inputs) -> Motion:
         """Make the arrays for a time grid, with nothing reached."""
         points = inputs.t.size
-        if is_staged(inputs.module):
+        if code_of(inputs.module).stages:
             q, q_dot, q_ddot = np.full((3, points, inputs.guess.size), np.nan)
         else:  # each coordinate contiguous in memory, as the code of a grid wants it
             q, q_dot, q_ddot = np.full((3, inputs.guess.size, points), np.nan).transpose(0, 2, 1)

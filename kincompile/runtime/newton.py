@@ -21,9 +21,9 @@ import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, RESIDUAL_FACTOR, ROUNDING, TOLERANCE
 from kincompile.errors import InputError
+from kincompile.runtime.engine.engine import Point, norm
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.linear import solve_linear
-from kincompile.runtime.problem import Point, Problem, norm, problem
+from kincompile.runtime.problem import Problem, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.inputs import Values
-    from kincompile.runtime.problem import Vector
+
+    Vector: TypeAlias = NDArray[np.float64]
 
 LARGEST_ANGLE = 0.5
 """Longest safeguarded step of an angle, rad: sine and cosine are still nearly linear over it."""
@@ -230,12 +231,17 @@ def iterate(
 
 def plain_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
     """Apply the whole correction."""
-    try:
-        correction = solve_linear(point.Phi_q, -point.Phi)
-    except np.linalg.LinAlgError:
-        return Status.SINGULAR
+    correction = equations.engine.solve(point, -point.Phi)
+    size = norm(correction)
+    if not math.isfinite(size):
+        return unsolvable(point)
     following = equations.at(point.q + correction, t)
-    return Status.NOT_FINITE if following is None else (following, norm(correction))
+    return Status.NOT_FINITE if following is None else (following, size)
+
+
+def unsolvable(point: Point) -> Status:
+    """Say why Phi_q x = b has no solution at a point."""
+    return Status.SINGULAR if np.isfinite(point.Phi_q).all() else Status.NOT_FINITE
 
 
 def safeguarded_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
@@ -263,6 +269,9 @@ def _direction(equations: Problem, point: Point, weights: Vector) -> Vector | No
     This is Levenberg's and Marquardt's direction: it exists where Phi_q is singular, always lowers
     the residual, and becomes Newton's as the residual vanishes.
     """
+    if point.Phi_q.ndim == 1:  # large and sparse: a shortened step of Newton's has to do
+        correction = equations.engine.solve(point, -point.Phi)
+        return correction if np.isfinite(correction).all() else None
     scale = equations.scale(point.q)
     residual = weights * point.Phi
     bend = math.sqrt(BEND * min(1.0, norm(residual)))

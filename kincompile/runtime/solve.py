@@ -2,10 +2,10 @@
 
 inputs    checked, in the solver's form            inputs.read_inputs
   -> of a compiled module, its own march           native.make_native
-  -> go through the times                          follow.follow, or follow_large.follow_large
+  -> go through the times                          follow.follow
        assemble the first point from the guess     march.start      (newton.assemble)
        solve all points together                   grid.solve_grid  (coarse.coarse_march)
-       point by point what cannot be trusted       march.advance    (newton.iterate)
+       point by point what cannot be trusted       march.March
        find what ends the motion, or go through it events.locate
   -> say how it went                               verdict.verdict
 """
@@ -25,14 +25,11 @@ from kincompile.errors import (
     SolveError,
 )
 from kincompile.runtime.follow import follow
-from kincompile.runtime.follow_large import follow_large
 from kincompile.runtime.inputs import Inputs, read_inputs
-from kincompile.runtime.lanes import has_planned_solve
 from kincompile.runtime.march import Outcome, leaves_branch
 from kincompile.runtime.motion import Motion
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
-from kincompile.runtime.staged import is_staged
 from kincompile.runtime.status import Status
 from kincompile.runtime.variants import read_variants, solve_in_turn, solve_variants
 from kincompile.runtime.verdict import verdict
@@ -42,6 +39,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from kincompile.runtime.engine.code import Code
     from kincompile.runtime.inputs import Values
     from kincompile.runtime.motion import Progress
 
@@ -120,7 +118,7 @@ def solve(
     """
     sets = read_variants(module, p)
     inputs = read_inputs(module, t, p if sets is None else None, guess, tolerance, max_iterations)
-    on_grid = _takes_grid(module, inputs.t.size, method)
+    on_grid = _takes_grid(inputs.code, inputs.t.size, method)
     if through not in (None, "smooth"):
         raise InputError(f"through is {through!r}: give 'smooth', or nothing.")
 
@@ -129,7 +127,7 @@ def solve(
 
     if sets is None:
         solution = solve_one(inputs, progress)
-    elif has_planned_solve(module):
+    elif inputs.code.lanes is not None:
         solution = solve_variants(inputs, sets, progress)
     else:
         solution = solve_in_turn(inputs, sets, solve_one, progress)
@@ -144,9 +142,7 @@ def _solve_one(
     """Solve with one set of parameters."""
     motion = Motion.over(inputs)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
-        if is_staged(inputs.module):
-            outcome = follow_large(inputs, motion, smooth, progress)
-        elif may_be_compiled and _march_compiled(inputs, motion):
+        if may_be_compiled and _march_compiled(inputs, motion):
             outcome = Outcome(Status.CONVERGED, 0, None)
         else:
             outcome = follow(inputs, motion, on_grid, smooth, progress)
@@ -168,17 +164,17 @@ def _nearly(inputs: Inputs, near: list[int]) -> str:
     )
 
 
-def _takes_grid(module: ModuleType, points: int, method: str | None) -> bool:
+def _takes_grid(code: Code, points: int, method: str | None) -> bool:
     """Say whether the points of a grid are solved together."""
     if method not in (None, "grid", "march"):
         raise InputError(f"method is {method!r}: give 'grid', 'march', or nothing.")
-    if method == "grid" and not has_planned_solve(module):
+    if method == "grid" and code.lanes is None:
         raise InputError(
-            f"{module.NAME} goes from point to point, as all redundant mechanisms and those in the "
+            f"{code.name} goes from point to point, as all redundant mechanisms and those in the "
             "grouped form do: use method='march', or compile it with form='inline'."
         )
     return method == "grid" or (
-        method is None and points >= SMALLEST_GRID and has_planned_solve(module)
+        method is None and points >= SMALLEST_GRID and code.lanes is not None
     )
 
 
@@ -187,7 +183,7 @@ def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
 
     Where anything did not, the careful march finds out what it is, from the first time on.
     """
-    march = getattr(inputs.module, "march", None)
+    march = inputs.code.march
     if march is None:
         return False
     states = motion.q.T, motion.q_dot.T, motion.q_ddot.T
@@ -198,7 +194,7 @@ def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
     time = float(inputs.t[0])
     equations = problem(inputs.module, inputs.p, inputs.guess, time, inputs.guess)
     guess, found = (equations.at(q, time) for q in (inputs.guess, motion.q[0].copy()))
-    if guess is None or found is None or leaves_branch(equations, time, guess, found):
+    if guess is None or found is None or leaves_branch(equations, guess, found):
         return False
     motion.status[:], motion.iterations[:] = status, iterations
     motion.statistics["compiled"] = inputs.t.size

@@ -12,21 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import (
-    KINK_UNSEEN,
-    MAX_CORRECTIONS,
-    RESIDUAL_FACTOR,
-    ROUNDING,
-    SMALL_ERROR,
-    SMALLEST_DETERMINANT,
-    SMOOTH_UNSEEN,
-    TOO_NEAR,
-)
+from kincompile.criteria import MAX_CORRECTIONS, TOO_NEAR
 from kincompile.errors import InputError
 from kincompile.names import listed
-from kincompile.runtime.lanes import LaneCode
-from kincompile.runtime.march import State, advance, complete, start
-from kincompile.runtime.problem import problem
+from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.march import March, Outcome, State, all_hold, give_up, start
+from kincompile.runtime.problem import largest, problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
 
@@ -37,8 +28,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.inputs import Inputs
-    from kincompile.runtime.march import Outcome
-    from kincompile.runtime.problem import Problem
 
     Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]
@@ -149,7 +138,7 @@ def solve_in_turn(
 
 def _solve_chunk(inputs: Inputs, sets: Array, arrays: _Arrays, chunk: slice) -> None:
     """Solve some of the variants: compiled, where the module can, and with care those that fail."""
-    march = getattr(inputs.module, "march_variants", None)
+    march = inputs.code.march_variants
     if march is None:
         _Chunk(inputs, sets, arrays, chunk.start).run()
         return
@@ -169,156 +158,88 @@ def _solve_chunk(inputs: Inputs, sets: Array, arrays: _Arrays, chunk: slice) -> 
 
 
 class _Chunk:
-    """Variants that are solved together."""
+    """Variants that are solved together, and alone for the steps that are out of the ordinary."""
 
     def __init__(self, inputs: Inputs, sets: Array, arrays: _Arrays, first: int) -> None:
         self._inputs, self._sets, self._arrays, self._first = inputs, sets, arrays, first
-        self._code = LaneCode(inputs.module, inputs.module.ARRAYS, np.ascontiguousarray(sets.T))
-        count = len(sets)
-        self._alive = np.ones(count, dtype=bool)
-        self._q, self._q_dot, self._q_ddot = np.empty((3, inputs.guess.size, count))
-        self._signs: Any = np.zeros((0, count))
-        self._smallest: Any = 0.0
-        nominal = problem(inputs.module, sets[0], inputs.guess, float(inputs.t[0]), inputs.guess)
-        self._allowed = RESIDUAL_FACTOR * inputs.tolerance * nominal.magnitude
-        self._spread = nominal.spread(inputs.guess)[:, np.newaxis]
+        self._times: list[float] = inputs.t.tolist()
+        self._alive = np.ones(len(sets), dtype=bool)
+        engine = Planned(inputs.code, np.ascontiguousarray(sets.T))
+        nominal = problem(inputs.module, sets[0], inputs.guess, self._times[0], inputs.guess)
+        self._march = March(nominal, engine, inputs.tolerance)
 
     def run(self) -> None:
         """Go through the grid with all variants."""
-        times = self._inputs.t.tolist()
-        guess = np.repeat(self._inputs.guess[:, np.newaxis], len(self._sets), axis=1)
-        good, iterations = self._correct(guess, times[0], self._inputs.max_iterations)
-        self._record(0, good, iterations)
-        self._smallest = SMALLEST_DETERMINANT * self._sizes
+        inputs, time = self._inputs, self._times[0]
+        guess = np.repeat(inputs.guess[:, np.newaxis], len(self._sets), axis=1)
+        found = self._march.correct(guess, time, inputs.max_iterations)
+        state, checks = self._march.complete(found.point)
+        good = all_hold(found.good, checks)
+        self._record(0, state, good, found.iterations)
         for variant in np.flatnonzero(~good).tolist():
-            equations = self._equations(variant, self._inputs.guess, times[0])
-            self._take(0, variant, start(equations, times[0], self._inputs_of(variant)))
-        for index in range(1, len(times)):
-            self._step(index, times)
+            alone = self._alone(variant, inputs.guess)
+            own = replace(inputs, p=self._sets[variant])
+            self._take(0, state, variant, start(alone, time, own))
+        for index in range(1, len(self._times)):
+            state = self._step(index, state)
 
-    def _step(self, index: int, times: list[float]) -> None:
+    def _step(self, index: int, state: State) -> State:
         """Take all variants that are left from one time to the next."""
-        h = times[index] - times[index - 1]
-        before = self._q.copy(), self._q_dot.copy(), self._q_ddot.copy()
-        signs = self._signs.copy()
-        predicted = self._q + h * (self._q_dot + (0.5 * h) * self._q_ddot)
-        good, iterations = self._correct(predicted, times[index], MAX_CORRECTIONS)
-        good &= np.max(np.abs(self._q - predicted) / self._spread, axis=0) <= SMALL_ERROR
-        good &= (self._signs == signs).all(axis=0)
-        good &= self._is_smooth(before, predicted, h)
-        self._record(index, good, iterations)
+        t = self._times[index]
+        following, good, iterations = self._march.step_together(state, t, MAX_CORRECTIONS)
+        good &= self._alive
+        self._record(index, following, good, iterations)
         for variant in np.flatnonzero(self._alive & ~good).tolist():
-            equations = self._equations(variant, before[0][:, variant], times[index - 1])
-            state = _state(equations, times[index - 1], [part[:, variant] for part in before])
-            if isinstance(state, Status):
-                self._fail(index, variant, state)
+            alone = self._alone(variant, state.point.q[:, variant])
+            point = alone.equations.at(np.ascontiguousarray(state.point.q[:, variant]), state.t)
+            known = Status.NOT_FINITE if point is None else alone.state(point)
+            if isinstance(known, Status):
+                outcome = Outcome(known, 0, None)
             else:
-                outcome = advance(equations, state, times[index], self._inputs_of(variant))
-                self._take(index, variant, outcome)
+                outcome = alone.advance(known, t, self._inputs.max_iterations)
+                if outcome.position is None:
+                    own = replace(self._inputs, p=self._sets[variant])
+                    outcome = give_up(alone, outcome, t, own)
+            self._take(index, following, variant, outcome)
+        return following
 
-    def _is_smooth(self, before: tuple[Array, Array, Array], predicted: Array, h: float) -> Mask:
-        """Say where the velocity is as well predicted as the position is."""
-        change = self._q_dot - (before[1] + h * before[2])
-        kink = abs(h) * np.max(np.abs(change) / self._spread, axis=0)
-        error = np.max(np.abs(self._q - predicted) / self._spread, axis=0)
-        return np.asarray(kink <= KINK_UNSEEN * (error + SMOOTH_UNSEEN))
+    def _alone(self, variant: int, q: Array) -> March:
+        """Return the march of one variant."""
+        inputs, time = self._inputs, self._times[0]
+        equations = problem(inputs.module, self._sets[variant], q, time, inputs.guess)
+        return March(equations, equations.engine, inputs.tolerance)
 
-    def _correct(self, q: Array, t: float, corrections: int) -> tuple[Mask, NDArray[np.int64]]:
-        """Run Newton's method on all variants; keep what it gives, and say where it is good."""
-        q = q.copy()
-        tolerance = self._inputs.tolerance
-        done = np.zeros(q.shape[1], dtype=bool)
-        iterations = np.zeros(q.shape[1], dtype=np.int64)
-        for _ in range(corrections):
-            at = self._code.position(q, t)
-            change = np.array(np.broadcast_arrays(*self._code.solve(at, at.Phi), q[0])[:-1])
-            change[:, done] = 0.0
-            q -= change
-            iterations += ~done
-            allowed = tolerance * self._spread + ROUNDING * np.abs(q)
-            done |= (np.abs(change) <= allowed).all(axis=0)
-            if (done | ~self._alive).all():
-                break
-        return self._complete(q, t, done), iterations
-
-    def _complete(self, q: Array, t: float, done: Mask) -> Mask:
-        """Solve for velocity and acceleration, and check what was found."""
-        at = self._code.position(q, t)
-        residual = np.max(np.abs(np.array(np.broadcast_arrays(*at.Phi, q[0])[:-1])), axis=0)
-        good = done & self._alive
-        for value, limit in zip(at.Phi, self._allowed.tolist(), strict=True):
-            good &= np.abs(value) <= limit
-        q_dot, q_ddot = self._code.rates(at, q, t)
-        self._q = q
-        for rows, values in ((self._q_dot, q_dot), (self._q_ddot, q_ddot)):
-            for row, value in zip(rows, values, strict=True):
-                row[:] = value
-        good &= np.isfinite(self._q_dot.sum(axis=0) + self._q_ddot.sum(axis=0))
-        determinants = _blocks(at.determinants, q.shape[1])
-        self._signs, self._sizes = np.sign(determinants), np.abs(determinants)
-        self._residual = residual
-        good &= (self._sizes > self._smallest).all(axis=0)
-        return good
-
-    def _record(self, index: int, good: Mask, iterations: NDArray[np.int64]) -> None:
+    def _record(self, index: int, state: State, good: Mask, iterations: Any) -> None:
         """Write down the variants that are good at a point."""
         arrays, own = self._arrays, slice(self._first, self._first + good.size)
-        for target, values in zip(
-            arrays.motion[:, index], (self._q, self._q_dot, self._q_ddot), strict=True
-        ):
+        found = state.point.q, state.q_dot, state.q_ddot
+        for target, values in zip(arrays.motion[:, index], found, strict=True):
             target[:, own] = values if good.all() else np.where(good, values, np.nan)
         arrays.status[index, own][good] = Status.CONVERGED
-        arrays.residual[index, own][good] = self._residual[good]
+        arrays.residual[index, own][good] = largest(state.point.Phi, good.size)[good]
         arrays.iterations[index, own][good] = iterations[good]
 
-    def _take(self, index: int, variant: int, outcome: Outcome) -> None:
-        """Write down what the careful march found for one variant, and let it go on from there."""
-        if outcome.status is not Status.CONVERGED or outcome.state is None:
-            self._fail(index, variant, outcome.status)
+    def _take(self, index: int, state: State, variant: int, outcome: Outcome) -> None:
+        """Put what was found for one variant alone into the state of all, and write it down.
+
+        One that ends is kept busy with its guess.
+        """
+        found, arrays, place = outcome.state, self._arrays, self._first + variant
+        status = outcome.status
+        if found is not None and status is Status.CONVERGED and found.sensitivity > TOO_NEAR:
+            status = Status.SINGULAR  # its rates are too uncertain to go on from
+        arrays.status[index, place] = status
+        if found is None or status is not Status.CONVERGED:
+            self._alive[variant] = False
+            state.point.q[:, variant] = self._inputs.guess
+            state.q_dot[:, variant] = state.q_ddot[:, variant] = 0.0
             return
-        if outcome.state.sensitivity > TOO_NEAR:  # its rates are too uncertain to go on from
-            self._fail(index, variant, Status.SINGULAR)
-            return
-        arrays, place, state = self._arrays, self._first + variant, outcome.state
-        self._q[:, variant] = state.point.q
-        self._q_dot[:, variant] = state.q_dot
-        self._q_ddot[:, variant] = state.q_ddot
-        arrays.motion[:, index, :, place] = state.point.q, state.q_dot, state.q_ddot
-        arrays.status[index, place] = Status.CONVERGED
-        arrays.residual[index, place] = np.max(np.abs(state.point.Phi))
+        state.point.q[:, variant] = found.point.q
+        state.q_dot[:, variant], state.q_ddot[:, variant] = found.q_dot, found.q_ddot
+        state.determinants[:, variant] = found.determinants
+        arrays.motion[:, index, :, place] = found.point.q, found.q_dot, found.q_ddot
+        arrays.residual[index, place] = np.max(np.abs(found.point.Phi))
         arrays.iterations[index, place] = outcome.iterations
-        lane = LaneCode(
-            self._inputs.module, self._inputs.module.FLOATS, self._sets[variant].tolist()
-        )
-        determinants = lane.position(state.point.q.tolist(), state.t).determinants
-        self._signs[:, variant] = np.sign(_blocks(determinants, 1)[:, 0])
-
-    def _fail(self, index: int, variant: int, status: Status) -> None:
-        """Write down why a variant ends; its place in the arrays is kept busy with its guess."""
-        self._arrays.status[index, self._first + variant] = status
-        self._alive[variant] = False
-        self._q[:, variant] = self._inputs.guess
-        self._q_dot[:, variant] = self._q_ddot[:, variant] = 0.0
-
-    def _equations(self, variant: int, q: Array, t: float) -> Problem:
-        return problem(self._inputs.module, self._sets[variant], q, t, self._inputs.guess)
-
-    def _inputs_of(self, variant: int) -> Inputs:
-        return replace(self._inputs, p=self._sets[variant])
-
-
-def _blocks(determinants: Any, count: int) -> Array:
-    """Return the determinants of the blocks as an array, shape (blocks, count)."""
-    result = np.empty((len(determinants), count))
-    for block, values in enumerate(determinants):
-        result[block] = values
-    return result
-
-
-def _state(equations: Any, t: float, parts: list[Array]) -> State | Status:
-    """Return a variant's last good point in the form of the careful march."""
-    point = equations.at(np.ascontiguousarray(parts[0]), t)
-    return Status.NOT_FINITE if point is None else complete(equations, t, point)
 
 
 def _solution(inputs: Inputs, sets: Array, arrays: _Arrays) -> Solution:

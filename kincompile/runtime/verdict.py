@@ -6,19 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.names import body_coordinates, listed
-from kincompile.runtime.singular.events import owner_of_coordinates
+from kincompile.names import listed
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from types import ModuleType
 
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.code import Code
+    from kincompile.runtime.engine.engine import Array, Point
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.march import Outcome
-    from kincompile.runtime.problem import Point, Vector
     from kincompile.runtime.singular.events import Event
 
 NAMED_EQUATIONS = 3
@@ -44,7 +43,7 @@ MET = 1e-9
 def verdict(
     inputs: Inputs,
     status: NDArray[np.int64],
-    residual: Vector,
+    residual: Array,
     outcome: Outcome,
     events: Sequence[Event],
 ) -> str:
@@ -61,7 +60,7 @@ def verdict(
     events
         Events on the way, in order.
     """
-    name, times = inputs.module.NAME, inputs.t
+    name, times = inputs.code.name, inputs.t
     if outcome.status is Status.CONVERGED:
         points = f"all {times.size} points" if times.size > 1 else "the point"
         passed = "".join(f" Passed: {event.kind} at t = {event.t:.10g}." for event in events)
@@ -72,7 +71,7 @@ def verdict(
         f" ({outcome.status.name}).",
         _before(outcome, index),
         _why(outcome, events, times[index]),
-        _there(inputs.module, outcome),
+        _there(inputs.code, outcome),
     ]
     return " ".join(part for part in parts if part)
 
@@ -109,35 +108,36 @@ def _why(outcome: Outcome, events: Sequence[Event], t: float) -> str:
     return event.message if is_between else general
 
 
-def _there(module: ModuleType, outcome: Outcome) -> str:
+def _there(code: Code, outcome: Outcome) -> str:
     """Name the equations that do not hold at the time of failure, or say what else is there."""
     if outcome.position is not None:
         return "The position there was found."
     if outcome.attempt is not None and outcome.attempt.status is Status.CONVERGED:
         return "A position exists at that time, but the motion does not lead there continuously."
     point = unassembled(outcome)
-    return "" if point is None else _unmet(module, point)
+    return "" if point is None else _unmet(code, point)
 
 
-def _unmet(module: ModuleType, point: Point) -> str:
+def _unmet(code: Code, point: Point) -> str:
     """Say by how much which equations are missed at the best position, and where its bodies are."""
     sizes = np.abs(point.Phi)
     order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
     rows = [row for row in order.tolist() if sizes[row] > MET * sizes[order[0]]]
-    worst = ", ".join(f"{module.EQUATIONS[row]} = {point.Phi[row]:.3g}" for row in rows)
-    places = listed(_places(module, point.q), most=NAMED_BODIES)
+    worst = ", ".join(f"{code.equations[row]} = {point.Phi[row]:.3g}" for row in rows)
+    places = listed(_places(code, point.q), most=NAMED_BODIES)
     return (
         f"The equations with the largest residuals at the nearest position: {worst}. "
         f"There: {places}."
     )
 
 
-def _places(module: ModuleType, q: Vector) -> Iterator[str]:
+def _places(code: Code, q: Array) -> Iterator[str]:
     """Yield where each body is, and the values of coordinates that belong to none."""
-    values = dict(zip(module.COORDINATES, q.tolist(), strict=True))
-    for owner in dict.fromkeys(owner_of_coordinates(module).values()):
-        if owner in values:
-            yield f"{owner} = {values[owner]:.4g}"
-        else:
-            x, y, phi = (values[name] for name in body_coordinates(owner))
+    values = dict(zip(code.coordinates, q.tolist(), strict=True))
+    firsts = {body: first for body, first, _ in code.bodies}
+    for owner in dict.fromkeys(code.owners().values()):
+        if owner in firsts:
+            x, y, phi = q[firsts[owner] : firsts[owner] + 3]
             yield f"{owner} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+        else:
+            yield f"{owner} = {values[owner]:.4g}"

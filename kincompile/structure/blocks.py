@@ -1,4 +1,8 @@
-"""Block triangular form: a square system as small ones that are solved one after the other."""
+"""The block triangular form: a square system as blocks that are solved one after the other.
+
+A *block* is a strongly connected component of the equations, each matched with a coordinate that
+it determines (Dulmage and Mendelsohn): equations that can only be solved together.
+"""
 
 from __future__ import annotations
 
@@ -7,26 +11,27 @@ from graphlib import TopologicalSorter
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
+    Index = NDArray[np.intp]
+
+SMALL = 300
+"""Equations up to which the plain algorithms below are faster than importing SciPy's."""
+
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Equations that must be solved together, and the coordinates they determine."""
+    """Equations that must be solved together, and the coordinates that they determine."""
 
     rows: tuple[int, ...]
     columns: tuple[int, ...]
 
 
-def matching(
-    pattern: Sequence[tuple[int, int]] | NDArray[np.intp], shape: tuple[int, int]
-) -> list[int]:
+def matching(pattern: Sequence[tuple[int, int]] | Index, shape: tuple[int, int]) -> Index:
     """Match equations with coordinates, one to one and as many as possible.
 
     Parameters
@@ -38,27 +43,127 @@ def matching(
 
     Returns
     -------
-    list of int
+    ndarray of int, shape (m,)
         The column matched with each row, -1 where there is none.
     """
     rows, columns = np.array(pattern, dtype=np.intp).reshape(-1, 2).T
-    matrix = csr_array((np.ones(len(rows)), (rows, columns)), shape=shape)
-    matched: list[int] = maximum_bipartite_matching(matrix, perm_type="column").tolist()
-    return matched
+    if max(shape) > SMALL:
+        from scipy.sparse.csgraph import maximum_bipartite_matching
+
+        found: Index = maximum_bipartite_matching(_matrix(rows, columns, shape), "column")
+        return found
+    columns_of: list[list[int]] = [[] for _ in range(shape[0])]
+    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+        columns_of[row].append(column)
+    matched, owner = [-1] * shape[0], [-1] * shape[1]
+    for row in range(shape[0]):
+        _match(row, columns_of, matched, owner)
+    return np.array(matched, dtype=np.intp)
+
+
+def _match(
+    start: int, columns_of: Sequence[Sequence[int]], matched: list[int], owner: list[int]
+) -> None:
+    """Match one more row, by an alternating path on which others change their columns."""
+    reached_from: dict[int, int] = {}
+    waiting = [start]
+    for row in waiting:
+        for column in columns_of[row]:
+            if column in reached_from:
+                continue
+            reached_from[column] = row
+            if owner[column] >= 0:
+                waiting.append(owner[column])
+                continue
+            while column >= 0:  # back along the path: each row passes its column on
+                row = owner[column] = reached_from[column]
+                matched[row], column = column, matched[row]
+            return
+
+
+def components(heads: Index, tails: Index, count: int) -> Index:
+    """Return the number of the strongly connected component of each node, shape (count,).
+
+    Parameters
+    ----------
+    heads, tails : ndarray of int, shape (edges,)
+        Ends of each edge, nodes from 0 to count - 1.
+    """
+    if count > SMALL:
+        from scipy.sparse.csgraph import connected_components
+
+        graph = _matrix(heads, tails, (count, count))
+        found: Index = connected_components(graph, connection="strong")[1]
+        return found
+    reached = np.eye(count, dtype=np.float32)
+    reached[heads, tails] = 1
+    for _ in range(count.bit_length()):  # paths of twice the length
+        reached = np.minimum(reached @ reached, 1)
+    return np.unique(np.argmax((reached * reached.T) > 0, axis=1), return_inverse=True)[1]
+
+
+def _matrix(rows: Index, columns: Index, shape: tuple[int, int]) -> object:
+    from scipy.sparse import csr_array
+
+    return csr_array((np.ones(rows.size), (rows, columns)), shape=shape)
+
+
+def order_of_solution(needs: Index, labels: Iterable[int]) -> list[int]:
+    """Return labels in an order in which none needs a later one; `needs` has pairs as columns."""
+    before: dict[int, set[int]] = {label: set() for label in labels}
+    for head, tail in needs.T.tolist():
+        if head != tail:
+            before[head].add(tail)
+    return list(TopologicalSorter(before).static_order())
+
+
+@dataclass(frozen=True, slots=True)
+class BlockForm:
+    """The block triangular form of a square matrix given by its entries.
+
+    Attributes
+    ----------
+    rows, columns : ndarray of int, shape (nnz,)
+        Place of each entry.
+    of_row, of_column : ndarray of int, shape (size,)
+        Block of each equation and of each coordinate.
+    """
+
+    rows: Index
+    columns: Index
+    of_row: Index
+    of_column: Index
+
+    @classmethod
+    def of(cls, rows: Index, columns: Index, size: int) -> BlockForm | None:
+        """Find the blocks; None where the matrix is structurally singular."""
+        matched = matching(np.stack((rows, columns), axis=1), (size, size))
+        if (matched < 0).any():
+            return None
+        owner = np.empty(size, dtype=np.intp)
+        owner[matched] = np.arange(size)
+        of_row = components(rows, owner[columns], size)
+        return cls(rows, columns, of_row, of_row[owner])
+
+    def is_inner(self) -> NDArray[np.bool_]:
+        """Return which entries lie within a block, shape (nnz,)."""
+        return np.asarray(self.of_row[self.rows] == self.of_column[self.columns])
+
+    def needs(self) -> Index:
+        """Return the blocks of row and column of each other entry, shape (2, others)."""
+        outer = ~self.is_inner()
+        return np.stack((self.of_row[self.rows[outer]], self.of_column[self.columns[outer]]))
 
 
 def block_triangular(
     rows: Sequence[int], columns: Sequence[int], pattern: Iterable[tuple[int, int]]
 ) -> tuple[Block, ...] | None:
-    """Split a square system into blocks in the order in which they can be solved.
-
-    The blocks are the strong components of the matched equations (Dulmage and Mendelsohn): each
-    needs the results of earlier blocks only.
+    """Split a square system into blocks in an order in which they can be solved.
 
     Parameters
     ----------
     rows, columns
-        The equations and coordinates of the system, equally many.
+        The equations and coordinates of the system, equally many, in increasing order.
     pattern
         Row and column of each entry that is not identically zero.
 
@@ -68,32 +173,19 @@ def block_triangular(
         None where the equations cannot be matched with the coordinates: the system is structurally
         singular.
     """
-    row_number = {row: k for k, row in enumerate(rows)}
-    column_number = {column: k for k, column in enumerate(columns)}
-    local = [(row_number[row], column_number[column]) for row, column in pattern]
     if not rows:
         return ()
-    matched = matching(local, (len(rows), len(columns)))
-    if -1 in matched:
+    local = np.array(list(pattern), dtype=np.intp).reshape(-1, 2).T
+    row_numbers, column_numbers = np.array(rows, np.intp), np.array(columns, np.intp)
+    form = BlockForm.of(
+        np.searchsorted(row_numbers, local[0]), np.searchsorted(column_numbers, local[1]), len(rows)
+    )
+    if form is None:
         return None
-    owner = {column: row for row, column in enumerate(matched)}
-    edges = [(row, owner[column]) for row, column in local]
-    heads, tails = zip(*edges, strict=True)
-    graph = csr_array((np.ones(len(edges)), (heads, tails)), shape=(len(rows), len(rows)))
-    _, labels = connected_components(graph, connection="strong")
-    component = labels.tolist()
-    needs: dict[int, set[int]] = {label: set() for label in component}
-    for head, tail in edges:
-        if component[head] != component[tail]:
-            needs[component[head]].add(component[tail])
-    members: dict[int, list[int]] = {}
-    for row, label in enumerate(component):
-        members.setdefault(label, []).append(row)
-    order = TopologicalSorter({label: sorted(before) for label, before in sorted(needs.items())})
     return tuple(
         Block(
-            tuple(rows[row] for row in members[label]),
-            tuple(sorted(columns[matched[row]] for row in members[label])),
+            tuple(row_numbers[form.of_row == label].tolist()),
+            tuple(column_numbers[form.of_column == label].tolist()),
         )
-        for label in order.static_order()
+        for label in order_of_solution(form.needs(), range(form.of_row.max() + 1))
     )

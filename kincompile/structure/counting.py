@@ -22,7 +22,7 @@ Pattern = Sequence[tuple[int, int]] | NDArray[np.intp]
 def unmatched(system: ConstraintSystem, pattern: Pattern) -> tuple[list[str], list[str]]:
     """Return the names of equations and coordinates that a maximum matching leaves over."""
     names = [item.name for item in system.coordinates]
-    matched = matching(pattern, (len(system.equations), len(names)))
+    matched = matching(pattern, (len(system.equations), len(names))).tolist()
     equations = [name for name, column in zip(system.equations, matched, strict=True) if column < 0]
     taken = set(matched)
     return equations, [name for column, name in enumerate(names) if column not in taken]

@@ -43,7 +43,7 @@ def parts_of(pattern: Sequence[tuple[int, int]], shape: tuple[int, int]) -> Part
         Numbers of equations and of coordinates.
     """
     m, n = shape
-    of_row = matching(pattern, shape)
+    of_row = matching(pattern, shape).tolist()
     of_column = [-1] * n
     for row, column in enumerate(of_row):
         if column >= 0:

@@ -14,12 +14,11 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, eye_array
-from scipy.sparse.linalg import splu
 
 from kincompile.criteria import ASSEMBLED, size_of
 from kincompile.errors import InputError
 from kincompile.names import listed
+from kincompile.structure.blocks import SMALL
 
 Array: TypeAlias = NDArray[np.float64]
 Evaluate: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
@@ -256,9 +255,16 @@ class _Analysis:
 
 def _damped(matrix: Array, Phi: Array, damping: float) -> Array:
     """Return the correction of Levenberg and Marquardt."""
+    n = matrix.shape[1]
+    if n <= SMALL:
+        normal = matrix.T @ matrix + damping * np.eye(n)
+        return np.asarray(np.linalg.solve(normal, matrix.T @ Phi), dtype=np.float64)
+    from scipy.sparse import csc_array, eye_array
+    from scipy.sparse.linalg import splu
+
     sparse = csc_array(matrix)
-    normal = sparse.T @ sparse + damping * eye_array(matrix.shape[1])
-    return np.asarray(splu(csc_array(normal)).solve(matrix.T @ Phi), dtype=np.float64)
+    factors = splu(csc_array(sparse.T @ sparse + damping * eye_array(n)))
+    return np.asarray(factors.solve(matrix.T @ Phi), dtype=np.float64)
 
 
 def _best(matrices: Array, order: Sequence[int]) -> tuple[list[int], list[int], Array]:

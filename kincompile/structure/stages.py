@@ -1,22 +1,22 @@
-"""The order of solution of a large system: equal blocks as lanes, chains of them, a sparse rest.
+"""The order of solution of a large system: batches of equal blocks, chains of them, a sparse rest.
 
 The blocks of the block triangular form fall into classes of equal structure. A class whose blocks
-do not need each other is solved as one, each number an array over its blocks. Classes that need
-each other, or themselves, form a chain: loops, each driven by the one before. There too the blocks
-are factored side by side; one after the other go only the few numbers that a block hands on to the
-next. Blocks too large to be written out as straight-line code are left to a sparse factorization.
+do not need each other is solved as a *batch*, each number an array over its blocks. Classes that
+need each other, or themselves, form a *chain*: loops, each driven by the one before. There too the
+blocks are factored side by side; only the few interface variables between neighbouring blocks are
+solved sequentially. Blocks too large to be written out as straight-line code are left to a sparse
+factorization.
 """
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from graphlib import TopologicalSorter
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
+
+from kincompile.structure.blocks import BlockForm, components, order_of_solution
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Lanes:
-    """Blocks of equal structure.
+class Batch:
+    """Blocks of equal structure, solved side by side.
 
     Attributes
     ----------
@@ -57,15 +57,15 @@ class Chain:
 
     Attributes
     ----------
-    parts
+    batches
         The classes of its blocks.
-    links : ndarray of int, shape (count,)
+    interface : ndarray of int, shape (count,)
         Equations with entries in columns of other blocks of the chain, in an order in which none
-        needs a later one.
+        needs a later one; those columns are the interface variables.
     """
 
-    parts: tuple[Lanes, ...]
-    links: Index
+    batches: tuple[Batch, ...]
+    interface: Index
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class Sparse:
     outer: Index
 
 
-Stage = Lanes | Chain | Sparse
+Stage = Batch | Chain | Sparse
 
 LARGEST_BLOCK = 40
 """Equations up to which a block is written out as straight-line code."""
@@ -114,72 +114,59 @@ def plan_stages(
     tuple of Stage or None
         In the order of solution; None where the system is structurally singular.
     """
-    pattern = csr_array((np.ones(rows.size), (rows, columns)), shape=(size, size))
-    matched = maximum_bipartite_matching(pattern, perm_type="column")
-    if (matched < 0).any():
+    blocks = BlockForm.of(rows, columns, size)
+    if blocks is None:
         return None
-    blocks = _Blocks.of(rows, columns, matched)
-    order, starts, signatures = _signatures(blocks, constants)
-    classes: dict[tuple[int, ...], list[int]] = {}
-    for block, signature in enumerate(signatures):
-        classes.setdefault(signature, []).append(block)
-    class_of_block = np.empty(len(signatures), dtype=np.intp)
-    members = [np.array(found, dtype=np.intp) for found in classes.values()]
-    for number, found in enumerate(members):
-        class_of_block[found] = number
-    needs = np.unique(class_of_block[blocks.outside()], axis=1)
+    classes = _classes(blocks, constants)
+    class_of_block = np.empty(sum(item.blocks.size for item in classes), dtype=np.intp)
+    for number, item in enumerate(classes):
+        class_of_block[item.blocks] = number
+    sizes = np.bincount(blocks.of_row)
+    needs = np.unique(class_of_block[blocks.needs()], axis=1)
     stages: list[Stage] = []
     for together, is_cyclic in _class_order(needs, len(classes)):
-        chosen = np.concatenate([members[number] for number in together])
-        largest = int(np.bincount(blocks.of_row)[chosen].max())
-        if largest > LARGEST_BLOCK or (is_cyclic and chosen.size < SHARED * len(together)):
+        own = [classes[number] for number in together]
+        chosen = np.concatenate([item.blocks for item in own])
+        is_rare = is_cyclic and chosen.size < SHARED * len(together)
+        if is_rare or sizes[chosen].max() > LARGEST_BLOCK:
             stages.append(_sparse(chosen, blocks))
             continue
-        lanes = []
-        for number in together:
-            first = starts[members[number]]
-            count = len(signatures[members[number][0]])
-            entries = order[first + np.arange(count)[:, np.newaxis]]
-            lanes.append(_lanes(members[number], entries, blocks))
-        stages.append(_chain(chosen, tuple(lanes), blocks) if is_cyclic else lanes[0])
+        batches = tuple(_batch(item, blocks) for item in own)
+        stages.append(_chain(chosen, batches, blocks) if is_cyclic else batches[0])
     return tuple(stages)
 
 
 @dataclass(frozen=True, slots=True)
-class _Blocks:
-    """The entries of Phi_q, and the blocks of the block triangular form.
+class _Class:
+    """Blocks of equal structure, shape (L,), and their entries, shape (entries, L)."""
 
-    Attributes
-    ----------
-    rows, columns : ndarray of int, shape (nnz,)
-        Place of each entry.
-    of_row, of_column : ndarray of int, shape (size,)
-        Block of each equation and of each coordinate.
+    blocks: Index
+    entries: Index
+
+
+def _classes(blocks: BlockForm, constants: Values) -> list[_Class]:
+    """Return the classes of blocks, in the order of their first blocks.
+
+    The structure of a block is the row, the column and, where it is one, the number of each of its
+    entries; of entries outside the block the row alone.
     """
-
-    rows: Index
-    columns: Index
-    of_row: Index
-    of_column: Index
-
-    @classmethod
-    def of(cls, rows: Index, columns: Index, matched: Index) -> _Blocks:
-        """Find the blocks: the strong components of the matched equations."""
-        size = matched.size
-        owner = np.empty(size, dtype=np.intp)
-        owner[matched] = np.arange(size)
-        edges = csr_array((np.ones(rows.size), (rows, owner[columns])), shape=(size, size))
-        _, of_row = connected_components(edges, connection="strong")
-        return cls(rows, columns, of_row, of_row[owner])
-
-    def is_inner(self) -> NDArray[np.bool_]:
-        """Return which entries lie within a block."""
-        return np.asarray(self.of_row[self.rows] == self.of_column[self.columns])
-
-    def outside(self) -> Index:
-        """Return the blocks of row and column of each other entry, shape (2, others)."""
-        outer = ~self.is_inner()
-        return np.stack((self.of_row[self.rows[outer]], self.of_column[self.columns[outer]]))
+    _, kind = np.unique(constants, return_inverse=True)  # all NaN are one kind
+    row_rank, column_rank = _ranks(blocks.of_row), _ranks(blocks.of_column)
+    place = np.where(blocks.is_inner(), column_rank[blocks.columns] + 1, 0)
+    row, width = row_rank[blocks.rows], int(column_rank.max()) + 2
+    code = (row * width + place) * (int(kind.max()) + 1) + kind
+    block = blocks.of_row[blocks.rows]
+    order = np.lexsort((blocks.columns, place == 0, row, block))
+    starts = np.concatenate(([0], np.cumsum(np.bincount(block))))
+    codes, bounds = code[order].tolist(), starts.tolist()
+    found: dict[tuple[int, ...], list[int]] = {}
+    for number, (first, last) in enumerate(itertools.pairwise(bounds)):
+        found.setdefault(tuple(codes[first:last]), []).append(number)
+    classes = []
+    for structure, members in found.items():
+        entries = order[starts[members] + np.arange(len(structure))[:, np.newaxis]]
+        classes.append(_Class(np.array(members, dtype=np.intp), entries))
+    return classes
 
 
 def _ranks(labels: Index) -> Index:
@@ -191,32 +178,18 @@ def _ranks(labels: Index) -> Index:
     return ranks
 
 
-def _signatures(blocks: _Blocks, constants: Values) -> tuple[Index, Index, list[tuple[int, ...]]]:
-    """Return the entries by block, where each block begins, and the signature of each block."""
-    _, kind = np.unique(constants, return_inverse=True)  # all NaN are one kind
-    row_rank, column_rank = _ranks(blocks.of_row), _ranks(blocks.of_column)
-    place = np.where(blocks.is_inner(), column_rank[blocks.columns] + 1, 0)
-    row, width = row_rank[blocks.rows], int(column_rank.max()) + 2
-    code = (row * width + place) * (int(kind.max()) + 1) + kind
-    block = blocks.of_row[blocks.rows]
-    order = np.lexsort((blocks.columns, place == 0, row, block))
-    starts = np.concatenate(([0], np.cumsum(np.bincount(block))))
-    codes, bounds = code[order].tolist(), starts.tolist()
-    return order, starts, [tuple(codes[a:b]) for a, b in itertools.pairwise(bounds)]
-
-
-def _lanes(chosen: Index, entries: Index, blocks: _Blocks) -> Lanes:
-    """Return the stage of equal blocks; `entries` has a row an entry and a column a block."""
-    sample = entries[:, 0]
+def _batch(item: _Class, blocks: BlockForm) -> Batch:
+    """Return the stage of a class of blocks."""
+    sample = item.entries[:, 0]
     inside = blocks.is_inner()[sample]
     row = _ranks(blocks.of_row)[blocks.rows[sample]]
     column = _ranks(blocks.of_column)[blocks.columns[sample]]
-    return Lanes(
-        _members(blocks.of_row, chosen),
-        _members(blocks.of_column, chosen),
-        entries[inside],
+    return Batch(
+        _members(blocks.of_row, item.blocks),
+        _members(blocks.of_column, item.blocks),
+        item.entries[inside],
         tuple(zip(row[inside].tolist(), column[inside].tolist(), strict=True)),
-        entries[~inside],
+        item.entries[~inside],
         tuple(row[~inside].tolist()),
     )
 
@@ -230,60 +203,40 @@ def _members(labels: Index, chosen: Index) -> Index:
 
 def _class_order(needs: Index, count: int) -> list[tuple[list[int], bool]]:
     """Return groups of classes in order of solution, and whether their blocks need each other."""
-    graph = csr_array((np.ones(needs.shape[1]), (needs[0], needs[1])), shape=(count, count))
-    _, component = connected_components(graph, connection="strong")
-    before: dict[int, set[int]] = {label: set() for label in component.tolist()}
-    cyclic = set()
-    for head, tail in needs.T.tolist():
-        if component[head] == component[tail]:
-            cyclic.add(int(component[head]))
-        else:
-            before[int(component[head])].add(int(component[tail]))
-    ordered = TopologicalSorter({label: sorted(found) for label, found in sorted(before.items())})
+    component = components(needs[0], needs[1], count)
+    ends = component[needs]
+    cyclic = set(ends[0][ends[0] == ends[1]].tolist())
     return [
         (np.flatnonzero(component == label).tolist(), label in cyclic)
-        for label in ordered.static_order()
+        for label in order_of_solution(np.unique(ends, axis=1), np.unique(component).tolist())
     ]
 
 
-def _chain(chosen: Index, parts: tuple[Lanes, ...], blocks: _Blocks) -> Chain:
+def _chain(chosen: Index, batches: tuple[Batch, ...], blocks: BlockForm) -> Chain:
     """Return the stage of blocks that need each other."""
-    heads, tails = blocks.outside()
-    within = np.isin(heads, chosen) & np.isin(tails, chosen)
+    needs = blocks.needs()
+    within = np.isin(needs, chosen).all(axis=0)
     rows = np.unique(blocks.rows[~blocks.is_inner()][within])
-    position = _positions(heads[within], tails[within], int(blocks.of_row.max()) + 1)
-    return Chain(parts, rows[np.argsort(position[blocks.of_row[rows]], kind="stable")])
+    position = _positions(needs[:, within], chosen)
+    return Chain(batches, rows[np.argsort(position[blocks.of_row[rows]], kind="stable")])
 
 
-def _sparse(chosen: Index, blocks: _Blocks) -> Sparse:
+def _sparse(chosen: Index, blocks: BlockForm) -> Sparse:
     """Return the stage of blocks that are solved by a sparse factorization, in order."""
     own = np.isin(blocks.of_row, chosen)
     rows, columns = np.flatnonzero(own), np.flatnonzero(np.isin(blocks.of_column, chosen))
-    heads, tails = blocks.outside()
-    position = _positions(heads, tails, int(blocks.of_row.max()) + 1)
-    rows = rows[np.lexsort((rows, position[blocks.of_row[rows]]))]
-    columns = columns[np.lexsort((columns, position[blocks.of_column[columns]]))]
+    needs = blocks.needs()
+    position = _positions(needs[:, np.isin(needs, chosen).all(axis=0)], chosen)
+    rows = rows[np.argsort(position[blocks.of_row[rows]], kind="stable")]
+    columns = columns[np.argsort(position[blocks.of_column[columns]], kind="stable")]
     entries = np.flatnonzero(own[blocks.rows])
     inside = np.isin(blocks.of_column[blocks.columns[entries]], chosen)
     return Sparse(rows, columns, entries[inside], entries[~inside])
 
 
-def _positions(heads: Index, tails: Index, count: int) -> Index:
-    """Return the position of each block in an order in which none needs a later one.
-
-    Each head needs its tail.
-    """
-    followers: list[list[int]] = [[] for _ in range(count)]
-    missing = np.bincount(heads, minlength=count).tolist()
-    for head, tail in zip(heads.tolist(), tails.tolist(), strict=True):
-        followers[tail].append(head)
-    ready = [block for block, number in enumerate(missing) if number == 0]
-    position = np.empty(count, dtype=np.intp)
-    for k in range(count):
-        block = ready.pop()
-        position[block] = k
-        for head in followers[block]:
-            missing[head] -= 1
-            if missing[head] == 0:
-                ready.append(head)
+def _positions(needs: Index, chosen: Index) -> Index:
+    """Return the position of each chosen block in an order in which none needs a later one."""
+    order = order_of_solution(np.unique(needs, axis=1), chosen.tolist())
+    position = np.empty(chosen.max() + 1, dtype=np.intp)
+    position[order] = np.arange(len(order))
     return position

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Cosine and sine of a body's angle, the cosine first; where only one is needed, that one."""
+    """What is used of a body's frame, and the angle where that is its cosine and sine."""
 
-    angle: int
+    angle: int | None
     values: tuple[Assignment, ...]
 
 
@@ -102,42 +102,50 @@ def schedule(
     return Listing(frames, tuple(steps), results, inputs, input_names, functions, names)
 
 
+def vectors(program: Program) -> dict[str, list[str]]:
+    """Return the names of the elements of each vector that functions read."""
+    coordinates = [item.name for item in program.coordinates]
+    parameters = [item.name for item in program.parameters]
+    return {"q": coordinates, "q_dot": [rate(name) for name in coordinates], "p": parameters}
+
+
 def input_names(program: Program, table: NameTable) -> dict[str, str]:
-    """Return the names of t, coordinates, rates and parameters in a target, by the model's."""
-    wanted = [item.name for item in program.coordinates]
-    wanted += [*map(rate, wanted), *(item.name for item in program.parameters)]
-    return {"t": "t", **{name: table.take(name) for name in wanted}}
+    """Return the names of all inputs in a target, by the model's."""
+    names = [name for members in vectors(program).values() for name in members]
+    return {"t": "t", **{name: table.take(name) for name in names}}
 
 
 def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, str]]:
     """Yield vector, index and name in the target of each input that is read, t apart."""
-    coordinates = [item.name for item in program.coordinates]
-    vectors = {
-        "q": coordinates,
-        "q_dot": [rate(name) for name in coordinates],
-        "p": [item.name for item in program.parameters],
-    }
-    for vector, members in vectors.items():
+    for vector, members in vectors(program).items():
         for k, member in enumerate(members):
             if member in listing.inputs:
                 yield vector, k, listing.input_names[member]
 
 
 def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[Frame, ...]:
-    """Return the frames whose cosine or sine is used, and name those."""
-    by_angle: dict[int, list[Assignment]] = {}
-    for node in sorted(scheduler.uses):
-        kind, *operands = inline.nodes[node]
-        if kind == "call" and node in inline.hints:
-            by_angle.setdefault(operands[1], []).append(scheduler.name(node))
-    return tuple(Frame(angle, tuple(values)) for angle, values in by_angle.items())
+    """Return the frames of which something is used, and name that."""
+    found = []
+    for entries in inline.frames:
+        values = tuple(scheduler.name(node) for node in entries if node in scheduler.uses)
+        if values:
+            found.append(Frame(_angle(inline, values), values))
+    return tuple(found)
+
+
+def _angle(inline: InlineProgram, values: Sequence[Assignment]) -> int | None:
+    """Return the node whose cosine and sine the values are, None where they are something else."""
+    calls = [inline.nodes[item.node] for item in values]
+    if [call[:2] for call in calls] != [("call", "cos"), ("call", "sin")]:
+        return None
+    return calls[0][2] if calls[0][2] == calls[1][2] else None
 
 
 def _functions(
     inline: InlineProgram, uses: Iterable[int], frames: tuple[Frame, ...]
 ) -> tuple[str, ...]:
     """Return the names of the functions called; cosine and sine of a frame are one call."""
-    pairs = [frame for frame in frames if len(frame.values) == 2]
+    pairs = [frame for frame in frames if frame.angle is not None]
     shared = {item.node for frame in pairs for item in frame.values}
     nodes = [inline.nodes[node] for node in uses if node not in shared]
     called = {node[1] for node in nodes if node[0] == "call"}

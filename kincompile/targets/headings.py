@@ -1,13 +1,15 @@
-"""What emitted code says about itself, in every target: sizes, units, rows, textbook sources."""
+"""What emitted code says about itself: names, sizes, units, numbers, rows, textbook sources."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.quantities import quantity_named
-from kincompile.targets.lines import labelled, table
+from kincompile.quantities import FORMAT, quantity_named
+from kincompile.targets.lines import indented, labelled, quoted, table, wrapped
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from kincompile.ir.inline import Entry, InlineProgram, Section
 
 
@@ -26,6 +28,39 @@ def header(code: InlineProgram, first: int = 0) -> list[str]:
     return [*lines, "", *table(rows)]
 
 
+def constants(code: InlineProgram, level: int, pair: str) -> dict[str, object]:
+    """Return names, numbers and the pattern of Phi_q, by the slot of a template.
+
+    Parameters
+    ----------
+    code
+        The program.
+    level
+        Indentation of the lines of an array.
+    pair
+        Text of a row and a column, with ``{}`` for each.
+    """
+    program = code.program
+
+    def lines(items: Iterable[str]) -> str:
+        return indented(items, level)
+
+    return {
+        "name": program.name,
+        "format": FORMAT,
+        "fingerprint": program.fingerprint,
+        "n": len(program.coordinates),
+        "m": len(program.equations),
+        "k": len(program.parameters),
+        "coordinates": lines(quoted(item.name for item in program.coordinates)),
+        "equations": lines(quoted(program.equations)),
+        "parameters": lines(quoted(item.name for item in program.parameters)),
+        "defaults": lines(wrapped(repr(item.default) for item in program.parameters)),
+        "guess": lines(wrapped(repr(item.guess) for item in program.coordinates)),
+        "pattern": lines(wrapped(pair.format(*place) for place in code.pattern())),
+    }
+
+
 def short_title(section: Section, first: int = 0) -> str:
     """Return rows, type and name of a constraint, for a comment above its code."""
     instance = section.instance
@@ -37,7 +72,7 @@ def title(section: Section, first: int = 0) -> str:
     return f"{short_title(section, first)}: {section.text}"
 
 
-def place(quantity: str, entry: Entry, code: InlineProgram) -> str:
+def entry_title(quantity: str, entry: Entry, code: InlineProgram) -> str:
     """Return which entry of a matrix a line is; nothing for rows of equations, which are titled."""
     found = quantity_named(quantity)
     row = code.program.names_of(found.rows)[entry.row]

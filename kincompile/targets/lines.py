@@ -33,7 +33,7 @@ def quoted(names: Iterable[str]) -> list[str]:
 
 
 def labelled(label: str, items: Iterable[str]) -> list[str]:
-    """Return a label and items behind it, continued below the first item."""
+    """Return a label and items after it, continued below the first item."""
     lines = wrapped(items, WIDTH - 6)
     lines[-1] = lines[-1].rstrip(",")
     return [f"{label if k == 0 else '':<5} {line}" for k, line in enumerate(lines)]
@@ -67,33 +67,33 @@ def broken(text: str, width: int = WIDTH - 8) -> list[str]:
     if len(text) <= width:
         return [text]
     spans, depths = [(0, len(text))], {0: 0}
-    for depth, places in sorted(_places_to_break(text).items()):
-        spans = [part for span in spans for part in _parts(span, places, width)]
-        depths |= dict.fromkeys(places, depth)
+    for depth, breaks in sorted(_breaks(text).items()):
+        spans = [part for span in spans for part in _parts(span, breaks, width)]
+        depths |= dict.fromkeys(breaks, depth)
     return ["    " * depths[start] + text[start:stop].strip() for start, stop in spans]
 
 
-def _places_to_break(text: str) -> dict[int, list[int]]:
+def _breaks(text: str) -> dict[int, list[int]]:
     """Return where a plus or minus stands, by the number of parentheses around it."""
-    places: dict[int, list[int]] = {}
+    breaks: dict[int, list[int]] = {}
     depth = 0
     for k, character in enumerate(text):
         depth += character in "(["
         depth -= character in ")]"
         if character in "+-" and text[k - 1 : k + 2 : 2] == "  ":
-            places.setdefault(depth, []).append(k)
-    return places
+            breaks.setdefault(depth, []).append(k)
+    return breaks
 
 
-def _parts(span: tuple[int, int], places: Iterable[int], width: int) -> list[tuple[int, int]]:
-    """Return a span of text cut into as few parts as fit, at some of the places."""
+def _parts(span: tuple[int, int], breaks: Iterable[int], width: int) -> list[tuple[int, int]]:
+    """Return a span of text cut into as few parts as fit, at some of the breaks."""
     first, last = span
     if last - first <= width:
         return [span]
     parts, start, previous = [], first, first
-    for place in (*(place for place in places if first < place < last), last):
-        if place - start > width and previous > start:
+    for stop in (*(k for k in breaks if first < k < last), last):
+        if stop - start > width and previous > start:
             parts.append((start, previous))
             start = previous
-        previous = place
+        previous = stop
     return [*parts, (start, last)]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import number_of, operands_of
 from kincompile.targets.lines import wrapped
-from kincompile.targets.schedule import Scheduler, count_uses
+from kincompile.targets.schedule import Assignment, Scheduler, count_uses
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -19,26 +19,43 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
+class BlockCall:
+    """The call that solves a block too large for a closed form, or takes its determinant.
+
+    Attributes
+    ----------
+    names
+        Names of the unknowns in order, or of the determinant.
+    size
+        Number of equations.
+    matrix, right
+        Nodes of the matrix row by row, and of the right side, empty for a determinant.
+    """
+
+    names: tuple[str, ...]
+    size: int
+    matrix: tuple[int, ...]
+    right: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class SolveListing:
     """The planned solve with names.
 
     Attributes
     ----------
-    entries
-        Names of the varying entries of Phi_q, in order: the input of the factorization.
     factors
         Nodes that the solution reads from the factorization.
     factor_steps, solve_steps
-        Nodes to be computed one after the other, in each function.
+        What is computed one after the other, in each function.
     names
         Names of all nodes that have one.
     """
 
     plan: SolvePlan
-    entries: tuple[int, ...]
     factors: tuple[int, ...]
-    factor_steps: tuple[int, ...]
-    solve_steps: tuple[int, ...]
+    factor_steps: tuple[Assignment | BlockCall, ...]
+    solve_steps: tuple[Assignment | BlockCall, ...]
     names: Mapping[int, str]
 
 
@@ -61,16 +78,31 @@ def schedule_solve(code: InlineProgram, plan: SolvePlan, table: NameTable) -> So
     blocks = {node for node, content in enumerate(plan.nodes) if content[0] == "linear"}
     scheduler = Scheduler(plan.nodes, labels, names, table, labels, {*labels, *factors, *blocks})
     needed = sorted(scheduler.uses)
-    factor_steps = scheduler.assign("k", [node for node in needed if node not in variable])
-    solve_steps = scheduler.assign("b", [node for node in needed if node in variable])
+    kept = scheduler.assign("k", [node for node in needed if node not in variable])
+    solved = scheduler.assign("b", [node for node in needed if node in variable])
     return SolveListing(
-        plan,
-        tuple(node for _, _, node in plan.entries),
-        factors,
-        tuple(item.node for item in factor_steps),
-        tuple(item.node for item in solve_steps),
-        names,
+        plan, factors, _calls(plan, kept, names), _calls(plan, solved, names), names
     )
+
+
+def _calls(
+    plan: SolvePlan, steps: Iterable[Assignment], names: Mapping[int, str]
+) -> tuple[Assignment | BlockCall, ...]:
+    """Return steps in which all unknowns of a block are one call."""
+    found: dict[object, Assignment | BlockCall] = {}
+    for item in steps:
+        kind, *content = plan.nodes[item.node]
+        if kind != "linear":
+            found[item.node] = item
+            continue
+        name, size, _, *operands = content
+        key = name, *operands
+        same = [k for k, node in enumerate(plan.nodes) if (*node[1:2], *node[4:]) == key]
+        called = sorted(same, key=lambda k: int(plan.nodes[k][3]))
+        matrix, right = operands[: size * size], operands[size * size :]
+        names_of_call = tuple(names[k] for k in called)
+        found.setdefault(key, BlockCall(names_of_call, size, tuple(matrix), tuple(right)))
+    return tuple(found.values())
 
 
 def _depending_on(nodes: Sequence[Node], inputs: Iterable[int]) -> set[int]:
@@ -87,10 +119,8 @@ def _factors(plan: SolvePlan, variable: Collection[int]) -> tuple[int, ...]:
     nodes = plan.nodes
     needed = count_uses(nodes, plan.solution).keys() & variable
     read = {k for node in needed for k in operands_of(nodes[node])}
-    read = {nodes[k][1] if nodes[k][0] == "neg" else k for k in read}
-    return tuple(
-        node for node in sorted(read.difference(variable)) if number_of(nodes, node) is None
-    )
+    values = {nodes[k][1] if nodes[k][0] == "neg" else k for k in read}.difference(variable)
+    return tuple(node for node in sorted(values) if number_of(nodes, node) is None)
 
 
 def explained(code: InlineProgram, plan: SolvePlan) -> list[str]:
@@ -104,14 +134,3 @@ def explained(code: InlineProgram, plan: SolvePlan) -> list[str]:
         columns = ", ".join(coordinates[column] for column in block.columns)
         lines.append(f"block: {columns} by {rows}")
     return [line.replace("eliminated:,", "eliminated:").rstrip(",") for line in lines]
-
-
-def components(plan: SolvePlan, node: int) -> list[int]:
-    """Return the nodes of all components of the solution that a node is one of, in order."""
-    _, _, size, _, *operands = plan.nodes[node]
-    same = [
-        k
-        for k, content in enumerate(plan.nodes)
-        if content[:3] == ("linear", "solve", size) and list(content[4:]) == operands
-    ]
-    return sorted(same, key=lambda k: int(plan.nodes[k][3]))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import UnsupportedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from kincompile.ir.graph import Constant, Node
+    from kincompile.ir.graph import Node
 
 SUM, PRODUCT, SIGN, POWER, ATOM = range(5)
 """Binding strengths, loosest first."""
@@ -22,36 +22,18 @@ ELEMENTARY = (
 )  # fmt: skip
 """Names of the elementary functions that a program may call: those of C's math.h."""
 
+Operation = tuple[str, tuple[int, ...], int]
+"""Text with ``{}`` for each operand, the strength below which an operand needs parentheses, and the
+strength of the whole."""
 
-class Operation(NamedTuple):
-    """How an operation is written.
-
-    Attributes
-    ----------
-    text
-        Its text, with ``{}`` for each operand.
-    operands
-        How strongly each operand must bind to stand without parentheses.
-    strength
-        How strongly the whole binds.
-    """
-
-    text: str
-    operands: tuple[int, ...]
-    strength: int
-
-
-ARITHMETIC = {
-    "add": Operation("{} + {}", (SUM, PRODUCT), SUM),
-    "sub": Operation("{} - {}", (SUM, PRODUCT), SUM),
-    "mul": Operation("{} * {}", (PRODUCT, SIGN), PRODUCT),
-    "div": Operation("{} / {}", (PRODUCT, POWER), PRODUCT),
-    "neg": Operation("-{}", (PRODUCT,), PRODUCT),
+ARITHMETIC: Mapping[str, Operation] = {
+    "add": ("{} + {}", (SUM, PRODUCT), SUM),
+    "sub": ("{} - {}", (SUM, PRODUCT), SUM),
+    "mul": ("{} * {}", (PRODUCT, SIGN), PRODUCT),
+    "div": ("{} / {}", (PRODUCT, POWER), PRODUCT),
+    "neg": ("-{}", (PRODUCT,), PRODUCT),
 }
 """What all languages write alike."""
-
-SQUARE = Operation("square({})", (SUM,), ATOM)
-"""A square as a function, where a language has no power or a slow one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,17 +46,15 @@ class Dialect:
         Its name, for messages.
     functions
         Text of each elementary function, with ``{}`` for the arguments.
-    pi
-        The number pi.
-    square
-        A square, of which it may be a power or a function.
+    pi, square
+        The number pi; a square, which is a power or a function.
     select
         Text of a choice: condition, value where it holds, value elsewhere.
     table
         Text of a tabulated function: name of the table, order of the derivative, argument; with
         ``{mechanism}`` for the mechanism's name.
     signs
-        Relations and connectives that are not those of Python's arrays.
+        Relations and connectives that differ from those of NumPy.
     number
         Text of a whole or a floating-point number that is not negative.
     """
@@ -82,7 +62,7 @@ class Dialect:
     language: str
     functions: Mapping[str, str]
     pi: str = "pi"
-    square: Operation = SQUARE
+    square: Operation = ("square({})", (SUM,), ATOM)
     select: str = "({} ? {} : {})"
     table: str = "spline({}, {}, {})"
     signs: Mapping[str, str] = field(default_factory=dict)
@@ -96,10 +76,8 @@ class Printer:
     ----------
     dialect
         The language.
-    nodes
-        The code.
-    names
-        Names of nodes, by number.
+    nodes, names
+        The code, and names of nodes by number.
     mechanism
         Name of the mechanism, with which those of tables begin in some languages.
     """
@@ -111,15 +89,13 @@ class Printer:
         names: Mapping[int, str],
         mechanism: str = "",
     ) -> None:
-        self._dialect = dialect
-        self._nodes = nodes
-        self._names = names
+        self._dialect, self._nodes, self._names = dialect, nodes, names
         self._mechanism = mechanism
         self._operations = {
             **ARITHMETIC,
             "square": dialect.square,
-            "pi": Operation(dialect.pi, (), ATOM),
-            "select": Operation(dialect.select, (SUM, SUM, SUM), ATOM),
+            "pi": (dialect.pi, (), ATOM),
+            "select": (dialect.select, (SUM, SUM, SUM), ATOM),
         }
 
     def text(self, node: int) -> str:
@@ -139,42 +115,33 @@ class Printer:
         """Return a node in terms of its operands, and how strongly that binds."""
         kind, *content = self._nodes[node]
         if kind in self._operations:
-            text, operands, strength = self._operations[kind]
-            return text.format(*map(self._at, content, operands)), strength
-        if kind == "const":
-            return self._number(content[0])
-        return self._primary(kind, content), ATOM
-
-    def _primary(self, kind: str, content: list[Any]) -> str:
-        """Return a node that consists of a word or a sign, and operands."""
-        match kind, content:
-            case "call", [name, *arguments]:
-                return self._function(name).format(", ".join(map(self.text, arguments)))
-            case "compare" | "logic", [sign, a, b]:
-                sign = self._dialect.signs.get(sign, sign)
-                return f"({self.text(a)} {sign} {self.text(b)})"
-            case "table", [name, order, a]:
-                table = self._dialect.table
-                return table.format(name, order, self.text(a), mechanism=self._mechanism)
-        raise TypeError(f"cannot print {(kind, *content)!r}")
+            text, strengths, strength = self._operations[kind]
+            return text.format(*map(self._at, content, strengths)), strength
+        if kind != "const":
+            return self._primary(kind, content), ATOM
+        value, number = content[0], self._dialect.number
+        if isinstance(value, Fraction):
+            return f"{number(value.numerator)} / {number(value.denominator)}", PRODUCT
+        return number(value), ATOM
 
     def _at(self, node: int, strength: int) -> str:
         """Return a node as an operand, in parentheses where it binds too loosely."""
         text, own = self._print(node)
         return text if own >= strength else f"({text})"
 
-    def _number(self, value: Constant) -> tuple[str, int]:
-        """Return a number that is not negative as text, and how strongly that binds."""
-        number = self._dialect.number
-        if isinstance(value, Fraction):
-            return f"{number(value.numerator)} / {number(value.denominator)}", PRODUCT
-        return number(value), ATOM
-
-    def _function(self, name: str) -> str:
-        """Return the text of an elementary function."""
-        if name not in self._dialect.functions:
-            raise UnsupportedError(
-                f"the {self._dialect.language} target has no function {name!r}; use another "
-                "target, or write the expression with other functions"
-            )
-        return self._dialect.functions[name]
+    def _primary(self, kind: str, content: list[Any]) -> str:
+        """Return a node that has a word or a sign beside its operands."""
+        dialect = self._dialect
+        match kind, content:
+            case "call", [name, *arguments] if name in dialect.functions:
+                return dialect.functions[name].format(", ".join(map(self.text, arguments)))
+            case "compare" | "logic", [sign, a, b]:
+                return f"({self.text(a)} {dialect.signs.get(sign, sign)} {self.text(b)})"
+            case "table", [name, order, a]:
+                return dialect.table.format(name, order, self.text(a), mechanism=self._mechanism)
+            case "call", [name, *_]:
+                raise UnsupportedError(
+                    f"the {dialect.language} target has no function {name!r}; use another target, "
+                    "or write the expression with other functions"
+                )
+        raise TypeError(f"cannot print {(kind, *content)!r}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.quantities import quantity_named
 from kincompile.targets.evaluators import inputs_read
-from kincompile.targets.headings import header, place, title
+from kincompile.targets.headings import entry_title, header, title
 from kincompile.targets.lines import broken
 
 if TYPE_CHECKING:
@@ -97,5 +97,7 @@ class Layout:
                 row, column = item.row + self.first, item.column + self.first
                 form = self.entry if quantity_named(quantity).is_matrix else self.element
                 left = form.format(quantity, row, column)
-                lines += self.assigned(left, printer.text(item.node), place(quantity, item, code))
+                lines += self.assigned(
+                    left, printer.text(item.node), entry_title(quantity, item, code)
+                )
         return lines

@@ -1,19 +1,20 @@
 r"""Derivatives of Phi that need Phi alone, for the verification of an emitted module.
 
 A direction is :math:`(\dot q, \dot t)`; along the line :math:`q + s\,\dot q,\ t + s\,\dot t` the
-first derivative of Phi by s is a column of Phi_q or Phi_t, and the second, where no acceleration
-acts, is minus gamma.
+first derivative of Phi by s is a column of Phi_q or Phi_t, and the second, with zero acceleration,
+is -gamma.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
     from types import ModuleType
 
 Array = NDArray[Any]
@@ -22,8 +23,8 @@ STEP = 1e-30
 """Complex step: no difference is taken, so that it may be as small as one likes."""
 
 SHORT = 1e-5
-"""Step of the differences of complex steps: these are exact to rounding, so that it may be small,
-and hardly ever reaches over a knot of a spline or from one piece to the next."""
+"""Step of the differences of complex steps. These are exact to rounding, so that it may be small;
+it hardly ever reaches over a knot of a spline or from one piece to the next."""
 
 DIFFERENCE = 1e-3
 """Step of the differences that judge where Phi cannot be continued to complex numbers."""
@@ -32,7 +33,10 @@ ROUGH = 1e-3
 """Change with half the step up to which differences mean anything."""
 
 SAME = 1e-9
-"""Part of an equation's terms by which Phi of complex numbers may be away from Phi of real ones."""
+"""Largest difference between Phi of complex and of real numbers, relative to its terms."""
+
+Derivative = Callable[["ModuleType", Array, float, Array, float], Array]
+"""Gives derivatives of Phi, (k, m), at q (n,) and t along the directions (k, n) and of time."""
 
 
 def value(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
@@ -43,23 +47,8 @@ def value(module: ModuleType, q: Array, t: float, along: Array, time: float) -> 
 def complex_step(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
     """Return the derivative of Phi along directions.
 
-    Parameters
-    ----------
-    module
-        An emitted module.
-    q : ndarray, shape (n,)
-        Where.
-    t
-        When.
-    along : ndarray, shape (k, n)
-        Directions of q.
-    time
-        Direction of t, of all of them.
-
-    Returns
-    -------
-    ndarray, shape (k, m)
-        NaN where Phi of complex numbers is not Phi: a compiled module takes the former from NumPy.
+    It is NaN where Phi of complex numbers is not Phi: a compiled module takes the former from
+    NumPy.
     """
     moved = module.Phi(q + 1j * STEP * along, t + 1j * STEP * time if time else t)
     here = module.Phi(q, t)
@@ -67,35 +56,33 @@ def complex_step(module: ModuleType, q: Array, t: float, along: Array, time: flo
     return np.where(is_same, np.imag(moved) / STEP, np.nan)
 
 
-def stepped(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the second derivative of Phi along a line, by differences of complex steps.
+def second_complex_step(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
+    """Return the second derivative of Phi along one line, by differences of complex steps."""
 
-    Arguments are those of `complex_step`, with one direction: shape (1, n).
-    """
-    return _slope(
-        lambda h: complex_step(module, q + h * along[0], t + h * time, along, time), SHORT
-    )
+    def slope(h: float) -> Array:
+        return complex_step(module, q + h * along[0], t + h * time, along, time)
+
+    return _slope(slope, SHORT)
 
 
 def differences(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the derivative of Phi along directions, of real numbers alone; NaN beside a pole."""
-    return _smooth(
-        module.Phi(q, t),
-        lambda h: _slope(lambda s: np.asarray(module.Phi(q + s * along, t + s * time)), h),
-    )
+    """Return the derivative of Phi along directions, by real numbers alone; NaN beside a pole."""
+
+    def at(s: float) -> Array:
+        return np.asarray(module.Phi(q + s * along, t + s * time))
+
+    return _smooth(module.Phi(q, t), lambda h: _slope(at, h))
 
 
 def second_differences(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
-    """Return the second derivative of Phi along lines, likewise."""
+    """Return the second derivative of Phi along lines, by real numbers alone; NaN beside a pole."""
     here = module.Phi(q, t)
 
+    def at(s: float) -> Array:
+        return np.asarray(module.Phi(q + s * along, t + s * time))
+
     def curvature(h: float) -> Array:
-        near, far = (
-            module.Phi(q + s * along, t + s * time)
-            + module.Phi(q - s * along, t - s * time)
-            - 2 * here
-            for s in (h, 2 * h)
-        )
+        near, far = (at(s) + at(-s) - 2 * here for s in (h, 2 * h))
         return np.asarray((16 * near - far) / (12 * h**2))
 
     return _smooth(here, curvature)
@@ -114,17 +101,29 @@ def _slope(function: Callable[[float], Array], h: float) -> Array:
     return np.asarray((8 * near - far) / (12 * h))
 
 
-Oracle = tuple[str, "Callable[[ModuleType, Array, float, Array, float], Array]", float]
-"""What it is called, what it gives, and the error up to which numbers agree with it."""
+@dataclass(frozen=True, slots=True)
+class Oracle:
+    """An independent way to a quantity: its name, its function and the error that it allows."""
+
+    name: str
+    derivative: Derivative
+    limit: float
+
 
 ORACLES: Mapping[str, tuple[Oracle, Oracle]] = {
-    "Phi": (("Phi alone", value, 1e-12), ("Phi alone", value, 1e-12)),
-    "Phi_q": (("complex step", complex_step, 1e-8), ("differences", differences, 1e-5)),
-    "nu": (("complex step in t", complex_step, 1e-8), ("differences in t", differences, 1e-5)),
+    "Phi": (Oracle("Phi alone", value, 1e-12), Oracle("Phi alone", value, 1e-12)),
+    "Phi_q": (
+        Oracle("complex step", complex_step, 1e-8),
+        Oracle("differences", differences, 1e-5),
+    ),
+    "nu": (
+        Oracle("complex step in t", complex_step, 1e-8),
+        Oracle("differences in t", differences, 1e-5),
+    ),
     "gamma": (
-        ("line oracle, complex step", stepped, 1e-8),
-        ("line oracle, differences", second_differences, 1e-5),
+        Oracle("line oracle, complex step", second_complex_step, 1e-8),
+        Oracle("line oracle, differences", second_differences, 1e-5),
     ),
 }
-"""For each quantity two oracles, the more exact one first. The second one uses real numbers alone,
-and is right wherever Phi is smooth: the first is believed where it agrees with it."""
+"""Two oracles for each quantity, the more exact one first. The second one uses real numbers alone,
+and is right wherever Phi is smooth: the first is believed where the two agree."""

@@ -1,9 +1,8 @@
 r"""Verification of an emitted module by oracles that know nothing of derivatives.
 
 Phi_q is compared with a complex step of Phi, nu with one in time, and gamma with the line oracle:
-along :math:`q + s\,\dot q,\ t + s`, where no acceleration acts, gamma is minus the second
-derivative of Phi by s. All that is used is the Phi of the module itself: who trusts Phi, which is
-what was written down, may then trust the rest.
+along :math:`q + s\,\dot q,\ t + s`, with zero acceleration, gamma is minus the second derivative
+of Phi by s. Only the Phi of the module itself is used: if Phi is right, so is the rest.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ LEGEND = (
     "complex step: Phi_q = Im Phi(q + i h) / h, nu = -Im Phi(q, t + i h) / h",
     "line oracle: gamma = -d2/ds2 Phi(q + s q_dot, t + s) at s = 0",
 )
-"""What is compared with, for who reads the table."""
+"""The oracles, for readers of the table."""
 
 LARGEST = 10
 """How many of the largest errors of each quantity stand for all."""
@@ -67,9 +66,9 @@ class Check:
     coordinate
         Of Phi_q, the coordinate of the entry with the largest error; else "".
     oracle
-        What it was compared with.
+        Name of the oracle.
     error
-        Largest difference over all states, relative to what the terms contribute.
+        Largest difference over all states, relative to the size of the terms.
     passed
         Whether it is small enough.
     """
@@ -90,7 +89,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """What `kc.verify` finds.
+    """The outcome of `kc.verify`.
 
     Attributes
     ----------
@@ -117,7 +116,7 @@ class Verification:
         return self.checks
 
     def to_text(self) -> str:
-        """Give the table and the verdict as plain text."""
+        """Return the table and the verdict as plain text."""
         shown = self._shown()
         rows = [
             [
@@ -132,17 +131,13 @@ class Verification:
         ]
         header = ("equation", "quantity", "worst by", "compared with", "error", "verdict")
         rest = len(self.checks) - len(shown)
-        more = [f"  {rest} more comparisons agree better than these"] if rest else []
-        return "\n".join([
-            f"Verification of {self.name}",
-            *indented(table(header, rows, right=("error",))),
-            *more,
-            *indented(LEGEND),
-            f"  {self._verdict()}",
-        ])  # fmt: skip
+        lines = table(header, rows, right=("error",))
+        lines += [f"{rest} more comparisons agree better than these"] if rest else []
+        title = f"Verification of {self.name}"
+        return "\n".join([title, *indented([*lines, *LEGEND, self._verdict()])])
 
     def _shown(self) -> list[Check]:
-        """Return the checks to be shown: all, or what differs and the largest errors."""
+        """Return the checks to be shown: all, or those that differ and the largest errors."""
         if len(self.checks) <= len(ORACLES) * ALL_SHOWN:
             return list(self.checks)
         shown: set[Check] = {check for check in self.checks if not check.passed}
@@ -163,12 +158,12 @@ class Verification:
         return f"{generic} generic and {assembled} assembled states: {verdict}"
 
     def __str__(self) -> str:
-        """Give the text."""
+        """Return the text."""
         return self.to_text()
 
 
 def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
-    """Compare Phi_q, nu and gamma of an emitted module with what follows from its Phi alone.
+    """Compare Phi_q, nu and gamma of an emitted module with derivatives of its Phi.
 
     Parameters
     ----------
@@ -178,7 +173,7 @@ def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
     Returns
     -------
     Verification
-        `.passed`, a `.table` with an entry for each equation and quantity, and `.to_text()`.
+        `.passed`, a `.table` with a check of each equation and quantity, and `.to_text()`.
 
     Raises
     ------
@@ -206,7 +201,7 @@ def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
 
 
 def _compiled(model: Mechanism | ConstraintSystem) -> ModuleType:
-    """Compile a model; that equations are redundant is no matter here."""
+    """Compile a model, without warnings of redundant equations."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RedundantConstraintWarning)
         return compiler.compile(model)
@@ -242,12 +237,12 @@ def _is_finite(module: ModuleType, q: Array, t: float) -> bool:
 
 
 def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
-    """Yield what the oracles say of each equation."""
+    """Yield the checks of each equation by the oracles."""
     reference = problem(module, module.DEFAULTS, module.GUESS, 0.0).reference
     for quantity in ORACLES:
         size = _sizes(module, states, quantity, reference)
         error, limit, judge = _judged(module, states, quantity, size)
-        # The entry and the state at which an equation is worst, compared with what is allowed.
+        # The entry and the state with the largest error, compared with the allowed one.
         columns = np.argmax(error, axis=2)
         errors = np.max(error, axis=2)
         worst = np.argmax(errors / limit, axis=0)
@@ -258,16 +253,16 @@ def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
                 quantity,
                 equation,
                 column,
-                ORACLES[quantity][judge[at]][0],
+                ORACLES[quantity][judge[at]].name,
                 float(errors[at]),
                 bool(errors[at] <= limit[at]),
             )
 
 
 def _sizes(module: ModuleType, states: list[State], quantity: str, reference: Array) -> Array:
-    """Return what errors are relative to, (states, m, k): what the terms of an equation contribute.
+    """Return the scale of errors, (states, m, k): the size of an equation's terms.
 
-    Of Phi_q k is n, else 1.
+    k is n for Phi_q, else 1.
     """
     Phi_q = np.array([module.Phi_q(q, t) for q, _, t in states])
     terms = np.abs(Phi_q) @ reference
@@ -317,19 +312,20 @@ def _judged(
 ) -> tuple[Array, Array, Array]:
     """Return errors (states, m, k), the allowed ones and the number of the oracle (states, m).
 
-    What disagrees with the exact oracle may be wrong, or the oracle may: Phi need not have a
-    continuation to complex numbers. It is believed where it agrees with the plain one.
+    Where the module disagrees with the exact oracle, either may be wrong: Phi need not have a
+    continuation to complex numbers. The exact oracle is believed where it agrees with the plain
+    one.
     """
     exact, plain = ORACLES[quantity]
     found = _estimates(module, states, quantity, exact)
     error = _error(module, states, quantity, found, size)
-    limit, judge = np.full(error.shape[:2], exact[2]), np.zeros(error.shape[:2], dtype=int)
-    if (error > exact[2]).any():
+    limit, judge = np.full(error.shape[:2], exact.limit), np.zeros(error.shape[:2], dtype=int)
+    if (error > exact.limit).any():
         other = _estimates(module, states, quantity, plain)
-        doubted = np.max(_away(found, other, size), axis=2) > plain[2]
+        doubted = np.max(_distance(found, other, size), axis=2) > plain.limit
         error[doubted] = _error(module, states, quantity, other, size)[doubted]
-        limit[doubted], judge[doubted] = plain[2], 1
-        # Beside a pole, and where a root begins, no oracle tells: the other states do.
+        limit[doubted], judge[doubted] = plain.limit, 1
+        # Beside a pole, and where a root begins, no oracle gives a number: the other states do.
         silent = doubted & ~np.isfinite(other).all(axis=2)
         silent &= ~silent.all(axis=0)
         error[silent] = 0.0
@@ -339,33 +335,27 @@ def _judged(
 def _error(
     module: ModuleType, states: list[State], quantity: str, found: Array, size: Array
 ) -> Array:
-    """Return how far what the module gives is at most from what an oracle found."""
+    """Return the largest deviation of the module from the oracle."""
     size = np.maximum(size, np.abs(found)) if quantity != "Phi_q" else size
-    error = np.zeros(found.shape)
-    for form in _forms(module, states, quantity):
-        error = np.maximum(error, _away(form, found, size))
-    return error
+    forms = _forms(module, states, quantity)
+    return np.asarray(np.max([_distance(form, found, size) for form in forms], axis=0))
 
 
-def _away(found: Array, given: Array, size: Array) -> Array:
-    """Return how far numbers are apart; infinitely, where one of them is not finite."""
+def _distance(found: Array, given: Array, size: Array) -> Array:
+    """Return the relative distance of numbers; infinite if one of them is not finite."""
     return np.asarray(np.nan_to_num(np.abs(found - given) / size, nan=np.inf))
 
 
 def _estimates(module: ModuleType, states: list[State], quantity: str, oracle: Oracle) -> Array:
-    """Return what an oracle gives for a quantity at all states, (states, m, k); NaN for nothing."""
-    _, derivative, _ = oracle
+    """Return the values of an oracle at all states, (states, m, k); NaN where it has none."""
     found = []
     for q, q_dot, t in states:
-        along, time = (
-            (np.eye(q.size), 0.0)
-            if quantity == "Phi_q"
-            else (np.zeros((1, q.size)), 1.0)
-            if quantity in ("Phi", "nu")
-            else (q_dot[np.newaxis], 1.0)
-        )
+        if quantity == "Phi_q":
+            along, time = np.eye(q.size), 0.0
+        else:
+            along, time = (q_dot if quantity == "gamma" else np.zeros(q.size))[np.newaxis], 1.0
         try:
-            rates = derivative(module, q, t, along, time).T
+            rates = oracle.derivative(module, q, t, along, time).T
         except (ArithmeticError, TypeError, ValueError):
             rates = np.full((len(module.EQUATIONS), len(along)), np.nan)
         found.append(-rates if quantity in ("nu", "gamma") else rates)

@@ -18,7 +18,7 @@ from kincompile.view.marks import GROUND_FRAME, BodyPoint, Pin, Point, Profile, 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from kincompile.model.expressions import Scalar
+    from kincompile.model.expressions import Scalar, Scalars
     from kincompile.model.resolve import Joint
     from kincompile.view.marks import Array
 
@@ -54,7 +54,7 @@ class Geometry:
         """Return the number of an expression of parameters; zero where it has none."""
         return evaluate(as_expression(value), dict(self.values)) or 0.0
 
-    def pair(self, pair: tuple[Scalar, Scalar]) -> Point:
+    def pair(self, pair: Scalars) -> Point:
         """Return the numbers of a point or a direction."""
         return self.number(pair[0]), self.number(pair[1])
 

@@ -72,8 +72,8 @@ class Case:
     def derived(self) -> dict[str, Any]:
         """Phi, and what SymPy derives from it: Phi_q, nu and gamma."""
         Phi, q, q_dot = self.model.Phi, self.model.q, self.model.q_dot
-        Phi_q, Phi_t = Phi.jacobian(q), Phi.diff(kc.t)
-        gamma = -(Phi_q * q_dot).jacobian(q) * q_dot
+        Phi_q, Phi_t = jacobian(Phi, q), Phi.diff(kc.t)
+        gamma = -jacobian(Phi_q * q_dot, q) * q_dot
         gamma -= 2 * Phi_q.diff(kc.t) * q_dot + Phi_t.diff(kc.t)
         return {"Phi": Phi, "Phi_q": Phi_q, "nu": -Phi_t, "gamma": gamma}
 
@@ -106,6 +106,13 @@ class Case:
         """Return the states one by one, as lists of numbers."""
         states = zip(self.q, self.q_dot, self.t, self.p, strict=True)
         return [[value.tolist() for value in state] for state in states]
+
+
+def jacobian(rows: Any, q: Any) -> Any:
+    """Return the derivatives of rows by coordinates, of which each row has few."""
+    return sympy.Matrix(
+        len(rows), len(q), lambda i, j: rows[i].diff(q[j]) if rows[i].has(q[j]) else 0
+    )
 
 
 # ---- the mechanisms ------------------------------------------------------------------------------

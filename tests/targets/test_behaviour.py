@@ -29,8 +29,8 @@ def test_that_every_quantity_is_what_sympy_derives_from_phi(target, name, case_n
     assert_same(target[name], case_named(name).expected)
 
 
-def test_that_the_matrices_of_a_system_are_what_sympy_derives_from_phi(name, case_named):
-    case = case_named(name)
+def test_that_the_matrices_of_a_system_are_what_sympy_derives_from_phi(example, case_named):
+    case = case_named(example.path.stem)
     shown = {item: case.evaluate(getattr(case.model, item)) for item in QUANTITIES}
     assert_same(shown, case.expected)
 

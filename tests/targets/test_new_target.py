@@ -8,7 +8,7 @@ import numpy as np
 
 import kincompile as kc
 from kincompile.quantities import singles
-from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect, Operation
+from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
 from kincompile.targets.registry import TARGETS, Listed
 from kincompile.targets.statements import Layout
 from kincompile.targets.target import Target
@@ -38,7 +38,7 @@ class Plain:
 
     DIALECT = Dialect(
         "plain", {name: f"{name}({{}})" for name in ELEMENTARY},
-        square=Operation("{}**2", (ATOM,), POWER), select="({1} if {0} else {2})",
+        square=("{}**2", (ATOM,), POWER), select="({1} if {0} else {2})",
     )  # fmt: skip
     RESERVED: tuple[str, ...] = ("q", "q_dot", "t", "p", "pi", *ELEMENTARY)
     function, files = staticmethod(function), staticmethod(files)

@@ -18,7 +18,8 @@ from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.arguments import Kind
 from kincompile.model.catalogue import CONSTRAINTS
-from kincompile.runtime.staged import StagedSolver
+from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.engine.stages import StagedSolver
 from kincompile.structure.counting import unmatched
 
 TYPES = list(CONSTRAINTS.values())
@@ -110,7 +111,7 @@ def test_that_the_planned_solve_solves(form: str, m: kc.Mechanism) -> None:
         x = module.solve(module.Phi_q_nonzeros(q, 0.3), b)
         np.testing.assert_allclose(Phi_q @ x, b, rtol=1e-8, atol=1e-8)
         if form == "grouped":
-            solver = StagedSolver(module)
+            solver = StagedSolver(code_of(module))
             x = solver.solve(solver.factor(module.Phi_q_nonzeros(q, 0.3)), b)
             np.testing.assert_allclose(Phi_q @ x, b, rtol=1e-8, atol=1e-8)
 

@@ -215,7 +215,7 @@ def test_that_a_slip_in_the_c_file_is_found(example_named, quick_compiler, right
 def test_that_a_slip_in_the_file_is_found(example_named, tmp_path, right, wrong, entry):
     """The first place alone: the same number elsewhere in the file is right."""
     source = example_named("slider_crank").source
-    assert source.count(right) > 1
+    assert source.count(right.partition(",")[0]) > 1
     path = tmp_path / "slip.py"
     path.write_text(source.replace(right, wrong, 1))
     found = kc.verify(kc.load(path))

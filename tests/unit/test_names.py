@@ -2,8 +2,8 @@
 
 import pytest
 
+from kincompile.model.bodies import Body
 from kincompile.names import (
-    body_coordinates,
     listed,
     name_problem,
     rate,
@@ -41,7 +41,7 @@ def test_that_a_unit_cannot_end_a_text(unit: object) -> None:
 
 def test_that_rates_and_coordinates_have_one_name_everywhere() -> None:
     assert (rate("x_rod"), rate("x_rod", 2)) == ("x_rod_dot", "x_rod_ddot")
-    assert body_coordinates("rod") == ("x_rod", "y_rod", "phi_rod")
+    assert Body("rod").coordinates == ("x_rod", "y_rod", "phi_rod")
 
 
 def test_that_a_long_list_is_cut() -> None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from kincompile import quantities
 from kincompile.errors import InputError
+from kincompile.runtime.engine.code import attach
 from kincompile.runtime.memory import LINE, empty
 from kincompile.runtime.native.library import library
 from kincompile.runtime.native.points import (
@@ -86,6 +87,7 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
         function.__name__, function.__module__ = name, module.__name__
         function.__doc__ = function.__doc__ or names[name].__doc__
     names.update(compiled)
+    attach(module)
     return module
 
 

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.engine import Array as Vector
     from kincompile.runtime.inputs import Values
-    from kincompile.runtime.problem import Problem, Vector
+    from kincompile.runtime.problem import Problem
 
 SEED = 1989
 """Any will do; fixed, so that the result is the same on every run."""
@@ -81,7 +82,7 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
         )
     time = float(inputs.t[0])
     with np.errstate(all="ignore"):
-        equations = problem(module, inputs.p, inputs.guess, time)
+        equations = problem(module, inputs.p, inputs.guess, time, inputs.guess)
         equations.angular = equations.angular | _periodic(equations, time, inputs.guess)
         found: list[Vector] = []
         last = 0

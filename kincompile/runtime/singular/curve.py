@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.runtime.linear import solve_linear
-from kincompile.runtime.singular.branches import determinants
+from kincompile.runtime.engine.linear import solve_linear
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from kincompile.runtime.engine.engine import Array as Vector
+    from kincompile.runtime.engine.engine import Point
     from kincompile.runtime.march import State
-    from kincompile.runtime.problem import Problem, Vector
+    from kincompile.runtime.problem import Problem
 
 LONGEST, FIRST, SHORTEST = 0.05, 0.01, 1e-9
 """Lengths of steps along the curve, in radians and sizes of the mechanism."""
@@ -66,8 +67,8 @@ class Place:
         The position.
     t : float
         The time.
-    Phi_q : ndarray, shape (m, n)
-        The Jacobian there.
+    point
+        The equations there.
     matrix : ndarray, shape (m, n + 1)
         Derivatives of Phi with respect to q and t, in scales of the equations and coordinates.
     tangent : ndarray, shape (n + 1,)
@@ -76,7 +77,7 @@ class Place:
 
     q: Vector
     t: float
-    Phi_q: Vector
+    point: Point
     matrix: Vector
     tangent: Vector
 
@@ -135,11 +136,11 @@ class Curve:
             found = self._derivatives(y[:-1], float(y[-1]))
             if found is None:
                 return None
-            Phi, _, matrix = found
+            point, matrix = found
             away = place.tangent @ ((y - predicted) / self.scale)
             try:
                 change = solve_linear(
-                    np.vstack((matrix, place.tangent)), np.append(self._weights * Phi, away)
+                    np.vstack((matrix, place.tangent)), np.append(self._weights * point.Phi, away)
                 )
             except np.linalg.LinAlgError:
                 return None
@@ -207,7 +208,7 @@ class Curve:
 
     def _value(self, place: Place, first: Place, block: int) -> float:
         """Return the determinant of a block at a place."""
-        return determinants(self.equations, (place.q, place.t, place.Phi_q), first.Phi_q)[block]
+        return float(self.equations.engine.determinants(place.point, first.point)[block])
 
     def _forward(self, place: Place, length: float) -> float | None:
         """Return the tangent's component along time, a length further on."""
@@ -222,7 +223,7 @@ class Curve:
     def _parts(self, before: Place, after: Place, blocks: list[int] | slice) -> Vector:
         """Return the determinants of blocks, as parts of what they were."""
         there, here = (
-            np.array(determinants(self.equations, (place.q, place.t, place.Phi_q), before.Phi_q))
+            self.equations.engine.determinants(place.point, before.point)
             for place in (before, after)
         )
         with np.errstate(all="ignore"):
@@ -233,24 +234,24 @@ class Curve:
         parts = self._parts(before, after, slice(None))
         return [int(block) for block in np.flatnonzero(~(parts > 0))]
 
-    def _derivatives(self, q: Vector, t: float) -> tuple[Vector, Vector, Vector] | None:
-        """Return Phi, Phi_q, and the scaled derivatives by q and t, or None where not finite."""
+    def _derivatives(self, q: Vector, t: float) -> tuple[Point, Vector] | None:
+        """Return the equations and their scaled derivatives by q and t; None where not finite."""
         point = self.equations.at(q, t)
         if point is None:
             return None
         try:
-            nu = self.equations.module.nu(q, t, self.equations.p)
+            nu = self.equations.code.nu(q, t, self.equations.p)
         except (ArithmeticError, ValueError):
             return None
         matrix = self._weights[:, np.newaxis] * np.column_stack((point.Phi_q, -nu)) * self.scale
-        return (point.Phi, point.Phi_q, matrix) if np.isfinite(matrix).all() else None
+        return (point, matrix) if np.isfinite(matrix).all() else None
 
     def _place(self, q: Vector, t: float, towards: Vector) -> Place | None:
         found = self._derivatives(q, t)
         if found is None:
             return None
-        _, Phi_q, matrix = found
-        return Place(q, t, Phi_q, matrix, _tangent(matrix, towards))
+        point, matrix = found
+        return Place(q, t, point, matrix, _tangent(matrix, towards))
 
 
 def _tangent(matrix: Vector, towards: Vector) -> Vector:

@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.names import listed
-from kincompile.runtime.march import State, complete
+from kincompile.runtime.march import March, State
 from kincompile.runtime.singular.curve import Bracket, Curve
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from types import ModuleType
+    from collections.abc import Sequence
 
-    from kincompile.runtime.problem import Point, Problem, Vector
+    from kincompile.runtime.engine.code import Code
+    from kincompile.runtime.engine.engine import Array as Vector
+    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.problem import Problem
 
 LOCK_UP, BIFURCATION, BRANCH_SWITCH = "lock-up", "bifurcation", "branch switch"
 """Kinds of events."""
@@ -115,14 +117,14 @@ _QUINTIC = np.array([
 
 
 def locate(
-    equations: Problem, state: State, latest: float, duration: float
+    march: March, state: State, latest: float, duration: float
 ) -> tuple[Event, Passage | None] | None:
     """Find the singular configuration that a motion cannot pass.
 
     Parameters
     ----------
-    equations
-        The module with its parameters and scales.
+    march
+        What follows the motion.
     state
         The last good point of the motion.
     latest
@@ -136,6 +138,7 @@ def locate(
         The event, and for a bifurcation the motion on both sides of it. None where the curve goes
         on to that time, or nowhere.
     """
+    equations = march.equations
     curve = Curve(equations, state, duration)
     forward = math.copysign(1.0, latest - state.t)
     start = curve.start(state, forward)
@@ -149,8 +152,8 @@ def locate(
     if (place.t - latest) * forward > LATE * max(duration, abs(latest - state.t)):
         return None
     kind = LOCK_UP if bracket.turns else BIFURCATION
-    event = _event(equations, kind, place.q, place.t, place.Phi_q)
-    return event, None if bracket.turns else _passage(curve, bracket, at)
+    event = _event(equations, kind, place.q, place.t, place.point.Phi_q)
+    return event, None if bracket.turns else _passage(march, curve, bracket, at)
 
 
 def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
@@ -166,7 +169,7 @@ def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
         Its time.
     """
     try:
-        nu = equations.module.nu(point.q, t, equations.p)
+        nu = equations.code.nu(point.q, t, equations.p)
     except (ArithmeticError, ValueError):
         return None
     if not (np.isfinite(nu).all() and np.isfinite(point.Phi_q).all()):
@@ -179,13 +182,13 @@ def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
     return _event(equations, kind, point.q, t, point.Phi_q)
 
 
-def branch_switch(module: ModuleType, state: State, t: float, q: Vector, spread: Vector) -> Event:
+def branch_switch(code: Code, state: State, t: float, q: Vector, spread: Vector) -> Event:
     """Return the event of a position that the mechanism could only jump to.
 
     Parameters
     ----------
-    module
-        The emitted module.
+    code
+        The module.
     state
         The last good point of the motion.
     t, q
@@ -194,7 +197,7 @@ def branch_switch(module: ModuleType, state: State, t: float, q: Vector, spread:
         The distance that is large for each coordinate.
     """
     jump = (q - state.point.q) / spread
-    bodies = _involved(module, jump)
+    bodies = _involved(code, jump)
     return Event(
         BRANCH_SWITCH, state.t, bodies,
         f"Branch switch at t = {state.t:.10g}: at t = {t:.10g} the mechanism can be assembled, but "
@@ -209,13 +212,13 @@ def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) ->
     spread = equations.spread(q)
     _, sizes, directions = np.linalg.svd(Phi_q * spread)
     null = directions[-1] / directions[-1][np.argmax(np.abs(directions[-1]))]
-    module = equations.module
+    code = equations.code
     # Equal loops become singular together: then several movements are free.
     free = directions[np.append(sizes[:-1] <= IN_RANGE * sizes[0], True)]
-    bodies = _involved(module, np.linalg.norm(free, axis=0))
+    bodies = _involved(code, np.linalg.norm(free, axis=0))
     return Event(
         kind, t, bodies, _message(kind, t, bodies), q,
-        dict(zip(module.COORDINATES, null.tolist(), strict=True)),
+        dict(zip(code.coordinates, null.tolist(), strict=True)),
     )  # fmt: skip
 
 
@@ -236,29 +239,21 @@ def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
     )
 
 
-def _involved(module: ModuleType, movement: Vector) -> tuple[str, ...]:
+def _involved(code: Code, movement: Vector) -> tuple[str, ...]:
     """Return the bodies that take part in a movement, and coordinates that belong to none."""
     large = np.abs(movement) > INVOLVED * np.max(np.abs(movement), initial=0.0)
-    owners = owner_of_coordinates(module)
-    names = zip(module.COORDINATES, large.tolist(), strict=True)
+    owners = code.owners()
+    names = zip(code.coordinates, large.tolist(), strict=True)
     return tuple(dict.fromkeys(owners[name] for name, is_large in names if is_large))
 
 
-def owner_of_coordinates(module: ModuleType) -> Mapping[str, str]:
-    """Return the body of each coordinate; one that belongs to none stands for itself."""
-    owners = {name: name for name in module.COORDINATES}
-    for body, first, count in module.BODIES:
-        owners.update(dict.fromkeys(module.COORDINATES[first : first + count], body))
-    return owners
-
-
-def _passage(curve: Curve, bracket: Bracket, at: float) -> Passage | None:
+def _passage(march: March, curve: Curve, bracket: Bracket, at: float) -> Passage | None:
     """Return the motion on both sides of a bifurcation."""
     sides = []
     for length in (at - PASSAGE, at + PASSAGE):
         place = curve.step(bracket.first, length)
         point = place and curve.equations.at(place.q, place.t)
-        state = point and place and complete(curve.equations, place.t, point)
+        state = point and march.state(point)
         if not isinstance(state, State):
             return None
         sides.append(state)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.ir.graph import operands_of
 from kincompile.quantities import quantity_named
 from kincompile.targets.c.dialect import C
-from kincompile.targets.headings import place, title
+from kincompile.targets.headings import entry_title, title
 from kincompile.targets.lines import wrapped
-from kincompile.targets.planned_solve import components, explained
+from kincompile.targets.planned_solve import explained
 from kincompile.targets.printer import Printer
+from kincompile.targets.schedule import Assignment, count_uses
 from kincompile.targets.statements import Layout
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.targets.evaluators import Listing
-    from kincompile.targets.planned_solve import SolveListing
+    from kincompile.targets.planned_solve import BlockCall, SolveListing
 
 LAYOUT = Layout("//", "const double {}", "at->{}[{}][lane]", "")
 
@@ -52,7 +52,7 @@ def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer
                 if quantity_named(quantity).is_matrix:
                     index = numbers[quantity][entry.row, entry.column]
                 left, text = LAYOUT.element.format(quantity, index), printer.text(entry.node)
-                body += LAYOUT.assigned(left, text, place(quantity, entry, code))
+                body += LAYOUT.assigned(left, text, entry_title(quantity, entry, code))
     write = _with_angles if has_angles else _plain
     return [f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
 
@@ -104,13 +104,15 @@ def _frames(listing: Listing, printer: Printer) -> list[str]:
         return []
     lines = ["// body frames: A = [[c, -s], [s, c]]"]
     for frame in listing.frames:
-        if len(frame.values) == 2:
+        if frame.angle is not None:
             c, s = (item.name for item in frame.values)
             angle = printer.text(frame.angle)
             lines += [f"double {c}, {s};", f"far |= cos_sin({angle}, exact, &{c}, &{s});"]
         else:
-            item = frame.values[0]
-            lines.append(f"const double {item.name} = {printer.definition(item.node)};")
+            lines += [
+                f"const double {item.name} = {printer.definition(item.node)};"
+                for item in frame.values
+            ]
     return lines
 
 
@@ -119,13 +121,13 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     plan, names = listing.plan, listing.names
     printer = Printer(C, plan.nodes, names)
     numbers = {place: k for k, place in enumerate(code.pattern())}
-    read = _read(listing, (*listing.factor_steps, *listing.factors, *plan.determinants))
+    read = count_uses(plan.nodes, (*listing.factors, *plan.determinants))
     factor = [
         f"const double {names[node]} = at->Phi_q[{numbers[row, column]}][lane];"
         for row, column, node in plan.entries
         if node in read
     ]
-    factor += _steps(listing.factor_steps, listing, printer)
+    factor += _steps(listing.factor_steps, printer)
     factor += [f"at->F[{k}][lane] = {names[node]};" for k, node in enumerate(listing.factors)]
     factor += [
         f"at->determinants[{k}][lane] = {printer.text(node)};"
@@ -143,14 +145,14 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
 def _solution(listing: SolveListing, printer: Printer) -> list[str]:
     """Return the function that solves for a right side."""
     plan, names = listing.plan, listing.names
-    read = _read(listing, (*listing.solve_steps, *plan.solution))
+    read = count_uses(plan.nodes, plan.solution)
     body = [f"const double {names[node]} = F[{k}][lane];" for k, node in enumerate(listing.factors)]
     body += [
         f"const double {names[node]} = right[{k}][lane];"
         for k, node in enumerate(plan.right)
         if node in read
     ]
-    body += _steps(listing.solve_steps, listing, printer)
+    body += _steps(listing.solve_steps, printer)
     body += [f"to[{k}][lane] = {printer.text(node)};" for k, node in enumerate(plan.solution)]
     return [
         "// x of Phi_q x = right.",
@@ -162,66 +164,35 @@ def _solution(listing: SolveListing, printer: Printer) -> list[str]:
     ]
 
 
-def _read(listing: SolveListing, starts: Iterable[int]) -> set[int]:
-    """Return the named nodes that code reads, which is what it must declare."""
-    found: set[int] = set()
-    stack = [operand for node in starts for operand in _operands(listing, node)]
-    stack += [node for node in starts if node in listing.names]
-    while stack:
-        node = stack.pop()
-        if node in listing.names:
-            found.add(node)
-        else:
-            stack += _operands(listing, node)
-    return found
-
-
-def _operands(listing: SolveListing, node: int) -> tuple[int, ...]:
-    return operands_of(listing.plan.nodes[node])
-
-
-def _steps(nodes: Iterable[int], listing: SolveListing, printer: Printer) -> list[str]:
-    """Return an assignment for each node; a larger block's solution comes from one call."""
+def _steps(steps: Iterable[Assignment | BlockCall], printer: Printer) -> list[str]:
+    """Return the statements of a function; larger blocks are solved by a call."""
     lines: list[str] = []
-    done: set[int] = set()
-    for node in nodes:
-        operation, *content = listing.plan.nodes[node]
-        if operation != "linear":
-            left = LAYOUT.value.format(listing.names[node])
-            lines += LAYOUT.assigned(left, printer.definition(node))
-        elif content[0] == "determinant":
-            lines += _determinant(node, listing, printer)
-        elif node not in done:
-            same = components(listing.plan, node)
-            done |= set(same)
-            lines += _block_solution(same, listing, printer)
+    for step in steps:
+        if isinstance(step, Assignment):
+            left = LAYOUT.value.format(step.name)
+            lines += LAYOUT.assigned(left, printer.definition(step.node))
+        else:
+            lines += _block_call(step, printer)
     return lines
 
 
-def _determinant(node: int, listing: SolveListing, printer: Printer) -> list[str]:
-    _, _, size, _, *matrix = listing.plan.nodes[node]
+def _block_call(step: BlockCall, printer: Printer) -> list[str]:
+    """Return the call that solves a block, with the names of the unknowns, or its determinant."""
+    matrix = _indented(step.matrix, printer)
+    if not step.right:
+        left = LAYOUT.value.format(step.names[0])
+        return [f"{left} = block_determinant({step.size}, (const double[]){{", *matrix, "});"]
+    vector = f"block_of_{step.names[0]}"
     return [
-        f"const double {listing.names[node]} = block_determinant({size}, (const double[]){{",
-        *_indented(matrix, printer),
-        "});",
-    ]
-
-
-def _block_solution(same: list[int], listing: SolveListing, printer: Printer) -> list[str]:
-    """Return the call that solves a block, and the names of the components."""
-    _, _, size, _, *operands = listing.plan.nodes[same[0]]
-    names = [listing.names[node] for node in same]
-    vector = f"block_of_{names[0]}"
-    return [
-        f"double {vector}[{size}];",
-        f"block_solve({size}, (const double[]){{",
-        *_indented(operands[: size * size], printer),
+        f"double {vector}[{step.size}];",
+        f"block_solve({step.size}, (const double[]){{",
+        *matrix,
         "}, (const double[]){",
-        *_indented(operands[size * size :], printer),
+        *_indented(step.right, printer),
         f"}}, {vector});",
-        *(f"const double {name} = {vector}[{k}];" for k, name in enumerate(names)),
+        *(f"const double {name} = {vector}[{k}];" for k, name in enumerate(step.names)),
     ]
 
 
-def _indented(nodes: list[int], printer: Printer) -> list[str]:
+def _indented(nodes: Iterable[int], printer: Printer) -> list[str]:
     return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile import quantities
-from kincompile.targets.constants import constants
+from kincompile.targets.headings import constants
 from kincompile.targets.javascript.dialect import JAVASCRIPT
 from kincompile.targets.lines import indented, wrapped
 from kincompile.targets.naming import NameTable

@@ -62,7 +62,9 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
     for name, spline in program.tables.items():
         arrays[f"{name}.breaks"] = np.array(spline.breaks)
         arrays[f"{name}.coefficients"] = np.array(spline.coefficients)
-    arrays["bodies"] = _text([name for name, _ in program.frames])
+    arrays["bodies"] = _text([body.name for body in program.bodies])
+    columns_of = [(body.columns.start, len(body.columns)) for body in program.bodies]
+    arrays["body_columns"] = np.array(columns_of, dtype=np.intp).reshape(-1, 2)
     arrays["guess"] = np.array([item.guess for item in program.coordinates])
     code: list[str] = []
     called: set[str] = set()
@@ -112,17 +114,6 @@ def _entry_numbers(
         arrays[f"{item.name}.entries"] = np.array(kept, dtype=np.intp).reshape(-1, count)
 
 
-def _identifier(name: str) -> str:
-    """Return a kernel's input as a Python name: `cos phi_i` is `cos_i`, `r_i.x` is `x_i`."""
-    for function in ("cos", "sin"):
-        if name.startswith(f"{function} phi_"):
-            return f"{function}_{name[8:]}"
-    vector, dot, axis = name.partition(".")
-    if dot and vector.startswith("r_"):
-        return f"{axis}{vector[1:]}"
-    return name.replace(".", "_").replace("'", "_prime")
-
-
 def _group_code(
     item: Group,
     grouped: GroupedProgram,
@@ -132,7 +123,7 @@ def _group_code(
 ) -> list[str]:
     """Write the functions of a group; return the lines of its entry in the module's table."""
     table = NameTable((*RESERVED, *grouped.program.tables))
-    names = {name: table.take(_identifier(name)) for name in item.inputs}
+    names = {name: table.take(name) for name in item.inputs}
     sections = (Section(item.sample, "", _local_entries(item)),)
     inline = InlineProgram(grouped.program, item.nodes, sections, item.hints)
     arrays[f"{item.name}.rows"] = item.rows

@@ -9,7 +9,7 @@ import numpy as np
 
 from kincompile.ir.elimination import plan_entries
 from kincompile.ir.inline import InlineProgram
-from kincompile.structure.stages import Chain, Lanes, Sparse, Stage, plan_stages
+from kincompile.structure.stages import Batch, Chain, Sparse, Stage, plan_stages
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.solve import solve_functions
 from kincompile.targets.numpy.target import RESERVED_IN_SOLVE
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class PlannedLanes:
+class PlannedBatch:
     """Equal blocks with the elimination that solves one of them.
 
     Attributes
@@ -37,7 +37,7 @@ class PlannedLanes:
     """
 
     key: str
-    lanes: Lanes
+    batch: Batch
     plan: SolvePlan
     varying: Index
 
@@ -48,7 +48,7 @@ class PlannedStage:
 
     key: str
     stage: Stage
-    parts: tuple[PlannedLanes, ...]
+    parts: tuple[PlannedBatch, ...]
 
 
 def plan_solving(
@@ -74,31 +74,31 @@ def plan_solving(
     planned = []
     for k, stage in enumerate(plan_stages(rows, columns, constants, size) or ()):
         key, parts = f"stage_{k}", []
-        for name, lanes in _classes(key, stage):
-            plan, varying = _plan(lanes, constants)
+        for name, batch in _classes(key, stage):
+            plan, varying = _plan(batch, constants)
             if plan is None:
                 return ()
-            parts.append(PlannedLanes(name, lanes, plan, varying))
+            parts.append(PlannedBatch(name, batch, plan, varying))
         planned.append(PlannedStage(key, stage, tuple(parts)))
     return tuple(planned)
 
 
-def _classes(key: str, stage: Stage) -> list[tuple[str, Lanes]]:
+def _classes(key: str, stage: Stage) -> list[tuple[str, Batch]]:
     """Return the classes of blocks of a stage, with a name for each."""
     if isinstance(stage, Chain):
-        return [(f"{key}_{k}", part) for k, part in enumerate(stage.parts)]
+        return [(f"{key}_{k}", part) for k, part in enumerate(stage.batches)]
     return [] if isinstance(stage, Sparse) else [(key, stage)]
 
 
-def _plan(lanes: Lanes, constants: NDArray[np.float64]) -> tuple[SolvePlan | None, Index]:
+def _plan(batch: Batch, constants: NDArray[np.float64]) -> tuple[SolvePlan | None, Index]:
     """Return the elimination of one of the blocks, and the numbers of the entries that vary."""
-    first = constants[lanes.inner[:, 0]]
+    first = constants[batch.inner[:, 0]]
     entries = [
         (row, column, None if np.isnan(value) else float(value))
-        for (row, column), value in zip(lanes.places, first.tolist(), strict=True)
+        for (row, column), value in zip(batch.places, first.tolist(), strict=True)
     ]
-    size = lanes.rows.shape[0]
-    return plan_entries(size, size, entries), lanes.inner[np.isnan(first)]
+    size = batch.rows.shape[0]
+    return plan_entries(size, size, entries), batch.inner[np.isnan(first)]
 
 
 def solving_arrays(stages: tuple[PlannedStage, ...]) -> dict[str, NDArray[Any]]:
@@ -106,16 +106,16 @@ def solving_arrays(stages: tuple[PlannedStage, ...]) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     for item in stages:
         if isinstance(item.stage, Chain):
-            arrays[f"{item.key}.links"] = item.stage.links
+            arrays[f"{item.key}.links"] = item.stage.interface
         elif isinstance(item.stage, Sparse):
             arrays |= _stage_arrays(item.key, item.stage)
         for part in item.parts:
-            arrays |= _stage_arrays(part.key, part.lanes)
+            arrays |= _stage_arrays(part.key, part.batch)
             arrays[f"{part.key}.varying"] = part.varying
     return arrays
 
 
-def _stage_arrays(key: str, stage: Lanes | Sparse) -> dict[str, NDArray[Any]]:
+def _stage_arrays(key: str, stage: Batch | Sparse) -> dict[str, NDArray[Any]]:
     return {f"{key}.{name}": getattr(stage, name) for name in ("rows", "columns", "inner", "outer")}
 
 
@@ -124,7 +124,7 @@ def solving_code(stages: tuple[PlannedStage, ...], program: Program) -> list[str
     code: list[str] = []
     for item in stages:
         for part in item.parts:
-            rows, columns = part.lanes.rows[:, 0].tolist(), part.lanes.columns[:, 0].tolist()
+            rows, columns = part.batch.rows[:, 0].tolist(), part.batch.columns[:, 0].tolist()
             sample = dataclasses.replace(
                 program,
                 equations=tuple(program.equations[k] for k in rows),
@@ -142,7 +142,7 @@ def solving_table(stages: tuple[PlannedStage, ...]) -> list[str]:
     for item in stages:
         own = []
         for part in item.parts:
-            outer = "".join(f"{row}, " for row in part.lanes.outer_rows)
+            outer = "".join(f"{row}, " for row in part.batch.outer_rows)
             own.append(f'Stage("{part.key}", _{part.key}_factor, _{part.key}_solve, ({outer})),')
         if isinstance(item.stage, Chain):
             lines += [f'Chain("{item.key}", (', *(f"    {line}" for line in own), ")),"]

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING
 
 from kincompile.targets.lines import wrapped
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.text import assignments, tuple_text
-from kincompile.targets.planned_solve import components, explained
+from kincompile.targets.planned_solve import explained
 from kincompile.targets.printer import Printer
+from kincompile.targets.schedule import Assignment
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from kincompile.ir.inline import InlineProgram
-    from kincompile.targets.planned_solve import SolveListing
+    from kincompile.targets.planned_solve import BlockCall, SolveListing
 
 
 def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = "") -> list[str]:
     """Return the lines of `_factor` and `_solve`, with a prefix where there are several."""
     printer, names = Printer(NUMPY, listing.plan.nodes, listing.names), listing.names
-    factor = [*_unpack([names[node] for node in listing.entries], "J")]
-    factor += _steps(listing.factor_steps, listing, printer)
+    factor = _unpack([names[node] for _, _, node in listing.plan.entries], "J")
+    factor += _steps(listing.factor_steps, printer)
     kept = tuple_text(names[node] for node in listing.factors)
     determinants = tuple_text(printer.text(node) for node in listing.plan.determinants)
     factor += f"return {kept}, {determinants}".split("\n")
     solve = [*_unpack([names[node] for node in listing.factors], "F")]
     solve += _unpack([names[node] for node in listing.plan.right], "b")
-    solve += _steps(listing.solve_steps, listing, printer)
+    solve += _steps(listing.solve_steps, printer)
     solution = tuple_text(printer.text(node) for node in listing.plan.solution)
     solve += f"return {solution}".split("\n")
     return [
@@ -46,44 +46,25 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
     ]
 
 
-def _steps(nodes: Iterable[int], listing: SolveListing, printer: Printer) -> list[str]:
-    """Return an assignment for each node; a larger block's solution comes from one call."""
+def _steps(steps: Iterable[Assignment | BlockCall], printer: Printer) -> list[str]:
+    """Return the statements of a function; LAPACK takes the larger blocks."""
     lines: list[str] = []
-    done: set[tuple[int, ...]] = set()
-    for is_linear, group in itertools.groupby(
-        nodes, lambda node: listing.plan.nodes[node][0] == "linear"
-    ):
-        if not is_linear:
-            lines += assignments([(listing.names[k], printer.definition(k)) for k in group])
+    texts: list[tuple[str, str]] = []
+    for step in steps:
+        if isinstance(step, Assignment):
+            texts.append((step.name, printer.definition(step.node)))
             continue
-        for node in group:
-            _, name, size, _, *operands = listing.plan.nodes[node]
-            if (name, *operands) not in done:
-                done.add((name, *operands))
-                lines += _block_call(node, name, size, operands, listing, printer)
-    return lines
+        function = "solve" if step.right else "determinant"
+        lines += assignments(texts)
+        lines.append(f"{', '.join(step.names)} = f.block_{function}({step.size}, (")
+        lines += _indented(step.matrix, printer)
+        lines += ["), (", *_indented(step.right, printer)] if step.right else []
+        lines.append("))")
+        texts = []
+    return lines + assignments(texts)
 
 
-def _block_call(
-    node: int,
-    name: str,
-    size: int,
-    operands: list[int],
-    listing: SolveListing,
-    printer: Printer,
-) -> list[str]:
-    """Return the call of LAPACK for a block: its solution, or its determinant."""
-    left = [listing.names[node]]
-    if name == "solve":
-        left = [listing.names[k] for k in components(listing.plan, node)]
-    matrix, right = operands[: size * size], operands[size * size :]
-    lines = [f"{', '.join(left)} = f.block_{name}({size}, (", *_indented(matrix, printer)]
-    if right:
-        lines += ["), (", *_indented(right, printer)]
-    return [*lines, "))"]
-
-
-def _indented(nodes: list[int], printer: Printer) -> list[str]:
+def _indented(nodes: Iterable[int], printer: Printer) -> list[str]:
     return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any, Literal
 
 from kincompile import quantities
 from kincompile.ir.elimination import plan_solve
-from kincompile.names import rate
 from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
-from kincompile.targets.evaluators import varying
-from kincompile.targets.headings import header, place, short_title, title
+from kincompile.targets.evaluators import varying, vectors
+from kincompile.targets.headings import entry_title, header, short_title, title
 from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
@@ -81,6 +81,7 @@ def files(
     data = {
         **_constants(code),
         "kernels": "\n".join(lines),
+        "has_pi": any(re.search(r"\bpi\b", line) for line in lines),
         "functions": "\n".join(_functions(code)),
         "results": "\n".join(_results()),
         "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
@@ -126,7 +127,9 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
 
 def bodies_text(program: Program) -> str:
     """Return the bodies: name, first column and number of columns of each."""
-    return tuple_text(f'("{body}", {angle - 2}, 3)' for body, angle in program.frames)
+    return tuple_text(
+        f'("{body.name}", {body.columns.start}, {len(body.columns)})' for body in program.bodies
+    )
 
 
 def _pattern_name(quantity: Quantity) -> str:
@@ -292,7 +295,7 @@ def _section(
         return [whole]
     lines = [f"    {line}" for line in commented(title(section))] if is_own else []
     for entry, text in zip(entries, texts, strict=True):
-        lines += element(text, place(name, entry, code))
+        lines += element(text, entry_title(name, entry, code))
     return lines
 
 
@@ -311,14 +314,8 @@ def _matrix(code: InlineProgram, printer: Printer) -> list[str]:
 
 def _unpack(program: Program, listing: Listing) -> list[str]:
     """Return the lines that name the inputs: all of a vector, or the few that are read."""
-    coordinates = [item.name for item in program.coordinates]
-    vectors = {
-        "q": coordinates,
-        "q_dot": [rate(name) for name in coordinates],
-        "p": [item.name for item in program.parameters],
-    }
     lines, names = [], listing.input_names
-    for vector, members in vectors.items():
+    for vector, members in vectors(program).items():
         read = [k for k, name in enumerate(members) if name in listing.inputs]
         if 2 * len(read) > len(members):
             lines += _targets([names[name] for name in members], vector)
@@ -341,8 +338,8 @@ def _frames(listing: Listing, printer: Printer, is_first: bool) -> list[str]:
     lines = ["# body frames: A = [[c, -s], [s, c]]"] if listing.frames and is_first else []
     for frame in listing.frames:
         left = ", ".join(item.name for item in frame.values)
-        if len(frame.values) == 2:
+        if frame.angle is not None:
             lines.append(f"{left} = cos_sin({printer.text(frame.angle)})")
         else:
-            lines.append(f"{left} = {printer.definition(frame.values[0].node)}")
+            lines += [f"{item.name} = {printer.definition(item.node)}" for item in frame.values]
     return lines

@@ -1,6 +1,6 @@
 """How Octave and MATLAB write expressions; `either` and `in_reals` are the template's."""
 
-from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect, Operation
+from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
 
 # Complex for some real numbers, where the other targets have NaN.
 PARTIAL = ("asin", "acos", "acosh", "atanh", "log", "sqrt", "pow")
@@ -12,7 +12,7 @@ OCTAVE = Dialect(
     "Octave",
     {name: f"{own}({{}})" for name, own in NAMES.items()}
     | {name: f"in_reals({NAMES[name]}({{}}))" for name in PARTIAL},
-    square=Operation("{}^2", (ATOM,), POWER),
+    square=("{}^2", (ATOM,), POWER),
     select="either({}, {}, {})",
     table="{mechanism}_{}({}, {})",
     signs={"&": "&&", "|": "||", "!=": "~="},

@@ -28,7 +28,7 @@ DIALECT = OCTAVE
 LAYOUT = Layout("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, continued=" ...")
 
 LONGEST_NAME = 63
-"""Characters of a name; MATLAB drops those behind them."""
+"""Longest name; MATLAB truncates longer ones."""
 
 KEYWORDS = (
     "break", "case", "catch", "classdef", "continue", "do", "else", "elseif", "end", "endif",

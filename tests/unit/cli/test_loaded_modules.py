@@ -16,9 +16,9 @@ print("\\nLOADED", *sys.modules)
 
 PAGES = "kincompile.view kincompile.derivation kincompile.compare kincompile.verify"
 LARGE = "kincompile.ir.grouping kincompile.targets.numpy.grouped kincompile.structure.stages"
-EXTRA = "rich platformdirs matplotlib scipy.interpolate scipy.optimize kincompile.runtime.native"
+EXTRA = "rich platformdirs matplotlib scipy kincompile.runtime.native"
 LANGUAGES = "kincompile.targets.c kincompile.targets.octave kincompile.targets.javascript"
-EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2 scipy"
+EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2"
 RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
 
 NOT_LOADED = {

@@ -10,15 +10,17 @@ import kincompile as kc
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Components, Vector, VectorSymbol
 from kincompile.compare.compare import compare
-from kincompile.compare.entries import Verdict
-from kincompile.compare.faults import SQUARES, X_AND_Y, VectorFaults
-from kincompile.compare.mutations import (
+from kincompile.compare.comparison import Verdict
+from kincompile.compare.fault import (
     A_FOR_B,
     MISSING_SQUARE,
     SECOND_DERIVATIVE,
     SINE_COSINE,
+    SQUARES,
     TRANSPOSED,
+    X_AND_Y,
 )
+from kincompile.compare.joint_faults import JointFaults
 from kincompile.compare.reference import Reference
 from kincompile.compare.report import Report
 from kincompile.compare.vectors import Exchanged
@@ -145,11 +147,9 @@ def hypotheses(quantity: str) -> Iterator[tuple[str, dict[tuple[int, int], sympy
         expansion = Expansion(Misread(joint))
         row_blocks = derive(joint.template)
         coordinates = joint.template.coordinates
-        for kind, _, changed in VectorFaults(
-            joint, quantity, REFERENCE, REFERENCE.random
-        ).variants():
+        for fault in JointFaults(joint, quantity, REFERENCE, REFERENCE.random).formulas():
             entries = {}
-            for (b, k), expression in changed.items():
+            for (b, k), expression in fault.result.items():
                 row = sum(2 if isinstance(item.Phi, Vector) else 1 for item in row_blocks[:b])
                 column = sum(item.size for item in coordinates[:k])
                 columns = [expansion.components(expression)]
@@ -159,7 +159,7 @@ def hypotheses(quantity: str) -> Iterator[tuple[str, dict[tuple[int, int], sympy
                 for c, items in enumerate(columns):
                     for r, item in enumerate(items):
                         entries[block.rows[row + r], column * (quantity == "Phi_q") + c] = item
-            yield kind, entries
+            yield fault.kind, entries
 
 
 def judged(quantity: str, entries: dict[tuple[int, int], Any]) -> Report:

@@ -163,6 +163,7 @@ def test_the_command_where_something_differs(tmp_path: Path) -> None:
     assert run(hand, "-o", names[1], "--gradescope", names[2]).exit_code == 1
     page = Path(names[0]).read_text()
     assert "a term has the wrong sign" in page
+    assert "For instance yours " in page
     assert "http" not in page
     data = json.loads(Path(names[1]).read_text())
     assert (data["verdict"], data["equal"]) == ("different", False)

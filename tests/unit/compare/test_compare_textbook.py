@@ -10,7 +10,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compare.entries import Verdict
+from kincompile.compare.comparison import Verdict
 from kincompile.compare.report import Report
 
 Pair = tuple[str, str]
@@ -447,6 +447,15 @@ def test_that_a_textbook_formula_is_equal(kind: str, tmp_path: Path) -> None:
     assert report.quantities == ("Phi", "Phi_q", "nu", "gamma")
     assert [entry.label for entry in report.entries if entry.verdict is not Verdict.EQUAL] == []
     assert report.conventions == ()
+
+
+@pytest.mark.parametrize("kind", [pytest.param("cam", marks=pytest.mark.slow), "flat", "pin"])
+def test_that_a_fault_in_the_formulas_of_a_cam_is_named(kind: str, tmp_path: Path) -> None:
+    gamma = [f"2*({row})" for row in FORMULAS[kind]["gamma"]]
+    report = checked(kind, {"Phi_q": FORMULAS[kind]["Phi_q"], "gamma": gamma}, tmp_path)
+    assert {entry.quantity for entry in report.different} == {"gamma"}
+    for entry in report.different:
+        assert "factor 2 or 1/2" in [item.kind for item in entry.diagnoses]
 
 
 def test_that_the_printed_gamma_of_the_translational_joint_holds_on_the_manifold_only(

@@ -7,8 +7,8 @@ import pytest
 
 import kincompile as kc
 from kincompile.derivation.document import Link, Math, Table, Verbatim
+from kincompile.derivation.evaluation import evaluation
 from kincompile.derivation.formulas import Decimal
-from kincompile.derivation.situation import situation
 from kincompile.errors import InputError
 
 
@@ -27,7 +27,7 @@ def table(derivation: Any, anchor: str, sections_of: Any, k: int = 0) -> Table:
 
 def test_that_the_default_is_the_assembled_state_at_time_zero(example_named: Any) -> None:
     example = example_named("four_bar")
-    chosen = situation(example.model.system(), None)
+    chosen = evaluation(example.model.system(), None)
     assert chosen.origin == "the assembled state at t = 0"
     solution = kc.solve(example.module, [0.0])
     np.testing.assert_allclose(chosen.q, solution.q[0], atol=1e-9)
@@ -37,7 +37,7 @@ def test_that_the_default_is_the_assembled_state_at_time_zero(example_named: Any
 
 def test_that_another_time_may_be_chosen(example_named: Any) -> None:
     example = example_named("problem_3_5_6")
-    chosen = situation(example.model.system(), 1.0)
+    chosen = evaluation(example.model.system(), 1.0)
     expected = [0.45625, 0.2045383521, 0.612604148]  # case R3 at t = 1
     np.testing.assert_allclose(chosen.q, expected, atol=1e-9)
     np.testing.assert_allclose(
@@ -48,7 +48,7 @@ def test_that_another_time_may_be_chosen(example_named: Any) -> None:
 def test_that_given_values_are_taken_as_they_are(example_named: Any) -> None:
     system = example_named("four_bar").model.system()
     given = {"phi_crank": 0.3, "x_crank_dot": 2.0, "a": 4.0, "t": 0.5}
-    chosen = situation(system, given)
+    chosen = evaluation(system, given)
     assert chosen.origin == "the state that was asked for"
     assert not chosen.is_assembled
     assert {name: chosen.values[name] for name in given} == given
@@ -57,7 +57,7 @@ def test_that_given_values_are_taken_as_they_are(example_named: Any) -> None:
 
 
 def test_that_a_parameter_alone_leaves_the_mechanism_assembled(example_named: Any) -> None:
-    chosen = situation(example_named("four_bar").model.system(), {"omega": 3.0})
+    chosen = evaluation(example_named("four_bar").model.system(), {"omega": 3.0})
     assert chosen.is_assembled
     assert chosen.values["phi_crank_dot"] == pytest.approx(3.0)
 

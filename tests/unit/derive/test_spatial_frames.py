@@ -41,6 +41,8 @@ class EulerRotation:
     p: VectorSymbol
 
     letters: ClassVar[str] = "ABB"
+    names: ClassVar[tuple[str, ...]] = ("e0", "e1", "e2", "e3")
+    symbols: ClassVar[tuple[str, ...]] = names
 
     @property
     def coordinates(self) -> tuple[Expression, ...]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import kincompile as kc
 from kincompile.files.file_format import model_schema
-from kincompile.files.model_file import read_json_model, read_toml_model
+from kincompile.files.model_file import read_data_model
 from kincompile.files.safe_expressions import parse_expression
 from kincompile.files.write_model import value
 from kincompile.model.expressions import alpha
@@ -47,7 +47,7 @@ angle = "2*t"
 
 
 def toml(text):
-    return read_toml_model(FILE, text.encode())
+    return read_data_model(FILE, text.encode())
 
 
 def problems(text):
@@ -72,8 +72,8 @@ def test_that_a_whole_number_beyond_exact_doubles_compiles():
 @pytest.mark.parametrize("form", ["toml", "json"])
 def test_that_an_example_reads_back_to_the_same_code(example, form):
     text = example.model.to_toml() if form == "toml" else example.model.to_json()
-    read = read_toml_model if form == "toml" else read_json_model
-    model = read(FILE, text.encode())
+    file = FILE.with_suffix(f".{form}")
+    model = read_data_model(file, text.encode())
     assert kc.emit(model).source == example.source
     assert (model.end, model.points) == (example.model.end, example.model.points)
 
@@ -123,7 +123,7 @@ def test_that_every_constraint_can_be_written_and_read():
         m.add(item)
     written = m.to_toml()
     assert toml(written).to_toml() == written
-    assert read_json_model(FILE, m.to_json().encode()).to_toml() == written
+    assert read_data_model(FILE.with_suffix(".json"), m.to_json().encode()).to_toml() == written
 
 
 x, y = sympy.symbols("x y")
@@ -242,13 +242,13 @@ JSON = json.dumps(
 )
 def test_that_json_is_refused_with_line_and_field(old, new, message):
     with pytest.raises(kc.ModelError) as caught:
-        read_json_model(Path("model.json"), JSON.replace(old, new).encode())
+        read_data_model(Path("model.json"), JSON.replace(old, new).encode())
     assert caught.value.problems[0].startswith(f"model.json, {message}"), caught.value.problems[0]
 
 
 def test_that_another_encoding_is_refused_with_its_line():
     with pytest.raises(kc.ModelError, match=r"line 2: this is not text in UTF-8 \(byte 0xe9\)"):
-        read_toml_model(FILE, b"kincompile = 1\nname = '\xe9'\n")
+        read_data_model(FILE, b"kincompile = 1\nname = '\xe9'\n")
 
 
 def test_that_a_huge_file_is_refused(tmp_path):

@@ -132,7 +132,8 @@ def test_that_random_equations_have_the_derivatives_of_complex_steps(inner: symp
         kc.ConstraintSystem("random", "x y", [x - y / 3 + inner, y - t], parameters={"p": 0.6})
     )
     kernel = program.instances[0].kernel
-    at = {**AT, "x_dot": 0.7, "y_dot": -1.3}
+    numbers = {**AT, "x_dot": 0.7, "y_dot": -1.3}
+    at = {name: np.float64(number) for name, number in numbers.items()}
     step, h = 1e-30, 1e-4
 
     def Phi(**changed: Any) -> Any:
@@ -150,7 +151,8 @@ def test_that_random_equations_have_the_derivatives_of_complex_steps(inner: symp
         return
     values = run(kernel.nodes, at, {})
     entries = {column: values[node] for _, column, node in kernel.outputs["Phi_q"]}
-    for column, name in enumerate(("x", "y")):
+    for column, name in enumerate(program.instances[0].constraint.columns):
+        assert name is not None
         known = Phi(**{name: at[name] + 1j * step}).imag / step
         assert entries.get(column, 0.0) == pytest.approx(known, rel=1e-12, abs=1e-12)
     by_t = Phi(t=at["t"] + 1j * step).imag / step

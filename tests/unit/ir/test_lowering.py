@@ -7,8 +7,10 @@ import sympy
 import kincompile as kc
 from kincompile.ir.inline import inline
 from kincompile.ir.interpret import interpret
-from kincompile.ir.kernels import constraint_kernel, derivative_name
+from kincompile.ir.kernels import constraint_kernel
 from kincompile.ir.lower import lower
+from kincompile.ir.program import Attribute, FrameEntry, Function, Motion
+from kincompile.model.cams import PointFollower
 from kincompile.model.joints import Revolute
 
 
@@ -100,5 +102,23 @@ def test_that_the_interpreter_takes_batches_and_parameters(chain: kc.Mechanism) 
     assert not np.allclose(batch[0], interpret(program, q, q_dot, 0.3)[0])
 
 
-def test_that_a_derivative_is_named_by_strokes() -> None:
-    assert [derivative_name("C", order) for order in range(3)] == ["C", "C'", "C''"]
+def test_that_inputs_say_what_they_are_and_not_only_how_they_are_called() -> None:
+    kernel = constraint_kernel(PointFollower.template())
+    found = {item.name: item for item in kernel.inputs if not isinstance(item, str)}
+    assert found["phi_j_dot"] == Motion(1, 2, 1, "phi_j_dot")
+    assert found["cos_i"] == FrameEntry(0, 0, "cos_i")
+    assert found["s_i_x"] == Attribute("s_i", 0, "s_i_x")
+    assert found["rho_j_prime"] == Function("rho_j", 1, owner=2, body=1)
+    assert found["alpha_j"] == Motion(2, 0, 0, "alpha_j")
+
+
+def test_that_a_frame_is_a_kernel_bound_to_each_body(chain: kc.Mechanism) -> None:
+    program = lower(chain.system())
+    assert [(body.name, body.columns) for body in program.bodies] == [
+        ("one", range(3)), ("two", range(3, 6)),
+    ]  # fmt: skip
+    for body in program.bodies:
+        calls = [program.values[node] for node in body.entries]
+        angle = program.values.index(("input", f"phi_{body.name}"))
+        assert calls == [("call", "cos", angle), ("call", "sin", angle)]
+        assert body.labels == (f"c_{body.name}", f"s_{body.name}")

@@ -34,7 +34,7 @@ def test_that_a_matching_is_one_to_one_within_the_pattern_and_largest(
     given_pattern: tuple[Pattern, int, int],
 ) -> None:
     pattern, m, n = given_pattern
-    matched = matching(sorted(pattern), (m, n))
+    matched = matching(sorted(pattern), (m, n)).tolist()
     pairs = [(row, column) for row, column in enumerate(matched) if column >= 0]
     assert len(matched) == m
     assert set(pairs) <= pattern
@@ -70,7 +70,7 @@ def test_that_each_block_needs_earlier_blocks_only(given_pattern: tuple[Pattern,
 def test_that_no_block_could_be_split(given_pattern: tuple[Pattern, int]) -> None:
     """Within a block every equation leads to every other, through the coordinates it needs."""
     pattern, n = given_pattern
-    owner = {column: row for row, column in enumerate(matching(sorted(pattern), (n, n)))}
+    owner = {column: row for row, column in enumerate(matching(sorted(pattern), (n, n)).tolist())}
     reach = np.eye(n, dtype=bool)
     for row, column in pattern:
         reach[row, owner[column]] = True

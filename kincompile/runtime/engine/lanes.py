@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from types import ModuleType
+    from kincompile.runtime.engine.code import Code
 
 Lane = Any
 """A float, or an array (N,) over a batch."""
@@ -42,19 +42,29 @@ class LaneCode:
 
     Parameters
     ----------
-    module
-        An emitted module with a planned solve.
+    code
+        A module with a planned solve.
     functions
-        ``module.FLOATS`` or ``module.ARRAYS``.
+        Its elementary functions, of floats or of arrays.
     p
         Parameters: floats, or arrays that broadcast with the lanes.
     """
 
-    def __init__(self, module: ModuleType, functions: Any, p: Lanes) -> None:
-        lanes = module.LANES
-        self._functions, self._p, self._m = functions, p, module.N_EQUATIONS
-        self._position, self._nu, self._gamma = lanes["position"], lanes["nu"], lanes["gamma"]
-        self._factor, self._solve = lanes["factor"], lanes["solve"]
+    def __init__(self, code: Code, functions: Any, p: Lanes) -> None:
+        assert code.lanes is not None
+        own = code.lanes
+        self._functions, self._p, self._m = functions, p, len(code.equations)
+        self._position, self._nu, self._gamma = own.position, own.nu, own.gamma
+        self._factor, self._solve = own.factor, own.solve
+
+    def evaluate(self, q: Lanes, t: Lane) -> tuple[Lanes, Lanes]:
+        """Evaluate Phi, and the entries of Phi_q that vary."""
+        values = self._position(self._functions, q, t, self._p)
+        return values[: self._m], values[self._m :]
+
+    def factor(self, Phi: Lanes, entries: Lanes) -> Factored:
+        """Factor Phi_q."""
+        return Factored(Phi, *self._factor(self._functions, entries))
 
     def position(self, q: Lanes, t: Lane) -> Factored:
         """Evaluate Phi and Phi_q, and factor Phi_q."""
@@ -64,15 +74,9 @@ class LaneCode:
 
     def solve(self, at: Factored, right: Lanes) -> Lanes:
         """Return x of Phi_q x = right."""
-        solution: Lanes = self._solve(self._functions, at.factors, right)
-        return solution
+        return self._solve(self._functions, at.factors, right)
 
     def rates(self, at: Factored, q: Lanes, t: Lane) -> tuple[Lanes, Lanes]:
         """Return velocity and acceleration at a position."""
         q_dot = self.solve(at, self._nu(self._functions, q, t, self._p))
         return q_dot, self.solve(at, self._gamma(self._functions, q, q_dot, t, self._p))
-
-
-def has_planned_solve(module: ModuleType) -> bool:
-    """Return whether a module can be run on its lanes."""
-    return "solve" in getattr(module, "LANES", {})

@@ -19,18 +19,14 @@ import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import ModuleType
 
     from numpy.typing import NDArray
     from scipy.sparse.linalg import SuperLU
 
+    from kincompile.runtime.engine.code import Code
+
     Array = NDArray[np.float64]
     Index = NDArray[np.signedinteger[Any]]
-
-
-def is_staged(module: ModuleType) -> bool:
-    """Return whether the solve of a module is planned in stages."""
-    return bool(getattr(module, "STAGES", ()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -319,12 +315,12 @@ class StagedSolver:
         pivoting took their place.
     """
 
-    def __init__(self, module: ModuleType) -> None:
-        pattern, size = module.PATTERN, module.N_EQUATIONS
+    def __init__(self, code: Code) -> None:
+        pattern, size = code.pattern, len(code.equations)
         self.pivoted = 0
         self._rows, self._columns = np.ascontiguousarray(pattern.T)
         self._first = np.searchsorted(self._rows, np.arange(size))  # entries go row by row
-        self._stages = [_stage(stage, pattern, module.ARRAYS, size) for stage in module.STAGES]
+        self._stages = [_stage(stage, pattern, code.arrays, size) for stage in code.stages]
         self._size = size
 
     def factor(self, nonzeros: Array) -> StagedFactors:
@@ -346,6 +342,13 @@ class StagedSolver:
         ]
         return np.concatenate(found) if found else np.empty(0)
 
+    def determinants_of(self, nonzeros: Array) -> Array:
+        """Return the determinants of all blocks; one zero where Phi_q cannot be factored."""
+        try:
+            return self.determinants(self.factor(nonzeros))
+        except RuntimeError:
+            return np.zeros(1)
+
     def solve(self, factors: StagedFactors, b: Array, *, checked: bool = True) -> Array:
         """Return x of Phi_q x = b, shape (n,); not finite where Phi_q is singular.
 
@@ -356,7 +359,10 @@ class StagedSolver:
         for stage, part in zip(self._stages, factors.parts, strict=True):
             stage.solve(part, factors.nonzeros, b, x)
         is_good = self._is_good(factors.nonzeros, b, x) if checked else np.isfinite(x).all()
-        return x if is_good else self._solve_whole(factors, b)
+        if is_good:
+            return x
+        self.pivoted += 1
+        return self._solve_whole(factors, b)
 
     def _is_good(self, nonzeros: Array, b: Array, x: Array) -> bool:
         """Say whether a solution satisfies every equation."""
@@ -365,18 +371,21 @@ class StagedSolver:
         terms = np.add.reduceat(np.abs(products), self._first) + np.abs(b)
         return bool(np.all(missing <= LOST * terms + ROUNDED * terms.max(initial=0.0)))
 
-    def _solve_whole(self, factors: StagedFactors, b: Array) -> Array:
+    def solve_transposed(self, factors: StagedFactors, b: Array) -> Array:
+        """Return x of Phi_q^T x = b by a factorization with pivoting; NaN where it is singular."""
+        return self._solve_whole(factors, b, "T")
+
+    def _solve_whole(self, factors: StagedFactors, b: Array, kind: str = "N") -> Array:
         """Return the solution by a factorization with pivoting; NaN where that is singular."""
         from scipy.sparse import csc_array
         from scipy.sparse.linalg import splu
 
-        self.pivoted += 1
         places, shape = (self._rows, self._columns), (self._size, self._size)
         try:
             factored: Any = splu(csc_array((factors.nonzeros, places), shape=shape))
         except (RuntimeError, ValueError):  # singular; entries that are not finite
             return np.full(self._size, np.nan)
-        solution: Array = factored.solve(b)
+        solution: Array = factored.solve(b, kind)
         return solution
 
 

@@ -1,11 +1,11 @@
-"""The hand side of a comparison: formulas, arrays or functions, all evaluated in the same way."""
+"""The written side of a comparison: formulas, arrays or functions, all evaluated in one way."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
@@ -26,32 +26,29 @@ if TYPE_CHECKING:
     from kincompile.compare.reference import Reference
     from kincompile.compare.states import Array, States
 
-Expressions = tuple[tuple[sympy.Expr, ...], ...]
+Texts = tuple[tuple[str, ...], ...]
 
 _NO_ACCELERATIONS = "accelerations are the unknowns of Phi_q q_ddot = gamma; no formula holds them"
 
 
 @dataclass(frozen=True, slots=True)
-class Hand:
+class Written:
     """One quantity as its author has it.
 
     Attributes
     ----------
     texts
-        What is written in each entry; empty texts for arrays and functions.
+        The text of each entry; empty for functions and for arrays of values at states.
     evaluate
         Gives the values and the sizes of their terms at states, both (N, rows, columns).
-    expressions
-        The entries in SymPy, or None for arrays and functions.
     takes_parameters
         Whether it may be evaluated at other parameters than the default ones.
     takes_states
         Whether it may be evaluated at any states, not only those its author gave.
     """
 
-    texts: tuple[tuple[str, ...], ...]
+    texts: Texts
     evaluate: Callable[[States], tuple[Array, Array]]
-    expressions: Expressions | None = None
     takes_parameters: bool = True
     takes_states: bool = True
 
@@ -68,8 +65,43 @@ class Vocabulary:
     names: Mapping[str, sympy.Expr]
     refused: Mapping[str, str]
 
+    def read(self, value: object) -> sympy.Expr:
+        """Return a text, a `Cell`, a number or a SymPy expression in plain symbols.
 
-def vocabulary(reference: Reference, aliases: Mapping[str, Any], where: str = "") -> Vocabulary:
+        Raises
+        ------
+        NotAnExpressionError
+            If it is none of these, or holds an unknown name.
+        """
+        if isinstance(value, Cell):
+            return parse_expression(value.text, self.names, value.place, self.refused)
+        if isinstance(value, str):
+            return parse_expression(value, self.names, None, self.refused)
+        expression: sympy.Expr = sympy.sympify(as_expression(_without_derivatives(value)))
+        unknown = sorted(symbol_names(expression) - set(self.names))
+        if unknown:
+            raise NotAnExpressionError(
+                f"{expression} contains {listed(unknown)}{suggestion(unknown[0], self.names)}; "
+                f"the names are: {listed(self.names, 60)}"
+            )
+        meanings = {sympy.Symbol(name): item for name, item in self.names.items()}
+        meant: sympy.Expr = expression.xreplace(meanings)
+        return meant
+
+
+def _without_derivatives(value: object) -> object:
+    """Return an expression with the rates of `dynamicsymbols` as plain symbols."""
+    if not isinstance(value, sympy.Expr):
+        return value
+    rates = {
+        item: sympy.Symbol(rate(item.expr.func.__name__))
+        for item in value.atoms(sympy.Derivative)
+        if item.variables == (t,) and isinstance(item.expr, sympy.Function)
+    }
+    return value.xreplace(rates)
+
+
+def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabulary:
     """Return the names of a system and the author's own.
 
     A coordinate ``phi3`` has the rate ``phi3_dot``, also ``phi3d``.
@@ -81,8 +113,6 @@ def vocabulary(reference: Reference, aliases: Mapping[str, Any], where: str = ""
     aliases
         Further names, each with its expression: a text, a `Cell` or SymPy. An alias may use those
         before it.
-    where
-        What to write in front of a message: the name of the file.
 
     Raises
     ------
@@ -94,25 +124,22 @@ def vocabulary(reference: Reference, aliases: Mapping[str, Any], where: str = ""
     names["t"] = t
     refused = {}
     for name in reference.coordinates:
-        speed = sympy.Symbol(rate(name))
-        names[rate(name)] = speed
-        names.setdefault(f"{name}d", speed)
-        refused[rate(name, 2)] = _NO_ACCELERATIONS
-        refused.setdefault(f"{name}dd", _NO_ACCELERATIONS)
+        names[rate(name)] = sympy.Symbol(rate(name))
+        names.setdefault(f"{name}d", names[rate(name)])
+        refused[rate(name, 2)] = refused[f"{name}dd"] = _NO_ACCELERATIONS
     problems = []
     for name, value in aliases.items():
         problem = _alias_problem(name, names)
         try:
             if problem is None:
-                names[name] = _alias(value, names, refused)
+                names[name] = Vocabulary(names, refused).read(value)
         except NotAnExpressionError as error:
             problem = str(error)
         if problem is not None:
-            problems.append(f"{where}alias {name!r}: {problem}")
+            problems.append(f"alias {name!r}: {problem}")
     if problems:
         raise InputError(problems)
-    refused = {name: reason for name, reason in refused.items() if name not in names}
-    return Vocabulary(names, refused)
+    return Vocabulary(names, {name: why for name, why in refused.items() if name not in names})
 
 
 def _alias_problem(name: str, names: Mapping[str, sympy.Expr]) -> str | None:
@@ -121,37 +148,10 @@ def _alias_problem(name: str, names: Mapping[str, sympy.Expr]) -> str | None:
     return name_problem(name, "it") if name != "alpha" else None
 
 
-def _alias(value: Any, names: Mapping[str, sympy.Expr], refused: Mapping[str, str]) -> sympy.Expr:
-    if isinstance(value, Cell):
-        return parse_expression(value.text, names, value.place, refused)
-    if isinstance(value, str):
-        return parse_expression(value, names, None, refused)
-    return _plain(value)
-
-
-def _plain(value: Any) -> sympy.Expr:
-    """Return a number or SymPy expression in plain symbols, rates of `dynamicsymbols` included."""
-    if isinstance(value, sympy.Expr) and value.has(sympy.Derivative):
-        rates = {
-            item: sympy.Symbol(rate(item.expr.func.__name__))
-            for item in value.atoms(sympy.Derivative)
-            if item.variables == (t,) and isinstance(item.expr, sympy.Function)
-        }
-        value = value.xreplace(rates)
-    expression: sympy.Expr = sympy.sympify(as_expression(value))
-    return expression
-
-
-def read_hand(
-    quantity: str,
-    given: Any,
-    words: Vocabulary,
-    reference: Reference,
-    *,
-    at_states: bool = False,
-    where: str = "",
-) -> Hand:
-    """Take one quantity in any of the forms a user may give it.
+def read_written(
+    quantity: str, given: object, words: Vocabulary, reference: Reference, at_states: bool
+) -> Written:
+    """Read one quantity in any of the forms a user may give it.
 
     Parameters
     ----------
@@ -167,8 +167,6 @@ def read_hand(
         The system that the quantity belongs to.
     at_states
         Whether an array holds values at given states.
-    where
-        What to write in front of a message.
 
     Raises
     ------
@@ -179,114 +177,83 @@ def read_hand(
         return _from_array(quantity, given, at_states)
     if callable(given) and not isinstance(given, sympy.Basic):
         return _from_function(quantity, given, reference)
-    rows = _rows(quantity, given, where)
-    _check_rectangular(quantity, rows, where)
+    rows = _rows(quantity, given)
+    _check_rectangular(quantity, rows)
     problems: list[str] = []
-    table = [
-        [
-            _entry(cell, words, f"{where}{quantity}", f"row {r}, column {c}", problems)
-            for c, cell in enumerate(row, 1)
-        ]
-        for r, row in enumerate(rows, 1)
-    ]
+    expressions: list[sympy.Expr] = []
+    for r, row in enumerate(rows, 1):
+        for c, cell in enumerate(row, 1):
+            try:
+                expressions.append(words.read(cell))
+            except NotAnExpressionError as error:
+                # A cell knows its own place in the file.
+                place = "" if isinstance(cell, Cell) else f"row {r}, column {c}: "
+                problems.append(f"{quantity}, {place}{error}")
     if problems:
         raise InputError(problems)
-    if quantity != "Phi_q":
-        rows, table = _as_column(rows), _as_column(table)
-    texts = tuple(tuple(_written(cell) for cell in row) for row in rows)
-    return _from_expressions(texts, tuple(map(tuple, table)), reference)
+    if quantity != "Phi_q" and len(rows) == 1:
+        rows = [[cell] for cell in rows[0]]
+    return _from_expressions(rows, expressions, reference)
 
 
-def _rows(quantity: str, given: Any, where: str) -> list[list[Any]]:
+def _rows(quantity: str, given: object) -> list[list[object]]:
     if isinstance(given, str):
         try:
             given = split_matrix(given, Place())
         except ExpressionError as error:
-            raise InputError(f"{where}{quantity}: {error}") from error
+            raise InputError(f"{quantity}: {error}") from error
     if isinstance(given, sympy.MatrixBase | np.ndarray):
         given = np.asarray(given, dtype=object).tolist()
+    if isinstance(given, sympy.Expr | int | float):
+        given = [given]
     if isinstance(given, Sequence) and len(given) > 0:
         return [list(row) if isinstance(row, Sequence) and not isinstance(row, str) else [row]
                 for row in given]  # fmt: skip
-    if isinstance(given, sympy.Expr | int | float):
-        return [[given]]
     raise InputError(
-        f"{where}{quantity} is {type(given).__name__}; expected text, rows of expressions, a SymPy "
+        f"{quantity} is {type(given).__name__}; expected text, rows of expressions, a SymPy "
         "matrix, an array or a function."
     )
 
 
-def _check_rectangular(quantity: str, rows: list[list[Any]], where: str) -> None:
+def _check_rectangular(quantity: str, rows: list[list[object]]) -> None:
     width = len(rows[0])
     problems = [
-        f"{where}{_line(row)}row {k} of {quantity} has {len(row)} entries, row 1 has {width}; "
+        f"{_line(row)}row {k} of {quantity} has {len(row)} entries, row 1 has {width}; "
         "give every row as many, with a comma between two"
         for k, row in enumerate(rows, 1)
         if len(row) != width
     ]
     if problems or not width:
-        raise InputError(problems or f"{where}{quantity} has no entries.")
+        raise InputError(problems or f"{quantity} has no entries.")
 
 
-def _line(row: list[Any]) -> str:
+def _line(row: list[object]) -> str:
     return f"line {row[0].place.line}: " if row and isinstance(row[0], Cell) else ""
 
 
-def _entry(
-    cell: Any, words: Vocabulary, quantity: str, place: str, problems: list[str]
-) -> sympy.Expr:
-    """Return an entry in SymPy; a `Cell` knows its own place in the file."""
-    at = f"{quantity}, " if isinstance(cell, Cell) else f"{quantity}, {place}: "
-    try:
-        if isinstance(cell, Cell):
-            return parse_expression(cell.text, words.names, cell.place, words.refused)
-        if isinstance(cell, str):
-            return parse_expression(cell, words.names, None, words.refused)
-        expression = _plain(cell)
-        unknown = sorted(symbol_names(expression) - set(words.names))
-        if not unknown:
-            meanings = {sympy.Symbol(name): value for name, value in words.names.items()}
-            meant: sympy.Expr = expression.xreplace(meanings)
-            return meant
-        hint = suggestion(unknown[0], words.names)
-        problems.append(
-            f"{at}{expression} contains {listed(unknown)}{hint}; "
-            f"the names are: {listed(words.names, 60)}"
-        )
-    except NotAnExpressionError as error:
-        problems.append(f"{at}{error}")
-    nothing: sympy.Expr = sympy.Integer(0)
-    return nothing
-
-
-def _as_column(rows: list[list[Any]]) -> list[list[Any]]:
-    """Return a vector written as a row as a column."""
-    return [[item] for item in rows[0]] if len(rows) == 1 else rows
-
-
-def _written(cell: Any) -> str:
-    return " ".join(cell.text.split()) if isinstance(cell, Cell) else str(cell)
-
-
 def _from_expressions(
-    texts: tuple[tuple[str, ...], ...], table: Expressions, reference: Reference
-) -> Hand:
-    code = reference.compiled([entry for row in table for entry in row])
-    shape = (len(table), len(table[0]))
+    rows: list[list[object]], expressions: list[sympy.Expr], reference: Reference
+) -> Written:
+    code = reference.compiled(expressions)
+    shape = (-1, len(rows), len(rows[0]))
 
     def evaluate(states: States) -> tuple[Array, Array]:
-        values, sizes = code.evaluate(states)
-        return values.reshape(-1, *shape), sizes.reshape(-1, *shape)
+        values, sizes = code(states)
+        return values.reshape(shape), sizes.reshape(shape)
 
-    return Hand(texts, evaluate, table)
+    texts = tuple(
+        tuple(" ".join(cell.text.split()) if isinstance(cell, Cell) else str(cell) for cell in row)
+        for row in rows
+    )
+    return Written(texts, evaluate)
 
 
-def _no_texts(shape: tuple[int, ...]) -> tuple[tuple[str, ...], ...]:
+def _no_texts(shape: tuple[int, ...]) -> Texts:
     return (("",) * shape[1],) * shape[0]
 
 
-def _from_array(quantity: str, given: Array, at_states: bool) -> Hand:
-    """Take an array that holds everywhere, or one with the given states along its first axis."""
+def _from_array(quantity: str, given: Array, at_states: bool) -> Written:
+    """Return an array that holds everywhere, or one with the given states along its first axis."""
     array = given.astype(float)
     if quantity != "Phi_q":
         array = array.reshape(*(array.shape if at_states else (-1,)), 1)
@@ -297,9 +264,6 @@ def _from_array(quantity: str, given: Array, at_states: bool) -> Hand:
             f"{quantity} has shape {given.shape}; expected its rows (and columns), with the states "
             "in front where states={'q': ..., ...} is given."
         )
-    texts = _no_texts(array.shape[-2:])
-    if not at_states:
-        texts = tuple(tuple(f"{item:.6g}" for item in row) for row in array)
 
     def evaluate(states: States) -> tuple[Array, Array]:
         if at_states and len(array) != len(states):
@@ -310,10 +274,12 @@ def _from_array(quantity: str, given: Array, at_states: bool) -> Hand:
         values = np.broadcast_to(array, (len(states), *array.shape[-2:]))
         return values, np.abs(values)
 
-    return Hand(texts, evaluate, takes_states=not at_states)
+    if at_states:
+        return Written(_no_texts(array.shape[1:]), evaluate, takes_states=False)
+    return Written(tuple(tuple(f"{item:.6g}" for item in row) for row in array), evaluate)
 
 
-def _from_function(quantity: str, function: Callable[..., Any], reference: Reference) -> Hand:
+def _from_function(quantity: str, function: Callable[..., object], reference: Reference) -> Written:
     names = ("q", "q_dot", "t") if quantity == "gamma" else ("q", "t")
     count = _positional_count(function)
     if count is not None and count < len(names):
@@ -321,6 +287,7 @@ def _from_function(quantity: str, function: Callable[..., Any], reference: Refer
     takes_parameters = count is None or count > len(names)
 
     def at(states: States, k: int) -> Array:
+        """Return the values at one state, (rows, columns)."""
         arguments = [getattr(states, name)[k] for name in names]
         arguments += [states.p[k]] if takes_parameters else []
         value = np.asarray(function(*arguments), dtype=float)
@@ -331,17 +298,17 @@ def _from_function(quantity: str, function: Callable[..., Any], reference: Refer
             values = np.stack([at(states, k) for k in range(len(states))])
         return values, np.abs(values)
 
-    shape = np.atleast_2d(at(reference.random.take(np.array([0])), 0)).shape
-    return Hand(_no_texts(shape), evaluate, takes_parameters=takes_parameters)
+    shape = np.atleast_2d(at(reference.random, 0)).shape
+    return Written(_no_texts(shape), evaluate, takes_parameters=takes_parameters)
 
 
-def _positional_count(function: Callable[..., Any]) -> int | None:
-    """Return how many arguments a function takes by position, None where it cannot be told."""
+def _positional_count(function: Callable[..., object]) -> int | None:
+    """Return how many arguments a function takes by position, None if that is not known."""
     try:
-        parameters = inspect.signature(function).parameters.values()
+        kinds = [item.kind for item in inspect.signature(function).parameters.values()]
     except (TypeError, ValueError):
         return None
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    if any(item.kind is inspect.Parameter.VAR_POSITIONAL for item in parameters):
+    if inspect.Parameter.VAR_POSITIONAL in kinds:
         return None
-    return sum(item.kind in kinds for item in parameters)
+    by_position = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    return sum(kind in by_position for kind in kinds)

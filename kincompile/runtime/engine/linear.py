@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from kincompile.runtime.problem import Vector
+    from kincompile.runtime.engine.code import Array as Vector
 
 
 def solve_linear(matrix: Vector, sides: Vector) -> Vector:

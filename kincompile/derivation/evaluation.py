@@ -1,14 +1,20 @@
-"""The state at which a page shows numbers, and the emitted module that gives them."""
+"""The emitted module at one state: each entry as a formula, a number and a line of code."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.calculus.expressions import Symbol
+from kincompile.derivation.document import Display, Math
+from kincompile.derivation.emitted_lines import emitted_lines
+from kincompile.derivation.expanded import Writer
+from kincompile.derivation.formulas import Decimal, Equated, Glyph, Partial, size
 from kincompile.errors import InputError, StructuralError
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
@@ -23,21 +29,32 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from types import ModuleType
 
+    from kincompile.derivation.document import SourceLine
+    from kincompile.derivation.emitted_lines import EntryKey
+    from kincompile.derivation.formulas import Formula
+    from kincompile.ir.inline import Entry
+    from kincompile.ir.inline import Section as Rows
     from kincompile.model.system import ConstraintSystem
 
 Array = NDArray[np.float64]
 
+BRIEF = 30
+"""Nodes of a formula that still fits into a cell of a table."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Situation:
-    """A system, its emitted module and a state.
+ROUNDING = 1e-14
+"""Numbers this much smaller than the largest of their kind are shown as zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A system, its emitted module and the numbers at one state.
 
     Attributes
     ----------
     system, code, source, module
         The system, its program, the text of the emitted module, the module.
     origin
-        Where the state comes from, in words.
+        The source of the state, in words.
     t
         Time.
     q, q_dot, q_ddot
@@ -45,13 +62,13 @@ class Situation:
     p
         Parameters, shape (k,).
     Phi, Phi_q, nu, gamma
-        What the emitted module gives there.
+        The values of the emitted module there.
     assembly
-        The way of Newton's method from the guess, None where there is none.
+        The iterates of Newton's method from the guess; None where the system is not square.
     is_assembled
         Whether the state lies on the constraints.
     problem
-        Why the system cannot be solved, "" where it can.
+        The reason why the system cannot be solved, "" where it can.
     """
 
     system: ConstraintSystem
@@ -75,14 +92,82 @@ class Situation:
     @property
     def values(self) -> dict[str, float]:
         """Numbers by name: coordinates, rates, parameters and t."""
-        names = [item.name for item in self.system.coordinates]
-        found = dict(zip(names, self.q.tolist(), strict=True))
-        found |= dict(zip((rate(name) for name in names), self.q_dot.tolist(), strict=True))
+        found = dict(zip(self.coordinates, self.q.tolist(), strict=True))
+        found |= dict(zip(map(rate, self.coordinates), self.q_dot.tolist(), strict=True))
         parameters = (item.name for item in self.system.parameters)
         return found | dict(zip(parameters, self.p.tolist(), strict=True)) | {"t": self.t}
 
+    @cached_property
+    def coordinates(self) -> list[str]:
+        """Names of the coordinates."""
+        return [item.name for item in self.system.coordinates]
 
-def situation(system: ConstraintSystem, state: Mapping[str, float] | float | None) -> Situation:
+    @cached_property
+    def shown(self) -> dict[str, Array]:
+        """The numbers by name, with zero for those that are rounding errors of zero."""
+        names = ("q", "q_dot", "q_ddot", "nu", "gamma", "Phi_q", "Phi")
+        found: dict[str, Array] = {name: getattr(self, name) for name in names}
+        sizes = {name: np.max(np.abs(values), initial=0.0) for name, values in found.items()}
+        sizes["Phi"] = sizes["q"]  # Phi of an assembled mechanism is nothing but rounding error
+        return {
+            name: np.where(np.abs(values) <= ROUNDING * sizes[name], 0.0, values)
+            for name, values in found.items()
+        }
+
+    @cached_property
+    def _writer(self) -> Writer:
+        return Writer(self.code.nodes)
+
+    @cached_property
+    def _lines(self) -> dict[EntryKey, SourceLine]:
+        return emitted_lines(self.code, self.source)
+
+    def expanded(self, entry: Entry) -> Formula:
+        """Return an entry in sines and cosines."""
+        return self._writer.formula(entry.node)
+
+    def line(self, quantity: str, entry: Entry) -> SourceLine | None:
+        """Return where the emitted module computes an entry."""
+        return self._lines.get((quantity, entry.row, entry.column))
+
+    def symbol(self, quantity: str, row: int) -> Glyph:
+        """Return the symbol of an equation's Phi, nu or gamma."""
+        return Glyph(quantity, self.system.equations[row], bold=False)
+
+    def value(self, quantity: str, entry: Entry) -> float:
+        """Return an entry's number at the chosen state, from the emitted module."""
+        values = self.shown[quantity]
+        return float(values[entry.row, entry.column] if values.ndim == 2 else values[entry.row])
+
+    def partial(self, entry: Entry) -> Partial:
+        """Return the symbol of an entry of Phi_q."""
+        return Partial(self.symbol("Phi", entry.row), Symbol(self.coordinates[entry.column]))
+
+    def brief(self, quantity: str, entry: Entry) -> Math:
+        """Return an entry in sines and cosines where that is short, else its symbol."""
+        formula = self.expanded(entry)
+        if size(formula) <= BRIEF:
+            return Math(formula)
+        is_cell = quantity == "Phi_q"
+        return Math(self.partial(entry) if is_cell else self.symbol(quantity, entry.row))
+
+    def display(self, quantity: str, entry: Entry) -> Display:
+        """Return an entry's line: symbol, formula, number, and the code that computes it."""
+        is_cell = quantity == "Phi_q"
+        left = self.partial(entry) if is_cell else self.symbol(quantity, entry.row)
+        formula, number = self.expanded(entry), Decimal(self.value(quantity, entry))
+        parts = (left, formula) if is_number(formula) else (left, formula, number)
+        return Display(Equated(parts), anchor(quantity, entry), self.line(quantity, entry))
+
+    def expansion(self, rows: Rows, quantities: tuple[str, ...]) -> tuple[Display, ...]:
+        """Return the lines of a constraint's entries."""
+        return tuple(
+            self.display(quantity, entry) for name in quantities
+            for quantity, entry in ((name, item) for item in rows.entries[name])
+        )  # fmt: skip
+
+
+def evaluation(system: ConstraintSystem, state: Mapping[str, float] | float | None) -> Evaluation:
     """Choose a state and evaluate the emitted module there.
 
     Parameters
@@ -149,7 +234,7 @@ def _evaluated(
     problem: str,
     t: float,
     given: dict[str, float],
-) -> Situation:
+) -> Evaluation:
     names = [item.name for item in system.coordinates]
     guess = np.array([item.guess for item in system.coordinates], dtype=float)
     p = np.array([given.get(item.name, item.default) for item in system.parameters], dtype=float)
@@ -168,7 +253,7 @@ def _evaluated(
     if not all(np.isfinite(item).all() for item in (Phi, Phi_q, nu, gamma)):
         raise InputError(f"the formulas of {system.name!r} have no finite values at this state")
     q_ddot = _solved(Phi_q, gamma) if is_assembled else np.zeros_like(q)
-    return Situation(
+    return Evaluation(
         system, code, source, module, _origin(t, is_assembled, is_given), t, q, q_dot, q_ddot, p,
         Phi, Phi_q, nu, gamma, assembly, is_assembled, problem,
     )  # fmt: skip
@@ -188,3 +273,14 @@ def _origin(t: float, is_assembled: bool, is_given: bool) -> str:
     if is_assembled:
         return f"the assembled state at t = {t:g}"
     return f"the guess, because the mechanism does not assemble at t = {t:g}"
+
+
+def is_number(formula: Formula) -> bool:
+    """Return whether a formula is a plain number as it stands."""
+    return type(formula).__name__ in ("Number", "Decimal")
+
+
+def anchor(quantity: str, entry: Entry) -> str:
+    """Return the anchor of an entry's line."""
+    place = f"{entry.row}-{entry.column}" if quantity == "Phi_q" else str(entry.row)
+    return f"{quantity}-{place}"

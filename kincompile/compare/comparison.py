@@ -1,0 +1,229 @@
+"""The outcome of a comparison as data: verdicts, diagnoses and conventions."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+
+class Verdict(StrEnum):
+    """The verdict on an entry; a later one is more severe."""
+
+    EQUAL = "equal"
+    CONVENTION = "equal up to convention"
+    MANIFOLD = "equal on the manifold"
+    DIFFERENT = "different"
+
+    @property
+    def is_right(self) -> bool:
+        """Whether the entry is right at every state."""
+        return self in (Verdict.EQUAL, Verdict.CONVENTION)
+
+
+def worst(verdicts: Iterable[Verdict]) -> Verdict:
+    """Return the most severe verdict."""
+    return max(verdicts, key=list(Verdict).index)
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """An explanation of entries that differ.
+
+    Attributes
+    ----------
+    kind
+        The fault in a few words, for instance ``rotation transposed``.
+    text
+        A sentence that says what is wrong and where, without giving the right formula away.
+    detail
+        The term or factor concerned, as the right formula has it; shown only where revealed.
+    """
+
+    kind: str
+    text: str
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A state at which an entry differs, and both values there.
+
+    Attributes
+    ----------
+    state
+        Coordinates, rates, time and parameters by name.
+    generated, hand
+        The values; `generated` by the author's conventions.
+    """
+
+    state: Mapping[str, float]
+    generated: float
+    hand: float
+
+
+@dataclass(frozen=True, slots=True)
+class ComparedEntry:
+    """One entry of Phi, Phi_q, nu or gamma.
+
+    Attributes
+    ----------
+    quantity
+        Phi, Phi_q, nu or gamma.
+    row
+        Name of the equation.
+    column
+        Name of the coordinate; None but for Phi_q.
+    generated
+        The right formula, in the system's own conventions.
+    hand
+        The formula as written; empty for arrays and functions.
+    verdict
+        Equal, equal up to convention, equal on the manifold, or different.
+    diagnoses
+        Explanations of the difference. Several are equivalent: they give the same numbers.
+    difference
+        The state at which it differs most; None for an entry that is right.
+    """
+
+    quantity: str
+    row: str
+    column: str | None
+    generated: str
+    hand: str
+    verdict: Verdict
+    diagnoses: tuple[Diagnosis, ...] = ()
+    difference: Difference | None = None
+
+    @property
+    def label(self) -> str:
+        """The entry in short: ``Phi_q[A.x, phi_crank]``."""
+        place = self.row if self.column is None else f"{self.row}, {self.column}"
+        return f"{self.quantity}[{place}]"
+
+    @property
+    def anchor(self) -> str:
+        """The name of the entry's paragraph on a page; without blanks."""
+        return f"{self.quantity}-{self.row}-{self.column or ''}"
+
+    def explanation(self, reveal: bool) -> list[str]:
+        """Return verdict and diagnoses in lines; none for an entry that is right."""
+        if self.verdict.is_right:
+            return []
+        lines = [f"{self.label}: {self.verdict.value}"]
+        for k, item in enumerate(self.diagnoses):
+            lines.append(("  " if k == 0 else "  or ") + item.text)
+            if reveal and item.detail:
+                lines.append(f"    {item.detail}")
+        return [*lines, f"  right: {self.generated}"] if reveal else lines
+
+    def to_data(self, reveal: bool) -> dict[str, Any]:
+        """Return the entry as plain data; the right formula and value only where revealed."""
+        data = asdict(self) | {"verdict": self.verdict.value}
+        data["diagnoses"] = list(data["diagnoses"])
+        if not reveal:
+            data["generated"] = None
+            for item in data["diagnoses"]:
+                item["detail"] = None
+            if self.difference is not None:
+                data["difference"]["generated"] = None
+        return data
+
+
+@dataclass(frozen=True, slots=True)
+class Convention:
+    """A way of writing in which formulas differ from the generated ones and are still right.
+
+    Attributes
+    ----------
+    kind
+        For instance ``row sign``.
+    text
+        A sentence for people.
+    rows
+        Names of the equations that it concerns; empty where it concerns all.
+    """
+
+    kind: str
+    text: str
+    rows: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All entries of a comparison with their verdicts.
+
+    Attributes
+    ----------
+    model
+        Name of the mechanism.
+    constraint
+        The constraint that was checked alone, or None.
+    entries
+        All entries, quantity by quantity, row by row.
+    conventions
+        Differences in the author's way of writing that are not mistakes.
+    """
+
+    model: str
+    constraint: str | None
+    entries: tuple[ComparedEntry, ...]
+    conventions: tuple[Convention, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The most severe verdict of any entry."""
+        return worst(entry.verdict for entry in self.entries)
+
+    @property
+    def equal(self) -> bool:
+        """Whether no entry is different.
+
+        Equal up to a named convention counts, and so does equal on the constraint manifold, where
+        velocity and acceleration are solved: a textbook's formula is not wrong.
+        """
+        return self.verdict is not Verdict.DIFFERENT
+
+    @property
+    def different(self) -> tuple[ComparedEntry, ...]:
+        """The entries that are different."""
+        return tuple(entry for entry in self.entries if entry.verdict is Verdict.DIFFERENT)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The quantities compared, in order."""
+        return tuple(dict.fromkeys(entry.quantity for entry in self.entries))
+
+    @property
+    def title(self) -> str:
+        """The model, and the constraint that was checked alone."""
+        return self.model if self.constraint is None else f"{self.model}, {self.constraint}"
+
+    @property
+    def summary(self) -> str:
+        """One sentence: how many entries have which verdict."""
+        counts = [
+            f"{number} {verdict.value}"
+            for verdict in Verdict
+            if (number := sum(entry.verdict is verdict for entry in self.entries))
+        ]
+        return f"{self.title}: {len(self.entries)} entries compared, {', '.join(counts)}."
+
+    def rows(self, quantity: str) -> dict[str, list[ComparedEntry]]:
+        """Return the entries of a quantity by equation."""
+        rows: dict[str, list[ComparedEntry]] = {}
+        for entry in self.entries:
+            if entry.quantity == quantity:
+                rows.setdefault(entry.row, []).append(entry)
+        return rows
+
+    def counts(self) -> list[tuple[str, list[int]]]:
+        """Return, for every quantity, the number of entries with each verdict."""
+        return [
+            (name, [sum(e.quantity == name and e.verdict is v for e in self.entries)
+                    for v in Verdict])
+            for name in self.quantities
+        ]  # fmt: skip

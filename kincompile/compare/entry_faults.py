@@ -1,0 +1,116 @@
+"""Faults in an entry written out in sines and cosines, as one types it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import sympy
+
+from kincompile.compare.agreement import agrees
+from kincompile.compare.fault import (
+    MISSING_FACTOR,
+    MISSING_RATE,
+    MISSING_SQUARE,
+    MIXED_ANGLES,
+    SINE_COSINE,
+    Fault,
+    term_faults,
+    whole_faults,
+)
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from kincompile.compare.reference import Reference
+    from kincompile.compare.states import Array, States
+
+MOST_TERMS = 80
+"""Longer entries are not taken apart: one term in so many is no longer recognisable."""
+
+
+def entry_faults(
+    reference: Reference, quantity: str, row: int, column: int, states: States
+) -> Iterator[Fault[Mapping[tuple[int, int], Array]]]:
+    """Yield the faults of one entry; they show there and nowhere else.
+
+    Parameters
+    ----------
+    reference
+        The system.
+    quantity, row, column
+        The entry, by its place in the system; the column of a vector is 0.
+    states
+        Where to evaluate.
+    """
+    entry = sympy.expand(reference.expression(quantity, row, column))
+    angles = [
+        sympy.Symbol(name)
+        for name, is_angle in zip(reference.coordinates, reference.angular, strict=True)
+        if is_angle
+    ]
+    faults = [*whole_faults(quantity, "the entry", lambda factor: factor * entry, str(entry))]
+    text = "sine and cosine are swapped throughout"
+    faults.append(Fault(SINE_COSINE, text, _sine_cosine(entry), str(entry)))
+    terms = sympy.Add.make_args(entry)
+    parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
+    replaced = [0] * len(faults)  # number of the part in whose place the result stands
+    for k, term in enumerate(parts[1:], 1):
+        found = list(_faults_of_term(term, angles))
+        faults += found
+        replaced += [k] * len(found)
+    # Sums are taken of numbers: SymPy would sort the terms of each.
+    results = [fault.result for fault in faults]
+    values, sizes = (item[..., None] for item in reference.evaluate([*parts, *results], states))
+    right, wrong = values[:, :1], values[:, :1] - values[:, replaced] + values[:, len(parts) :]
+    sizes = sizes[:, :1] + np.abs(values[:, replaced]) + sizes[:, len(parts) :]
+    equal = np.all(agrees(wrong, sizes, right), axis=(0, 2))
+    for k, fault in enumerate(faults):
+        if not equal[k]:
+            yield replace(fault, result={(row, column): wrong[:, k, 0]})
+
+
+def _faults_of_term(
+    term: sympy.Expr, angles: Sequence[sympy.Symbol]
+) -> Iterator[Fault[sympy.Expr]]:
+    """Yield the faults of a term; the result stands in its place."""
+    full = str(term)
+    yield from term_faults("a term", lambda factor: factor * term, full)
+    functions = sorted(term.atoms(sympy.sin, sympy.cos), key=str)
+    yield Fault(SINE_COSINE, "sine and cosine are swapped in a term", _sine_cosine(term), full)
+    for function in functions if len(functions) > 1 else ():
+        text = f"sine and cosine of {function.args[0]} are swapped in a term"
+        swapped = term.xreplace({function: _sine_cosine(function)})
+        yield Fault(SINE_COSINE, text, swapped, full)
+    for angle in angles:
+        for other in angles if term.has(angle) else ():
+            if other != angle:
+                text = f"{other} stands where {angle} belongs, in a term"
+                mixed = {item: item.xreplace({angle: other}) for item in functions}
+                yield Fault(MIXED_ANGLES, text, term.xreplace(mixed), full)
+    yield from _missing_factors(term, full)
+
+
+def _sine_cosine(expression: sympy.Expr) -> sympy.Expr:
+    """Return an expression with sines for cosines and cosines for sines."""
+    other = {sympy.sin: sympy.cos, sympy.cos: sympy.sin}
+    found = expression.atoms(sympy.sin, sympy.cos)
+    swapped: sympy.Expr = expression.xreplace({f: other[f.func](*f.args) for f in found})
+    return swapped
+
+
+def _missing_factors(term: sympy.Expr, full: str) -> Iterator[Fault[sympy.Expr]]:
+    """Yield the term without a factor, or without a square."""
+    number, _ = term.as_coeff_Mul()
+    if abs(number) not in (0, 1, 2):
+        text = "a constant factor of a term is missing"
+        yield Fault(MISSING_FACTOR, text, term / abs(number), full)
+    for factor in sympy.Mul.make_args(term):
+        base, exponent = factor.as_base_exp()
+        if isinstance(base, sympy.Symbol) and base.name.endswith(rate("")):
+            kind, text = MISSING_RATE, f"a factor {base} is missing in a term"
+            if exponent == 2:
+                kind, text = MISSING_SQUARE, f"{base} stands where {base}^2 belongs, in a term"
+            yield Fault(kind, text, term / base, full)

@@ -1,0 +1,80 @@
+"""A fault in a formula: its kind, and the formula or the numbers that result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+SIGN = "sign"
+WHOLE_SIGN = "whole sign"
+REVERSED = "driver's rate reversed"
+LEFT_ZERO = "left zero"
+FACTOR = "factor 2 or 1/2"
+MISSING_TERM = "missing term"
+SINE_COSINE = "sine and cosine swapped"
+TRANSPOSED = "rotation transposed"
+A_FOR_B = "A where B belongs, or B where A"
+MIXED_ANGLES = "phi_i and phi_j mixed"
+MIXED_POINTS = "s_i and s_j mixed"
+XI_ETA = "xi and eta swapped"
+MISSING_FACTOR = "chain-rule factor missing"
+MISSING_SQUARE = "velocity square missing"
+MISSING_RATE = "velocity factor missing"
+SECOND_DERIVATIVE = "driver's second derivative forgotten"
+DRIVER_RATE = "driver's rate forgotten"
+BLOCKS = "body blocks swapped"
+X_AND_Y = "x and y columns swapped"
+CROSS_TERM = "cross term 2 Phi_qt q_dot missing"
+QUADRATIC_TERM = "(Phi_q q_dot)_q q_dot missing"
+PHI_TT = "Phi_tt missing"
+COUPLING = "coupling 2 w (r_j_dot - r_i_dot) missing"
+SQUARES = "w_j^2 - w_i^2 for (w_j - w_i)^2"
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class Fault(Generic[Result]):
+    """A fault and its result.
+
+    Attributes
+    ----------
+    kind
+        The fault in a few words.
+    text
+        What is wrong, and where.
+    result
+        The faulty formula, formulas by part, or numbers by entry.
+    detail
+        The right formula of the faulty term or entry, for those who may see it.
+    """
+
+    kind: str
+    text: str
+    result: Result
+    detail: str = ""
+
+
+def whole_faults(
+    quantity: str, name: str, multiple: Callable[[Fraction], Result], detail: str = ""
+) -> Iterator[Fault[Result]]:
+    """Yield the faults of a formula as a whole; `multiple` gives it times a factor."""
+    sign = {"nu": REVERSED, "gamma": WHOLE_SIGN}.get(quantity, SIGN)
+    yield Fault(sign, f"{name} has the wrong sign", multiple(Fraction(-1)), detail)
+    yield Fault(LEFT_ZERO, f"{name} is left zero", multiple(Fraction(0)), detail)
+    for word, factor in (("twice", Fraction(2)), ("half", Fraction(1, 2))):
+        yield Fault(FACTOR, f"{name} is {word} what it should be", multiple(factor), detail)
+
+
+def term_faults(
+    name: str, multiple: Callable[[Fraction], Result], detail: str = ""
+) -> Iterator[Fault[Result]]:
+    """Yield the faults of a term; `multiple` gives the formula with the term times a factor."""
+    yield Fault(MISSING_TERM, f"{name} is missing", multiple(Fraction(0)), detail)
+    yield Fault(SIGN, f"{name} has the wrong sign", multiple(Fraction(-1)), detail)
+    for word, factor in (("twice", Fraction(2)), ("half", Fraction(1, 2))):
+        yield Fault(FACTOR, f"{name} is counted {word}", multiple(factor), detail)

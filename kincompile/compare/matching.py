@@ -1,0 +1,332 @@
+"""How hand-written formulas are laid out against the generated ones, found by numbers.
+
+Phi and Phi_q say how an author wrote the rows: their order, signs and scales. nu and gamma have to
+follow. So a row of gamma with the opposite sign is a convention where Phi_q has that sign as well,
+and a mistake where it has not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.compare.agreement import ABSOLUTE, agrees, multiple
+from kincompile.compare.layouts import Layout, other_layouts, usual_layout
+from kincompile.compare.reference import QUANTITIES
+from kincompile.compare.rows import match_rows
+from kincompile.compare.vectors import joint_values, with_roles_exchanged
+from kincompile.model.resolve import Joint
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from kincompile.compare.reference import ConstraintBlock, Reference
+    from kincompile.compare.states import Array, States
+    from kincompile.compare.written import Written
+
+DEGREE = np.pi / 180
+_ALIKE = 1e-7  # between rows of length 1, to sort the layouts that are examined
+_MOST_TRIED = 24
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What is compared: the equations of a system, or of one constraint, at some states."""
+
+    reference: Reference
+    block: ConstraintBlock | None
+    states: States
+
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """The equations, as rows of the system."""
+        if self.block is not None:
+            return self.block.rows
+        return tuple(range(len(self.reference.equations)))
+
+    @property
+    def blocks(self) -> tuple[ConstraintBlock, ...]:
+        """The constraints."""
+        return self.reference.blocks if self.block is None else (self.block,)
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """Whether formulas take angles in degrees, and whether their derivatives are per degree."""
+
+    takes_degrees: bool = False
+    per_degree: bool = False
+
+    def column_factors(self, reference: Reference) -> Array:
+        """Return the factors of the columns of Phi_q, shape (n,)."""
+        return np.where(reference.angular & self.per_degree, DEGREE, 1.0)
+
+
+@dataclass(frozen=True)
+class Matching:
+    """How the written formulas are laid out against the generated ones.
+
+    Attributes
+    ----------
+    layout, units
+        Columns of Phi_q, and the unit of angles.
+    rows
+        The row of the system that each written row is.
+    factors
+        written = factor * generated, by row and state, shape (rows, N).
+    exchanged
+        Rows of the system whose constraint has the roles of its bodies exchanged.
+    signs
+        -1 for nu or gamma where the whole vector has the opposite sign.
+    """
+
+    layout: Layout
+    units: Units
+    rows: tuple[int, ...]
+    factors: Array
+    exchanged: frozenset[int] = frozenset()
+    signs: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def moved(self) -> list[int]:
+        """The written rows that stand in another place than in the system."""
+        usual = sorted(self.rows)
+        return [k for k, row in enumerate(self.rows) if row != usual[k]]
+
+    def sign(self, quantity: str) -> float:
+        """Return the sign of a whole quantity."""
+        return self.signs.get(quantity, 1.0)
+
+    def is_plain(self, quantity: str, row: int) -> bool:
+        """Return whether no convention concerns a written row of a quantity."""
+        return (
+            self.units == Units()
+            and not (quantity == "Phi_q" and self.layout.convention)
+            and row not in self.moved
+            and self.rows[row] not in self.exchanged
+            and self.sign(quantity) == 1
+            and bool(np.all(self.factors[row] == 1))
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A matching, and the share of the rows that it explains entirely."""
+
+    matching: Matching
+    share: float
+
+
+class Matcher:
+    """Finds the matching that explains the most, the plain one first."""
+
+    def __init__(self, subject: Subject, written: Mapping[str, Written]) -> None:
+        self._subject = subject
+        self._quantities = written
+        self._reference = subject.reference
+
+    def match(self) -> Matching:
+        """Return how the written formulas are laid out."""
+        usual = self._usual_layout()
+        best = self._rows_matched(usual, Units())
+        if self._reference.angular.any():
+            units = (Units(True, False), Units(True, True), Units(False, True))
+            best = self._better(best, ((usual, item) for item in units))
+        if "Phi_q" in self._quantities and best.share < 0.5:
+            best = self._better(best, ((item, Units()) for item in self._promising(usual)))
+        # A relative angle counted from the other body flips nu as well: its roles come first.
+        matching = self._with_signs(self._with_roles(best.matching))
+        return self._with_roles(matching)
+
+    def expected(self, matching: Matching, states: States) -> dict[str, Array]:
+        """Return the right values by the author's conventions, (N, rows, columns) each.
+
+        Columns of the ground hold NaN.
+        """
+        generated = self._generated(matching, states)
+        by_group = dict(zip(self._subject.states.group.tolist(), matching.factors.T, strict=True))
+        factors = np.stack([by_group[k] for k in states.group.tolist()])
+        result = {}
+        for name in self._quantities:
+            values = generated[name][:, list(matching.rows)]
+            if name == "Phi_q":
+                scale = matching.units.column_factors(self._reference)
+                values = matching.layout.arranged(values * scale)
+            result[name] = values * (factors * matching.sign(name))[:, :, None]
+        return result
+
+    def written(self, matching: Matching, states: States) -> dict[str, tuple[Array, Array]]:
+        """Return values and sizes of the written formulas, (N, rows, columns) each."""
+        if matching.units.takes_degrees:
+            states = states.in_degrees(self._reference.angular)
+        return {name: item.evaluate(states) for name, item in self._quantities.items()}
+
+    def _generated(self, matching: Matching, states: States) -> dict[str, Array]:
+        """Return the generated quantities of the system, in the roles the author gave."""
+        found = self._reference.values(states)
+        values = {name: found.of(name) for name in QUANTITIES}
+        for block in self._subject.blocks:
+            if matching.exchanged.issuperset(block.rows):
+                other = self._exchanged(block, states)
+                assert other is not None
+                for name in values:
+                    values[name] = values[name].copy()
+                    values[name][:, list(block.rows)] = other[name]
+        return values
+
+    def _exchanged(self, block: ConstraintBlock, states: States) -> dict[str, Array] | None:
+        """Return a constraint's quantities with the roles of bodies i and j exchanged."""
+        joint = block.constraint
+        other = with_roles_exchanged(joint) if isinstance(joint, Joint) else None
+        if other is None:
+            return None
+        found = joint_values(other, self._reference, states)
+        values = {name: found.of(name) for name in QUANTITIES}
+        Phi_q = np.zeros((len(states), len(block.rows), len(self._reference.coordinates)))
+        for k, name in enumerate(other.columns):
+            if name is not None:
+                Phi_q[:, :, self._reference.coordinates.index(name)] = found["Phi_q"][:, :, k]
+        return {**values, "Phi_q": Phi_q}
+
+    def _usual_layout(self) -> Layout:
+        if "Phi_q" not in self._quantities:
+            return Layout(tuple(range(len(self._reference.coordinates))))
+        width = self._quantities["Phi_q"].shape[1]
+        layout = usual_layout(self._reference, self._subject.block, width)
+        assert layout is not None, "shapes are checked before"
+        return layout
+
+    def _promising(self, usual: Layout) -> list[Layout]:
+        """Return the other layouts that are worth a closer look, the best first.
+
+        The look at all of them is quick: rows in the usual order, each divided by its length.
+        Where rows and columns both have another order, it sees nothing; then a few are tried.
+        """
+        layouts = list(other_layouts(self._reference, usual, len(self._subject.rows)))
+        values, _ = self._quantities["Phi_q"].evaluate(self._subject.states)
+        written = _directions(np.nan_to_num(values))
+        Phi_q = self._reference.values(self._subject.states)["Phi_q"][:, list(self._subject.rows)]
+        scores = []
+        for layout in layouts:
+            generated = layout.arranged(Phi_q)
+            known = ~np.isnan(generated[0, 0])
+            right = _directions(generated[..., known])
+            # The columns of the ground count in the length of a row by hand, and only there.
+            w = _directions(written[..., known])
+            off = np.minimum(np.abs(w - right).max((0, 2)), np.abs(w + right).max((0, 2)))
+            scores.append(int(np.sum(off <= _ALIKE)))
+        if max(scores, default=0) == 0:
+            return layouts[:_MOST_TRIED]
+        order = sorted(range(len(layouts)), key=lambda k: -scores[k])
+        return [layouts[k] for k in order[:_MOST_TRIED]]
+
+    def _better(self, best: _Candidate, others: Iterable[tuple[Layout, Units]]) -> _Candidate:
+        """Return the candidate that explains the most rows; another one only if it is most rows."""
+        for layout, units in others:
+            if best.share == 1.0:
+                break
+            other = self._rows_matched(layout, units)
+            if other.share > best.share and other.share >= 0.5:
+                best = other
+        return best
+
+    def _rows_matched(self, layout: Layout, units: Units) -> _Candidate:
+        """Find order and factors of the rows under a layout."""
+        states, rows = self._subject.states, self._subject.rows
+        plain = Matching(layout, units, rows, np.ones((len(rows), len(states))))
+        written, expected = self.written(plain, states), self.expected(plain, states)
+        defining: list[str] = [name for name in ("Phi_q", "Phi") if name in written]
+        names = defining or list(written)
+        order, found = match_rows(
+            [written[name] for name in names],
+            [expected[name] for name in names],
+            states.group,
+            may_scale=bool(defining),
+        )
+        factors = np.stack([item.factor for item in found])
+        matching = replace(plain, rows=tuple(rows[k] for k in order), factors=factors)
+        return _Candidate(matching, float(np.mean([item.share == 1.0 for item in found])))
+
+    def _with_signs(self, matching: Matching) -> Matching:
+        """Find out whether nu or gamma has the opposite sign as a whole."""
+        written = self.written(matching, self._subject.states)
+        expected = self.expected(matching, self._subject.states)
+        flipped: dict[str, bool] = {}
+        nonzero: dict[str, int] = {}
+        for name in [name for name in written if name not in ("Phi", "Phi_q")]:
+            nonzero[name] = np.sum(np.any(np.abs(expected[name]) > ABSOLUTE, axis=(0, 2)))
+            opposite = agrees(*written[name], -expected[name])
+            flipped[name] = bool(nonzero[name] and opposite.all())
+        # One row alone may be a slip. It is a convention where several agree, or all there is.
+        every = all(flipped[name] for name in flipped if nonzero[name])
+        signs = {name: -1.0 for name in flipped if flipped[name] and (every or nonzero[name] > 1)}
+        return replace(matching, signs=signs)
+
+    def _with_roles(self, matching: Matching) -> Matching:
+        """Exchange the roles of i and j in the constraints that this explains entirely.
+
+        Phi or Phi_q has to show it: in gamma alone the exchange of a revolute joint is its sign.
+        """
+        if not {"Phi", "Phi_q"}.intersection(self._quantities):
+            return matching
+        written = self.written(matching, self._subject.states)
+        right = self._right_rows(matching, written)
+        for block in self._subject.blocks:
+            rows = [k for k, row in enumerate(matching.rows) if row in block.rows]
+            if not all(right[rows]):
+                trial = self._with_exchanged(matching, block, rows, written)
+                if (
+                    trial is not None
+                    and self._is_natural(trial, rows)
+                    and all(self._right_rows(trial, written)[rows])
+                ):
+                    matching = trial
+        return matching
+
+    def _is_natural(self, trial: Matching, rows: list[int]) -> bool:
+        """Return whether the rows have the sign that the exchanged roles give them.
+
+        Exchanged and written with the opposite sign, a relative angle has its usual Phi_q and a
+        reversed nu: without Phi that is a driver's rate reversed.
+        """
+        return "Phi" in self._quantities or bool(np.all(trial.factors[rows] > 0))
+
+    def _with_exchanged(
+        self,
+        matching: Matching,
+        block: ConstraintBlock,
+        rows: list[int],
+        written: Mapping[str, tuple[Array, Array]],
+    ) -> Matching | None:
+        """Return the matching with one constraint exchanged and the factors that it then has."""
+        states = self._subject.states
+        if self._exchanged(block, states) is None:
+            return None
+        factors = matching.factors.copy()
+        factors[rows] = 1.0
+        exchanged = matching.exchanged.union(block.rows)
+        trial = replace(matching, exchanged=exchanged, factors=factors)
+        name = "Phi_q" if "Phi_q" in written else "Phi"
+        values, sizes = written[name]
+        expected = self.expected(trial, states)[name]
+        for k in rows:
+            found = multiple(values[:, k], sizes[:, k], expected[:, k], states.group)
+            factors[k] = found.factor
+        return trial
+
+    def _right_rows(self, matching: Matching, written: Mapping[str, tuple[Array, Array]]) -> Array:
+        """Return for every written row whether all its quantities agree."""
+        expected = self.expected(matching, self._subject.states)
+        right = np.ones(len(matching.rows), dtype=bool)
+        for name, (values, sizes) in written.items():
+            equal = agrees(values, sizes, expected[name]) | np.isnan(expected[name])
+            right &= equal.all(axis=(0, 2))
+        return right
+
+
+def _directions(values: Array) -> Array:
+    """Return rows of length 1; their signs stay."""
+    length = np.sqrt(np.sum(values**2, axis=-1, keepdims=True))
+    return np.asarray(values / np.where(length == 0, 1.0, length))

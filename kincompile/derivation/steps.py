@@ -1,0 +1,167 @@
+"""The nine steps of a constraint, as far as joints and free equations have them in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from kincompile.derivation.document import (
+    Code,
+    Display,
+    Math,
+    Section,
+    Verbatim,
+    row_range,
+    table,
+    text,
+)
+from kincompile.derivation.formulas import (
+    GAMMA,
+    GAMMA_TERMS,
+    NU,
+    PHI,
+    PHI_Q,
+    PHI_T,
+    VELOCITY_TERM,
+    Decimal,
+    Equated,
+    Row,
+    decimals,
+)
+from kincompile.tables import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.derivation.evaluation import Evaluation
+    from kincompile.derivation.formulas import Formula, Glyph
+    from kincompile.derive.derivation import RowBlock
+    from kincompile.derive.equations import EquationDerivatives
+    from kincompile.ir.inline import Section as Rows
+
+QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
+
+
+Derived = TypeVar("Derived", bound="RowBlock | EquationDerivatives")
+
+
+@dataclass(frozen=True, slots=True)
+class Steps(ABC, Generic[Derived]):
+    """The steps of a constraint.
+
+    Attributes
+    ----------
+    evaluation
+        The emitted module, for formulas and numbers.
+    rows
+        The rows of the constraint in the emitted program.
+    name
+        Name of the constraint.
+    columns
+        Names of its coordinates.
+    derivatives
+        What follows from Phi, for each row block of a joint or each expression of an equation.
+    level
+        Level of the steps that are derived: "vector" or "expanded".
+    """
+
+    evaluation: Evaluation
+    rows: Rows
+    name: str
+    columns: Sequence[str]
+    derivatives: Sequence[Derived]
+    level: str
+
+    @abstractmethod
+    def symbol(self, letter: str, k: int) -> Glyph:
+        """Return the symbol of the k-th Phi, nu or gamma."""
+
+    def section(self, kind: str, is_driver: bool, *steps: Section) -> Section:
+        """Return the steps under the kind and the name of the constraint."""
+        title = f"{kind} (driver) " if is_driver else f"{kind} "
+        return Section(f"constraint-{self.name}", (title, Verbatim(self.name)), (), steps)
+
+    def step(self, number: int, title: str, *blocks: Block, level: str | None = None) -> Section:
+        """Return one step, of the level of the derived ones unless another is given."""
+        level = self.level if level is None else level
+        return Section(f"{self.name}-step-{number}", (f"{number}. {title}",), blocks, (), level)
+
+    def nu(self, *notes: Block) -> Section:
+        """Return the step of the velocity equation, with notes below it."""
+        lines = [
+            Display(Equated((self.symbol("nu", k), Row(("-", PHI_T)), item.nu)))
+            for k, item in enumerate(self.derivatives)
+        ]
+        return self.step(5, "The right side of the velocity equation", *lines, *notes)
+
+    def gamma_terms(self, k: int) -> list[Block]:
+        """Return the k-th gamma, term by term."""
+        item = self.derivatives[k]
+        terms: list[tuple[Formula, Formula]] = [(VELOCITY_TERM, item.velocity)]
+        terms += zip(GAMMA_TERMS, item.gamma_terms, strict=True)
+        terms.append((self.symbol("gamma", k), item.gamma))
+        return [Display(Equated(pair)) for pair in terms]
+
+    def gamma(self, *blocks: Block) -> Section:
+        """Return the step of the acceleration equation."""
+        title = "The right side of the acceleration equation, term by term"
+        return self.step(6, title, *blocks)
+
+    def expansion(self) -> Section:
+        """Return the step in which everything becomes sines and cosines: the emitted code."""
+        note = text(
+            "This is what the emitted module computes, with its intermediate values written out. "
+            "Entries of the Jacobian that are not listed are zero."
+        )
+        lines = self.evaluation.expansion(self.rows, QUANTITIES)
+        return self.step(7, "Expanded to sines and cosines", note, *lines, level="expanded")
+
+    def placement(self) -> Section:
+        """Return the step that gives the rows and columns of the constraint."""
+        first, count = self.rows.instance.first_row, len(self.rows.entries["Phi"])
+        note = text(
+            f"{counted(count, 'equation')}; the constraints before have {first}: that is the row "
+            f"offset. {'Row' if count == 1 else 'Rows'} {row_range(first, count)} counted from 0, "
+            f"{row_range(first + 1, count)} counted from 1."
+        )
+        names = self.evaluation.coordinates
+        lines = [(Verbatim(names[k]), str(k), str(k + 1)) for k in self._column_numbers()]
+        columns = table(("coordinate", "column from 0", "from 1"), lines)
+        title = "Placement by row and column offset"
+        return self.step(8, title, note, columns, level="expanded")
+
+    def _column_numbers(self) -> list[int]:
+        return sorted({entry.column for entry in self.rows.entries["Phi_q"]})
+
+    def numbers(self, *vectors: Block) -> Section:
+        """Return the step in numbers: the state, vectors, then Phi, Phi_q, nu and gamma."""
+        blocks = (text(f"At {self.evaluation.origin}:"), self._state(), *vectors)
+        return self.step(9, "In numbers", *blocks, *self._results(), level="numeric")
+
+    def _state(self) -> Block:
+        """Return coordinates and rates at the state."""
+        evaluation = self.evaluation
+        rows: list[tuple[Run | Runs, ...]] = []
+        for name in self.columns:
+            k = evaluation.coordinates.index(name)
+            numbers = (Math(Decimal(evaluation.shown[key][k])) for key in ("q", "q_dot"))
+            rows.append((Verbatim(name), *numbers))
+        return table(("coordinate", "value", "rate"), rows)
+
+    def _results(self) -> Sequence[Block]:
+        """Return the numbers of Phi, of its columns of Phi_q, of nu and of gamma."""
+        first, count = self.rows.instance.first_row, len(self.rows.entries["Phi"])
+        columns = self._column_numbers()
+        names: list[Run] = []
+        for column in columns:
+            names += [", " if names else "", Verbatim(self.evaluation.coordinates[column])]
+        shown = {key: self.evaluation.shown[key][first : first + count] for key in QUANTITIES}
+        shown["Phi_q"] = shown["Phi_q"][:, columns]
+        phi, phi_q, nu, gamma = (
+            Display(Equated((replace(symbol, exponent=self.name), decimals(shown[key]))))
+            for key, symbol in zip(QUANTITIES, (PHI, PHI_Q, NU, GAMMA), strict=True)
+        )
+        code = f"rows = slice({first}, {first + count})  # {self.name}\nprint(Phi_q(q, t, p)[rows])"
+        return (phi, text("In the columns of ", *names, ":"), phi_q, nu, gamma, Code(code))

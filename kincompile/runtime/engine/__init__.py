@@ -1,0 +1,1 @@
+"""Emitted modules as typed objects, and the engines that solve with them."""

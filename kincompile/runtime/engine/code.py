@@ -1,0 +1,158 @@
+"""An emitted module as the runtime sees it: what every module has, and what some have, typed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from types import ModuleType
+
+Array = NDArray[np.float64]
+
+PLACE = "_code"
+"""Where a module keeps its `Code`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaneFunctions:
+    """The code of a module itself, on numbers of any kind; see docs/architecture.md.
+
+    Attributes
+    ----------
+    position, nu, gamma, factor, solve
+        The functions of ``LANES``, of ``(f, q, [q_dot,] t, p)`` and of ``(f, ...)``.
+    floats, arrays
+        What serves as `f`: elementary functions of floats, and of arrays.
+    """
+
+    position: Callable[..., Sequence[Any]]
+    nu: Callable[..., Sequence[Any]]
+    gamma: Callable[..., Sequence[Any]]
+    factor: Callable[..., tuple[Sequence[Any], Sequence[Any]]]
+    solve: Callable[..., Sequence[Any]]
+    floats: Any
+    arrays: Any
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Code:
+    """An emitted module.
+
+    Attributes
+    ----------
+    module
+        The module itself, for messages and for users.
+    name, coordinates, equations, parameters, units
+        Names and units, as in the contract.
+    guess : ndarray, shape (n,)
+        Where Newton starts.
+    pattern : ndarray of int, shape (nnz, 2)
+        Rows and columns of Phi_q's entries.
+    bodies
+        Of each body its name, the number of its first coordinate, and how many it has.
+    angular : ndarray of bool, shape (n,)
+        Which coordinates are angles.
+    lengths : ndarray, shape (n,)
+        Zero for angles, one for the others.
+    position, nu, gamma, Phi_q, nonzeros
+        Functions of the contract; `nonzeros` is ``Phi_q_nonzeros``.
+    redundant
+        Names of the equations that repeat others, and agree with them.
+    lanes : LaneFunctions or None
+        With the planned solve, where the module has one.
+    stages
+        The staged solve of a module in grouped form, or nothing.
+    evaluate : callable or None
+        Of a module in grouped form: Phi and the entries of Phi_q at one point.
+    arrays
+        Elementary functions of arrays, for the code of stages.
+    march, march_variants : callable or None
+        Of a compiled module: its own march over times, and of many parameter sets.
+    """
+
+    module: ModuleType
+    name: str
+    coordinates: tuple[str, ...]
+    equations: tuple[str, ...]
+    parameters: tuple[str, ...]
+    units: Mapping[str, str]
+    guess: Array
+    pattern: NDArray[np.signedinteger[Any]]
+    bodies: tuple[tuple[str, int, int], ...]
+    angular: NDArray[np.bool_]
+    lengths: Array
+    position: Callable[..., tuple[Array, Array]]
+    nu: Callable[..., Array]
+    gamma: Callable[..., Array]
+    Phi_q: Callable[..., Array]
+    nonzeros: Callable[..., Array]
+    redundant: tuple[str, ...]
+    lanes: LaneFunctions | None
+    stages: tuple[Any, ...]
+    evaluate: Callable[..., tuple[Array, Array]] | None
+    arrays: Any
+    march: Callable[..., int] | None
+    march_variants: Callable[..., int] | None
+
+    def owners(self) -> dict[str, str]:
+        """Return the body of each coordinate; one that belongs to none stands for itself."""
+        owners = {name: name for name in self.coordinates}
+        for body, first, count in self.bodies:
+            owners.update(dict.fromkeys(self.coordinates[first : first + count], body))
+        return owners
+
+
+def code_of(module: ModuleType) -> Code:
+    """Return a module's `Code`, which the loader has put there; made now for any other module."""
+    found = vars(module).get(PLACE)
+    return found if isinstance(found, Code) else attach(module)
+
+
+def attach(module: ModuleType) -> Code:
+    """Read what a module has, and keep it there. To be called again when its functions change."""
+    names = vars(module)
+    lanes = names.get("LANES", {})
+    coordinates = names["COORDINATES"]
+    angular = np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool)
+    code = Code(
+        module=module,
+        name=names["NAME"],
+        coordinates=coordinates,
+        equations=names["EQUATIONS"],
+        parameters=names["PARAMETERS"],
+        units=names["UNITS"],
+        guess=names["GUESS"],
+        pattern=names["PATTERN"],
+        bodies=names.get("BODIES", ()),
+        angular=angular,
+        lengths=np.where(angular, 0.0, 1.0),
+        position=names["position"],
+        nu=names["nu"],
+        gamma=names["gamma"],
+        Phi_q=names["Phi_q"],
+        nonzeros=names["Phi_q_nonzeros"],
+        redundant=names.get("REDUNDANT", ()),
+        lanes=LaneFunctions(
+            position=lanes["position"],
+            nu=lanes["nu"],
+            gamma=lanes["gamma"],
+            factor=lanes["factor"],
+            solve=lanes["solve"],
+            floats=names["FLOATS"],
+            arrays=names["ARRAYS"],
+        )
+        if "solve" in lanes
+        else None,
+        stages=names.get("STAGES", ()),
+        evaluate=names.get("evaluate"),
+        arrays=names.get("ARRAYS"),
+        march=names.get("march"),
+        march_variants=names.get("march_variants"),
+    )
+    names[PLACE] = code
+    return code

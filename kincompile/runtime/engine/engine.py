@@ -1,0 +1,116 @@
+"""What solves with a module's equations: one protocol, whatever the mechanism and its form.
+
+| engine | linear systems | for |
+| --- | --- | --- |
+| `planned.Planned` | the elimination planned at compile time | batches of points or variants |
+| `dense.Dense` | LAPACK with pivoting; least squares for redundant equations | single points |
+| `staged.Staged` | block after block of a large sparse matrix | mechanisms in the grouped form |
+
+A compiled module needs none of its own: its functions take the place of the NumPy ones.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from kincompile.runtime.engine.code import Code
+
+Array = NDArray[np.float64]
+
+
+@dataclass(slots=True, eq=False)
+class Point:
+    """A position, or a batch of N, at which the equations were evaluated. The batch is last.
+
+    Attributes
+    ----------
+    q : ndarray, shape (n,) or (n, N)
+        The position.
+    t : float or ndarray, shape (N,)
+        The time.
+    Phi : ndarray, shape (m,) or (m, N)
+        The constraint vector, of a batch also as a row each; m > n where redundant equations agree.
+    Phi_q
+        The Jacobian, as its engine has it: a matrix (m, n), the entries of its pattern, or those of
+        them that vary.
+    factors
+        What the engine keeps of Phi_q once it was factored.
+    """
+
+    q: Array
+    t: Any
+    Phi: Any
+    Phi_q: Any
+    factors: Any = None
+
+    @property
+    def residual(self) -> float:
+        """Euclidean norm of Phi at one position."""
+        return norm(self.Phi)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rates:
+    """Velocity and acceleration at a position.
+
+    Attributes
+    ----------
+    q_dot, q_ddot : ndarray, shape of q
+        The rates; not finite where they cannot be had.
+    movement : ndarray, shape of q
+        The solution for the right side that was asked for besides.
+    agree : bool
+        Whether redundant equations are all met by the rates.
+    """
+
+    q_dot: Array
+    q_ddot: Array
+    movement: Array
+    agree: bool = True
+
+
+class Engine(Protocol):
+    """The equations of a module with parameters set, and the linear systems of their Phi_q.
+
+    No method raises on numbers: what cannot be had is not finite.
+    """
+
+    code: Code
+
+    def __init__(self, code: Code, p: Array) -> None:
+        """Set the parameters of a module."""
+
+    def evaluate(self, q: Array, t: Any) -> Point:
+        """Evaluate Phi and Phi_q at positions (n,) or (n, N) and times () or (N,)."""
+
+    def factor(self, point: Point) -> None:
+        """Factor Phi_q of a point, once."""
+
+    def solve(self, point: Point, b: Array) -> Array:
+        """Return x of Phi_q x = b, b of shape (m,) or (m, N)."""
+
+    def solve_transposed(self, point: Point, b: Array) -> Array:
+        """Return x of Phi_q^T x = b, b of shape (n,) or (n, N)."""
+
+    def rates(self, point: Point, besides: Array | None) -> Rates:
+        """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
+
+    def determinants(self, point: Point, before: Point) -> Array:
+        """Return the determinants of the blocks of Phi_q, shape (blocks,) or (blocks, N).
+
+        Where there are no blocks it is one number, relative to that of a point before.
+        """
+
+    def signs(self, point: Point) -> tuple[float, ...]:
+        """Return their signs at one point; none where redundant equations forbid a determinant."""
+
+
+def norm(vector: Array) -> float:
+    """Return the Euclidean norm; three times as fast as `numpy.linalg.norm`."""
+    return math.sqrt(vector @ vector)
