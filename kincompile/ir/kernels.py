@@ -23,7 +23,16 @@ from kincompile.derive.derivation import derive
 from kincompile.ir.differentiate import negated_tangents, tangents
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph, pruned
-from kincompile.ir.program import Attribute, FrameEntry, Function, Hint, Input, Kernel, Motion
+from kincompile.ir.program import (
+    Attribute,
+    FrameEntry,
+    FrameKernel,
+    Function,
+    Hint,
+    Input,
+    Kernel,
+    Motion,
+)
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -32,7 +41,6 @@ if TYPE_CHECKING:
 
     from kincompile.calculus.expressions import Components, Profile, Rotation, TimeFunction, Value
     from kincompile.calculus.symbols import CoordinateSymbol, Frame
-    from kincompile.ir.graph import Node
     from kincompile.model.bodies import BodyKind
     from kincompile.model.resolve import FreeEquation
 
@@ -151,11 +159,8 @@ def _motion(template: Template) -> dict[CoordinateSymbol, tuple[Motion, ...]]:
 
 
 @cache
-def frame_kernel(kind: BodyKind) -> tuple[tuple[Node, ...], tuple[int, ...]]:
-    """Return the code of the frame of a kind of body, and its entries.
-
-    Its inputs are the numbers of the coordinates. In the plane: cosine and sine of the angle.
-    """
+def frame_kernel(kind: BodyKind) -> FrameKernel:
+    """Return the kernel of the frame of a kind of body."""
     own = kind.frame("i")
     environment = KernelEnvironment(Template("Frame", (own,), (), ()))
     found = Expansion(environment).entries(own.rotation)
@@ -164,7 +169,8 @@ def frame_kernel(kind: BodyKind) -> tuple[tuple[Node, ...], tuple[int, ...]]:
         item: graph.input(item.component) for item in environment.inputs if isinstance(item, Motion)
     }
     new = graph.instantiate(environment.graph.nodes, numbers)
-    return tuple(graph.nodes), tuple(new[item.node] for item in found)
+    entries = tuple(new[item.node] for item in found)
+    return FrameKernel(tuple(graph.nodes), entries, own.rotation.symbols)
 
 
 @cache

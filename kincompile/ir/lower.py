@@ -239,16 +239,16 @@ class _Binder:
                 nodes = [graph.const(value) for value in kind.ground]
                 rates = [graph.const(0)] * len(nodes)
             else:
-                nodes = [graph.input(name) for name in body.coordinates]
-                rates = [graph.input(rate(name)) for name in body.coordinates]
-            code, entries = frame_kernel(kind)
-            new = graph.instantiate(code, dict(enumerate(nodes)))
-            self._bodies[body.name] = *nodes, *rates, *(new[node] for node in entries)
+                names = body.coordinates
+                nodes = [graph.input(name) for name in names]
+                rates = [graph.input(rate(name)) for name in names]
+            frame = frame_kernel(kind)
+            new = graph.instantiate(frame.nodes, dict(enumerate(nodes)))
+            self._bodies[body.name] = *nodes, *rates, *(new[node] for node in frame.entries)
         return self._bodies[body.name]
 
     def frame_of(self, body: Body, columns: range) -> BodyFrame:
         """Return a body with the nodes that its frame gives."""
         entries = self._body(body)[2 * len(columns) :]
-        symbols = body.kind.frame("i").rotation.symbols
-        labels = tuple(f"{symbol}_{body.name}" for symbol in symbols)
+        labels = tuple(f"{symbol}_{body.name}" for symbol in frame_kernel(body.kind).symbols)
         return BodyFrame(body.name, columns, entries, labels)

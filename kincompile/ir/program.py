@@ -83,6 +83,25 @@ class Hint:
 
 
 @dataclass(frozen=True, slots=True)
+class FrameKernel:
+    """The code of a frame: cosine and sine of the angle in the plane.
+
+    Attributes
+    ----------
+    nodes
+        The code, whose inputs are the numbers of the coordinates.
+    entries
+        Nodes of what it gives.
+    symbols
+        Symbols of those in names, ``c`` and ``s``.
+    """
+
+    nodes: tuple[Node, ...]
+    entries: tuple[int, ...]
+    symbols: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class BodyFrame:
     """A body: the frame kernel bound to its coordinates.
 

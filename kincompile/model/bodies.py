@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from kincompile.model.expressions import Scalars
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BodyKind:
     """A kind of body: what its coordinates are.
 
