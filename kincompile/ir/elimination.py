@@ -16,7 +16,7 @@ from kincompile.ir.graph import Constant, Graph, Node
 from kincompile.structure.blocks import Block, block_triangular
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
     from kincompile.ir.inline import InlineProgram
 
@@ -106,9 +106,8 @@ def plan_entries(
     solution: dict[int, int] = {}
     determinants = [_solve_block(graph, block, matrix, right, solution) for block in blocks]
     for pivot in reversed(pivots):
-        terms, rest = eliminated[pivot.row], right[pivot.row]
-        for column in sorted(terms.keys() - {pivot.column}):
-            rest = graph.sub(rest, graph.mul(terms[column], solution[column]))
+        terms = eliminated[pivot.row]
+        rest = _remainder(graph, terms, {pivot.column}, right[pivot.row], solution)
         solution[pivot.column] = graph.div(rest, terms[pivot.column])
     return SolvePlan(
         tuple(graph.nodes),
@@ -119,6 +118,19 @@ def plan_entries(
         tuple(determinants),
         tuple(solution[column] for column in sorted(solution)),
     )
+
+
+def _remainder(
+    graph: Graph,
+    terms: dict[int, int],
+    unknown: Collection[int],
+    right: int,
+    solution: dict[int, int],
+) -> int:
+    """Return the right side of an equation less its terms in coordinates that are known."""
+    for column in sorted(terms.keys() - set(unknown)):
+        right = graph.sub(right, graph.mul(terms[column], solution[column]))
+    return right
 
 
 def _eliminate(graph: Graph, matrix: Matrix, right: dict[int, int]) -> tuple[list[Pivot], Matrix]:
@@ -174,12 +186,7 @@ def _solve_block(
     zero = graph.const(0)
     size = len(block.rows)
     a = [[matrix[row].get(column, zero) for column in block.columns] for row in block.rows]
-    b = []
-    for row in block.rows:
-        rest = right[row]
-        for column in sorted(matrix[row].keys() - set(block.columns)):
-            rest = graph.sub(rest, graph.mul(matrix[row][column], solution[column]))
-        b.append(rest)
+    b = [_remainder(graph, matrix[row], block.columns, right[row], solution) for row in block.rows]
     if size > LARGEST_CLOSED_FORM:
         entries = [node for row in a for node in row]
         for k, column in enumerate(block.columns):

@@ -234,7 +234,7 @@ class Graph:
         """Return a component of a small linear system's solution, or its determinant.
 
         ``name`` is ``"solve"`` or ``"determinant"``; the operands are the matrix row by row, and
-        for ``"solve"`` the right side behind it.
+        for ``"solve"`` the right side after it.
         """
         return self._intern(("linear", name, size, index, *operands))
 

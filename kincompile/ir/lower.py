@@ -102,7 +102,7 @@ def _fingerprint(
 
 
 def _kernel_mark(instance: Instance, first: str) -> Kernel | str:
-    """Return what tells kernels apart: of a free equation the code, or who was first to have it."""
+    """Return the name of a type; of a free equation the code, or the first that has the same."""
     if instance.bodies:
         return instance.kernel.name
     return instance.kernel if first == instance.name else first

@@ -88,7 +88,7 @@ def redundant_equations(
 
 
 def redundancy_warning(system: ConstraintSystem, found: Sequence[Surplus]) -> str:
-    """Return what to tell of redundant equations that agree with the others."""
+    """Return the warning about consistent redundant equations."""
     sentences = ". ".join(f"{item.text}; to remove it, {item.remedy}" for item in found)
     return (
         f"{system.name!r} is redundant: all equations are solved together in the sense of least "

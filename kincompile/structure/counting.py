@@ -45,7 +45,7 @@ def require_square(system: ConstraintSystem, pattern: Pattern) -> None:
 def counting_problem(
     system: ConstraintSystem, pattern: Pattern, dependent: Sequence[str] = ()
 ) -> str:
-    """Say what is wrong with the numbers of equations and coordinates, "" where nothing is.
+    """Return what is wrong with the numbers of equations and coordinates, "" where nothing is.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ DEPENDENT = 1e-6
 """Part of a row that is left when the rows before are taken out of it, below which it depends."""
 
 SETTLED = 1e-8
-"""Last step, in scales of the coordinates, of a position that is known well enough to tell a rank:
+"""Last step, in scales of the coordinates, of a position that is known well enough for a rank:
 at a singular position equations hold to 1e-12 when the position is still wrong by 1e-6."""
 
 ANGLES_FIRST = 10.0
@@ -207,7 +207,7 @@ class _Analysis:
     def _scaled(self, q: Array, t: Array) -> Array:
         """Return Phi_q at states with each row of length one and columns in scales.
 
-        A row that is not finite is one of zeros: it tells nothing there.
+        A row that is not finite is set to zero: it has no meaning there.
         """
         matrices = self._evaluate(q, t)[1] * self._scale
         matrices[~np.isfinite(matrices).all(axis=2)] = 0.0

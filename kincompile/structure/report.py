@@ -26,11 +26,11 @@ class Inspection(Findings):
     """What `kc.inspect` finds, with its text; see `Findings` for what it holds."""
 
     def __str__(self) -> str:
-        """Give the text."""
+        """Return the text."""
         return self.to_text()
 
     def to_text(self) -> str:
-        """Give everything as plain text tables; rows and columns count from 0."""
+        """Return everything as plain text tables; rows and columns count from 0."""
         return report_text(self)
 
 

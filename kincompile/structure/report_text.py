@@ -29,7 +29,7 @@ IN_A_ROW = 9
 
 
 def report_text(found: Findings) -> str:
-    """Give everything as plain text tables; rows and columns count from 0."""
+    """Return everything as plain text tables; rows and columns count from 0."""
     sections = {
         "Bodies": _bodies(found),
         "Other coordinates": _others(found),
@@ -165,7 +165,7 @@ def _parts(found: Findings) -> Iterator[str]:
 
 
 def _left(found: Findings) -> str:
-    """Say what may still move."""
+    """Return what may still move."""
     if not found.degrees_of_freedom:
         return "nothing may move by itself"
     free = counted(found.degrees_of_freedom, "degree")
@@ -195,7 +195,7 @@ def _advice(found: Findings) -> Iterator[str]:
 
 
 def _unassembled(found: Findings) -> str:
-    """Say by how much which equations are missed at the nearest position, and what to do."""
+    """Return the equations missed at the nearest position, by how much, and a remedy."""
     values = dict(zip(found.equations, found.residuals, strict=True))
     undefined = [name for name, value in values.items() if not math.isfinite(value)]
     if undefined:
