@@ -15,13 +15,11 @@ row  constraint                                         source
 Read `_position` first: Phi and Phi_q, constraint by constraint. `_nu` and `_gamma` are the right
 sides of velocity and acceleration, gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt.
 `_kinematics` is all of it once more, for batches. From `_Quantity` on all modules are alike.
-
-The functions take one point, q of shape (7,), or batches: q (..., 7), t (...)
-and p (..., 3) broadcast against each other. What begins with an underscore runs on floats
-(f = FLOATS) and on arrays (f = ARRAYS), whose last axis is the batch. Names in it, for a joint J on
-a body b: c_b and s_b are the cosine and sine of phi_b, J_b_x and J_b_y the point's vector A s,
-J_b_w2_x the same times phi_b_dot squared (_sq is a square), J_axis_b_x an axis A v, J_d_x the
-vector d between the points, J_d_dot_x its rate.
+The functions take one point, q of shape (7,), or batches: q (..., 7), t (...), p (..., 3).
+What begins with an underscore runs on floats (f = FLOATS) and on arrays (f = ARRAYS), whose last
+axis is the batch. Of a joint J on a body b, c_b and s_b are cosine and sine of phi_b, J_b_x and
+J_b_y its point's vector A s, J_b_w2_x that times phi_b_dot squared (_sq), J_axis_b_x an axis A v,
+J_d_x the vector d between its points, J_d_dot_x the rate of that.
 """
 
 import math
@@ -42,10 +40,9 @@ EQUATIONS = (
 PARAMETERS = ("base", "lift", "omega")
 # name, first column and number of columns of each body
 BODIES = (("cam", 0, 3), ("follower", 3, 3))
-UNITS = {
-    "x_cam": "m", "y_cam": "m", "phi_cam": "rad", "x_follower": "m", "y_follower": "m",
-    "phi_follower": "rad", "alpha_contact": "rad", "base": "m", "lift": "m", "omega": "rad/s",
-}
+UNITS = dict(zip(COORDINATES + PARAMETERS, (
+    "m", "m", "rad", "m", "m", "rad", "rad", "m", "m", "rad/s",
+)))
 DEFAULTS = np.array((0.04, 0.02, 6.283185307179586), dtype=float)
 GUESS = np.array((0.0, 0.0, 0.0, 0.0, 0.05, 0.0, 1.5707963267948966), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
@@ -57,7 +54,6 @@ PATTERN = np.array((
 _CONSTANTS = {
     0: 1.0, 1: 1.0, 2: -1.0, 14: 1.0,
 }
-pi = math.pi
 
 
 def _position(f, q, t, p):
@@ -95,8 +91,7 @@ def _position(f, q, t, p):
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         c_follower * contact_d_y - s_follower * contact_d_x,
         contact_14,
-        # 6  AbsoluteAngle "motor": cam angle omega*t
-        phi_cam - omega * t,
+        phi_cam - omega * t,  # 6  AbsoluteAngle "motor": cam angle omega*t
         # Phi_q
         c_follower,  # guide.parallel by phi_follower
         s_follower,  # contact.contact by x_cam
@@ -119,8 +114,7 @@ def _nu(f, q, t, p):
         0, 0,  # 0-1  Revolute "shaft"
         0, 0,  # 2-3  Translational "guide"
         0, 0,  # 4-5  CamFlatFollower "contact"
-        # 6  AbsoluteAngle "motor": cam angle omega*t
-        omega,
+        omega,  # 6  AbsoluteAngle "motor"
     )
 
 
@@ -132,10 +126,8 @@ def _gamma(f, q, q_dot, t, p):
     ) = q_dot
     base, lift, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
-    # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
-    # 4-5  CamFlatFollower "contact"
     cos_alpha_contact = cos(alpha_contact)
     contact_rho_cam = base + lift * (1 - cos_alpha_contact) / 2
     sin_alpha_contact = sin(alpha_contact)
@@ -180,9 +172,7 @@ def _gamma(f, q, q_dot, t, p):
     contact_34 = contact_rho_cam_1 * alpha_contact_dot_sq
     return (
         0, 0,  # 0-1  Revolute "shaft"
-        # 2-3  Translational "guide": ground (0, 0) axis (0, 1) - follower (0, 0) axis (0, 1)
-        0,
-        phi_follower_dot * (phi_follower_dot * s_follower),
+        0, phi_follower_dot * (phi_follower_dot * s_follower),  # 2-3  Translational "guide"
         # 4-5  CamFlatFollower "contact": cam (0, 0) profile - follower (0, 0) axis (1, 0)
         phi_follower_dot * (phi_follower_dot * (c_follower * (y_follower - y_cam - contact_5)
                     - s_follower * (x_follower - x_cam - contact_7))
@@ -212,7 +202,6 @@ def _kinematics(f, q, q_dot, t, p):
     ) = q_dot
     base, lift, omega = p
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
-    # body frames: A = [[c, -s], [s, c]]
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
     cos_alpha_contact = cos(alpha_contact)
@@ -302,8 +291,7 @@ def _factor(f, J):
         contact_contact_phi_follower, contact_contact_alpha_contact, contact_tangent_phi_cam,
         contact_tangent_phi_follower, contact_tangent_alpha_contact,
     ) = J
-    k_1 = 1 / guide_parallel_phi_follower
-    k_2 = 1 / contact_tangent_alpha_contact
+    k_1, k_2 = 1 / guide_parallel_phi_follower, 1 / contact_tangent_alpha_contact
     k_3 = 1 / contact_contact_y_follower
     return (
         contact_contact_x_cam, contact_contact_y_cam, contact_contact_phi_cam,
@@ -334,9 +322,7 @@ def _solve(f, F, b):
             - contact_contact_alpha_contact * alpha_contact) * k_3
     )
     x_follower = -guide_normal
-    return (
-        shaft_x, shaft_y, motor, x_follower, y_follower, phi_follower, alpha_contact,
-    )
+    return (shaft_x, shaft_y, motor, x_follower, y_follower, phi_follower, alpha_contact)
 
 
 def Phi(q, t, p=DEFAULTS):
@@ -387,12 +373,10 @@ def kinematics(q, q_dot, t, p=DEFAULTS):
 def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
     """Phi, the nonzeros of Phi_q, nu and gamma of a batch whose axis is the last one.
 
-    q and q_dot have the shape (7, N), t () or (N,), p (3,) or (3, N).
-    The results have the shapes (7, N), (15, N), (7, N), (7, N).
+    q and q_dot are (7, N), t is () or (N,), p (3,) or (3, N); the results have N columns.
     """
     states, t, p = _batch_last(t, p, (q, q_dot))
-    quantities = _PHI, _PHI_Q_NONZEROS, _NU, _GAMMA
-    return _on_batch(_kinematics, 0, quantities, t, p, states, is_last=True)
+    return _on_batch(_kinematics, 0, (_PHI, _PHI_Q_NONZEROS, _NU, _GAMMA), t, p, states, True)
 
 
 def solve(nonzeros, b):
@@ -408,12 +392,11 @@ def solve(nonzeros, b):
     return np.stack(np.broadcast_arrays(*x), axis=-1)
 
 
-# The code itself, for callers that keep each coordinate in an array of its own: functions of
-# (f, q, [q_dot,] t, p) with sequences q, q_dot, p. Of Phi_q they give the entries that vary.
-LANES = {
-    "position": _position, "nu": _nu, "gamma": _gamma, "kinematics": _kinematics,
-    "factor": _factor, "solve": _solve,
-}
+# the code itself, of (f, q, [q_dot,] t, p) with sequences q, q_dot, p of numbers or of arrays (N,)
+LANES = dict(
+    position=_position, nu=_nu, gamma=_gamma, kinematics=_kinematics, factor=_factor,
+    solve=_solve,
+)
 
 
 class InputError(ValueError):
@@ -421,12 +404,8 @@ class InputError(ValueError):
 
 
 def _cos_sin(angle):
-    """Cosine and sine of an array through t = tan(angle / 2): half the time of np.cos and np.sin.
-
-    With R = 2 / (1 + t^2) they are R - 1 and t R. A float is never exactly pi: there t is about
-    1e16, and t^2 far from overflow. The error is at most 4e-16.
-    """
-    t = np.tan(0.5 * angle)
+    """Cosine and sine through t = tan(angle / 2), half the time of np.cos and np.sin; to 4e-16."""
+    t = np.tan(0.5 * angle)  # at most 1e16, since a float is never exactly pi
     R = 2.0 / (1.0 + t * t)
     return R - 1.0, t * R
 
@@ -467,33 +446,39 @@ class _Quantity:
         result.put(self.index, computed)
         return result
 
+    def empty(self, count, dtype, is_last):
+        """Return an array (size, N) in which the entries that never change are in place."""
+        result = _empty((self.size, count) if is_last else (count, self.size), dtype)
+        if is_last:
+            result[self.fixed] = self.constants
+        elif not self.is_full:
+            result[:] = self.start.reshape(-1)
+        return result if is_last else result.T
+
 
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
 _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
 _PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
 _STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
-_BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
-_PARAMETER_LIST = DEFAULTS.tolist()
+_PARAMETER_LIST, _BLOCK = DEFAULTS.tolist(), 4000  # points at a time: they stay in the cache
 _empty = np.empty  # the loader's function in its place uses the memory of earlier results again
-for _array in (DEFAULTS, GUESS, PATTERN):
-    _array.flags.writeable = False
+DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = False
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
     """Return a quantity or several, what a kernel computes after so many values."""
-    quantities = wanted if type(wanted) is tuple else (wanted,)
     point = _point(t, p, states)
-    if point is not None:
-        try:
-            values = kernel(*point)
-        except (ArithmeticError, ValueError):
-            pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
-        else:
-            if quantities is not wanted:
-                return wanted.at_point(values[skip:])
-            values = iter(values)
-            return tuple([quantity.at_point(values) for quantity in quantities])
+    try:
+        values = kernel(*point) if point else None
+    except (ArithmeticError, ValueError):
+        values = None  # outside the domain of a function, where the array form gives NaN
+    if values is not None:
+        if type(wanted) is not tuple:
+            return wanted.at_point(values[skip:])
+        values = iter(values)
+        return tuple([quantity.at_point(values) for quantity in wanted])
+    quantities = wanted if type(wanted) is tuple else (wanted,)
     states, t, p, shape = _batch(t, p, states)
     results = _on_batch(kernel, skip, quantities, t, p, states)
     found = [part.T.reshape(shape + item.shape) for item, part in zip(quantities, results)]
@@ -503,15 +488,7 @@ def _evaluate(kernel, skip, wanted, t, p, *states):
 def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
     """Return quantities as arrays (size, N), in memory point by point or with the batch last."""
     count, dtype = states[0].shape[1], np.result_type(*states, t, p)
-    results = []
-    for item in quantities:
-        if is_last:
-            results.append(_empty((item.size, count), dtype))
-            results[-1][item.fixed] = item.constants
-        else:
-            results.append(_empty((count, item.size), dtype).T)
-            if not item.is_full:
-                results[-1].T[:] = item.start.reshape(-1)
+    results = [item.empty(count, dtype, is_last) for item in quantities]
     for start in range(0, count, _BLOCK):
         block = ..., slice(start, start + _BLOCK)
         at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
@@ -561,8 +538,7 @@ def _batch(t, p, states):
             f"{NAME}: the leading axes of {shapes}, t {t.shape} and p {p.shape} do not fit each "
             "other; they broadcast like NumPy arrays"
         ) from None
-    dtype = np.result_type(*states, t, p)
-    whole = (*shape, N_COORDINATES)
+    dtype, whole = np.result_type(*states, t, p), (*shape, N_COORDINATES)
     states = [_rows(state, whole).astype(dtype, copy=False) for state in states]
     t = t if t.ndim == 0 else _rows(t[..., np.newaxis], (*shape, 1))[0]
     p = p if p.ndim == 1 else _rows(p, (*shape, len(PARAMETERS)))
@@ -573,15 +549,11 @@ def _batch_last(t, p, states):
     """Check the arguments of a batch whose axis is the last one."""
     states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
     t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
-    count = states[0].shape[-1]
-    batches = {state.shape[1:] for state in states}
-    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
+    n, k, one = N_COORDINATES, len(PARAMETERS), states[0].shape[-1:]
+    if {t.shape or one, p.shape[1:] or one, *(state.shape[1:] for state in states)} != {one}:
         shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
-        raise InputError(
-            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
-            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
-            f"({len(PARAMETERS)}, N)"
-        )
+        text = f"do not have the same last axis; give states ({n}, N), t () or (N,), and p ({k},) "
+        raise InputError(f"{NAME}: {shapes}, t {t.shape} and p {p.shape} {text}or ({k}, N)")
     return states, t, p
 
 
@@ -608,9 +580,7 @@ def _checked(name, value, entries=None, axis=-1):
         )
     finite = np.isfinite(array)
     if not finite.all():
-        found = [name]
-        if entries is not None:
-            rows = np.moveaxis(finite, axis, 0).reshape(len(entries), -1)
-            found = [entry for entry, row in zip(entries, rows) if not row.all()]
-        raise InputError(f"{NAME}: {name} is not finite in {', '.join(found)}; give finite numbers")
+        rows = finite[np.newaxis] if entries is None else np.moveaxis(finite, axis, 0)
+        found = ", ".join(x for x, row in zip(entries or (name,), rows) if not row.all())
+        raise InputError(f"{NAME}: {name} is not finite in {found}; give finite numbers")
     return array

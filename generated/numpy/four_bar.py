@@ -16,13 +16,11 @@ row  constraint                                        source
 Read `_position` first: Phi and Phi_q, constraint by constraint. `_nu` and `_gamma` are the right
 sides of velocity and acceleration, gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt.
 `_kinematics` is all of it once more, for batches. From `_Quantity` on all modules are alike.
-
-The functions take one point, q of shape (9,), or batches: q (..., 9), t (...)
-and p (..., 5) broadcast against each other. What begins with an underscore runs on floats
-(f = FLOATS) and on arrays (f = ARRAYS), whose last axis is the batch. Names in it, for a joint J on
-a body b: c_b and s_b are the cosine and sine of phi_b, J_b_x and J_b_y the point's vector A s,
-J_b_w2_x the same times phi_b_dot squared (_sq is a square), J_axis_b_x an axis A v, J_d_x the
-vector d between the points, J_d_dot_x its rate.
+The functions take one point, q of shape (9,), or batches: q (..., 9), t (...), p (..., 5).
+What begins with an underscore runs on floats (f = FLOATS) and on arrays (f = ARRAYS), whose last
+axis is the batch. Of a joint J on a body b, c_b and s_b are cosine and sine of phi_b, J_b_x and
+J_b_y its point's vector A s, J_b_w2_x that times phi_b_dot squared (_sq), J_axis_b_x an axis A v,
+J_d_x the vector d between its points, J_d_dot_x the rate of that.
 """
 
 import math
@@ -41,13 +39,13 @@ EQUATIONS = ("A.x", "A.y", "B.x", "B.y", "C.x", "C.y", "D.x", "D.y", "motor")
 PARAMETERS = ("a", "b", "c", "d", "omega")
 # name, first column and number of columns of each body
 BODIES = (("crank", 0, 3), ("coupler", 3, 3), ("rocker", 6, 3))
-UNITS = {
-    "x_crank": "m", "y_crank": "m", "phi_crank": "rad", "x_coupler": "m", "y_coupler": "m",
-    "phi_coupler": "rad", "x_rocker": "m", "y_rocker": "m", "phi_rocker": "rad", "a": "m",
-    "b": "m", "c": "m", "d": "m", "omega": "rad/s",
-}
+UNITS = dict(zip(COORDINATES + PARAMETERS, (
+    "m", "m", "rad", "m", "m", "rad", "m", "m", "rad", "m", "m", "m", "m", "rad/s",
+)))
 DEFAULTS = np.array((10.0, 26.0, 18.0, 20.0, 1.5), dtype=float)
-GUESS = np.array((5.0, 0.0, 0.0, 20.0, 10.0, 0.7853981633974483, 20.0, 9.0, 4.71238898038469), dtype=float)
+GUESS = np.array((
+    5.0, 0.0, 0.0, 20.0, 10.0, 0.7853981633974483, 20.0, 9.0, 4.71238898038469,
+), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
 PATTERN = np.array((
     (0, 0), (0, 2), (1, 1), (1, 2), (2, 0), (2, 2), (2, 3), (2, 5), (3, 1), (3, 2), (3, 4),
@@ -59,11 +57,9 @@ _CONSTANTS = {
     0: 1.0, 2: 1.0, 4: 1.0, 6: -1.0, 8: 1.0, 10: -1.0, 12: 1.0, 14: -1.0, 16: 1.0, 18: -1.0,
     20: 1.0, 22: 1.0, 24: 1.0,
 }
-pi = math.pi
 
 
-# Phi_q with all its entries:
-#       x_crank y_crank phi_crank  x_coupler y_coupler phi_coupler  x_rocker y_rocker phi_rocker
+# Phi_q x_crank y_crank phi_crank  x_coupler y_coupler phi_coupler  x_rocker y_rocker phi_rocker
 # A.x   1       .       B_crank_y  .         .         .            .        .        .
 # A.y   .       1       -B_crank_x .         .         .            .        .        .
 # B.x   1       .       -B_crank_y -1        .         -C_coupler_y .        .        .
@@ -86,16 +82,13 @@ def _position(f, q, t, p):
     c_rocker, s_rocker = cos_sin(phi_rocker)
     # 0-1  Revolute "A"
     a_2 = a / 2
-    B_crank_x = a_2 * c_crank
-    B_crank_y = a_2 * s_crank
+    B_crank_x, B_crank_y = a_2 * c_crank, a_2 * s_crank
     # 2-3  Revolute "B"
     b_2 = b / 2
-    C_coupler_x = b_2 * c_coupler
-    C_coupler_y = b_2 * s_coupler
+    C_coupler_x, C_coupler_y = b_2 * c_coupler, b_2 * s_coupler
     # 4-5  Revolute "C"
     c_2 = c / 2
-    D_rocker_x = c_2 * c_rocker
-    D_rocker_y = c_2 * s_rocker
+    D_rocker_x, D_rocker_y = c_2 * c_rocker, c_2 * s_rocker
     return (
         # Phi
         # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
@@ -110,8 +103,7 @@ def _position(f, q, t, p):
         # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
         x_rocker + D_rocker_x - d,
         y_rocker + D_rocker_y,
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        phi_crank - omega * t,
+        phi_crank - omega * t,  # 8  AbsoluteAngle "motor": crank angle omega*t
         # Phi_q
         B_crank_y,  # A.x by phi_crank
         -B_crank_x,  # A.y by phi_crank
@@ -135,8 +127,7 @@ def _nu(f, q, t, p):
         0, 0,  # 2-3  Revolute "B"
         0, 0,  # 4-5  Revolute "C"
         0, 0,  # 6-7  Revolute "D"
-        # 8  AbsoluteAngle "motor": crank angle omega*t
-        omega,
+        omega,  # 8  AbsoluteAngle "motor"
     )
 
 
@@ -145,38 +136,26 @@ def _gamma(f, q, q_dot, t, p):
     phi_crank_dot, phi_coupler_dot, phi_rocker_dot = q_dot[2], q_dot[5], q_dot[8]
     a, b, c, d, omega = p
     cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
-    # 0-1  Revolute "A"
     phi_crank_dot_sq = phi_crank_dot**2
     a_2 = a / 2
     B_crank_w2_x = phi_crank_dot_sq * (a_2 * c_crank)
     B_crank_w2_y = phi_crank_dot_sq * (a_2 * s_crank)
-    # 2-3  Revolute "B"
     phi_coupler_dot_sq = phi_coupler_dot**2
     b_2 = b / 2
     C_coupler_w2_x = phi_coupler_dot_sq * (b_2 * c_coupler)
     C_coupler_w2_y = phi_coupler_dot_sq * (b_2 * s_coupler)
-    # 4-5  Revolute "C"
     phi_rocker_dot_sq = phi_rocker_dot**2
     c_2 = c / 2
     D_rocker_w2_x = phi_rocker_dot_sq * (c_2 * c_rocker)
     D_rocker_w2_y = phi_rocker_dot_sq * (c_2 * s_rocker)
     return (
-        # 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        -B_crank_w2_x,
-        -B_crank_w2_y,
-        # 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        B_crank_w2_x + C_coupler_w2_x,
-        B_crank_w2_y + C_coupler_w2_y,
-        # 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        C_coupler_w2_x + D_rocker_w2_x,
-        C_coupler_w2_y + D_rocker_w2_y,
-        # 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        D_rocker_w2_x,
-        D_rocker_w2_y,
+        -B_crank_w2_x, -B_crank_w2_y,  # 0-1  Revolute "A"
+        B_crank_w2_x + C_coupler_w2_x, B_crank_w2_y + C_coupler_w2_y,  # 2-3  Revolute "B"
+        C_coupler_w2_x + D_rocker_w2_x, C_coupler_w2_y + D_rocker_w2_y,  # 4-5  Revolute "C"
+        D_rocker_w2_x, D_rocker_w2_y,  # 6-7  Revolute "D"
         0,  # 8  AbsoluteAngle "motor"
     )
 
@@ -189,7 +168,6 @@ def _kinematics(f, q, q_dot, t, p):
     phi_crank_dot, phi_coupler_dot, phi_rocker_dot = q_dot[2], q_dot[5], q_dot[8]
     a, b, c, d, omega = p
     cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
@@ -236,18 +214,14 @@ def _factor(f, J):
         B_y_phi_coupler, C_x_phi_coupler, C_x_phi_rocker, C_y_phi_coupler, C_y_phi_rocker,
         D_x_phi_rocker, D_y_phi_rocker,
     ) = J
-    k_1 = C_x_phi_coupler + B_x_phi_coupler
-    k_2 = C_y_phi_coupler + B_y_phi_coupler
-    k_3 = C_x_phi_rocker + D_x_phi_rocker
-    k_4 = C_y_phi_rocker + D_y_phi_rocker
+    k_1, k_2 = C_x_phi_coupler + B_x_phi_coupler, C_y_phi_coupler + B_y_phi_coupler
+    k_3, k_4 = C_x_phi_rocker + D_x_phi_rocker, C_y_phi_rocker + D_y_phi_rocker
     determinant = k_1 * k_4 - k_3 * k_2
     k_6 = 1 / determinant
     return (
         A_x_phi_crank, A_y_phi_crank, B_x_phi_crank, B_x_phi_coupler, B_y_phi_crank,
         B_y_phi_coupler, D_x_phi_rocker, D_y_phi_rocker, k_1, k_2, k_3, k_4, k_6,
-    ), (
-        determinant,
-    )
+    ), (determinant,)
 
 
 def _solve(f, F, b):
@@ -257,16 +231,11 @@ def _solve(f, F, b):
         B_y_phi_coupler, D_x_phi_rocker, D_y_phi_rocker, k_1, k_2, k_3, k_4, k_6,
     ) = F
     A_x, A_y, B_x, B_y, C_x, C_y, D_x, D_y, motor = b
-    x_crank = A_x - A_x_phi_crank * motor
-    y_crank = A_y - A_y_phi_crank * motor
-    b_3 = B_x - B_x_phi_crank * motor - x_crank
-    b_4 = B_y - B_y_phi_crank * motor - y_crank
-    b_5 = C_x + b_3 + D_x
-    b_6 = C_y + b_4 + D_y
-    phi_coupler = (k_4 * b_5 - k_3 * b_6) * k_6
-    phi_rocker = (k_1 * b_6 - k_2 * b_5) * k_6
-    y_rocker = D_y - D_y_phi_rocker * phi_rocker
-    x_rocker = D_x - D_x_phi_rocker * phi_rocker
+    x_crank, y_crank = A_x - A_x_phi_crank * motor, A_y - A_y_phi_crank * motor
+    b_3, b_4 = B_x - B_x_phi_crank * motor - x_crank, B_y - B_y_phi_crank * motor - y_crank
+    b_5, b_6 = C_x + b_3 + D_x, C_y + b_4 + D_y
+    phi_coupler, phi_rocker = (k_4 * b_5 - k_3 * b_6) * k_6, (k_1 * b_6 - k_2 * b_5) * k_6
+    y_rocker, x_rocker = D_y - D_y_phi_rocker * phi_rocker, D_x - D_x_phi_rocker * phi_rocker
     y_coupler = -(b_4 - B_y_phi_coupler * phi_coupler)
     x_coupler = -(b_3 - B_x_phi_coupler * phi_coupler)
     return (
@@ -322,12 +291,10 @@ def kinematics(q, q_dot, t, p=DEFAULTS):
 def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
     """Phi, the nonzeros of Phi_q, nu and gamma of a batch whose axis is the last one.
 
-    q and q_dot have the shape (9, N), t () or (N,), p (5,) or (5, N).
-    The results have the shapes (9, N), (25, N), (9, N), (9, N).
+    q and q_dot are (9, N), t is () or (N,), p (5,) or (5, N); the results have N columns.
     """
     states, t, p = _batch_last(t, p, (q, q_dot))
-    quantities = _PHI, _PHI_Q_NONZEROS, _NU, _GAMMA
-    return _on_batch(_kinematics, 0, quantities, t, p, states, is_last=True)
+    return _on_batch(_kinematics, 0, (_PHI, _PHI_Q_NONZEROS, _NU, _GAMMA), t, p, states, True)
 
 
 def solve(nonzeros, b):
@@ -343,12 +310,11 @@ def solve(nonzeros, b):
     return np.stack(np.broadcast_arrays(*x), axis=-1)
 
 
-# The code itself, for callers that keep each coordinate in an array of its own: functions of
-# (f, q, [q_dot,] t, p) with sequences q, q_dot, p. Of Phi_q they give the entries that vary.
-LANES = {
-    "position": _position, "nu": _nu, "gamma": _gamma, "kinematics": _kinematics,
-    "factor": _factor, "solve": _solve,
-}
+# the code itself, of (f, q, [q_dot,] t, p) with sequences q, q_dot, p of numbers or of arrays (N,)
+LANES = dict(
+    position=_position, nu=_nu, gamma=_gamma, kinematics=_kinematics, factor=_factor,
+    solve=_solve,
+)
 
 
 class InputError(ValueError):
@@ -356,12 +322,8 @@ class InputError(ValueError):
 
 
 def _cos_sin(angle):
-    """Cosine and sine of an array through t = tan(angle / 2): half the time of np.cos and np.sin.
-
-    With R = 2 / (1 + t^2) they are R - 1 and t R. A float is never exactly pi: there t is about
-    1e16, and t^2 far from overflow. The error is at most 4e-16.
-    """
-    t = np.tan(0.5 * angle)
+    """Cosine and sine through t = tan(angle / 2), half the time of np.cos and np.sin; to 4e-16."""
+    t = np.tan(0.5 * angle)  # at most 1e16, since a float is never exactly pi
     R = 2.0 / (1.0 + t * t)
     return R - 1.0, t * R
 
@@ -398,33 +360,39 @@ class _Quantity:
         result.put(self.index, computed)
         return result
 
+    def empty(self, count, dtype, is_last):
+        """Return an array (size, N) in which the entries that never change are in place."""
+        result = _empty((self.size, count) if is_last else (count, self.size), dtype)
+        if is_last:
+            result[self.fixed] = self.constants
+        elif not self.is_full:
+            result[:] = self.start.reshape(-1)
+        return result if is_last else result.T
+
 
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
 _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
 _PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
 _STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
-_BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
-_PARAMETER_LIST = DEFAULTS.tolist()
+_PARAMETER_LIST, _BLOCK = DEFAULTS.tolist(), 4000  # points at a time: they stay in the cache
 _empty = np.empty  # the loader's function in its place uses the memory of earlier results again
-for _array in (DEFAULTS, GUESS, PATTERN):
-    _array.flags.writeable = False
+DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = False
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
     """Return a quantity or several, what a kernel computes after so many values."""
-    quantities = wanted if type(wanted) is tuple else (wanted,)
     point = _point(t, p, states)
-    if point is not None:
-        try:
-            values = kernel(*point)
-        except (ArithmeticError, ValueError):
-            pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
-        else:
-            if quantities is not wanted:
-                return wanted.at_point(values[skip:])
-            values = iter(values)
-            return tuple([quantity.at_point(values) for quantity in quantities])
+    try:
+        values = kernel(*point) if point else None
+    except (ArithmeticError, ValueError):
+        values = None  # outside the domain of a function, where the array form gives NaN
+    if values is not None:
+        if type(wanted) is not tuple:
+            return wanted.at_point(values[skip:])
+        values = iter(values)
+        return tuple([quantity.at_point(values) for quantity in wanted])
+    quantities = wanted if type(wanted) is tuple else (wanted,)
     states, t, p, shape = _batch(t, p, states)
     results = _on_batch(kernel, skip, quantities, t, p, states)
     found = [part.T.reshape(shape + item.shape) for item, part in zip(quantities, results)]
@@ -434,15 +402,7 @@ def _evaluate(kernel, skip, wanted, t, p, *states):
 def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
     """Return quantities as arrays (size, N), in memory point by point or with the batch last."""
     count, dtype = states[0].shape[1], np.result_type(*states, t, p)
-    results = []
-    for item in quantities:
-        if is_last:
-            results.append(_empty((item.size, count), dtype))
-            results[-1][item.fixed] = item.constants
-        else:
-            results.append(_empty((count, item.size), dtype).T)
-            if not item.is_full:
-                results[-1].T[:] = item.start.reshape(-1)
+    results = [item.empty(count, dtype, is_last) for item in quantities]
     for start in range(0, count, _BLOCK):
         block = ..., slice(start, start + _BLOCK)
         at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
@@ -492,8 +452,7 @@ def _batch(t, p, states):
             f"{NAME}: the leading axes of {shapes}, t {t.shape} and p {p.shape} do not fit each "
             "other; they broadcast like NumPy arrays"
         ) from None
-    dtype = np.result_type(*states, t, p)
-    whole = (*shape, N_COORDINATES)
+    dtype, whole = np.result_type(*states, t, p), (*shape, N_COORDINATES)
     states = [_rows(state, whole).astype(dtype, copy=False) for state in states]
     t = t if t.ndim == 0 else _rows(t[..., np.newaxis], (*shape, 1))[0]
     p = p if p.ndim == 1 else _rows(p, (*shape, len(PARAMETERS)))
@@ -504,15 +463,11 @@ def _batch_last(t, p, states):
     """Check the arguments of a batch whose axis is the last one."""
     states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
     t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
-    count = states[0].shape[-1]
-    batches = {state.shape[1:] for state in states}
-    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
+    n, k, one = N_COORDINATES, len(PARAMETERS), states[0].shape[-1:]
+    if {t.shape or one, p.shape[1:] or one, *(state.shape[1:] for state in states)} != {one}:
         shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
-        raise InputError(
-            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
-            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
-            f"({len(PARAMETERS)}, N)"
-        )
+        text = f"do not have the same last axis; give states ({n}, N), t () or (N,), and p ({k},) "
+        raise InputError(f"{NAME}: {shapes}, t {t.shape} and p {p.shape} {text}or ({k}, N)")
     return states, t, p
 
 
@@ -539,9 +494,7 @@ def _checked(name, value, entries=None, axis=-1):
         )
     finite = np.isfinite(array)
     if not finite.all():
-        found = [name]
-        if entries is not None:
-            rows = np.moveaxis(finite, axis, 0).reshape(len(entries), -1)
-            found = [entry for entry, row in zip(entries, rows) if not row.all()]
-        raise InputError(f"{NAME}: {name} is not finite in {', '.join(found)}; give finite numbers")
+        rows = finite[np.newaxis] if entries is None else np.moveaxis(finite, axis, 0)
+        found = ", ".join(x for x, row in zip(entries or (name,), rows) if not row.all())
+        raise InputError(f"{NAME}: {name} is not finite in {found}; give finite numbers")
     return array

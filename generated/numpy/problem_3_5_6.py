@@ -12,13 +12,11 @@ row  constraint                        source
 Read `_position` first: Phi and Phi_q, constraint by constraint. `_nu` and `_gamma` are the right
 sides of velocity and acceleration, gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt.
 `_kinematics` is all of it once more, for batches. From `_Quantity` on all modules are alike.
-
-The functions take one point, q of shape (3,), or batches: q (..., 3), t (...)
-and p (..., 0) broadcast against each other. What begins with an underscore runs on floats
-(f = FLOATS) and on arrays (f = ARRAYS), whose last axis is the batch. Names in it, for a joint J on
-a body b: c_b and s_b are the cosine and sine of phi_b, J_b_x and J_b_y the point's vector A s,
-J_b_w2_x the same times phi_b_dot squared (_sq is a square), J_axis_b_x an axis A v, J_d_x the
-vector d between the points, J_d_dot_x its rate.
+The functions take one point, q of shape (3,), or batches: q (..., 3), t (...), p (..., 0).
+What begins with an underscore runs on floats (f = FLOATS) and on arrays (f = ARRAYS), whose last
+axis is the batch. Of a joint J on a body b, c_b and s_b are cosine and sine of phi_b, J_b_x and
+J_b_y its point's vector A s, J_b_w2_x that times phi_b_dot squared (_sq), J_axis_b_x an axis A v,
+J_d_x the vector d between its points, J_d_dot_x the rate of that.
 """
 
 import math
@@ -34,9 +32,7 @@ EQUATIONS = ("equation_1", "equation_2", "equation_3")
 PARAMETERS = ()
 # name, first column and number of columns of each body
 BODIES = ()
-UNITS = {
-    "x2": "", "y2": "", "phi3": "",
-}
+UNITS = dict(zip(COORDINATES + PARAMETERS, ("", "", "")))
 DEFAULTS = np.array((), dtype=float)
 GUESS = np.array((0.2, 0.2, 0.7853981633974483), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
@@ -47,11 +43,9 @@ PATTERN = np.array((
 _CONSTANTS = {
     0: 1.0, 2: 1.0,
 }
-pi = math.pi
 
 
-# Phi_q with all its entries:
-#            x2     y2     phi3
+# Phi_q      x2     y2     phi3
 # equation_1 1      .      equation_1_2
 # equation_2 .      1      equation_1_1
 # equation_3 2 * x2 2 * y2 .
@@ -63,10 +57,8 @@ def _position(f, q, t, p):
     equation_1_2 = cos(phi3) / 4
     return (
         # Phi
-        # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-        x2 + equation_1_1 - 3 / 5,
-        # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-        y2 - equation_1_2,
+        x2 + equation_1_1 - 3 / 5,  # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
+        y2 - equation_1_2,  # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
         # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
         x2**2 + y2**2 - (t / 10 + 2 / 5)**2,
         # Phi_q
@@ -81,8 +73,7 @@ def _nu(f, q, t, p):
     return (
         0,  # 0  Equation "equation_1"
         0,  # 1  Equation "equation_2"
-        # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        (t / 10 + 2 / 5) / 5,
+        (t / 10 + 2 / 5) / 5,  # 2  Equation "equation_3"
     )
 
 
@@ -90,15 +81,11 @@ def _gamma(f, q, q_dot, t, p):
     phi3 = q[2]
     x2_dot, y2_dot, phi3_dot = q_dot
     cos, sin = f.cos, f.sin
-    # 0  Equation "equation_1"
     phi3_dot_sq = phi3_dot**2
     return (
-        # 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-        phi3_dot_sq * sin(phi3) / 4,
-        # 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-        -phi3_dot_sq * cos(phi3) / 4,
-        # 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
-        1 / 50 - 2 * (x2_dot**2 + y2_dot**2),
+        phi3_dot_sq * sin(phi3) / 4,  # 0  Equation "equation_1"
+        -phi3_dot_sq * cos(phi3) / 4,  # 1  Equation "equation_2"
+        1 / 50 - 2 * (x2_dot**2 + y2_dot**2),  # 2  Equation "equation_3"
     )
 
 
@@ -129,13 +116,8 @@ def _factor(f, J):
     # block: phi3 by equation_3
     equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2 = J
     k_1 = equation_3_x2 * equation_1_phi3 + equation_3_y2 * equation_2_phi3
-    determinant = -k_1
-    k_3 = 1 / k_1
-    return (
-        equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2, k_3,
-    ), (
-        determinant,
-    )
+    determinant, k_3 = -k_1, 1 / k_1
+    return (equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2, k_3), (determinant,)
 
 
 def _solve(f, F, b):
@@ -143,12 +125,9 @@ def _solve(f, F, b):
     equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2, k_3 = F
     equation_1, equation_2, equation_3 = b
     b_1 = (equation_3 - equation_3_x2 * equation_1 - equation_3_y2 * equation_2) * k_3
-    phi3 = -b_1
-    y2 = equation_2 + equation_2_phi3 * b_1
+    phi3, y2 = -b_1, equation_2 + equation_2_phi3 * b_1
     x2 = equation_1 + equation_1_phi3 * b_1
-    return (
-        x2, y2, phi3,
-    )
+    return (x2, y2, phi3)
 
 
 def Phi(q, t, p=DEFAULTS):
@@ -199,12 +178,10 @@ def kinematics(q, q_dot, t, p=DEFAULTS):
 def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
     """Phi, the nonzeros of Phi_q, nu and gamma of a batch whose axis is the last one.
 
-    q and q_dot have the shape (3, N), t () or (N,), p (0,) or (0, N).
-    The results have the shapes (3, N), (6, N), (3, N), (3, N).
+    q and q_dot are (3, N), t is () or (N,), p (0,) or (0, N); the results have N columns.
     """
     states, t, p = _batch_last(t, p, (q, q_dot))
-    quantities = _PHI, _PHI_Q_NONZEROS, _NU, _GAMMA
-    return _on_batch(_kinematics, 0, quantities, t, p, states, is_last=True)
+    return _on_batch(_kinematics, 0, (_PHI, _PHI_Q_NONZEROS, _NU, _GAMMA), t, p, states, True)
 
 
 def solve(nonzeros, b):
@@ -220,12 +197,11 @@ def solve(nonzeros, b):
     return np.stack(np.broadcast_arrays(*x), axis=-1)
 
 
-# The code itself, for callers that keep each coordinate in an array of its own: functions of
-# (f, q, [q_dot,] t, p) with sequences q, q_dot, p. Of Phi_q they give the entries that vary.
-LANES = {
-    "position": _position, "nu": _nu, "gamma": _gamma, "kinematics": _kinematics,
-    "factor": _factor, "solve": _solve,
-}
+# the code itself, of (f, q, [q_dot,] t, p) with sequences q, q_dot, p of numbers or of arrays (N,)
+LANES = dict(
+    position=_position, nu=_nu, gamma=_gamma, kinematics=_kinematics, factor=_factor,
+    solve=_solve,
+)
 
 
 class InputError(ValueError):
@@ -266,33 +242,39 @@ class _Quantity:
         result.put(self.index, computed)
         return result
 
+    def empty(self, count, dtype, is_last):
+        """Return an array (size, N) in which the entries that never change are in place."""
+        result = _empty((self.size, count) if is_last else (count, self.size), dtype)
+        if is_last:
+            result[self.fixed] = self.constants
+        elif not self.is_full:
+            result[:] = self.start.reshape(-1)
+        return result if is_last else result.T
+
 
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
 _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
 _PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
 _STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
-_BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
-_PARAMETER_LIST = DEFAULTS.tolist()
+_PARAMETER_LIST, _BLOCK = DEFAULTS.tolist(), 4000  # points at a time: they stay in the cache
 _empty = np.empty  # the loader's function in its place uses the memory of earlier results again
-for _array in (DEFAULTS, GUESS, PATTERN):
-    _array.flags.writeable = False
+DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = False
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
     """Return a quantity or several, what a kernel computes after so many values."""
-    quantities = wanted if type(wanted) is tuple else (wanted,)
     point = _point(t, p, states)
-    if point is not None:
-        try:
-            values = kernel(*point)
-        except (ArithmeticError, ValueError):
-            pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
-        else:
-            if quantities is not wanted:
-                return wanted.at_point(values[skip:])
-            values = iter(values)
-            return tuple([quantity.at_point(values) for quantity in quantities])
+    try:
+        values = kernel(*point) if point else None
+    except (ArithmeticError, ValueError):
+        values = None  # outside the domain of a function, where the array form gives NaN
+    if values is not None:
+        if type(wanted) is not tuple:
+            return wanted.at_point(values[skip:])
+        values = iter(values)
+        return tuple([quantity.at_point(values) for quantity in wanted])
+    quantities = wanted if type(wanted) is tuple else (wanted,)
     states, t, p, shape = _batch(t, p, states)
     results = _on_batch(kernel, skip, quantities, t, p, states)
     found = [part.T.reshape(shape + item.shape) for item, part in zip(quantities, results)]
@@ -302,15 +284,7 @@ def _evaluate(kernel, skip, wanted, t, p, *states):
 def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
     """Return quantities as arrays (size, N), in memory point by point or with the batch last."""
     count, dtype = states[0].shape[1], np.result_type(*states, t, p)
-    results = []
-    for item in quantities:
-        if is_last:
-            results.append(_empty((item.size, count), dtype))
-            results[-1][item.fixed] = item.constants
-        else:
-            results.append(_empty((count, item.size), dtype).T)
-            if not item.is_full:
-                results[-1].T[:] = item.start.reshape(-1)
+    results = [item.empty(count, dtype, is_last) for item in quantities]
     for start in range(0, count, _BLOCK):
         block = ..., slice(start, start + _BLOCK)
         at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
@@ -360,8 +334,7 @@ def _batch(t, p, states):
             f"{NAME}: the leading axes of {shapes}, t {t.shape} and p {p.shape} do not fit each "
             "other; they broadcast like NumPy arrays"
         ) from None
-    dtype = np.result_type(*states, t, p)
-    whole = (*shape, N_COORDINATES)
+    dtype, whole = np.result_type(*states, t, p), (*shape, N_COORDINATES)
     states = [_rows(state, whole).astype(dtype, copy=False) for state in states]
     t = t if t.ndim == 0 else _rows(t[..., np.newaxis], (*shape, 1))[0]
     p = p if p.ndim == 1 else _rows(p, (*shape, len(PARAMETERS)))
@@ -372,15 +345,11 @@ def _batch_last(t, p, states):
     """Check the arguments of a batch whose axis is the last one."""
     states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
     t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
-    count = states[0].shape[-1]
-    batches = {state.shape[1:] for state in states}
-    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
+    n, k, one = N_COORDINATES, len(PARAMETERS), states[0].shape[-1:]
+    if {t.shape or one, p.shape[1:] or one, *(state.shape[1:] for state in states)} != {one}:
         shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
-        raise InputError(
-            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
-            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
-            f"({len(PARAMETERS)}, N)"
-        )
+        text = f"do not have the same last axis; give states ({n}, N), t () or (N,), and p ({k},) "
+        raise InputError(f"{NAME}: {shapes}, t {t.shape} and p {p.shape} {text}or ({k}, N)")
     return states, t, p
 
 
@@ -407,9 +376,7 @@ def _checked(name, value, entries=None, axis=-1):
         )
     finite = np.isfinite(array)
     if not finite.all():
-        found = [name]
-        if entries is not None:
-            rows = np.moveaxis(finite, axis, 0).reshape(len(entries), -1)
-            found = [entry for entry, row in zip(entries, rows) if not row.all()]
-        raise InputError(f"{NAME}: {name} is not finite in {', '.join(found)}; give finite numbers")
+        rows = finite[np.newaxis] if entries is None else np.moveaxis(finite, axis, 0)
+        found = ", ".join(x for x, row in zip(entries or (name,), rows) if not row.all())
+        raise InputError(f"{NAME}: {name} is not finite in {found}; give finite numbers")
     return array

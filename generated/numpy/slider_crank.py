@@ -16,13 +16,11 @@ row  constraint                                      source
 Read `_position` first: Phi and Phi_q, constraint by constraint. `_nu` and `_gamma` are the right
 sides of velocity and acceleration, gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_dot - Phi_tt.
 `_kinematics` is all of it once more, for batches. From `_Quantity` on all modules are alike.
-
-The functions take one point, q of shape (9,), or batches: q (..., 9), t (...)
-and p (..., 0) broadcast against each other. What begins with an underscore runs on floats
-(f = FLOATS) and on arrays (f = ARRAYS), whose last axis is the batch. Names in it, for a joint J on
-a body b: c_b and s_b are the cosine and sine of phi_b, J_b_x and J_b_y the point's vector A s,
-J_b_w2_x the same times phi_b_dot squared (_sq is a square), J_axis_b_x an axis A v, J_d_x the
-vector d between the points, J_d_dot_x its rate.
+The functions take one point, q of shape (9,), or batches: q (..., 9), t (...), p (..., 0).
+What begins with an underscore runs on floats (f = FLOATS) and on arrays (f = ARRAYS), whose last
+axis is the batch. Of a joint J on a body b, c_b and s_b are cosine and sine of phi_b, J_b_x and
+J_b_y its point's vector A s, J_b_w2_x that times phi_b_dot squared (_sq), J_axis_b_x an axis A v,
+J_d_x the vector d between its points, J_d_dot_x the rate of that.
 """
 
 import math
@@ -44,10 +42,7 @@ EQUATIONS = (
 PARAMETERS = ()
 # name, first column and number of columns of each body
 BODIES = (("crank", 0, 3), ("rod", 3, 3), ("slider", 6, 3))
-UNITS = {
-    "x_crank": "m", "y_crank": "m", "phi_crank": "rad", "x_rod": "m", "y_rod": "m",
-    "phi_rod": "rad", "x_slider": "m", "y_slider": "m", "phi_slider": "rad",
-}
+UNITS = dict(zip(COORDINATES + PARAMETERS, ("m", "m", "rad", "m", "m", "rad", "m", "m", "rad")))
 DEFAULTS = np.array((), dtype=float)
 GUESS = np.array((2.0, 0.0, 0.0, 7.0, 0.0, 0.0, 10.0, 0.0, 0.0), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
@@ -60,11 +55,9 @@ _CONSTANTS = {
     0: 1.0, 2: 1.0, 4: 1.0, 6: -1.0, 8: 1.0, 10: -1.0, 12: 1.0, 14: -1.0, 15: 1.0, 17: -1.0,
     18: 1.0, 19: 1.0, 20: 1.0,
 }
-pi = math.pi
 
 
-# Phi_q with all its entries:
-#                0 1 2                  3  4  5                6  7  8
+# Phi_q          0 1 2                  3  4  5                6  7  8
 # main_bearing.x 1 . crank_pin_crank_y  .  .  .                .  .  .
 # main_bearing.y . 1 -crank_pin_crank_x .  .  .                .  .  .
 # crank_pin.x    1 . -crank_pin_crank_y -1 .  -wrist_pin_rod_y .  .  .
@@ -81,11 +74,9 @@ def _position(f, q, t, p):
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
     # 0-1  Revolute "main_bearing"
-    crank_pin_crank_x = 2 * c_crank
-    crank_pin_crank_y = 2 * s_crank
+    crank_pin_crank_x, crank_pin_crank_y = 2 * c_crank, 2 * s_crank
     # 2-3  Revolute "crank_pin"
-    wrist_pin_rod_x = 3 * c_rod
-    wrist_pin_rod_y = 3 * s_rod
+    wrist_pin_rod_x, wrist_pin_rod_y = 3 * c_rod, 3 * s_rod
     return (
         # Phi
         # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
@@ -97,12 +88,9 @@ def _position(f, q, t, p):
         # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
         x_rod + wrist_pin_rod_x - x_slider,
         y_rod + wrist_pin_rod_y - y_slider,
-        # 6  AbsoluteY "guide_height": slider (0, 0) value 0
-        y_slider,
-        # 7  AbsoluteAngle "guide_angle": slider angle 0
-        phi_slider,
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        phi_crank - t**2,
+        y_slider,  # 6  AbsoluteY "guide_height": slider (0, 0) value 0
+        phi_slider,  # 7  AbsoluteAngle "guide_angle": slider angle 0
+        phi_crank - t**2,  # 8  AbsoluteAngle "motor": crank angle t**2
         # Phi_q
         crank_pin_crank_y,  # main_bearing.x by phi_crank
         -crank_pin_crank_x,  # main_bearing.y by phi_crank
@@ -122,8 +110,7 @@ def _nu(f, q, t, p):
         0, 0,  # 4-5  Revolute "wrist_pin"
         0,  # 6  AbsoluteY "guide_height"
         0,  # 7  AbsoluteAngle "guide_angle"
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        2 * t,
+        2 * t,  # 8  AbsoluteAngle "motor"
     )
 
 
@@ -131,31 +118,23 @@ def _gamma(f, q, q_dot, t, p):
     phi_crank, phi_rod = q[2], q[5]
     phi_crank_dot, phi_rod_dot = q_dot[2], q_dot[5]
     cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
-    # 0-1  Revolute "main_bearing"
     phi_crank_dot_sq = phi_crank_dot**2
     crank_pin_crank_w2_x = phi_crank_dot_sq * (2 * c_crank)
     crank_pin_crank_w2_y = phi_crank_dot_sq * (2 * s_crank)
-    # 2-3  Revolute "crank_pin"
     phi_rod_dot_sq = phi_rod_dot**2
     wrist_pin_rod_w2_x = phi_rod_dot_sq * (3 * c_rod)
     wrist_pin_rod_w2_y = phi_rod_dot_sq * (3 * s_rod)
     return (
-        # 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
-        -crank_pin_crank_w2_x,
-        -crank_pin_crank_w2_y,
+        -crank_pin_crank_w2_x, -crank_pin_crank_w2_y,  # 0-1  Revolute "main_bearing"
         # 2-3  Revolute "crank_pin": crank (2, 0) - rod (-3, 0)
         crank_pin_crank_w2_x + wrist_pin_rod_w2_x,
         crank_pin_crank_w2_y + wrist_pin_rod_w2_y,
-        # 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
-        wrist_pin_rod_w2_x,
-        wrist_pin_rod_w2_y,
+        wrist_pin_rod_w2_x, wrist_pin_rod_w2_y,  # 4-5  Revolute "wrist_pin"
         0,  # 6  AbsoluteY "guide_height"
         0,  # 7  AbsoluteAngle "guide_angle"
-        # 8  AbsoluteAngle "motor": crank angle t**2
-        2,
+        2,  # 8  AbsoluteAngle "motor"
     )
 
 
@@ -163,7 +142,6 @@ def _kinematics(f, q, q_dot, t, p):
     x_crank, y_crank, phi_crank, x_rod, y_rod, phi_rod, x_slider, y_slider, phi_slider = q
     phi_crank_dot, phi_rod_dot = q_dot[2], q_dot[5]
     cos_sin = f.cos_sin
-    # body frames: A = [[c, -s], [s, c]]
     c_crank, s_crank = cos_sin(phi_crank)
     c_rod, s_rod = cos_sin(phi_rod)
     crank_pin_crank_x, crank_pin_crank_y = 2 * c_crank, 2 * s_crank
@@ -207,9 +185,7 @@ def _factor(f, J):
     return (
         main_bearing_x_phi_crank, main_bearing_y_phi_crank, crank_pin_x_phi_crank,
         crank_pin_x_phi_rod, crank_pin_y_phi_crank, crank_pin_y_phi_rod, wrist_pin_x_phi_rod, k_2,
-    ), (
-        determinant,
-    )
+    ), (determinant,)
 
 
 def _solve(f, F, b):
@@ -228,8 +204,7 @@ def _solve(f, F, b):
     y_rod = -(b_2 - crank_pin_y_phi_rod * phi_rod)
     x_crank = main_bearing_x - main_bearing_x_phi_crank * motor
     b_6 = crank_pin_x - x_crank - crank_pin_x_phi_crank * motor - crank_pin_x_phi_rod * phi_rod
-    x_rod = -b_6
-    x_slider = -(wrist_pin_x + b_6 - wrist_pin_x_phi_rod * phi_rod)
+    x_rod, x_slider = -b_6, -(wrist_pin_x + b_6 - wrist_pin_x_phi_rod * phi_rod)
     return (
         x_crank, y_crank, motor, x_rod, y_rod, phi_rod, x_slider, guide_height, guide_angle,
     )
@@ -283,12 +258,10 @@ def kinematics(q, q_dot, t, p=DEFAULTS):
 def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
     """Phi, the nonzeros of Phi_q, nu and gamma of a batch whose axis is the last one.
 
-    q and q_dot have the shape (9, N), t () or (N,), p (0,) or (0, N).
-    The results have the shapes (9, N), (21, N), (9, N), (9, N).
+    q and q_dot are (9, N), t is () or (N,), p (0,) or (0, N); the results have N columns.
     """
     states, t, p = _batch_last(t, p, (q, q_dot))
-    quantities = _PHI, _PHI_Q_NONZEROS, _NU, _GAMMA
-    return _on_batch(_kinematics, 0, quantities, t, p, states, is_last=True)
+    return _on_batch(_kinematics, 0, (_PHI, _PHI_Q_NONZEROS, _NU, _GAMMA), t, p, states, True)
 
 
 def solve(nonzeros, b):
@@ -304,12 +277,11 @@ def solve(nonzeros, b):
     return np.stack(np.broadcast_arrays(*x), axis=-1)
 
 
-# The code itself, for callers that keep each coordinate in an array of its own: functions of
-# (f, q, [q_dot,] t, p) with sequences q, q_dot, p. Of Phi_q they give the entries that vary.
-LANES = {
-    "position": _position, "nu": _nu, "gamma": _gamma, "kinematics": _kinematics,
-    "factor": _factor, "solve": _solve,
-}
+# the code itself, of (f, q, [q_dot,] t, p) with sequences q, q_dot, p of numbers or of arrays (N,)
+LANES = dict(
+    position=_position, nu=_nu, gamma=_gamma, kinematics=_kinematics, factor=_factor,
+    solve=_solve,
+)
 
 
 class InputError(ValueError):
@@ -317,12 +289,8 @@ class InputError(ValueError):
 
 
 def _cos_sin(angle):
-    """Cosine and sine of an array through t = tan(angle / 2): half the time of np.cos and np.sin.
-
-    With R = 2 / (1 + t^2) they are R - 1 and t R. A float is never exactly pi: there t is about
-    1e16, and t^2 far from overflow. The error is at most 4e-16.
-    """
-    t = np.tan(0.5 * angle)
+    """Cosine and sine through t = tan(angle / 2), half the time of np.cos and np.sin; to 4e-16."""
+    t = np.tan(0.5 * angle)  # at most 1e16, since a float is never exactly pi
     R = 2.0 / (1.0 + t * t)
     return R - 1.0, t * R
 
@@ -359,33 +327,39 @@ class _Quantity:
         result.put(self.index, computed)
         return result
 
+    def empty(self, count, dtype, is_last):
+        """Return an array (size, N) in which the entries that never change are in place."""
+        result = _empty((self.size, count) if is_last else (count, self.size), dtype)
+        if is_last:
+            result[self.fixed] = self.constants
+        elif not self.is_full:
+            result[:] = self.start.reshape(-1)
+        return result if is_last else result.T
+
 
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
 _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
 _PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
 _STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
-_BLOCK = 4000  # points at a time, so that intermediate arrays stay in the cache
-_PARAMETER_LIST = DEFAULTS.tolist()
+_PARAMETER_LIST, _BLOCK = DEFAULTS.tolist(), 4000  # points at a time: they stay in the cache
 _empty = np.empty  # the loader's function in its place uses the memory of earlier results again
-for _array in (DEFAULTS, GUESS, PATTERN):
-    _array.flags.writeable = False
+DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = False
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
     """Return a quantity or several, what a kernel computes after so many values."""
-    quantities = wanted if type(wanted) is tuple else (wanted,)
     point = _point(t, p, states)
-    if point is not None:
-        try:
-            values = kernel(*point)
-        except (ArithmeticError, ValueError):
-            pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
-        else:
-            if quantities is not wanted:
-                return wanted.at_point(values[skip:])
-            values = iter(values)
-            return tuple([quantity.at_point(values) for quantity in quantities])
+    try:
+        values = kernel(*point) if point else None
+    except (ArithmeticError, ValueError):
+        values = None  # outside the domain of a function, where the array form gives NaN
+    if values is not None:
+        if type(wanted) is not tuple:
+            return wanted.at_point(values[skip:])
+        values = iter(values)
+        return tuple([quantity.at_point(values) for quantity in wanted])
+    quantities = wanted if type(wanted) is tuple else (wanted,)
     states, t, p, shape = _batch(t, p, states)
     results = _on_batch(kernel, skip, quantities, t, p, states)
     found = [part.T.reshape(shape + item.shape) for item, part in zip(quantities, results)]
@@ -395,15 +369,7 @@ def _evaluate(kernel, skip, wanted, t, p, *states):
 def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
     """Return quantities as arrays (size, N), in memory point by point or with the batch last."""
     count, dtype = states[0].shape[1], np.result_type(*states, t, p)
-    results = []
-    for item in quantities:
-        if is_last:
-            results.append(_empty((item.size, count), dtype))
-            results[-1][item.fixed] = item.constants
-        else:
-            results.append(_empty((count, item.size), dtype).T)
-            if not item.is_full:
-                results[-1].T[:] = item.start.reshape(-1)
+    results = [item.empty(count, dtype, is_last) for item in quantities]
     for start in range(0, count, _BLOCK):
         block = ..., slice(start, start + _BLOCK)
         at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
@@ -453,8 +419,7 @@ def _batch(t, p, states):
             f"{NAME}: the leading axes of {shapes}, t {t.shape} and p {p.shape} do not fit each "
             "other; they broadcast like NumPy arrays"
         ) from None
-    dtype = np.result_type(*states, t, p)
-    whole = (*shape, N_COORDINATES)
+    dtype, whole = np.result_type(*states, t, p), (*shape, N_COORDINATES)
     states = [_rows(state, whole).astype(dtype, copy=False) for state in states]
     t = t if t.ndim == 0 else _rows(t[..., np.newaxis], (*shape, 1))[0]
     p = p if p.ndim == 1 else _rows(p, (*shape, len(PARAMETERS)))
@@ -465,15 +430,11 @@ def _batch_last(t, p, states):
     """Check the arguments of a batch whose axis is the last one."""
     states = [_checked(name, state, COORDINATES, 0) for name, state in zip(_STATES, states)]
     t, p = _checked("t", t), _checked("p", p, PARAMETERS, 0)
-    count = states[0].shape[-1]
-    batches = {state.shape[1:] for state in states}
-    if batches | {t.shape or (count,), p.shape[1:] or (count,)} != {(count,)}:
+    n, k, one = N_COORDINATES, len(PARAMETERS), states[0].shape[-1:]
+    if {t.shape or one, p.shape[1:] or one, *(state.shape[1:] for state in states)} != {one}:
         shapes = ", ".join(f"{name} {state.shape}" for name, state in zip(_STATES, states))
-        raise InputError(
-            f"{NAME}: {shapes}, t {t.shape} and p {p.shape} do not have the same last axis; give "
-            f"states ({N_COORDINATES}, N), t () or (N,), and p ({len(PARAMETERS)},) or "
-            f"({len(PARAMETERS)}, N)"
-        )
+        text = f"do not have the same last axis; give states ({n}, N), t () or (N,), and p ({k},) "
+        raise InputError(f"{NAME}: {shapes}, t {t.shape} and p {p.shape} {text}or ({k}, N)")
     return states, t, p
 
 
@@ -500,9 +461,7 @@ def _checked(name, value, entries=None, axis=-1):
         )
     finite = np.isfinite(array)
     if not finite.all():
-        found = [name]
-        if entries is not None:
-            rows = np.moveaxis(finite, axis, 0).reshape(len(entries), -1)
-            found = [entry for entry, row in zip(entries, rows) if not row.all()]
-        raise InputError(f"{NAME}: {name} is not finite in {', '.join(found)}; give finite numbers")
+        rows = finite[np.newaxis] if entries is None else np.moveaxis(finite, axis, 0)
+        found = ", ".join(x for x, row in zip(entries or (name,), rows) if not row.all())
+        raise InputError(f"{NAME}: {name} is not finite in {found}; give finite numbers")
     return array

@@ -59,12 +59,21 @@ def _lines(
 def _definitions(function: ast.FunctionDef) -> dict[str, ast.Assign]:
     """Return the statements that compute a value with a name of its own."""
     return {
-        target.id: statement
+        name.id: statement
         for statement in function.body
-        if isinstance(statement, ast.Assign)
-        and isinstance(target := statement.targets[0], ast.Name)
-        and not isinstance(statement.value, ast.Attribute | ast.Subscript)
+        if isinstance(statement, ast.Assign) and not _is_input(statement)
+        for name in ast.walk(statement.targets[0])
+        if isinstance(name, ast.Name)
     }
+
+
+def _is_input(statement: ast.Assign) -> bool:
+    """Return whether a statement only gives names to what the function was given."""
+    values = [statement.value]
+    if isinstance(statement.value, ast.Tuple):
+        values = statement.value.elts
+    is_vector = isinstance(statement.targets[0], ast.Tuple) and isinstance(values[0], ast.Name)
+    return is_vector or all(isinstance(value, ast.Attribute | ast.Subscript) for value in values)
 
 
 def _source_line(

@@ -111,7 +111,7 @@ def _text(file: Path) -> str:
 
 
 def _code(source: str, filename: str) -> tuple[CodeType, ...]:
-    """Compile emitted text; what modules have in common, a third of the time, only once."""
+    """Compile emitted text; what modules share only once: a four-bar takes 11 ms instead of 18."""
     own, mark, shared = source.partition(_SHARED)
     code = compile(own, filename, "exec")
     return code, _moved(_compiled(mark + shared), filename, own.count("\n"))

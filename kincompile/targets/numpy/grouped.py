@@ -31,8 +31,8 @@ from kincompile.targets.numpy.target import (
     public_functions,
     scalar_functions,
     shared_text,
-    tuple_text,
 )
+from kincompile.targets.numpy.text import tuple_text
 from kincompile.targets.printer import Printer
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
@@ -219,7 +219,7 @@ def _data(
             f'{name} = _data["{name}.breaks"], _data["{name}.coefficients"]'
             for name in program.tables
         ),
-        "defaults": tuple_text(repr(item.default) for item in program.parameters),
+        "defaults": tuple_text((repr(item.default) for item in program.parameters), 62),
         "scalar_functions": indented(scalar_functions(called)),
         "array_functions": indented(array_functions(called)),
         "kernels": "\n".join(code),

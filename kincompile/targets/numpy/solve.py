@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.targets.lines import broken, wrapped
+from kincompile.targets.lines import wrapped
 from kincompile.targets.numpy.dialect import NUMPY
+from kincompile.targets.numpy.text import assignments, tuple_text
 from kincompile.targets.planned_solve import explained
 from kincompile.targets.printer import Printer
 from kincompile.targets.schedule import Assignment
@@ -22,12 +23,14 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
     printer, names = Printer(NUMPY, listing.plan.nodes, listing.names), listing.names
     factor = _unpack([names[node] for _, _, node in listing.plan.entries], "J")
     factor += _steps(listing.factor_steps, printer)
-    factor += ["return (", *_tuple([names[node] for node in listing.factors]), "), ("]
-    factor += [*_tuple([printer.text(node) for node in listing.plan.determinants]), ")"]
+    kept = tuple_text(names[node] for node in listing.factors)
+    determinants = tuple_text(printer.text(node) for node in listing.plan.determinants)
+    factor += f"return {kept}, {determinants}".split("\n")
     solve = [*_unpack([names[node] for node in listing.factors], "F")]
     solve += _unpack([names[node] for node in listing.plan.right], "b")
     solve += _steps(listing.solve_steps, printer)
-    solve += ["return (", *_tuple([printer.text(node) for node in listing.plan.solution]), ")"]
+    solution = tuple_text(printer.text(node) for node in listing.plan.solution)
+    solve += f"return {solution}".split("\n")
     return [
         f"def {prefix}_factor(f, J):",
         '    """Return what a solve needs of Phi_q, and the determinants of its blocks."""',
@@ -46,24 +49,19 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
 def _steps(steps: Iterable[Assignment | BlockCall], printer: Printer) -> list[str]:
     """Return the statements of a function; LAPACK takes the larger blocks."""
     lines: list[str] = []
+    texts: list[tuple[str, str]] = []
     for step in steps:
         if isinstance(step, Assignment):
-            lines += assigned(step.name, printer.definition(step.node))
-        else:
-            function = "solve" if step.right else "determinant"
-            lines.append(f"{', '.join(step.names)} = f.block_{function}({step.size}, (")
-            lines += _indented(step.matrix, printer)
-            lines += ["), (", *_indented(step.right, printer)] if step.right else []
-            lines.append("))")
-    return lines
-
-
-def assigned(name: str, text: str) -> list[str]:
-    """Return a value with its name, a long one in parentheses."""
-    lines = broken(text)
-    if len(lines) == 1:
-        return [f"{name} = {text}"]
-    return [f"{name} = (", *(f"    {line}" for line in lines), ")"]
+            texts.append((step.name, printer.definition(step.node)))
+            continue
+        function = "solve" if step.right else "determinant"
+        lines += assignments(texts)
+        lines.append(f"{', '.join(step.names)} = f.block_{function}({step.size}, (")
+        lines += _indented(step.matrix, printer)
+        lines += ["), (", *_indented(step.right, printer)] if step.right else []
+        lines.append("))")
+        texts = []
+    return lines + assignments(texts)
 
 
 def _indented(nodes: Iterable[int], printer: Printer) -> list[str]:
@@ -77,7 +75,3 @@ def _unpack(names: list[str], vector: str) -> list[str]:
     if len(lines) == 1:
         return [f"{lines[0] if len(names) == 1 else lines[0].rstrip(',')} = {vector}"]
     return ["(", *(f"    {line}" for line in lines), f") = {vector}"]
-
-
-def _tuple(texts: list[str]) -> list[str]:
-    return [f"    {line}" for line in wrapped(texts)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,10 +10,11 @@ from kincompile.ir.elimination import plan_solve
 from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
 from kincompile.targets.evaluators import varying, vectors
 from kincompile.targets.headings import entry_title, header, short_title, title
-from kincompile.targets.lines import WIDTH, broken, commented, indented, table, wrapped
+from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
-from kincompile.targets.numpy.solve import assigned, solve_functions
+from kincompile.targets.numpy.solve import solve_functions
+from kincompile.targets.numpy.text import assignments, element, packed, tuple_text
 from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
@@ -81,9 +81,10 @@ def files(
     data = {
         **_constants(code),
         "kernels": "\n".join(lines),
+        "has_pi": any(re.search(r"\bpi\b", line) for line in lines),
         "functions": "\n".join(_functions(code)),
         "results": "\n".join(_results()),
-        "lanes": indented(wrapped(f'"{name}": _{name}' for name in keys)),
+        "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
         "scalar_functions": indented(scalar_functions(sorted(called))),
         "array_functions": indented(array_functions(sorted(called))),
         "is_planned": plan is not None,
@@ -98,8 +99,8 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
     """Return what the head of the module says."""
     program = code.program
     names = [item.name for item in program.coordinates]
-    units = {item.name: item.unit for item in program.coordinates}
-    units |= {item.name: item.unit for item in program.parameters}
+    units = [item.unit for item in program.coordinates]
+    units += [item.unit for item in program.parameters]
     return {
         "title": program.name,
         "header": "\n".join(header(code)),
@@ -116,19 +117,12 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "is_redundant": bool(program.redundant),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
-        "units": indented(wrapped([f'"{name}": "{unit}"' for name, unit in units.items()])),
-        "defaults": tuple_text(repr(item.default) for item in program.parameters),
-        "guess": tuple_text(repr(item.guess) for item in program.coordinates),
+        "units": tuple_text((f'"{unit}"' for unit in units), WIDTH - 44),
+        "defaults": tuple_text((repr(item.default) for item in program.parameters), WIDTH - 34),
+        "guess": tuple_text((repr(item.guess) for item in program.coordinates), WIDTH - 34),
         "patterns": "\n".join(_patterns(code)),
         "tables": "\n".join(_tables(program)),
     }
-
-
-def tuple_text(items: Iterable[str]) -> str:
-    """Return a tuple as text: on one line, or its elements on lines of their own."""
-    items = list(items)
-    text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
-    return text if len(text) <= WIDTH - 15 else f"(\n{indented(wrapped(items))}\n)"
 
 
 def bodies_text(program: Program) -> str:
@@ -255,19 +249,20 @@ def function_body(
         elsewhere with comments, as many a line as fit.
     """
     body = []
+    is_first = style == "titled" and listing.results[0][0] == "Phi"  # where a reader begins
     if listing.functions:
         called = ", ".join(listing.functions)
         body.append(f"{called} = {', '.join(f'f.{name}' for name in listing.functions)}")
-    body += _frames(listing, printer)
-    for section, assignments in listing.steps:
-        body += [f"# {short_title(section)}"] if style == "titled" else []
-        texts = [(item.name, printer.definition(item.node)) for item in assignments]
-        body += _pairs(texts) if style == "packed" else _assignments(texts)
+    body += _frames(listing, printer, is_first)
+    for section, own in listing.steps:
+        body += [f"# {short_title(section)}"] if is_first else []
+        texts = [(item.name, printer.definition(item.node)) for item in own]
+        body += assignments(texts, is_titled=style != "packed")
     body.append("return (")
     for name, rows in listing.results:
         body += [f"    # {name}"] if len(listing.results) > 1 else []
         if style == "packed":
-            body += _packed([printer.text(entry.node) for _, own in rows for entry in own])
+            body += packed([printer.text(entry.node) for _, own in rows for entry in own])
             continue
         for section, entries in rows:
             body += _section(name, section, entries, code, printer, style)
@@ -285,28 +280,22 @@ def _section(
     printer: Printer,
     style: Style,
 ) -> list[str]:
-    """Return the entries of a constraint; what is nothing but numbers on one line."""
-    texts = [printer.text(entry.node) for entry in entries]
-    if style == "plain" or not entries:
-        return [line for text in texts for line in _element(text, "")]
-    is_own = quantity_named(name).rows == "equations"
-    if is_own and all(code.number(entry.node) == 0 for entry in entries):
-        return [f"    {', '.join(texts)},  # {short_title(section)}"]
-    is_titled = is_own and not quantity_named(name).is_matrix  # of a matrix each entry is named
-    lines = [f"    {line}" for line in commented(title(section))] if is_titled else []
+    """Return the entries of a constraint, right sides on one line where they fit."""
+    texts, quantity = [printer.text(entry.node) for entry in entries], None
+    if style == "titled" and entries:
+        quantity = quantity_named(name)
+    if quantity is None:
+        return [line for text in texts for line in element(text, "")]
+    is_own = quantity.rows == "equations" and not quantity.is_matrix
+    line = f"    {', '.join(texts)},  # {short_title(section)}"
+    if is_own and name != "Phi" and len(line) <= WIDTH - 4:
+        return [line]
+    whole = f"    {texts[0]},  # {title(section)}"
+    if is_own and len(texts) == 1 and len(whole) <= WIDTH - 4:
+        return [whole]
+    lines = [f"    {line}" for line in commented(title(section))] if is_own else []
     for entry, text in zip(entries, texts, strict=True):
-        lines += _element(text, entry_title(name, entry, code))
-    return lines
-
-
-def _packed(texts: Sequence[str]) -> list[str]:
-    """Return the elements of a tuple, as many a line as fit."""
-    lines: list[str] = []
-    for is_long, group in itertools.groupby(texts, lambda text: len(text) > WIDTH - 8):
-        if is_long:
-            lines += [line for text in group for line in _element(text, "")]
-        else:
-            lines += [f"    {line}" for line in wrapped(group)]
+        lines += element(text, entry_title(name, entry, code))
     return lines
 
 
@@ -317,39 +306,10 @@ def _matrix(code: InlineProgram, printer: Printer) -> list[str]:
     for entry in code.entries("Phi_q"):
         rows[entry.row][entry.column + 1] = printer.text(entry.node)
     for heads in (coordinates, [str(k) for k in range(len(coordinates))]):
-        lines = table([["", *heads], *rows], gap=1)
+        lines = table([["Phi_q", *heads], *rows], gap=1)
         if max(map(len, lines)) <= WIDTH:
-            return [f"# {line}" for line in ("Phi_q with all its entries:", *lines)]
+            return [f"# {line}" for line in lines]
     return []
-
-
-def _assignments(texts: Iterable[tuple[str, str]]) -> list[str]:
-    """Return values with their names, long ones in parentheses."""
-    return [line for name, text in texts for line in assigned(name, text)]
-
-
-def _pairs(texts: Sequence[tuple[str, str]]) -> list[str]:
-    """Return values with their names, two on a line where the second does not need the first."""
-    lines: list[str] = []
-    rest = list(texts)
-    while rest:
-        (name, text), *rest = rest
-        if rest and name not in re.findall(r"\w+", rest[0][1]):
-            pair = f"{name}, {rest[0][0]} = {text}, {rest[0][1]}"
-            if len(pair) <= WIDTH - 4:
-                lines.append(pair)
-                del rest[0]
-                continue
-        lines += assigned(name, text)
-    return lines
-
-
-def _element(text: str, comment: str) -> list[str]:
-    """Return an element of the returned tuple, a long one continued with deeper indentation."""
-    first, *rest = broken(text)
-    lines = [f"    {first}", *(f"        {line}" for line in rest)]
-    lines[-1] += f",  # {comment}" if comment else ","
-    return lines
 
 
 def _unpack(program: Program, listing: Listing) -> list[str]:
@@ -373,11 +333,9 @@ def _targets(members: Sequence[str], vector: str) -> list[str]:
     return ["(", *(f"    {line}" for line in wrapped(members)), f") = {vector}"]
 
 
-def _frames(listing: Listing, printer: Printer) -> list[str]:
+def _frames(listing: Listing, printer: Printer, is_first: bool) -> list[str]:
     """Return the cosine and sine of each body's angle, a line a body."""
-    if not listing.frames:
-        return []
-    lines = ["# body frames: A = [[c, -s], [s, c]]"]
+    lines = ["# body frames: A = [[c, -s], [s, c]]"] if listing.frames and is_first else []
     for frame in listing.frames:
         left = ", ".join(item.name for item in frame.values)
         if frame.angle is not None:
