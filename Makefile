@@ -68,13 +68,13 @@ demo: $(DEMO_READY)
 	@echo "  demo/wrecker_boom.html           the motion on a page: open it in a browser"
 
 test: $(TEST_READY)
-	@$(PYTEST) --numprocesses=auto
+	@$(PYTEST) --numprocesses=auto --dist=loadgroup
 
 test-all: test test-slow
 
 # The exhaustive rest: packaging, pages in a browser, large corpora.
 test-slow: $(PAGES_READY)
-	@$(PYTEST) --numprocesses=auto -m slow
+	@$(PYTEST) --numprocesses=auto --dist=loadgroup -m slow
 
 lint: $(LINT_READY)
 	@$(BIN)/ruff check --quiet

@@ -42,16 +42,6 @@ class Frame:
         return Symbol(f"phi_{self.index}")
 
     @property
-    def r_dot(self) -> VectorSymbol:
-        """The velocity of the body's origin."""
-        return VectorSymbol(f"r_{self.index}_dot")
-
-    @property
-    def phi_dot(self) -> Symbol:
-        """The angular velocity of the body."""
-        return Symbol(f"phi_{self.index}_dot")
-
-    @property
     def coordinates(self) -> tuple[CoordinateSymbol, ...]:
         """Its generalised coordinates, in order."""
         return self.r, self.phi
@@ -59,7 +49,7 @@ class Frame:
     @property
     def rates(self) -> tuple[CoordinateSymbol, ...]:
         """Their rates, in the same order."""
-        return self.r_dot, self.phi_dot
+        return VectorSymbol(f"r_{self.index}_dot"), Symbol(f"phi_{self.index}_dot")
 
     @property
     def rotation(self) -> Rotation:
@@ -88,11 +78,6 @@ class Contact:
         return Symbol(f"alpha_{self.index}")
 
     @property
-    def alpha_dot(self) -> Symbol:
-        """The rate of the contact parameter."""
-        return Symbol(f"alpha_{self.index}_dot")
-
-    @property
     def coordinates(self) -> tuple[CoordinateSymbol, ...]:
         """Its one generalised coordinate."""
         return (self.alpha,)
@@ -100,7 +85,7 @@ class Contact:
     @property
     def rates(self) -> tuple[CoordinateSymbol, ...]:
         """The rate of it."""
-        return (self.alpha_dot,)
+        return (Symbol(f"alpha_{self.index}_dot"),)
 
     @property
     def rotation(self) -> Rotation:

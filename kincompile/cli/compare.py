@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 import kincompile as kc
-from kincompile.cli.shared import DIFFERENT, print_data, read_model, require_output
+from kincompile.cli.shared import DIFFERENT, output_option, print_data, read_model, require_output
 from kincompile.errors import InputError
 from kincompile.writing import write_atomically
 
@@ -19,7 +19,7 @@ from kincompile.writing import write_atomically
 @click.argument("hand")
 @click.option("--constraint", metavar="NAME", help="Check this constraint alone.")
 @click.option("--reveal", is_flag=True, help="Show the right formulas.")
-@click.option("-o", "--output", metavar="FILE", help="Write the report: .html, .json or .txt.")
+@output_option("Write the report: .html, .json or .txt.", required=False)
 @click.option("--gradescope", metavar="FILE", help="Write a results.json for Gradescope.")
 @click.pass_context
 def command(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 import kincompile as kc
-from kincompile.cli.shared import print_data, read_model, require_output
+from kincompile.cli.shared import output_option, print_data, read_model, require_output
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.targets.registry import TARGETS
@@ -23,13 +23,7 @@ ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.end
 
 @click.command("compile")
 @click.argument("model")
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="FILE",
-    help="File to write, or a folder, or - for stdout.",
-)
+@output_option("File to write, or a folder, or - for stdout.")
 @click.option(
     "--target",
     default="numpy",

@@ -7,7 +7,13 @@ import click
 import kincompile as kc
 from kincompile.cli.motion import motion_options, time_grid
 from kincompile.cli.progress import progress_bar
-from kincompile.cli.shared import NOT_CONVERGED, assigned, print_data, read_model, require_output
+from kincompile.cli.shared import (
+    NOT_CONVERGED,
+    output_option,
+    print_data,
+    read_model,
+    require_output,
+)
 from kincompile.runtime.results.summary import summary
 from kincompile.runtime.results.write import require_known_suffix
 
@@ -16,14 +22,14 @@ from kincompile.runtime.results.write import require_known_suffix
 @click.argument("model")
 @motion_options
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
-@click.option("-o", "--output", metavar="FILE", help="Write the motion: .csv, .npz or .json.")
+@output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context
 def command(
     context: click.Context,
     model: str,
     end: float | None,
     points: int | None,
-    assignments: tuple[str, ...],
+    values: dict[str, float],
     through: str | None,
     analysis: str | None,
     output: str | None,
@@ -37,7 +43,6 @@ def command(
     if output is not None:
         require_known_suffix(output)
         require_output(output, model, "the model itself")
-    values = assigned(assignments)
     mechanism = read_model(model)
     if analysis is not None:
         settings = kc.read_analysis(analysis)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
+    Command = Callable[..., None]
+
 DIFFERENT, USAGE_OR_MODEL, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes."""
 
@@ -37,21 +39,26 @@ def require_output(path: str | Path, read: str, what: str) -> None:
         raise InputError(f"{path} is {what}; give another name to write to")
 
 
-def set_option(what: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return the option ``--set NAME=VALUE``; `what` describes the names."""
+def output_option(text: str, *, required: bool = True) -> Callable[[Command], Command]:
+    """Return the option ``-o FILE``."""
+    return click.option("-o", "--output", required=required, metavar="FILE", help=text)
+
+
+def set_option(what: str) -> Callable[[Command], Command]:
+    """Return the option ``--set NAME=VALUE``, which gives values by name."""
+    text = f"Value of a {what}; may be given several times."
     return click.option(
-        "--set",
-        "assignments",
-        multiple=True,
-        metavar="NAME=VALUE",
-        help=f"Value of a {what}; may be given several times.",
+        "--set", "values", multiple=True, metavar="NAME=VALUE", help=text, callback=_values
     )
 
 
-def assigned(assignments: tuple[str, ...]) -> dict[str, float]:
+def _values(
+    context: click.Context, option: click.Parameter, given: tuple[str, ...]
+) -> dict[str, float]:
     """Return the parameters that are set; the last one counts where one is set twice."""
+    del context, option
     values, problems = {}, []
-    for assignment in assignments:
+    for assignment in given:
         name, _, text = assignment.partition("=")
         try:
             values[name.strip()] = float(text)

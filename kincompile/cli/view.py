@@ -9,20 +9,14 @@ import click
 
 import kincompile as kc
 from kincompile.cli.motion import motion_options, time_grid
-from kincompile.cli.shared import NOT_CONVERGED, assigned, read_model
+from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
 
 
 @click.command("view")
 @click.argument("models", nargs=-1, required=True, metavar="MODEL...")
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="FILE",
-    help="Page to write, .html; a folder gets a page of each model, and index.html.",
-)
+@output_option("Page to write, .html; a folder gets a page of each model, and index.html.")
 @motion_options
 @click.pass_context
 def command(
@@ -31,7 +25,7 @@ def command(
     output: str,
     end: float | None,
     points: int | None,
-    assignments: tuple[str, ...],
+    values: dict[str, float],
     through: str | None,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
@@ -46,7 +40,7 @@ def command(
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
     read = [read_model(model) for model in models]
-    options: dict[str, Any] = {"p": assigned(assignments), "through": through}
+    options: dict[str, Any] = {"p": values, "through": through}
     pages = [kc.page(model, t=time_grid(model, end, points), **options) for model in read]
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:

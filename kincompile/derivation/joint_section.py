@@ -142,9 +142,8 @@ class _JointSteps(Steps[RowBlock]):
     def jacobian(self) -> Section:
         template = self.joint.template
         blocks: list[Block] = []
-        for index, columns in block_columns(template):
+        for variable, columns in block_columns(template):
             shown = Matrix(block_rows(template, columns))
-            variable = Glyph("q", index) if len(index) == 1 else Letter(index)
             symbol = Sub(Glyph("Phi", exponent=self.name), variable)
             blocks.append(Display(Equated((symbol, shown))))
         blocks += [
@@ -158,7 +157,7 @@ class _JointSteps(Steps[RowBlock]):
     def nu_notes(self) -> list[Block]:
         lines: list[tuple[Run | Runs, ...]] = []
         for block in self.derivatives:
-            lines += [(Math(PHI_T), *line) for line in _rule_lines(block.steps.Phi_t)]
+            lines += [(Math(PHI_T), *line) for line in _rule_lines(block.Phi_t_steps)]
         return [*self._constant_note(), *_fired(lines)]
 
     def gamma_blocks(self) -> list[Block]:
@@ -168,7 +167,7 @@ class _JointSteps(Steps[RowBlock]):
             if len(self.derivatives) > 1:
                 blocks.append(text("For ", Math(self.symbol("Phi", k)), ":"))
             blocks += self.gamma_terms(k)
-            for symbol, steps in zip(GAMMA_TERMS, block.steps.gamma_terms, strict=True):
+            for symbol, steps in zip(GAMMA_TERMS, block.gamma_steps, strict=True):
                 lines += [(Math(symbol), *line) for line in _rule_lines(steps)]
         return [*blocks, *self._constant_note(), *_fired(lines)]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any
 
 from kincompile.calculus.expressions import (
@@ -133,14 +134,12 @@ def _times_identity(factor: Scalar) -> Formula:
     return Row(("-", IDENTITY)) if factor == -ONE else Row((factor, IDENTITY))
 
 
-def block_columns(template: Template) -> list[tuple[str, slice]]:
-    """Return the index of each block of columns, i, j or that of a contact, and its coordinates."""
-    blocks = [(frame.index, slice(2 * k, 2 * k + 2)) for k, frame in enumerate(template.frames)]
-    first = 2 * len(template.frames)
-    return blocks + [
-        (f"alpha_{contact.index}", slice(first + k, first + k + 1))
-        for k, contact in enumerate(template.contacts)
-    ]
+def block_columns(template: Template) -> list[tuple[Formula, slice]]:
+    """Return what each block of Phi_q is a derivative by, q_i or alpha_i, and its coordinates."""
+    ends = accumulate((len(item.coordinates) for item in template.owners), initial=0)
+    names: list[Formula] = [Glyph("q", frame.index) for frame in template.frames]
+    names += [contact.alpha for contact in template.contacts]
+    return [(name, slice(*own)) for name, own in zip(names, pairwise(ends), strict=True)]
 
 
 def block_rows(template: Template, coordinates: slice) -> tuple[tuple[Formula, ...], ...]:

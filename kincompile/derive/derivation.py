@@ -24,23 +24,6 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Steps:
-    """The rules that fired while a row block was derived, inside out.
-
-    Attributes
-    ----------
-    velocity, Phi_t
-        Of Phi along q_dot, and by time.
-    gamma_terms
-        Of the three terms of gamma.
-    """
-
-    velocity: tuple[Step, ...]
-    Phi_t: tuple[Step, ...]
-    gamma_terms: tuple[tuple[Step, ...], ...]
-
-
-@dataclass(frozen=True, slots=True)
 class RowBlock:
     r"""One row block of a constraint: a vector equation (two rows) or a scalar one.
 
@@ -59,8 +42,8 @@ class RowBlock:
         :math:`-(\Phi_q \dot q)_q \dot q`, :math:`-2 \Phi_{qt} \dot q` and :math:`-\Phi_{tt}`.
     gamma
         Their sum.
-    steps
-        How all this was found.
+    Phi_t_steps, gamma_steps
+        The rules that fired for Phi_t and for each of the three terms, innermost first.
     """
 
     Phi: Expression
@@ -69,7 +52,8 @@ class RowBlock:
     nu: Expression
     gamma_terms: tuple[Expression, Expression, Expression]
     gamma: Expression
-    steps: Steps
+    Phi_t_steps: tuple[Step, ...]
+    gamma_steps: tuple[tuple[Step, ...], ...]
 
 
 @cache
@@ -82,7 +66,7 @@ def _row_block(template: Template, Phi: Expression) -> RowBlock:
     along_q_dot: Direction = dict(zip(template.coordinates, template.rates, strict=True))
     along_t: Direction = {TIME: ONE}
     Phi_t, Phi_t_steps = recorded(Phi, along_t)
-    velocity, velocity_steps = recorded(Phi, along_q_dot)
+    velocity = along(Phi, along_q_dot)
     second = (
         (-1, *recorded(velocity, along_q_dot)),
         (-2, *recorded(velocity, along_t)),
@@ -99,7 +83,8 @@ def _row_block(template: Template, Phi: Expression) -> RowBlock:
         nu=-Phi_t,
         gamma_terms=gamma_terms,
         gamma=_total(gamma_terms),
-        steps=Steps(velocity_steps, Phi_t_steps, tuple(steps for _, _, steps in second)),
+        Phi_t_steps=Phi_t_steps,
+        gamma_steps=tuple(steps for _, _, steps in second),
     )
 
 

@@ -239,7 +239,7 @@ def _spoken(template: Template, vector: Vector) -> tuple[int | None, str, str] |
 def _separation(template: Template, vector: VectorSum) -> tuple[None, str, str] | None:
     """Return the names of a distance vector d, which leads to body j, or of its rate."""
     *others, last = template.frames
-    if last.r_dot in vector.terms:
+    if last.rates[0] in vector.terms:
         return None, "d_dot", "d_dot"
     return (None, "d", "d") if others and last.r in vector.terms else None
 

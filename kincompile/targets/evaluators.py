@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from kincompile import quantities
@@ -85,21 +86,29 @@ def schedule(
         (name, tuple((section, varying(inline, section, name)) for section in inline.sections))
         for name in computed
     )
-    outputs = [entry.node for _, rows in results for _, entries in rows for entry in entries]
-    scheduler = Scheduler(inline.nodes, outputs, {}, table.copy(), inline.hints)
-    uses, names = scheduler.uses, scheduler.names
-    read = {node: inline.nodes[node][1] for node in uses if inline.nodes[node][0] == "input"}
-    names |= {node: input_names[name] for node, name in read.items()}
+    starts = [
+        [entry.node for _, rows in results for entry in rows[k][1]]
+        for k in range(len(inline.sections))
+    ]
+    scheduler = Scheduler(inline.nodes, chain(*starts), {}, table.copy(), inline.hints)
+    inputs = _name_inputs(inline, scheduler, input_names)
     frames = _frames(inline, scheduler)
-    steps = []
-    for position, section in enumerate(inline.sections):
-        starts = [entry.node for _, rows in results for entry in rows[position][1]]
-        own = scheduler.assign(section.instance.name, scheduler.operands_first(starts))
-        if own:
-            steps.append((section, own))
-    functions = _functions(inline, uses, frames)
-    inputs = frozenset(read.values())
-    return Listing(frames, tuple(steps), results, inputs, input_names, functions, names)
+    steps = tuple(
+        (section, own)
+        for section, nodes in zip(inline.sections, starts, strict=True)
+        if (own := scheduler.assign(section.instance.name, scheduler.operands_first(nodes)))
+    )
+    functions = _functions(inline, scheduler.uses, frames)
+    return Listing(frames, steps, results, inputs, input_names, functions, scheduler.names)
+
+
+def _name_inputs(
+    inline: InlineProgram, scheduler: Scheduler, input_names: Mapping[str, str]
+) -> frozenset[str]:
+    """Name the inputs that are read; return their names in the model."""
+    nodes = [node for node in scheduler.uses if inline.nodes[node][0] == "input"]
+    scheduler.names |= {node: input_names[inline.nodes[node][1]] for node in nodes}
+    return frozenset(inline.nodes[node][1] for node in nodes)
 
 
 def vectors(program: Program) -> dict[str, list[str]]:

@@ -40,11 +40,14 @@ class Listed:
 
 
 TARGETS = {
-    "numpy": Listed("kincompile.targets.numpy", (".py",), True, True, True),
+    "numpy": Listed(
+        "kincompile.targets.numpy", (".py",),
+        is_loadable=True, has_grouped_form=True, has_redundancy=True,
+    ),
     "c": Listed("kincompile.targets.c", (".c", ".h"), is_loadable=True),
     "octave": Listed("kincompile.targets.octave", (".m",)),
     "javascript": Listed("kincompile.targets.javascript", (".js",)),
-}
+}  # fmt: skip
 """Languages to emit."""
 
 

@@ -35,14 +35,10 @@ class Scheduler:
 
     Parameters
     ----------
-    nodes
-        The code.
-    outputs
-        Nodes that the function returns.
-    names
-        Names of the inputs, by node; those of the values are added.
-    table
-        Names that are taken; those of the values are added.
+    nodes, outputs
+        The code, and what the function returns.
+    names, table
+        Names of the inputs by node, and all that are taken; those of the values are added.
     labels
         Names that say what a value is.
     kept
@@ -58,10 +54,7 @@ class Scheduler:
         labels: Mapping[int, str],
         kept: Collection[int] = (),
     ) -> None:
-        self._nodes = nodes
-        self._table = table
-        self._labels = labels
-        self._kept = kept
+        self._nodes, self._table, self._labels, self._kept = nodes, table, labels, kept
         self._depths: dict[int, int] = {}
         self.names = names
         self.uses = count_uses(nodes, outputs)

@@ -60,22 +60,17 @@ class Layout:
 
     def inputs(self, program: Program, listing: Listing) -> list[str]:
         """Return the statements that name the inputs that are read."""
-        return [
-            line
-            for vector, k, name in inputs_read(program, listing)
-            for line in self.assigned(
-                self.value.format(name), self.element.format(vector, k + self.first)
-            )
-        ]
+        lines = []
+        for vector, k, name in inputs_read(program, listing):
+            lines += self._value(name, self.element.format(vector, k + self.first))
+        return lines
 
     def frames(self, listing: Listing, printer: Printer) -> list[str]:
         """Return the statements that compute cosine and sine of each body's angle."""
-        if not listing.frames:
-            return []
-        lines = [f"{self.comment} body frames: A = {self.rotation}"]
+        lines = [f"{self.comment} body frames: A = {self.rotation}"] if listing.frames else []
         for frame in listing.frames:
             for item in frame.values:
-                lines += self.assigned(self.value.format(item.name), printer.definition(item.node))
+                lines += self._value(item.name, printer.definition(item.node))
         return lines
 
     def steps(self, listing: Listing, printer: Printer) -> list[str]:
@@ -84,8 +79,12 @@ class Layout:
         for section, assignments in listing.steps:
             lines.append(f"{self.comment} {title(section, self.first)}")
             for item in assignments:
-                lines += self.assigned(self.value.format(item.name), printer.definition(item.node))
+                lines += self._value(item.name, printer.definition(item.node))
         return lines
+
+    def _value(self, name: str, text: str) -> list[str]:
+        """Return the statement that computes a value."""
+        return self.assigned(self.value.format(name), text)
 
     def results(self, quantity: str, code: InlineProgram, printer: Printer) -> list[str]:
         """Return the statements that put a quantity's entries into an array of zeros."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import kincompile.compiler as compiler
 from kincompile.errors import InputError, RedundantConstraintWarning
-from kincompile.quantities import TOGETHER, functions, is_moving, quantity_named
+from kincompile.quantities import QUANTITIES, TOGETHER, functions, is_moving
 from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.newton import newton
 from kincompile.runtime.problem import problem
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
+    from kincompile.quantities import Quantity
 
 Array = NDArray[Any]
 
@@ -239,7 +240,7 @@ def _is_finite(module: ModuleType, q: Array, t: float) -> bool:
 def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
     """Yield the checks of each equation by the oracles."""
     reference = problem(module, module.DEFAULTS, module.GUESS, 0.0).reference
-    for quantity in ORACLES:
+    for quantity in QUANTITIES:
         size = _sizes(module, states, quantity, reference)
         error, limit, judge = _judged(module, states, quantity, size)
         # The entry and the state with the largest error, compared with the allowed one.
@@ -248,34 +249,31 @@ def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
         worst = np.argmax(errors / limit, axis=0)
         for row, equation in enumerate(module.EQUATIONS):
             at = worst[row], row
-            column = module.COORDINATES[columns[at]] if quantity_named(quantity).is_matrix else ""
             yield Check(
-                quantity,
+                quantity.name,
                 equation,
-                column,
-                ORACLES[quantity][judge[at]].name,
+                module.COORDINATES[columns[at]] if quantity.is_matrix else "",
+                ORACLES[quantity.name][judge[at]].name,
                 float(errors[at]),
                 bool(errors[at] <= limit[at]),
             )
 
 
-def _sizes(module: ModuleType, states: list[State], quantity: str, reference: Array) -> Array:
-    """Return the scale of errors, (states, m, k): the size of an equation's terms.
+def _sizes(module: ModuleType, states: list[State], quantity: Quantity, reference: Array) -> Array:
+    """Return the scale of errors: the size of an equation's terms.
 
-    k is n for Phi_q, else 1.
+    Its shape is (states, m, n) for a matrix, (states, m, 1) for a vector.
     """
     Phi_q = np.array([module.Phi_q(q, t) for q, _, t in states])
     terms = np.abs(Phi_q) @ reference
     terms = np.where(terms > 0, terms, 1.0)[:, :, np.newaxis]
-    if quantity == "Phi_q":
-        return np.asarray(terms / reference)
-    if quantity == "gamma":
+    if quantity.is_moving:
         fastest = np.array([np.max(np.abs(q_dot / reference)) for _, q_dot, _ in states])
         terms = terms * np.maximum(1.0, fastest**2)[:, np.newaxis, np.newaxis]
-    return np.asarray(terms)
+    return np.asarray(terms / reference if quantity.is_matrix else terms)
 
 
-def _forms(module: ModuleType, states: list[State], quantity: str) -> Iterator[Array]:
+def _forms(module: ModuleType, states: list[State], quantity: Quantity) -> Iterator[Array]:
     """Yield a quantity as each function of the module gives it, (states, m, k).
 
     They are written out one by one, and a batch runs on other numbers than a single state.
@@ -283,7 +281,7 @@ def _forms(module: ModuleType, states: list[State], quantity: str) -> Iterator[A
     shape = len(states), len(module.EQUATIONS), -1
     q, q_dot, t = (np.array(part) for part in zip(*states, strict=True))
     for name, given in functions().items():
-        if quantity not in given or name == "Phi":  # all else is judged by Phi
+        if quantity.name not in given or name == "Phi":  # all else is judged by Phi
             continue
 
         def value(
@@ -291,24 +289,24 @@ def _forms(module: ModuleType, states: list[State], quantity: str) -> Iterator[A
         ) -> Array:
             function = getattr(module, name)
             found = function(q, q_dot, t) if is_moving(given) else function(q, t)
-            return np.asarray(found if len(given) == 1 else found[given.index(quantity)])
+            return np.asarray(found if len(given) == 1 else found[given.index(quantity.name)])
 
         yield np.array([value(*state) for state in states]).reshape(shape)
         yield value(q, q_dot, t).reshape(shape)
-    if quantity not in TOGETHER["kinematics"]:
+    if quantity.name not in TOGETHER["kinematics"]:
         return
-    place = TOGETHER["kinematics"].index(quantity)
+    place = TOGETHER["kinematics"].index(quantity.name)
     found = module.kinematics_batch_last(q.T, q_dot.T, t)[place].T
-    if not quantity_named(quantity).is_matrix:
+    if not quantity.is_matrix:
         yield found.reshape(shape)
         return
-    Phi_q = np.zeros((len(states), len(module.EQUATIONS), len(module.COORDINATES)))
-    Phi_q[:, module.PATTERN[:, 0], module.PATTERN[:, 1]] = found
-    yield Phi_q
+    matrix = np.zeros((len(states), len(module.EQUATIONS), len(module.COORDINATES)))
+    matrix[:, module.PATTERN[:, 0], module.PATTERN[:, 1]] = found
+    yield matrix
 
 
 def _judged(
-    module: ModuleType, states: list[State], quantity: str, size: Array
+    module: ModuleType, states: list[State], quantity: Quantity, size: Array
 ) -> tuple[Array, Array, Array]:
     """Return errors (states, m, k), the allowed ones and the number of the oracle (states, m).
 
@@ -316,14 +314,21 @@ def _judged(
     continuation to complex numbers. The exact oracle is believed where it agrees with the plain
     one.
     """
-    exact, plain = ORACLES[quantity]
-    found = _estimates(module, states, quantity, exact)
-    error = _error(module, states, quantity, found, size)
+    exact, plain = ORACLES[quantity.name]
+    forms = list(_forms(module, states, quantity))
+
+    def deviation(estimate: Array) -> Array:
+        """Return the largest deviation of the module from an oracle."""
+        scale = size if quantity.is_matrix else np.maximum(size, np.abs(estimate))
+        return np.asarray(np.max([_distance(form, estimate, scale) for form in forms], axis=0))
+
+    estimate = _estimates(module, states, quantity, exact)
+    error = deviation(estimate)
     limit, judge = np.full(error.shape[:2], exact.limit), np.zeros(error.shape[:2], dtype=int)
     if (error > exact.limit).any():
         other = _estimates(module, states, quantity, plain)
-        doubted = np.max(_distance(found, other, size), axis=2) > plain.limit
-        error[doubted] = _error(module, states, quantity, other, size)[doubted]
+        doubted = np.max(_distance(estimate, other, size), axis=2) > plain.limit
+        error[doubted] = deviation(other)[doubted]
         limit[doubted], judge[doubted] = plain.limit, 1
         # Beside a pole, and where a root begins, no oracle gives a number: the other states do.
         silent = doubted & ~np.isfinite(other).all(axis=2)
@@ -332,31 +337,24 @@ def _judged(
     return error, limit, judge
 
 
-def _error(
-    module: ModuleType, states: list[State], quantity: str, found: Array, size: Array
-) -> Array:
-    """Return the largest deviation of the module from the oracle."""
-    size = np.maximum(size, np.abs(found)) if quantity != "Phi_q" else size
-    forms = _forms(module, states, quantity)
-    return np.asarray(np.max([_distance(form, found, size) for form in forms], axis=0))
-
-
 def _distance(found: Array, given: Array, size: Array) -> Array:
     """Return the relative distance of numbers; infinite if one of them is not finite."""
     return np.asarray(np.nan_to_num(np.abs(found - given) / size, nan=np.inf))
 
 
-def _estimates(module: ModuleType, states: list[State], quantity: str, oracle: Oracle) -> Array:
+def _estimates(
+    module: ModuleType, states: list[State], quantity: Quantity, oracle: Oracle
+) -> Array:
     """Return the values of an oracle at all states, (states, m, k); NaN where it has none."""
+    sign = -1.0 if quantity.name in ("nu", "gamma") else 1.0
     found = []
     for q, q_dot, t in states:
-        if quantity == "Phi_q":
-            along, time = np.eye(q.size), 0.0
-        else:
-            along, time = (q_dot if quantity == "gamma" else np.zeros(q.size))[np.newaxis], 1.0
+        along, time = np.eye(q.size), 0.0
+        if not quantity.is_matrix:
+            along, time = (q_dot if quantity.is_moving else 0 * q)[np.newaxis], 1.0
         try:
             rates = oracle.derivative(module, q, t, along, time).T
         except (ArithmeticError, TypeError, ValueError):
             rates = np.full((len(module.EQUATIONS), len(along)), np.nan)
-        found.append(-rates if quantity in ("nu", "gamma") else rates)
+        found.append(sign * rates)
     return np.array(found)

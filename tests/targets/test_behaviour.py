@@ -8,9 +8,16 @@ import pytest
 
 import kincompile as kc
 from kincompile.ir import from_sympy
+from kincompile.targets.c import target as c
+from kincompile.targets.javascript import target as javascript
+from kincompile.targets.numpy import target as numpy
+from kincompile.targets.octave import target as octave
 from kincompile.targets.printer import ELEMENTARY, Printer
 from kincompile.targets.registry import TARGETS, load_target
 from kincompile.targets.target import Target
+
+# One process evaluates each target once for all of them.
+pytestmark = pytest.mark.xdist_group("targets")
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 TOLERANCE = 1e-13
@@ -61,6 +68,14 @@ def test_that_a_vector_of_another_length_is_refused(refused):
 
 
 # ---- what all targets say alike ------------------------------------------------------------------
+
+
+MODULES: dict[str, Target] = {"numpy": numpy, "c": c, "octave": octave, "javascript": javascript}
+"""The modules of the table; mypy compares them with the protocol."""
+
+
+def test_that_the_table_loads_the_module_of_each_target():
+    assert {name: load_target(name) for name in TARGETS} == MODULES
 
 
 @pytest.fixture(params=TARGETS)

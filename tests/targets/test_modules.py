@@ -4,9 +4,13 @@ And the interpreter, which takes batches too.
 """
 
 import numpy as np
+import pytest
 
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
+
+# One process evaluates each target once for all of them.
+pytestmark = pytest.mark.xdist_group("targets")
 
 TOLERANCE = 1e-13
 

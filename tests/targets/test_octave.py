@@ -5,6 +5,9 @@ import pytest
 
 import kincompile as kc
 
+# One process evaluates each target once for all of them.
+pytestmark = pytest.mark.xdist_group("targets")
+
 
 def test_that_the_script_finds_the_same_motion(example, results_of):
     found, solution = results_of("octave")[example.path.stem], example.solution

@@ -129,6 +129,26 @@ def import_cycle(modules: Sources) -> list[str]:
     return []
 
 
+def runtime_part(module: str) -> str:
+    """Return the folder or file directly below the runtime that a module belongs to."""
+    return ".".join(module.split(".")[:3])
+
+
+def runtime_cycle(modules: Sources) -> list[str]:
+    """Return the parts of the runtime that form a circle, a folder being one part, or nothing."""
+    runtime = f"{PACKAGE}.{RUNTIME}."
+    graph: dict[str, set[str]] = {}
+    for module, targets in import_graph(modules).items():
+        if module.startswith(runtime):
+            parts = {runtime_part(target) for target in targets if target.startswith(runtime)}
+            graph.setdefault(runtime_part(module), set()).update(parts - {runtime_part(module)})
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        return list(error.args[1])
+    return []
+
+
 def is_deferred_import(node: ast.AST, module: str) -> bool:
     """Tell whether a node of a function imports from the package, or by a computed name."""
     if isinstance(node, ast.Call):
@@ -179,6 +199,10 @@ def test_imports_go_down_and_do_not_cross_the_wall() -> None:
 
 def test_there_is_no_import_cycle() -> None:
     assert import_cycle(package_sources()) == []
+
+
+def test_the_folders_of_the_runtime_are_floors() -> None:
+    assert runtime_cycle(package_sources()) == []
 
 
 def test_no_import_of_the_package_waits_inside_a_function() -> None:
@@ -253,6 +277,19 @@ def test_a_clean_package_passes() -> None:
 def test_an_import_up_or_across_is_found(module: str, source: str, violation: str) -> None:
     planted = {**CLEAN, f"kincompile.{module}": source}
     assert floor_violations(planted) == [f"kincompile.{module} imports {violation}"]
+
+
+def test_a_circle_between_folders_of_the_runtime_is_found() -> None:
+    planted = {
+        **CLEAN,
+        "kincompile.runtime.march": "from kincompile.runtime.singular import signs",
+        "kincompile.runtime.singular": "",
+        "kincompile.runtime.singular.signs": "",
+        "kincompile.runtime.singular.events": "from kincompile.runtime.march import State",
+    }
+    assert import_cycle(planted) == []
+    circle = {"kincompile.runtime.march", "kincompile.runtime.singular"}
+    assert set(runtime_cycle(planted)) == circle
 
 
 def test_a_cycle_is_found_even_if_it_is_for_types_only() -> None:

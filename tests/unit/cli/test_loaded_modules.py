@@ -22,12 +22,12 @@ EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2"
 RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
 
 NOT_LOADED = {
-    "compile MODEL -o -": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} kincompile.runtime",
+    "compile MODEL -o -": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} kincompile.runtime scipy",
     "compile MODEL -o - --target javascript": (
         f"{PAGES} {LARGE} {EXTRA} {RANK} kincompile.runtime kincompile.targets.numpy "
         "kincompile.targets.c kincompile.targets.octave"
     ),
-    "run MODEL": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK}",
+    "run MODEL": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} scipy.sparse.csgraph",
     "inspect MODEL": f"{PAGES} {EXTRA} {LANGUAGES} kincompile.targets.numpy kincompile.runtime",
     "derive MODEL -o PAGE.html": (
         f"{EXTRA} {LARGE} kincompile.view kincompile.compare kincompile.verify"

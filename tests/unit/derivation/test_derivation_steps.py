@@ -25,8 +25,8 @@ def rules_of(kind: type[Any]) -> dict[str, set[Rule]]:
     blocks, rows = derive(kind.template()), partials(kind.template())
     return {
         "Phi_q": {s.rule for row in rows for item in row for s in item.steps},
-        "gamma": {s.rule for b in blocks for steps in b.steps.gamma_terms for s in steps},
-        "Phi_t": {s.rule for b in blocks for s in b.steps.Phi_t},
+        "gamma": {s.rule for b in blocks for steps in b.gamma_steps for s in steps},
+        "Phi_t": {s.rule for b in blocks for s in b.Phi_t_steps},
     }
 
 
