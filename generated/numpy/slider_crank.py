@@ -350,15 +350,14 @@ DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = Fal
 def _evaluate(kernel, skip, wanted, t, p, *states):
     """Return a quantity or several, what a kernel computes after so many values."""
     point = _point(t, p, states)
-    try:
-        values = kernel(*point) if point else None
-    except (ArithmeticError, ValueError):
-        values = None  # outside the domain of a function, where the array form gives NaN
-    if values is not None:
-        if type(wanted) is not tuple:
-            return wanted.at_point(values[skip:])
-        values = iter(values)
-        return tuple([quantity.at_point(values) for quantity in wanted])
+    if point is not None:
+        try:
+            if type(wanted) is not tuple:
+                return wanted.at_point(kernel(*point)[skip:])
+            values = iter(kernel(*point))
+            return tuple([quantity.at_point(values) for quantity in wanted])
+        except (ArithmeticError, ValueError):
+            pass  # outside the domain of a function: the array form gives NaN there, as NumPy does
     quantities = wanted if type(wanted) is tuple else (wanted,)
     states, t, p, shape = _batch(t, p, states)
     results = _on_batch(kernel, skip, quantities, t, p, states)
