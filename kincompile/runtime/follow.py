@@ -204,12 +204,15 @@ class _Way:
         if not self._on_grid or outcome.status is not Status.CONVERGED or first is None:
             return trusted
         if first.t == self._times[index]:
-            q, q_dot, q_ddot = (
-                values[index:].T for values in (motion.q, motion.q_dot, motion.q_ddot)
-            )
-            result = GridResult(q, q_dot, q_ddot, motion.residual[index:], trusted[index:])
+            arrays = motion.q, motion.q_dot, motion.q_ddot, motion.residual
+            known = [values[index].copy() for values in arrays]
+            q, q_dot, q_ddot, residual = (values[index:].T for values in arrays)
+            result = GridResult(q, q_dot, q_ddot, residual, trusted[index:])
             times = self._inputs.t[index:]
             motion.statistics["coarse"] += solve_grid(self._march, times, first, result)
+            # The first point was found with care; the grid's numbers never take its place.
+            for values, value in zip(arrays, known, strict=True):
+                values[index] = value
             motion.iterations[index + 1 :] = CORRECTIONS_ON_GRID
         return trusted
 

@@ -31,6 +31,25 @@ def test_that_most_points_of_a_fine_grid_are_not_marched(example):
     assert 1 < solution.statistics["coarse"] < 400
 
 
+@pytest.mark.parametrize(
+    "times",
+    [
+        np.r_[0, np.linspace(0, 1, 99)],
+        np.r_[np.zeros(40), np.linspace(0, 1, 60)],
+        np.repeat(np.linspace(0, 1, 50), 2),
+        np.r_[1, np.linspace(1, 0, 99)],
+        1e6 + 1e-9 * np.linspace(0, 1, 100),
+    ],
+    ids=["first twice", "first often", "each twice", "falling", "too near to tell apart"],
+)
+def test_that_a_time_may_repeat_on_a_grid(example_named, times):
+    ours, theirs = both(example_named("four_bar").module, times)
+    for solution in (ours, theirs):
+        assert solution.success, solution.message
+        assert all(np.isfinite(x).all() for x in (solution.q, solution.q_dot, solution.q_ddot))
+    np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize("points", [100, 451, 2001])
 def test_that_a_grid_across_a_lock_up_has_the_verdict_of_the_march(example_named, points):
     module = example_named("problem_3_5_6").module
