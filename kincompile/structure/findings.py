@@ -118,7 +118,7 @@ class Findings:
         What a maximum matching of equations with coordinates leaves over: equations that only
         repeat others, and coordinates that nothing determines.
     problem
-        Why the system cannot be compiled, or not be solved, as it is; "" where it can.
+        Why the system cannot be solved as it is; "" where it can.
     rank
         Rank of Phi_q at generic states at which the joints are assembled.
     redundant
