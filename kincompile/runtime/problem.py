@@ -107,6 +107,8 @@ class Problem:
         The reference is the scale here: a wild iterate must not become a solution because its own
         coordinates are huge.
         """
+        if point.q.ndim == 1 and within(point.Phi, tolerance * self.magnitude):
+            return True  # nearly always; the terms are never less, and cost a pass over Phi_q
         terms = self.terms(point, self.reference)
         return within(point.Phi, tolerance * terms)
 
