@@ -264,6 +264,8 @@ class Graph:
                 new.append(apply(new[operands[0]], new[operands[1]]))
             elif operation in ("neg", "square"):
                 new.append(getattr(self, operation)(new[operands[0]]))
+            elif operation == "call":
+                new.append(self.call(operands[0], *[new[k] for k in operands[1:]]))
             else:
                 new.append(self._copy(operation, operands, new))
         return new
@@ -272,8 +274,8 @@ class Graph:
         match operation, operands:
             case "pi", _:
                 return self.pi()
-            case "call" | "logic", [name, *arguments]:
-                return int(getattr(self, operation)(name, *(new[k] for k in arguments)))
+            case "logic", [name, *arguments]:
+                return self.logic(name, *(new[k] for k in arguments))
             case "compare", [relation, a, b]:
                 return self.compare(relation, new[a], new[b])
             case "select", [condition, a, b]:

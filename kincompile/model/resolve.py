@@ -139,6 +139,14 @@ class Scope:
         return {name: place for place, name in enumerate(self.coordinates)}
 
     @cached_property
+    def columns(self) -> dict[str, tuple[str | None, ...]]:
+        """The names of the columns of each body, by its name; the ground has none."""
+        found: dict[str, tuple[str | None, ...]] = {
+            name: body.coordinates for name, body in self.bodies.items()
+        }
+        return found | {GROUND.name: (None,) * len(GROUND.coordinates)}
+
+    @cached_property
     def coordinate_names(self) -> frozenset[str]:
         """The coordinates, for membership."""
         return frozenset(self.coordinates)
@@ -204,16 +212,12 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
         scalars,
         points,
         profiles,
-        (*(name for body in known for name in _columns(body)), *constraint.contact_names),
+        (*(name for body in known for name in scope.columns[body.name]), *constraint.contact_names),
     )
 
 
 def _title(constraint: Constraint) -> str:
     return f"{type(constraint).__name__} {constraint.name!r}"
-
-
-def _columns(body: Body) -> tuple[str | None, ...]:
-    return (None,) * len(body.coordinates) if body.is_ground else body.coordinates
 
 
 def _body(given: Any, where: str, scope: Scope) -> Body | None:

@@ -50,6 +50,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         In the order of declaration: the entries of p.
     constraints : tuple of Joint or FreeEquation
         As written, with their arguments resolved: the rows of Phi_q.
+    equations : tuple of str
+        Names of the equations, in order.
 
     Raises
     ------
@@ -58,8 +60,8 @@ class ConstraintSystem(MatrixViews, TextViews):
     """
 
     __slots__ = (
-        "bodies", "constraints", "coordinates", "end", "length_unit", "name", "parameters",
-        "points",
+        "bodies", "constraints", "coordinates", "end", "equations", "length_unit", "name",
+        "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -67,6 +69,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Parameter, ...]
     constraints: tuple[Joint | FreeEquation, ...]
+    equations: tuple[str, ...]
     length_unit: str
     end: float
     points: int
@@ -114,10 +117,12 @@ class ConstraintSystem(MatrixViews, TextViews):
             problems.append(f"{name!r} has no coordinates; add a body, or name coordinates")
         if problems:
             raise ModelError(list(dict.fromkeys(problems)))
+        constraints = tuple(item for item in resolved if item is not None)
+        names = tuple(name for item in constraints for name in item.equation_names)
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
-            "constraints": tuple(item for item in resolved if item is not None),
-            "length_unit": length_unit, "end": end, "points": points,
+            "constraints": constraints, "equations": names, "length_unit": length_unit,
+            "end": end, "points": points,
         }  # fmt: skip
         for key, value in values.items():
             object.__setattr__(self, key, value)
@@ -128,11 +133,6 @@ class ConstraintSystem(MatrixViews, TextViews):
     def system(self) -> ConstraintSystem:
         """Return the system itself."""
         return self
-
-    @property
-    def equations(self) -> tuple[str, ...]:
-        """Names of the equations, in order."""
-        return tuple(name for item in self.constraints for name in item.equation_names)
 
     @property
     def row_offsets(self) -> tuple[int, ...]:

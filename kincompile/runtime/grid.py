@@ -144,10 +144,10 @@ def _solve_block(
     point = found.point
     q_dot, q_ddot = result.q_dot[:, block], result.q_ddot[:, block]
     engine.put_rates(point, q_dot, q_ddot)
-    displacements = (row - other for row, other in zip(point.q, interpolated, strict=True))
-    good = found.good & within(displacements, LARGEST_DISPLACEMENT * spread)
+    interpolated -= point.q
+    good = found.good & within(interpolated, LARGEST_DISPLACEMENT * spread)
+    interpolated[:] = point.q
     for values, least in zip(engine.determinants(point, point), smallest, strict=True):
         good = good & (values / least > 1)
     result.residual[block] = largest(point.Phi, t.size)
-    interpolated[:] = point.q
     result.good[block] = good & np.isfinite(sum(q_dot) + sum(q_ddot))

@@ -83,7 +83,7 @@ class Problem:
     def is_small(self, correction: Array, q: Array, tolerance: float) -> bool:
         """Say whether a correction that led to q is small, or all that floating point can give."""
         allowed = tolerance * self.reference + ROUNDING * np.abs(q)
-        return bool(np.all(np.abs(correction) <= allowed))
+        return bool((np.abs(correction) <= allowed).all())
 
     def terms(self, point: Point, scale: Array) -> Array:
         """Give what the terms of each equation contribute at the scales of the coordinates.
@@ -107,6 +107,8 @@ class Problem:
         The reference is the scale here: a wild iterate must not become a solution because its own
         coordinates are huge.
         """
+        if point.q.ndim == 1 and within(point.Phi, tolerance * self.magnitude):
+            return True  # nearly always; the terms are never less, and cost a pass over Phi_q
         terms = self.terms(point, self.reference)
         return within(point.Phi, tolerance * terms)
 

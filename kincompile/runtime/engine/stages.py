@@ -319,7 +319,6 @@ class StagedSolver:
         pattern, size = code.pattern, len(code.equations)
         self.pivoted = 0
         self._rows, self._columns = np.ascontiguousarray(pattern.T)
-        self._first = np.searchsorted(self._rows, np.arange(size))  # entries go row by row
         self._stages = [_stage(stage, pattern, code.arrays, size) for stage in code.stages]
         self._size = size
 
@@ -367,8 +366,8 @@ class StagedSolver:
     def _is_good(self, nonzeros: Array, b: Array, x: Array) -> bool:
         """Say whether a solution satisfies every equation."""
         products = nonzeros * x.take(self._columns)
-        missing = np.abs(np.add.reduceat(products, self._first) - b)
-        terms = np.add.reduceat(np.abs(products), self._first) + np.abs(b)
+        missing = np.abs(_summed(self._rows, products, self._size) - b)
+        terms = _summed(self._rows, np.abs(products), self._size) + np.abs(b)
         return bool(np.all(missing <= LOST * terms + ROUNDED * terms.max(initial=0.0)))
 
     def solve_transposed(self, factors: StagedFactors, b: Array) -> Array:
