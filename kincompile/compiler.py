@@ -3,7 +3,8 @@
 mechanism -> system()        ConstraintSystem  names and attributes checked, all problems at once
 system    -> lower           Program           kernels x instances; each type derived once
 program   -> inline          InlineProgram     written out in one graph, where equal values meet
-pattern   -> redundant_equations               as many equations as coordinates, matched one to one
+pattern   -> counting_problem  str              why no position can be solved for; else ""
+pattern   -> redundant_equations               of more equations than coordinates those that repeat
 program   -> emit_program    Emitted           the files of a target
 emitted   -> from_source     module            loaded, its contract checked
 module    -> make_native     module            its functions replaced by compiled C, for target="c"
@@ -34,7 +35,7 @@ from kincompile.ir.lower import lower
 from kincompile.model.mechanism import Mechanism, system_of
 from kincompile.model.origins import remember_model
 from kincompile.names import listed
-from kincompile.structure.counting import require_square
+from kincompile.structure.counting import counting_problem
 from kincompile.targets.emission import emit_program
 from kincompile.targets.registry import TARGETS
 
@@ -80,14 +81,13 @@ def emit(
     Returns
     -------
     Emitted
-        The files; ``.source`` is the text of the main one, ``.write(folder)`` writes them.
+        The files; ``.source`` is the text of the main one, ``.write(folder)`` writes them. Where
+        the equations cannot determine the coordinates, ``.unsolvable`` says why.
 
     Raises
     ------
     ModelError
         If the model cannot be used as written; every problem is listed.
-    StructuralError
-        If the equations cannot determine the coordinates.
     UnsupportedError
         If there is no such target, or it cannot print the mechanism: only ``"numpy"`` has the
         grouped form.
@@ -132,14 +132,17 @@ def _is_grouped(system: ConstraintSystem, form: str | None) -> bool:
 def _lowered(
     system: ConstraintSystem, target: str, form: str | None
 ) -> InlineProgram | GroupedProgram:
-    """Return the program of a system in the form that a target is to print."""
+    """Return the program of a system in the form that a target is to print.
+
+    Where its equations cannot determine the coordinates, it knows why.
+    """
     is_grouped = _is_grouped(system, form)
     program = lower(system, share_equations=is_grouped)
     code = _grouped(program) if is_grouped else inline(program)
     n = len(system.coordinates)
     if len(system.equations) <= n or n > LARGEST_REDUNDANT:
-        require_square(system, code.pattern())
-        return code
+        problem = counting_problem(system, code.pattern())
+        return replace(code, program=replace(code.program, unsolvable=problem))
     return _with_redundancy(system, code, target)
 
 
@@ -156,7 +159,9 @@ def _with_redundancy(
     """Return a program that knows which of its equations repeat others, and warn of them."""
     from kincompile.ir.redundancy import redundancy_warning, redundant_equations
 
-    found = redundant_equations(system, code.program, code.pattern())
+    found, problem = redundant_equations(system, code.program, code.pattern())
+    if problem:
+        return replace(code, program=replace(code.program, unsolvable=problem))
     redundant = tuple(name for item in found for name in item.equations)
     if not TARGETS[target].has_redundancy:
         raise UnsupportedError(
@@ -187,11 +192,12 @@ def compile(  # noqa: A001 - the public name kc.compile
     Returns
     -------
     module
-        The emitted module, with Phi, Phi_q, nu, gamma and their fused forms.
+        The emitted module, with Phi, Phi_q, nu, gamma and their fused forms. Where the equations
+        cannot determine the coordinates, ``UNSOLVABLE`` says why, and so does `solve`.
 
     Raises
     ------
-    ModelError, StructuralError
+    ModelError
         As `emit` does.
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
@@ -227,7 +233,7 @@ def _native(module: ModuleType, code: InlineProgram) -> ModuleType:
 
 
 def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
-    """Count what a mechanism is made of, also where it cannot be compiled yet.
+    """Count what a mechanism is made of, also where its motion cannot be solved yet.
 
     Parameters
     ----------

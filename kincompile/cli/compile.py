@@ -34,9 +34,12 @@ def command(model: str, output: str, target: str) -> None:
     """Write Phi, Phi_q, nu and gamma of MODEL as a module.
 
     The module imports NumPy and nothing else: it runs where kincompile is not installed. Where a
-    target has several files, the others are written beside the one named.
+    target has several files, the others are written beside the one named. A model whose motion
+    cannot be solved, because a driver is missing, has a module too, and a warning.
     """
     emitted = kc.emit(read_model(model), target)
+    if emitted.unsolvable:
+        click.echo(f"Warning: {emitted.unsolvable}", err=True)
     if output == "-":
         print_data("\n".join(emitted.files.values()))
         return

@@ -15,14 +15,14 @@ from kincompile.derivation.document import Display, Math
 from kincompile.derivation.emitted_lines import emitted_lines
 from kincompile.derivation.expanded import Writer
 from kincompile.derivation.formulas import Decimal, Equated, Glyph, Partial, size
-from kincompile.errors import InputError, StructuralError
+from kincompile.errors import InputError
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
 from kincompile.names import listed, rate, suggestion
 from kincompile.runtime.load import from_source
 from kincompile.runtime.newton import NewtonResult, newton
 from kincompile.runtime.status import Status
-from kincompile.structure.counting import require_square
+from kincompile.structure.counting import counting_problem
 from kincompile.targets.emission import emit_program
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def evaluation(system: ConstraintSystem, state: Mapping[str, float] | float | No
     code = inline(lower(system))
     source = emit_program("numpy", code).source
     module = from_source(source, system.name)
-    problem = _problem(system, code)
+    problem = counting_problem(system, code.pattern())
     if isinstance(state, int | float) or state is None:
         t = _finite("t", 0.0 if state is None else state)
         given: dict[str, float] = {}
@@ -193,14 +193,6 @@ def evaluation(system: ConstraintSystem, state: Mapping[str, float] | float | No
         given = _checked(system, state)
         t = given.pop("t", 0.0)
     return _evaluated(system, code, source, module, problem, t, given)
-
-
-def _problem(system: ConstraintSystem, code: InlineProgram) -> str:
-    try:
-        require_square(system, code.pattern())
-    except StructuralError as error:
-        return str(error)
-    return ""
 
 
 def _finite(name: str, value: Any) -> float:

@@ -209,6 +209,8 @@ class Program:
         Digest of all the above: two systems with the same code and data have the same.
     redundant
         Names of equations that repeat others at every assembled position, and agree with them.
+    unsolvable
+        Why the equations cannot determine the coordinates; "" where they can.
     outputs
         Names of the outputs.
     end, points
@@ -227,6 +229,7 @@ class Program:
     end: float
     points: int
     redundant: tuple[str, ...] = ()
+    unsolvable: str = ""
     outputs: tuple[str, ...] = ()
 
     def names_of(self, kind: Rows | Columns) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.errors import StructuralError
 from kincompile.ir.interpret import interpret
 from kincompile.names import listed
 from kincompile.structure.counting import counting_problem
@@ -60,31 +59,27 @@ def driver_rows(system: ConstraintSystem) -> list[int]:
 
 def redundant_equations(
     system: ConstraintSystem, program: Program, pattern: Pattern
-) -> tuple[Surplus, ...]:
+) -> tuple[tuple[Surplus, ...], str]:
     """Return the redundant ones of more equations than coordinates.
 
     Returns
     -------
-    tuple of Surplus
-        The constraints with equations that depend on others at every assembled position, and agree
-        with them.
-
-    Raises
-    ------
-    StructuralError
-        Where those that are too many do not agree.
+    found : tuple of Surplus
+        The constraints with equations that depend on others at every assembled position.
+    problem : str
+        What is wrong where they do not agree with the others; "" where they do.
     """
     report = rank_report(system, program)
     found = surpluses(system, report)
     if least_squares_will_do(system, report):
-        return found
+        return found, ""
     names = [name for item in found for name in item.equations]
     sentences = [counting_problem(system, pattern, names)]
     sentences += [f"{item.text}; {item.remedy}" for item in found]
     if report.free:
         free = [system.coordinates[column].name for column in report.free]
         sentences.append(f"at assembled positions {listed(free)} may still move")
-    raise StructuralError(". ".join(sentences))
+    return found, ". ".join(sentences)
 
 
 def redundancy_warning(system: ConstraintSystem, found: Sequence[Surplus]) -> str:

@@ -66,11 +66,11 @@ def read_inputs(
     InputError
         With everything that is wrong with the values, by name.
     StructuralError
-        When the module has not as many equations as coordinates.
+        When the equations cannot determine the coordinates: what is wrong, and what to do.
     """
     _require_module(module)
     code = code_of(module)
-    _require_square(code)
+    require_square(code)
     problems: list[str] = []
     inputs = Inputs(
         code,
@@ -96,8 +96,18 @@ def _require_module(module: object) -> None:
     raise InputError(f"expected a compiled module, got a {type(module).__name__}: {remedy}.")
 
 
-def _require_square(code: Code) -> None:
-    """Refuse a module whose equations cannot determine its coordinates."""
+def require_square(code: Code) -> None:
+    """Refuse a module whose equations cannot determine its coordinates.
+
+    What the compiler has written into the module says why; else they are counted.
+
+    Raises
+    ------
+    StructuralError
+        With what is wrong, and what to do.
+    """
+    if code.unsolvable:
+        raise StructuralError(code.unsolvable)
     m, n = len(code.equations), len(code.coordinates)
     if m == n or (m > n and code.redundant):
         return

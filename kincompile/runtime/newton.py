@@ -151,7 +151,7 @@ def newton(
     InputError
         When a value has the wrong name, shape, type or is not finite.
     StructuralError
-        When the module has not as many equations as coordinates.
+        When the equations cannot determine the coordinates: what is wrong, and what to do.
     """
     inputs = read_inputs(module, t, p, q0, tolerance, max_iterations)
     if inputs.t.size > 1:

@@ -104,7 +104,7 @@ def solve(
     InputError
         When a value has the wrong name, shape, type or is not finite; all that is wrong at once.
     StructuralError
-        When the module has not as many equations as coordinates.
+        When the equations cannot determine the coordinates: what is wrong, and what to do.
     SolveError
         With `throw`, when a point failed; `.solution` holds what was found.
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from kincompile.errors import StructuralError
 from kincompile.names import listed
 from kincompile.structure.blocks import matching
 
@@ -28,24 +27,13 @@ def unmatched(system: ConstraintSystem, pattern: Pattern) -> tuple[list[str], li
     return equations, [name for column, name in enumerate(names) if column not in taken]
 
 
-def require_square(system: ConstraintSystem, pattern: Pattern) -> None:
-    """Check that there are as many equations as coordinates, and that each can determine one.
-
-    Raises
-    ------
-    StructuralError
-        With the counts, the coordinates that nothing determines or the equations that are too
-        many, and what to do.
-    """
-    problem = counting_problem(system, pattern)
-    if problem:
-        raise StructuralError(problem)
-
-
 def counting_problem(
     system: ConstraintSystem, pattern: Pattern, dependent: Sequence[str] = ()
 ) -> str:
     """Return what is wrong with the numbers of equations and coordinates, "" where nothing is.
+
+    It has the counts, the coordinates that nothing determines or the equations that are too many,
+    and what to do.
 
     Parameters
     ----------

@@ -36,4 +36,5 @@ def emit_program(name: str, code: InlineProgram | GroupedProgram) -> Emitted:
         printer = Printer(target.DIALECT, code.nodes, listing.names, program.name)
         functions[function] = target.function(function, code, listing, printer)
         called.update(listing.functions)
-    return Emitted(program.name, target.files(code, functions, called))
+    files = target.files(code, functions, called)
+    return Emitted(program.name, files, unsolvable=program.unsolvable)

@@ -50,6 +50,12 @@ def table(rows: Sequence[Sequence[str]], gap: int = 2) -> list[str]:
     ]
 
 
+def pieces(text: str, width: int = WIDTH - 8) -> list[str]:
+    """Return a text in pieces that give it when they are joined."""
+    lines = wrap(text, width, break_long_words=False, break_on_hyphens=False)
+    return [f"{line} " for line in lines[:-1]] + lines[-1:]
+
+
 def commented(text: str, width: int = WIDTH - 8) -> list[str]:
     """Return a text as comment lines, the later ones deeper."""
     if len(text) <= width:

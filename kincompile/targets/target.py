@@ -34,11 +34,15 @@ class Emitted:
         Text by file name; the first is the main one.
     arrays
         Arrays that belong to the main file; none for most targets.
+    unsolvable
+        Why the equations cannot determine the coordinates, so that there is no motion to solve
+        for; "" where they can.
     """
 
     name: str
     files: Mapping[str, str]
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    unsolvable: str = ""
 
     @property
     def source(self) -> str:

@@ -19,6 +19,8 @@ import kincompile.compiler as compiler
 from kincompile.errors import InputError, RedundantConstraintWarning
 from kincompile.quantities import QUANTITIES, TOGETHER, functions, is_moving
 from kincompile.runtime.contract import check as check_contract
+from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.inputs import require_square
 from kincompile.runtime.newton import newton
 from kincompile.runtime.problem import problem
 from kincompile.runtime.status import Status
@@ -178,8 +180,10 @@ def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
 
     Raises
     ------
-    ModelError, StructuralError
+    ModelError
         As `kc.compile` does.
+    StructuralError
+        As `kc.newton` does, because some of the states are assembled positions.
     ContractError
         If the module is not an emitted one.
     InputError
@@ -190,6 +194,7 @@ def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
         module = model
     else:
         module = _compiled(model)
+    require_square(code_of(module))
     with np.errstate(all="ignore"):
         states, assembled = _states(module)
         if not states:

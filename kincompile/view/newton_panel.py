@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile import criteria
 from kincompile.compiler import emit
-from kincompile.errors import StructuralError, UnsupportedError
+from kincompile.errors import UnsupportedError
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
@@ -32,12 +32,14 @@ def newton_script(model: Mechanism | ConstraintSystem) -> str:
     if count > MOST_COORDINATES:
         return _without(f"{count} coordinates are too many to show Newton's method step by step.")
     try:
-        source = emit(model, "javascript").source
-    except (StructuralError, UnsupportedError) as error:
+        emitted = emit(model, "javascript")
+    except UnsupportedError as error:
         return _without(f"Newton's method cannot be shown: {error}")
+    if emitted.unsolvable:
+        return _without(f"Newton's method cannot be shown: {emitted.unsolvable}")
     # In a function of its own, so that no name of a mechanism meets one of the page.
     return (
-        f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{source}"
+        f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{emitted.source}"
         "return module.exports;\n})();\n"
     )
 

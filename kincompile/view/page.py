@@ -167,8 +167,7 @@ def _solved(
 ) -> tuple[Solution | None, str]:
     """Compile and solve a system; return the solution, if there is one, and the message."""
     try:
-        module = compile_model(system)
+        solution = solve(compile_model(system), t, p, through=through)
     except StructuralError as error:
         return None, str(error)
-    solution = solve(module, t, p, through=through)
     return solution, solution.message

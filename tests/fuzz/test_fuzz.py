@@ -89,7 +89,7 @@ def check_file(path, ending, content, compiles):
         with watched():
             try:
                 kc.emit(model)
-            except (kc.ModelError, kc.StructuralError, kc.UnsupportedError):
+            except (kc.ModelError, kc.UnsupportedError):
                 return
 
 

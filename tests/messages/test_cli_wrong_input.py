@@ -78,7 +78,7 @@ CASES = {
     ),
     "under-constrained": (
         UNDRIVEN,
-        "compile M -o out.py",
+        "run M -o out.csv",
         ["'arm' has 2 equations for 3 coordinates", "1 more equation is needed"],
     ),
     "under-constrained run": (UNDRIVEN, "run M", ["1 more equation is needed", "add a joint or"]),

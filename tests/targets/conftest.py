@@ -209,7 +209,26 @@ def domain() -> Case:
     return Case.of(m, np.zeros((1, 3)), [-1.0])
 
 
-OWN = {"functions": functions, "top": strange, "struct": awkward, "domain": domain}
+def slider(name: str, **drivers: Any) -> Case:
+    """Return a slider-crank with drivers of bodies: it has one degree of freedom."""
+    m = kc.Mechanism(name)
+    radius = m.parameter("radius", 0.4)
+    m.add(kc.Revolute("A", m.ground, (0, 0), m.body("crank"), (-radius, 0.1)))
+    m.add(kc.Revolute("B", "crank", (radius, 0), m.body("rod"), (-1, 0)))
+    m.add(kc.AbsoluteY("C", "rod", (1, 0), sympy.sin(kc.t) / 9))
+    for body, angle in drivers.items():
+        m.add(kc.AbsoluteAngle(f"{body}_motor", body, angle))
+    return Case.of(m, np.random.default_rng(5).uniform(-1, 1, (STATES, 6)))
+
+
+OWN: dict[str, Callable[[], Case]] = {
+    "functions": functions,
+    "top": strange,
+    "struct": awkward,
+    "domain": domain,
+    "undriven": partial(slider, "undriven"),
+    "driven_twice": partial(slider, "driven_twice", crank=kc.t**2, rod=3 * kc.t + 1),
+}
 
 
 @pytest.fixture(scope="session")

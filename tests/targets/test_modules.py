@@ -6,6 +6,7 @@ And the interpreter, which takes batches too.
 import numpy as np
 import pytest
 
+import kincompile as kc
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 
@@ -13,6 +14,7 @@ from kincompile.ir.lower import lower
 pytestmark = pytest.mark.xdist_group("targets")
 
 TOLERANCE = 1e-13
+UNSOLVABLE = ("undriven", "driven_twice")
 
 
 def assert_close(found, expected):
@@ -84,6 +86,17 @@ def test_that_the_planned_solve_solves(module_of, case_named):
     q, t, p = case.q[0], case.t[0], case.p[0]
     x = module.solve(module.Phi_q_nonzeros(q, t, p), np.ones(q.size))
     np.testing.assert_allclose(module.Phi_q(q, t, p) @ x, 1, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", UNSOLVABLE)
+def test_that_a_module_that_is_not_square_has_no_solve_and_says_why(module_of, name):
+    module = module_of(name)
+    assert module.N_EQUATIONS != module.N_COORDINATES
+    assert not {"solve", "factor", "march"} & vars(module).keys()
+    assert not {"solve", "factor"} & getattr(module, "LANES", {}).keys()
+    with pytest.raises(kc.StructuralError, match=f"'{name}' has . equations for 6 coord") as caught:
+        kc.solve(module, [0.0, 1.0])
+    assert str(caught.value) == module.UNSOLVABLE
 
 
 def test_that_the_interpreter_takes_a_batch_at_one_time(name, case_named):

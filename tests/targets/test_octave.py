@@ -38,6 +38,16 @@ def test_that_a_guess_at_which_phi_q_is_singular_gives_no_motion(octave, tmp_pat
     assert found == {"refused": [[8.0]]}
 
 
+@pytest.mark.parametrize("name", ["undriven", "driven_twice"])
+def test_that_the_script_of_what_is_not_square_says_why(octave, case_named, tmp_path, name):
+    emitted = kc.emit(case_named(name).model, "octave")
+    emitted.write(tmp_path)
+    text = emitted.unsolvable.replace("'", "''")
+    said = f"show('said', strcmp(problem.message, '{text}'));"
+    found = octave(["try", name, "show('found', 1);", "catch problem", said, "end"])
+    assert found == {"said": [[1.0]]}
+
+
 def test_that_a_name_beyond_matlab_is_refused():
     m = kc.Mechanism("long")
     m.add(kc.AbsoluteAngle("motor", m.body("b" * 70), kc.t))

@@ -63,6 +63,8 @@ class Code:
         Functions of the contract; `nonzeros` is ``Phi_q_nonzeros``.
     redundant
         Names of the equations that repeat others, and agree with them.
+    unsolvable
+        Why the equations cannot determine the coordinates; "" where they can, or nobody says.
     lanes : LaneFunctions or None
         With the planned solve, where the module has one.
     stages
@@ -92,6 +94,7 @@ class Code:
     Phi_q: Callable[..., Array]
     nonzeros: Callable[..., Array]
     redundant: tuple[str, ...]
+    unsolvable: str
     lanes: LaneFunctions | None
     stages: tuple[Any, ...]
     evaluate: Callable[..., tuple[Array, Array]] | None
@@ -137,6 +140,7 @@ def attach(module: ModuleType) -> Code:
         Phi_q=names["Phi_q"],
         nonzeros=names["Phi_q_nonzeros"],
         redundant=names.get("REDUNDANT", ()),
+        unsolvable=names.get("UNSOLVABLE", ""),
         lanes=LaneFunctions(
             position=lanes["position"],
             nu=lanes["nu"],

@@ -64,7 +64,7 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
     InputError
         When a value has the wrong name, shape, type or is not finite.
     StructuralError
-        When the module has not as many equations as coordinates.
+        When the equations cannot determine the coordinates: what is wrong, and what to do.
 
     Notes
     -----

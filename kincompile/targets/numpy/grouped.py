@@ -30,7 +30,7 @@ from kincompile.targets.numpy.target import (
     public_functions,
     support,
 )
-from kincompile.targets.numpy.text import tuple_text
+from kincompile.targets.numpy.text import string_text, tuple_text
 from kincompile.targets.printer import Printer
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
@@ -76,7 +76,8 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
         "numpy/grouped.py.jinja",
         _data(grouped, code, tables, solving_table(stages), sorted(called), len(rows)),
     )
-    return Emitted(program.name, {f"{program.name}.py": source}, _small(arrays))
+    files = {f"{program.name}.py": source}
+    return Emitted(program.name, files, _small(arrays), program.unsolvable)
 
 
 def pattern_of(
@@ -208,6 +209,7 @@ def _data(
         "nonzeros": nonzeros,
         "k": len(program.parameters),
         "redundant": indented(quoted(program.redundant)),
+        "unsolvable": string_text(program.unsolvable),
         "is_planned": bool(solving),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "parameter_units": indented(

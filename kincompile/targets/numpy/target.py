@@ -14,7 +14,7 @@ from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.solve import solve_functions
-from kincompile.targets.numpy.text import assignments, element, packed, tuple_text
+from kincompile.targets.numpy.text import assignments, element, packed, string_text, tuple_text
 from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
@@ -115,6 +115,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "equations": tuple_text(f'"{name}"' for name in program.equations),
         "redundant": tuple_text(f'"{name}"' for name in program.redundant),
         "is_redundant": bool(program.redundant),
+        "unsolvable": string_text(program.unsolvable),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
         "units": tuple_text((f'"{unit}"' for unit in units), WIDTH - 44),

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import json
 import re
 from typing import TYPE_CHECKING
 
-from kincompile.targets.lines import WIDTH, broken, indented, wrapped
+from kincompile.targets.lines import WIDTH, broken, indented, pieces, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -17,6 +18,11 @@ def tuple_text(items: Iterable[str], room: int = WIDTH - 15) -> str:
     items = list(items)
     text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
     return text if len(text) <= room else f"(\n{indented(wrapped(items))}\n)"
+
+
+def string_text(text: str) -> str:
+    """Return the lines of a long string in parentheses, indented; "" for an empty one."""
+    return indented(json.dumps(piece, ensure_ascii=False) for piece in pieces(text))
 
 
 def packed(texts: Sequence[str]) -> list[str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from kincompile import quantities
 from kincompile.errors import InputError, UnsupportedError
+from kincompile.targets.lines import indented, pieces
 from kincompile.targets.octave.dialect import NAMES, OCTAVE
 from kincompile.targets.statements import Layout
 from kincompile.targets.templates import fill
@@ -137,6 +138,11 @@ def _spline(name: str, spline: SplineTable) -> str:
     return fill("octave/spline.m.jinja", data)
 
 
+def _literal(text: str) -> str:
+    """Return a string and the sign that the next line goes on with it."""
+    return "'" + text.replace("'", "''") + "' ..."
+
+
 def _script(code: InlineProgram) -> str:
     """Return the script that solves the motion."""
     program = code.program
@@ -153,6 +159,7 @@ def _script(code: InlineProgram) -> str:
         "name": program.name,
         "header": LAYOUT.header(code),
         "n": len(program.coordinates),
+        "unsolvable": indented(_literal(piece) for piece in pieces(program.unsolvable)),
         "end": repr(end),
         "points": points,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 1),

@@ -22,6 +22,25 @@ def test_that_a_folder_gets_a_file_with_the_name_of_the_mechanism(kincompile, pe
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["pendulum.py"]
 
 
+@pytest.mark.parametrize("target", TARGETS)
+def test_that_a_model_without_its_driver_is_written_with_a_warning(
+    kincompile, pendulum, tmp_path, target
+):
+    pendulum.write_text(pendulum.read_text().replace("mechanism.add(kc.Abs", "(kc.Abs"))
+    (tmp_path / "out").mkdir()
+    done = kincompile("compile", pendulum, "--target", target, "-o", tmp_path / "out")
+    assert (done.exit_code, done.stdout) == (0, "")
+    warning, *written = done.stderr.splitlines()
+    assert warning.startswith("Warning: 'pendulum' has 2 equations for 3 coordinates (drivers: n")
+    assert "1 more equation is needed" in warning
+    assert all(line.startswith("Wrote ") for line in written)
+    if target == "numpy":
+        module = kc.load(tmp_path / "out" / "pendulum.py")
+        with pytest.raises(kc.StructuralError) as caught:
+            kc.solve(module, 0.0)
+        assert warning == f"Warning: {caught.value}"
+
+
 def test_that_a_dash_is_stdout(kincompile, pendulum, tmp_path):
     done = kincompile("compile", pendulum, "-o", "-")
     assert done.stdout == kc.emit(kc.read_model(pendulum)).source
