@@ -77,11 +77,11 @@ typedef struct {
     double t[LANES];
     double p[K > 0 ? K : 1][LANES];
     double q[N][LANES], q_dot[N][LANES], q_ddot[N][LANES];
+    double determinants[BLOCKS > 0 ? BLOCKS : 1][LANES], F[FACTORS > 0 ? FACTORS : 1][LANES];
     double Phi[9][LANES];
     double Phi_q[21][LANES];
     double nu[9][LANES];
     double gamma[9][LANES];
-    double F[FACTORS > 0 ? FACTORS : 1][LANES], determinants[BLOCKS > 0 ? BLOCKS : 1][LANES];
 } block;
 
 #ifdef __GNUC__
@@ -520,13 +520,6 @@ static void store_rows(slider_crank_output to, double (*rows)[LANES], const int 
         }
 }
 
-// The same, for what is not much or is read again soon.
-static void write_rows(slider_crank_output to, double (*rows)[LANES], const int *listed, int size,
-    size_t start, size_t count)
-{
-    store_rows(to, rows, listed, size, start, count, 0);
-}
-
 // A quantity: where its entries are in a block and its results in a batch, its size, which entries
 // never change, and which are computed. A vector has no columns, and a matrix a place in `matrices`.
 typedef struct {
@@ -706,7 +699,7 @@ void slider_crank_solve(const slider_crank_system *system)
         read_rows(right, M, system->b, start, count, check);
         factor_of_block(&b, count);
         solve_of_block(&b, right, x, count);
-        write_rows(system->x, x, NULL, N, start, count);
+        store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
 
@@ -854,38 +847,44 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
     }
 }
 
-// A good point of the motion.
-typedef struct {
-    double t, q[N], q_dot[N], q_ddot[N], determinants[BLOCKS > 0 ? BLOCKS : 1];
+// A good point of a motion: its numbers in the rows of a block from t to determinants.
+enum { ROWS = offsetof(block, F) / sizeof(double[LANES]) };
+typedef union {
+    double t, row[ROWS];
 } state;
 
 static void take_up(state *at, const block *b, size_t k)
 {
-    at->t = b->t[k];
-    for (int i = 0; i < BLOCKS; i++)
-        at->determinants[i] = b->determinants[i][k];
-    for (int i = 0; i < N; i++) {
-        at->q[i] = b->q[i][k];
-        at->q_dot[i] = b->q_dot[i][k];
-        at->q_ddot[i] = b->q_ddot[i][k];
+    for (int i = 0; i < ROWS; i++)
+        at->row[i] = ((const double *)b)[i * LANES + (int)k];
+}
+
+// Put lanes of a block at a good point.
+static void put_at(block *b, const state *at, size_t first, size_t end)
+{
+    for (int i = 0; i < ROWS; i++)
+        for (size_t k = first; k < end; k++)
+            ((double *)b)[(size_t)i * LANES + k] = at->row[i];
+}
+
+// Take the points of a block from where they are to other times. Those that end too far from the
+// prediction q + h q_dot + h^2 q_ddot / 2 have not converged. Where the determinant of a block has
+// changed its sign, a singular configuration lies between; near one, the velocity must be where it
+// was predicted too, compared with the position's error.
+static void step(block *b, const scales *s, const double *t, size_t count, outcome *o)
+{
+    double q[N][LANES], q_dot[N][LANES], determinants[BLOCKS > 0 ? BLOCKS : 1][LANES];
+    double h[LANES], error[LANES] = { 0 }, kink[LANES] = { 0 }, crossed[LANES] = { 0 };
+    memcpy(determinants, b->determinants, sizeof determinants);
+    for (size_t k = 0; k < count; k++) {
+        h[k] = t[k] - b->t[k];
+        b->t[k] = t[k];
     }
-}
-
-// Whether the velocity of a point is far from its prediction, compared with the position's error.
-static int is_kinked(const block *b, const scales *s, double q_dot[N][LANES], double h,
-    double error, size_t k)
-{
-    double kink = 0;
     for (int i = 0; i < N; i++)
-        kink = fmax(kink, fabs(h * (b->q_dot[i][k] - q_dot[i][k])) / s->reference[i][k]);
-    return kink > KINK * error + SMOOTH;
-}
-
-// Correct predicted positions, h after a good point. Those that end too far from the prediction have
-// not converged; near a singular configuration the velocity must be where it was predicted too.
-static void settle(block *b, const scales *s, const double *h, size_t count, outcome *o)
-{
-    double q[N][LANES], q_dot[N][LANES], error[LANES] = { 0 };
+        for (size_t k = 0; k < count; k++) {
+            b->q[i][k] += h[k] * (b->q_dot[i][k] + 0.5 * h[k] * b->q_ddot[i][k]);
+            b->q_dot[i][k] += h[k] * b->q_ddot[i][k];
+        }
     memcpy(q, b->q, sizeof q);
     memcpy(q_dot, b->q_dot, sizeof q_dot);
     correct(b, s, count, MAX_CORRECTIONS, o);
@@ -893,159 +892,70 @@ static void settle(block *b, const scales *s, const double *h, size_t count, out
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
             const double size = fabs(b->q[i][k] - q[i][k]) / s->reference[i][k];
+            const double turn = fabs(h[k] * (b->q_dot[i][k] - q_dot[i][k])) / s->reference[i][k];
             error[k] = size <= error[k] ? error[k] : size;
+            kink[k] = turn > kink[k] ? turn : kink[k];
         }
+    for (int i = 0; i < BLOCKS; i++)
+        for (size_t k = 0; k < count; k++)
+            crossed[k] += (determinants[i][k] > 0 ? b->determinants[i][k] > 0
+                : b->determinants[i][k] < 0) ? 0 : 1;
     for (size_t k = 0; k < count; k++)
         if (!(error[k] <= LARGEST_ERROR))
             o->status[k] = SLIDER_CRANK_NOT_CONVERGED;
-        else if (o->sensitivity[k] > NEARLY_SINGULAR && is_kinked(b, s, q_dot, h[k], error[k], k))
+        else if ((o->sensitivity[k] > NEARLY_SINGULAR && kink[k] > KINK * error[k] + SMOOTH)
+            || (o->status[k] == SLIDER_CRANK_CONVERGED && crossed[k] != 0))
             o->status[k] = SLIDER_CRANK_SINGULAR;
 }
 
-// Where the determinant of a block has changed its sign, a singular configuration lies between.
-static int is_on_branch(const state *from, const block *b, size_t k)
-{
-    for (int i = 0; i < BLOCKS; i++) {
-        const double before = from->determinants[i], here = b->determinants[i][k];
-        if (!(before > 0 ? here > 0 : here < 0))
-            return 0;
-    }
-    return 1;
-}
-
-// Solve the points at the times in a block, each predicted from one good point by
-// q + h q_dot + h^2 q_ddot / 2. Returns how many continue the motion, from the first one on.
-static size_t step(block *b, const scales *s, const state *from, size_t count, outcome *o)
-{
-    double h[LANES];
-    for (size_t k = 0; k < count; k++)
-        h[k] = b->t[k] - from->t;
-    for (int i = 0; i < N; i++)
-        for (size_t k = 0; k < count; k++) {
-            b->q[i][k] = from->q[i] + h[k] * (from->q_dot[i] + 0.5 * h[k] * from->q_ddot[i]);
-            b->q_dot[i][k] = from->q_dot[i] + h[k] * from->q_ddot[i];
-        }
-    settle(b, s, h, count, o);
-    for (size_t k = 0; k < count; k++) {
-        if (o->status[k] == SLIDER_CRANK_CONVERGED && !is_on_branch(from, b, k))
-            o->status[k] = SLIDER_CRANK_SINGULAR;
-        if (o->status[k] != SLIDER_CRANK_CONVERGED)
-            return k;
-    }
-    return count;
-}
-
-// Go from a good point to a time in sub-steps, halved where they fail and doubled where they do
-// not. Returns the status at that time; where it is good, it is in lane 0.
-static int advance(block *b, const scales *s, state *at, double t, outcome *o)
+// Take one point of a block from a good point to a time, in sub-steps that are halved where they
+// fail and doubled where they do not.
+static void advance(block *b, const scales *s, state *at, double t, size_t k, outcome *o)
 {
     const double smallest = fabs(t - at->t) * SMALLEST_PART;
-    double h = 0.5 * (t - at->t);
-    int iterations = 0;
-    for (int k = 0; k < MAX_SUBSTEPS; k++) {
+    double h = 0.5 * (t - at->t), matrices[MATRICES];
+    block alone;
+    scales own;
+    outcome found;
+    place_constants(&alone, matrices, 1);
+    for (int i = 0; i < M; i++)
+        own.magnitude[i][0] = s->magnitude[i][k];
+    for (int i = 0; i < N; i++)
+        own.reference[i][0] = s->reference[i][k];
+    own.tolerance = s->tolerance;
+    found.is_over[0] = 0;
+    o->iterations[k] = 0;
+    for (int n = 0; n < MAX_SUBSTEPS; n++) {
         const int whole = fabs(h) >= fabs(t - at->t);
-        b->t[0] = whole ? t : at->t + h;
-        const size_t good = step(b, s, at, 1, o);
-        iterations += o->iterations[0];
-        if (good) {
-            take_up(at, b, 0);
-            h *= 2;
-        } else if (fabs(h) <= smallest) {
+        const double next = whole ? t : at->t + h;
+        put_at(&alone, at, 0, 1);
+        step(&alone, &own, &next, 1, &found);
+        const int good = found.status[0] == SLIDER_CRANK_CONVERGED;
+        o->iterations[k] += found.iterations[0];
+        if (good)
+            take_up(at, &alone, 0);
+        if (good ? whole : fabs(h) <= smallest)
             break;
-        } else {
-            h *= 0.5;
-        }
-        if (good && whole)
-            break;
+        h *= good ? 2 : 0.5;
     }
-    o->iterations[0] = iterations;
-    if (o->status[0] == SLIDER_CRANK_CONVERGED && at->t != t)
-        o->status[0] = SLIDER_CRANK_NOT_CONVERGED;
-    return o->status[0];
+    o->residual[k] = found.residual[0];
+    o->status[k] = found.status[0];
+    if (o->status[k] == SLIDER_CRANK_CONVERGED && at->t != t)
+        o->status[k] = SLIDER_CRANK_NOT_CONVERGED;
+    take_up(at, &alone, 0);
+    put_at(b, at, k, k + 1);
 }
 
-// Write points of a block to their places in the motion.
-static void record(const slider_crank_motion *motion, block *b, const outcome *o, size_t start,
-    size_t count)
-{
-    write_rows(motion->q, b->q, NULL, N, start, count);
-    write_rows(motion->q_dot, b->q_dot, NULL, N, start, count);
-    write_rows(motion->q_ddot, b->q_ddot, NULL, N, start, count);
-    memcpy(motion->residual + start, o->residual, count * sizeof *o->residual);
-    memcpy(motion->status + start, o->status, count * sizeof *o->status);
-    memcpy(motion->iterations + start, o->iterations, count * sizeof *o->iterations);
-}
-
-// Assemble the mechanism at a time, from a guess.
-static void assemble(block *b, scales *s, double t, const double *guess, int max_iterations,
-    size_t count, outcome *o)
-{
-    for (size_t k = 0; k < count; k++) {
-        b->t[k] = t;
-        o->is_over[k] = 0;
-        for (int i = 0; i < N; i++)
-            b->q[i][k] = guess[i];
-    }
-    measure(b, guess, count, s);
-    correct(b, s, count, max_iterations, o);
-    complete(b, s, count, o);
-    // The guess may be rough: from here on the assembled mechanism gives the size.
-    measure(b, guess, count, s);
-}
-
-size_t slider_crank_march(const slider_crank_motion *motion)
-{
-    block b;
-    scales s;
-    outcome o;
-    state at;
-    double matrices[MATRICES];
-    s.tolerance = motion->tolerance;
-    place_constants(&b, matrices, LANES);
-    for (int i = 0; i < K; i++)
-        for (size_t k = 0; k < LANES; k++)
-            b.p[i][k] = motion->p[i];
-    assemble(&b, &s, motion->t[0], motion->guess, motion->max_iterations, LANES, &o);
-    record(motion, &b, &o, 0, 1);
-    take_up(&at, &b, 0);
-    int status = o.status[0];
-    size_t done = status == SLIDER_CRANK_CONVERGED ? 1 : 0, width = 1;
-    while (status == SLIDER_CRANK_CONVERGED && done < motion->count) {
-        const size_t rest = motion->count - done, count = rest < width ? rest : width;
-        memcpy(b.t, motion->t + done, count * sizeof *b.t);
-        const size_t good = step(&b, &s, &at, count, &o);
-        if (good > 0) {
-            record(motion, &b, &o, done, good);
-            take_up(&at, &b, good - 1);
-            done += good;
-            // The fewer iterations, the more points the next prediction can serve.
-            if (good < count || o.iterations[good - 1] > 3)
-                width = good > 1 ? good / 2 : 1;
-            else
-                width = 2 * width < LANES ? 2 * width : LANES;
-        } else if (count > 1) {
-            width = 1;
-        } else {
-            status = advance(&b, &s, &at, motion->t[done], &o);
-            record(motion, &b, &o, done, 1);
-            done += status == SLIDER_CRANK_CONVERGED;
-        }
-    }
-    for (size_t k = done + 1; k < motion->count; k++)
-        motion->status[k] = SLIDER_CRANK_NOT_REACHED;
-    return done;
-}
-
-// Write the points of a block of variants at one time; those that are over have no numbers.
-static void record_variants(const slider_crank_variants *all, block *b, const outcome *o,
-    size_t time, size_t first, size_t count)
+// Write the points of a block at one time; variants that are over have no numbers.
+static void record(const slider_crank_variants *all, block *b, const outcome *o, size_t time,
+    size_t first, size_t count)
 {
     const slider_crank_output to[3] = { all->q, all->q_dot, all->q_ddot };
     double (*const rows[3])[LANES] = { b->q, b->q_dot, b->q_ddot };
     for (int kind = 0; kind < 3; kind++) {
         slider_crank_output now = to[kind];
         now.first += (ptrdiff_t)time * all->time;
-        write_rows(now, rows[kind], NULL, N, first, count);
+        store_rows(now, rows[kind], NULL, N, first, count, 0);
         for (size_t k = 0; k < count; k++)
             for (int i = 0; o->is_over[k] && i < N; i++)
                 now.first[i * now.entry + (ptrdiff_t)(first + k) * now.point] = NAN;
@@ -1056,6 +966,75 @@ static void record_variants(const slider_crank_variants *all, block *b, const ou
         all->status[place] = o->status[k];
         all->iterations[place] = o->iterations[k];
     }
+}
+
+// Assemble variants from the guess, at the first time.
+static void assemble(const slider_crank_variants *all, block *b, scales *s, size_t first,
+    size_t count, outcome *o)
+{
+    double matrices[MATRICES], check[LANES] = { 0 };
+    place_constants(b, matrices, count);
+    read_rows(b->p, K, all->p, first, count, check);
+    s->tolerance = all->tolerance;
+    for (size_t k = 0; k < count; k++) {
+        b->t[k] = all->t[0];
+        o->is_over[k] = 0;
+        for (int i = 0; i < N; i++)
+            b->q[i][k] = all->guess[i];
+    }
+    measure(b, all->guess, count, s);
+    correct(b, s, count, all->max_iterations, o);
+    complete(b, s, count, o);
+    // The guess may be rough: from here on the assembled mechanism gives the size.
+    measure(b, all->guess, count, s);
+}
+
+size_t slider_crank_march(const slider_crank_motion *motion)
+{
+    // The lanes of a block are times of the motion, as if each were a variant at its own.
+    const slider_crank_variants all = {
+        .t = motion->t, .p = { motion->p, 1, 0 }, .guess = motion->guess,
+        .tolerance = motion->tolerance, .max_iterations = motion->max_iterations,
+        .q = motion->q, .q_dot = motion->q_dot, .q_ddot = motion->q_ddot,
+        .residual = motion->residual, .status = motion->status, .iterations = motion->iterations,
+    };
+    block b;
+    scales s;
+    outcome o;
+    state at;
+    assemble(&all, &b, &s, 0, LANES, &o);
+    record(&all, &b, &o, 0, 0, 1);
+    take_up(&at, &b, 0);
+    int status = o.status[0];
+    size_t done = status == SLIDER_CRANK_CONVERGED ? 1 : 0, width = 1;
+    while (status == SLIDER_CRANK_CONVERGED && done < motion->count) {
+        const size_t rest = motion->count - done, count = rest < width ? rest : width;
+        size_t good = 0;
+        put_at(&b, &at, 0, count);
+        step(&b, &s, motion->t + done, count, &o);
+        while (good < count && o.status[good] == SLIDER_CRANK_CONVERGED)
+            good++;
+        if (good > 0) {
+            record(&all, &b, &o, 0, done, good);
+            take_up(&at, &b, good - 1);
+            done += good;
+            // The fewer iterations, the more points the next prediction can serve.
+            if (good < count || o.iterations[good - 1] > 3)
+                width = good > 1 ? good / 2 : 1;
+            else
+                width = 2 * width < LANES ? 2 * width : LANES;
+        } else if (count > 1) {
+            width = 1;
+        } else {
+            advance(&b, &s, &at, motion->t[done], 0, &o);
+            record(&all, &b, &o, 0, done, 1);
+            status = o.status[0];
+            done += status == SLIDER_CRANK_CONVERGED;
+        }
+    }
+    for (size_t k = done + 1; k < motion->count; k++)
+        motion->status[k] = SLIDER_CRANK_NOT_REACHED;
+    return done;
 }
 
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
@@ -1074,75 +1053,30 @@ static void put_to_rest(const slider_crank_variants *all, block *b, outcome *o, 
     }
 }
 
-// Take one variant of a block from where it was to the block's time, in sub-steps.
-static void advance_alone(block *b, const scales *s, state *at, size_t k, outcome *o)
-{
-    block alone;
-    scales own;
-    outcome found;
-    double matrices[MATRICES];
-    place_constants(&alone, matrices, 1);
-    own.tolerance = s->tolerance;
-    found.is_over[0] = 0;
-    for (int i = 0; i < K; i++)
-        alone.p[i][0] = b->p[i][k];
-    for (int i = 0; i < M; i++)
-        own.magnitude[i][0] = s->magnitude[i][k];
-    for (int i = 0; i < N; i++)
-        own.reference[i][0] = s->reference[i][k];
-    o->status[k] = advance(&alone, &own, at, b->t[k], &found);
-    o->iterations[k] = found.iterations[0];
-    o->residual[k] = found.residual[0];
-    for (int i = 0; i < BLOCKS; i++)
-        b->determinants[i][k] = alone.determinants[i][0];
-    for (int i = 0; i < N; i++) {
-        b->q[i][k] = alone.q[i][0];
-        b->q_dot[i][k] = alone.q_dot[i][0];
-        b->q_ddot[i][k] = alone.q_ddot[i][0];
-    }
-}
-
-// Take a block of variants to the next time: all together, and alone those that fail.
-static void step_variants(block *b, const scales *s, double t, size_t count, outcome *o)
-{
-    state from[LANES];
-    double h[LANES];
-    for (size_t k = 0; k < count; k++) {
-        take_up(&from[k], b, k);
-        h[k] = t - b->t[k];
-        b->t[k] = t;
-    }
-    for (int i = 0; i < N; i++)
-        for (size_t k = 0; k < count; k++) {
-            b->q[i][k] += h[k] * (b->q_dot[i][k] + 0.5 * h[k] * b->q_ddot[i][k]);
-            b->q_dot[i][k] += h[k] * b->q_ddot[i][k];
-        }
-    settle(b, s, h, count, o);
-    for (size_t k = 0; k < count; k++)
-        if (!o->is_over[k]
-            && (o->status[k] != SLIDER_CRANK_CONVERGED || !is_on_branch(&from[k], b, k)))
-            advance_alone(b, s, &from[k], k, o);
-}
-
 size_t slider_crank_march_variants(const slider_crank_variants *all)
 {
     block b;
     scales s;
     outcome o;
-    double matrices[MATRICES], check[LANES] = { 0 };
+    state from[LANES];
+    double times[LANES];
     size_t good = 0;
-    s.tolerance = all->tolerance;
-    place_constants(&b, matrices, LANES);
     for (size_t first = 0; first < all->variants; first += LANES) {
         const size_t rest = all->variants - first, count = rest < LANES ? rest : LANES;
-        read_rows(b.p, K, all->p, first, count, check);
-        assemble(&b, &s, all->t[0], all->guess, all->max_iterations, count, &o);
+        assemble(all, &b, &s, first, count, &o);
         put_to_rest(all, &b, &o, count);
-        record_variants(all, &b, &o, 0, first, count);
+        record(all, &b, &o, 0, first, count);
         for (size_t time = 1; time < all->count; time++) {
-            step_variants(&b, &s, all->t[time], count, &o);
+            for (size_t k = 0; k < count; k++) {
+                take_up(&from[k], &b, k);
+                times[k] = all->t[time];
+            }
+            step(&b, &s, times, count, &o);
+            for (size_t k = 0; k < count; k++)
+                if (!o.is_over[k] && o.status[k] != SLIDER_CRANK_CONVERGED)
+                    advance(&b, &s, &from[k], times[k], k, &o);
             put_to_rest(all, &b, &o, count);
-            record_variants(all, &b, &o, time, first, count);
+            record(all, &b, &o, time, first, count);
         }
         for (size_t k = 0; k < count; k++)
             good += !o.is_over[k];

@@ -165,7 +165,7 @@ class VectorSymbol(Vector):
 
 @dataclass(frozen=True, slots=True)
 class Basis(Vector):
-    """The unit vector along an axis, e_x unless told otherwise."""
+    """The unit vector along an axis, e_x by default."""
 
     axis: int = 0
     size: int = 2

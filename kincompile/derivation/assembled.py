@@ -38,11 +38,12 @@ from kincompile.structure.report import gruebler
 from kincompile.tables import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.derivation.document import Block, Run, Runs
     from kincompile.derivation.evaluation import Evaluation
     from kincompile.ir.inline import Entry
+    from kincompile.model.bodies import Body
     from kincompile.runtime.newton import NewtonResult
 
     Rows: TypeAlias = list[tuple[Run | Runs, ...]]
@@ -94,6 +95,16 @@ def _math(value: float, digits: int = 6) -> Math:
     return Math(Decimal(value, digits))
 
 
+def _column_rule(bodies: Sequence[Body]) -> str:
+    """Return how the column offset of a body follows from the kinds of the bodies before it."""
+    sizes = {len(body.kind.letters) for body in bodies}
+    if len(sizes) != 1:
+        return "The column offset of a body is the number of coordinates of the bodies before it."
+    (size,) = sizes
+    times = {1: "", 2: "twice ", 3: "three times "}.get(size, f"{size} times ")
+    return f"The column offset of a body is {times}the number of bodies before it."
+
+
 def _offsets(evaluation: Evaluation) -> Section:
     system = evaluation.system
     rows: Rows = []
@@ -105,8 +116,8 @@ def _offsets(evaluation: Evaluation) -> Section:
         rows.append((name, str(count), str(first), row_range(first, count), str(first + 1)))
     note = text(
         "The row offset of a constraint is the number of equations before it: the exclusive prefix "
-        "scan of the numbers of equations. The column offset of a body is three times the number "
-        "of bodies before it."
+        "scan of the numbers of equations. "
+        f"{_column_rule(system.bodies)}"
     )
     header = ("constraint", "equations", "row offset", "rows from 0", "first row from 1")
     columns: Rows = [

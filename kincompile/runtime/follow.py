@@ -132,7 +132,7 @@ class _Way:
         return self._advance(after)
 
     def end(self) -> None:
-        """Clear what a grid left behind the last point reached."""
+        """Clear the results of a grid after the last point reached."""
         self._motion.forget(self._index)
         self._count_pivoted()
 
@@ -153,7 +153,7 @@ class _Way:
         )
 
     def _march_at(self, q: NDArray[np.float64], engine: Engine | None) -> March:
-        """Return the march of the mechanism, whose size is told by the guess and a position."""
+        """Return the march of the mechanism, whose size comes from the guess and a position."""
         inputs, time = self._inputs, float(self._times[0])
         equations = problem(
             inputs.module, inputs.p, q, time, inputs.guess, staged=True, engine=engine

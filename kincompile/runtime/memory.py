@@ -1,4 +1,4 @@
-"""Memory for large results: that of earlier results which nobody holds any more is used again.
+"""Memory for large results: the buffers of garbage-collected results are used again.
 
 The system hands out memory page by page and clears each page first. For the results of a large
 batch that takes longer than to compute them, and the allocator gives them back with every call.

@@ -42,7 +42,7 @@ class Motion:
     near : list of int
         Points so near to a singular configuration that their rates are uncertain.
     note : str
-        What else is to be said.
+        A remark for the message of the solution.
     """
 
     q: Vector
@@ -76,7 +76,7 @@ class Motion:
         )
 
     def forget(self, index: int) -> None:
-        """Clear what a grid left behind the last point reached."""
+        """Clear the results of a grid after the last point reached."""
         for values in (self.q, self.q_dot, self.q_ddot, self.residual):
             values[index:] = np.nan
         self.iterations[index:] = 0

@@ -222,7 +222,7 @@ class _Chunk:
     def _take(self, index: int, state: State, variant: int, outcome: Outcome) -> None:
         """Put what was found for one variant alone into the state of all, and write it down.
 
-        One that ends is kept busy with its guess.
+        A variant that fails is parked at the guess.
         """
         found, arrays, place = outcome.state, self._arrays, self._first + variant
         status = outcome.status

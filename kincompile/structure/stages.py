@@ -213,7 +213,7 @@ def _class_order(needs: Index, count: int) -> list[tuple[list[int], bool]]:
 
 
 def _chain(chosen: Index, batches: tuple[Batch, ...], blocks: BlockForm) -> Chain:
-    """Return the stage of blocks that need each other."""
+    """Return the chain: the batches of a cycle of blocks, and their interface equations."""
     needs = blocks.needs()
     within = np.isin(needs, chosen).all(axis=0)
     rows = np.unique(blocks.rows[~blocks.is_inner()][within])

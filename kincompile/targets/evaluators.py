@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class BodyFrame:
     """What is used of a body's frame, and the angle where that is its cosine and sine."""
 
     angle: int | None
@@ -48,7 +48,7 @@ class Listing:
         Names of all named nodes, inputs included.
     """
 
-    frames: tuple[Frame, ...]
+    frames: tuple[BodyFrame, ...]
     steps: tuple[tuple[Section, tuple[Assignment, ...]], ...]
     results: tuple[tuple[str, tuple[tuple[Section, tuple[Entry, ...]], ...]], ...]
     inputs: frozenset[str]
@@ -132,13 +132,13 @@ def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, 
                 yield vector, k, listing.input_names[member]
 
 
-def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[Frame, ...]:
+def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[BodyFrame, ...]:
     """Return the frames of which something is used, and name that."""
     found = []
     for entries in inline.frames:
         values = tuple(scheduler.name(node) for node in entries if node in scheduler.uses)
         if values:
-            found.append(Frame(_angle(inline, values), values))
+            found.append(BodyFrame(_angle(inline, values), values))
     return tuple(found)
 
 
@@ -151,7 +151,7 @@ def _angle(inline: InlineProgram, values: Sequence[Assignment]) -> int | None:
 
 
 def _functions(
-    inline: InlineProgram, uses: Iterable[int], frames: tuple[Frame, ...]
+    inline: InlineProgram, uses: Iterable[int], frames: tuple[BodyFrame, ...]
 ) -> tuple[str, ...]:
     """Return the names of the functions called; cosine and sine of a frame are one call."""
     pairs = [frame for frame in frames if frame.angle is not None]

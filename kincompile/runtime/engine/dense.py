@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array, Code
 
 LARGEST_POWER = 700.0
-"""Power of e beyond which a determinant is not told: floating point ends at 709."""
+"""Power of e beyond which no determinant is given: floating point ends at 709."""
 
 
 class Dense:

@@ -136,7 +136,7 @@ class _LaneStage:
             x[columns] -= value
 
     def unit_solution(self, part: tuple[Any, Any], row: int) -> Array:
-        """Return the solution for a right side of one in a row of every block, shape (size, L)."""
+        """Solve every block for the unit vector of a row; return x, shape (size, L)."""
         size, lanes = self.rows.shape
         right = [float(k == row) for k in range(size)]
         result = np.empty((size, lanes))
@@ -400,7 +400,7 @@ def _stage(
 
 
 LARGEST_POWER = 600.0
-"""Power of e beyond which the size of a determinant is not told: floating point ends at 709."""
+"""Power of e beyond which no determinant is given: floating point ends at 709."""
 
 
 def _determinant(factors: SuperLU) -> float:

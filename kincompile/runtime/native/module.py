@@ -121,7 +121,7 @@ class _Functions:
             results = self._fill(batch, wanted, states[0].shape[:-1])
             if results is not None:
                 return results
-        # Broadcasting, conversion and what is to be said of bad arguments are the module's.
+        # Broadcasting, conversion and error messages are delegated to the NumPy module.
         rows, t, p, shape = vars(self._module)["_batch"](t, p, states)
         if rows[0].dtype != REAL:
             return None

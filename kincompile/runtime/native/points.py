@@ -55,7 +55,7 @@ class Places:
         self.free = [self.new()]
 
     def new(self) -> tuple[Array, Array, c_double, Array, list[Array], Any, Any]:
-        """Return where q, q_dot, t, p are written, the results, and what C is told.
+        """Return the arrays of q, q_dot, t, p, the results, and the arguments of the C call.
 
         That is: to take the default parameters, or those that are written.
         """

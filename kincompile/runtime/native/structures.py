@@ -1,4 +1,4 @@
-"""What emitted C code is told: the structures of its header, and where numbers lie."""
+"""The arguments of emitted C code: the structures of its header, and the layout of numbers."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
 
 
 def _periodic(equations: Problem, t: float, guess: Vector) -> NDArray[np.bool_]:
-    """Return which coordinates no equation can tell from themselves and a whole turn.
+    """Return which coordinates are 2 pi-periodic in every equation.
 
     A free coordinate has no unit that says that it is an angle.
     """

@@ -58,7 +58,7 @@ ROOT_STEPS = 80
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class CurvePoint:
     """A point of the curve.
 
     Attributes
@@ -88,7 +88,7 @@ class Bracket:
 
     Attributes
     ----------
-    first, second : Place
+    first, second : CurvePoint
         The points, in the direction of the motion.
     length : float
         The step from one to the other.
@@ -96,8 +96,8 @@ class Bracket:
         Whether the curve turns back in time.
     """
 
-    first: Place
-    second: Place
+    first: CurvePoint
+    second: CurvePoint
     length: float
     turns: bool
 
@@ -122,12 +122,12 @@ class Curve:
         terms = equations.terms(state.point, spread)
         self._weights = 1 / np.where(terms > 0, terms, 1.0)
 
-    def start(self, state: State, direction: float) -> Place | None:
+    def start(self, state: State, direction: float) -> CurvePoint | None:
         """Return a point of the motion as one of the curve, looking forward or back in time."""
         towards = direction * np.append(state.q_dot, 1.0) / self.scale
         return self._place(state.point.q, state.t, towards)
 
-    def step(self, place: Place, length: float) -> Place | None:
+    def step(self, place: CurvePoint, length: float) -> CurvePoint | None:
         """Go a length along the curve; None where it cannot be followed so far."""
         y = np.append(place.q, place.t) + length * place.tangent * self.scale
         predicted = y.copy()
@@ -156,7 +156,7 @@ class Curve:
             return None
         return self._place(y[:-1], float(y[-1]), place.tangent)
 
-    def next_singular(self, place: Place, latest: float) -> Bracket | None:
+    def next_singular(self, place: CurvePoint, latest: float) -> Bracket | None:
         """Follow the curve up to a time, or to the first step that contains a singular point."""
         length = FIRST
         forward = math.copysign(1.0, latest - place.t)
@@ -175,7 +175,7 @@ class Curve:
             place, length = following, min(2 * length, LONGEST)
         return None
 
-    def singular_point(self, bracket: Bracket) -> tuple[Place, float] | None:
+    def singular_point(self, bracket: Bracket) -> tuple[CurvePoint, float] | None:
         """Return the singular configuration in a bracket, and how far along it lies."""
         first = bracket.first
         if bracket.turns:
@@ -188,7 +188,7 @@ class Curve:
         parts = np.zeros(len(blocks)) if before is None else self._parts(first, before, blocks)
         return self._between(first, at, blocks[int(np.argmin(parts))])
 
-    def _between(self, first: Place, at: float, block: int) -> tuple[Place, float] | None:
+    def _between(self, first: CurvePoint, at: float, block: int) -> tuple[CurvePoint, float] | None:
         """Return a bifurcation by interpolation of places so far from it that they are accurate."""
         places = [self.step(first, at + offset * AROUND) for offset in OFFSETS]
         known = [place for place in places if place is not None]
@@ -206,21 +206,21 @@ class Curve:
         place = self._place(y[:-1], float(y[-1]), first.tangent)
         return None if place is None else (place, at + x * AROUND)
 
-    def _value(self, place: Place, first: Place, block: int) -> float:
+    def _value(self, place: CurvePoint, first: CurvePoint, block: int) -> float:
         """Return the determinant of a block at a place."""
         return float(self.equations.engine.determinants(place.point, first.point)[block])
 
-    def _forward(self, place: Place, length: float) -> float | None:
-        """Return the tangent's component along time, a length further on."""
+    def _forward(self, place: CurvePoint, length: float) -> float | None:
+        """Return the tangent's component along time after a step of this length."""
         found = self.step(place, length) if length else place
         return None if found is None else float(found.tangent[-1])
 
-    def _least(self, place: Place, length: float, blocks: list[int]) -> float | None:
-        """Return what is left of the determinants of blocks, a length further on, of the least."""
+    def _least(self, place: CurvePoint, length: float, blocks: list[int]) -> float | None:
+        """Return the smallest ratio of block determinants after a step of this length."""
         found = self.step(place, length) if length else place
         return None if found is None else float(np.min(self._parts(place, found, blocks)))
 
-    def _parts(self, before: Place, after: Place, blocks: list[int] | slice) -> Vector:
+    def _parts(self, before: CurvePoint, after: CurvePoint, blocks: list[int] | slice) -> Vector:
         """Return the determinants of blocks, as parts of what they were."""
         there, here = (
             self.equations.engine.determinants(place.point, before.point)
@@ -229,7 +229,7 @@ class Curve:
         with np.errstate(all="ignore"):
             return np.asarray((here / there)[blocks])
 
-    def _changed(self, before: Place, after: Place) -> list[int]:
+    def _changed(self, before: CurvePoint, after: CurvePoint) -> list[int]:
         """Return the blocks whose determinant has changed its sign, or is zero."""
         parts = self._parts(before, after, slice(None))
         return [int(block) for block in np.flatnonzero(~(parts > 0))]
@@ -246,12 +246,12 @@ class Curve:
         matrix = self._weights[:, np.newaxis] * np.column_stack((point.Phi_q, -nu)) * self.scale
         return (point, matrix) if np.isfinite(matrix).all() else None
 
-    def _place(self, q: Vector, t: float, towards: Vector) -> Place | None:
+    def _place(self, q: Vector, t: float, towards: Vector) -> CurvePoint | None:
         found = self._derivatives(q, t)
         if found is None:
             return None
         point, matrix = found
-        return Place(q, t, point, matrix, _tangent(matrix, towards))
+        return CurvePoint(q, t, point, matrix, _tangent(matrix, towards))
 
 
 def _tangent(matrix: Vector, towards: Vector) -> Vector:

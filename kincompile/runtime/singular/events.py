@@ -1,4 +1,4 @@
-r"""Singular configurations of a motion: located in time, told apart, and named.
+r"""Singular configurations of a motion: located in time, classified, and named.
 
 Where :math:`\Phi_q` is singular, its null vector :math:`v` is a movement that no equation forbids.
 At a lock-up the drivers demand what the joints cannot give: velocities grow beyond all bounds, and

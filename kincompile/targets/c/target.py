@@ -92,7 +92,7 @@ def _about(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
     return {
         "name": program.name,
         "NAME": program.name.upper(),
-        "header": LAYOUT.header(code),
+        "header": LAYOUT.heading(code),
         "n": len(program.coordinates),
         "m": len(program.equations),
         "k": len(program.parameters),
@@ -238,8 +238,7 @@ def _block(
 def _elementary(program: Program, called: Collection[str], largest: int) -> str:
     """Return what the code calls: functions of angles, splines, the solve of blocks of a size."""
     data = {
-        "has_cosine": "cos" in called,
-        "has_sine": "sin" in called,
+        "alone": [long for short, long in (("cos", "cosine"), ("sin", "sine")) if short in called],
         "tables": "\n\n".join(_splines(program)),
         "order": max(
             (len(row) for item in program.tables.values() for row in item.coefficients), default=0

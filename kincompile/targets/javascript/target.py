@@ -85,7 +85,7 @@ def files(
     data = {
         **constants(code, 2, "[{}, {}]"),
         "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),
-        "header": LAYOUT.header(code),
+        "header": LAYOUT.heading(code),
         "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
         "tables": indented(_tables(program)),
         "has_square": "square(" in text,

@@ -26,11 +26,9 @@ from kincompile.targets.numpy.grouped_solve import (
 )
 from kincompile.targets.numpy.target import (
     RESERVED,
-    array_functions,
     function_body,
     public_functions,
-    scalar_functions,
-    shared_text,
+    support,
 )
 from kincompile.targets.numpy.text import string_text, tuple_text
 from kincompile.targets.printer import Printer
@@ -222,14 +220,12 @@ def _data(
             for name in program.tables
         ),
         "defaults": tuple_text((repr(item.default) for item in program.parameters), 62),
-        "scalar_functions": indented(scalar_functions(called)),
-        "array_functions": indented(array_functions(called)),
         "kernels": "\n".join(code),
         "functions": "\n".join(_public(program, nonzeros)),
         "sizes": indented(_sizes()),
         "groups": indented(line for lines in tables for line in lines),
         "stages": indented(solving),
-        **shared_text(),
+        **support(called, has_frames=True, has_large_blocks=True),
     }
 
 

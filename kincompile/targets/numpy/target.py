@@ -85,12 +85,12 @@ def files(
         "functions": "\n".join(_functions(code)),
         "results": "\n".join(_results()),
         "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
-        "scalar_functions": indented(scalar_functions(sorted(called))),
-        "array_functions": indented(array_functions(sorted(called))),
         "is_planned": plan is not None,
-        "has_large_blocks": plan is not None and plan.has_large_blocks,
-        "has_frames": "cos_sin" in called,
-        **shared_text(),
+        **support(
+            called,
+            has_frames="cos_sin" in called,
+            has_large_blocks=plan is not None and plan.has_large_blocks,
+        ),
     }
     return {f"{code.program.name}.py": fill("numpy/module.py.jinja", data)}
 
@@ -205,23 +205,24 @@ def public_functions(
             yield quantity, name, (f"def {name}({states}, t, p=DEFAULTS):", f'    """{text}"""')
 
 
-def shared_text() -> dict[str, str]:
+def support(called: Collection[str], *, has_frames: bool, has_large_blocks: bool) -> dict[str, str]:
     """Return the parts that both forms of a module have in common, by slot."""
-    files = {
-        "arguments": "arguments",
-        "block_functions": "blocks",
-        "cos_sin": "cos_sin",
-        "spline": "spline",
+    functions = {
+        "scalar_functions": indented(_scalar_functions(sorted(called))),
+        "array_functions": indented(_array_functions(sorted(called))),
+        "has_frames": has_frames,
+        "has_large_blocks": has_large_blocks,
     }
-    return {slot: fill(f"numpy/{name}.py.jinja", {}).rstrip() for slot, name in files.items()}
+    files = {"arguments": {}, "spline": {}, "elementary": functions}
+    return {name: fill(f"numpy/{name}.py.jinja", data).rstrip() for name, data in files.items()}
 
 
-def scalar_functions(called: Iterable[str]) -> list[str]:
+def _scalar_functions(called: Iterable[str]) -> list[str]:
     """Return a class body that maps the functions called to those of `math`."""
     return [f"{name} = {SCALAR_FUNCTIONS.get(name, f'math.{name}')}" for name in called]
 
 
-def array_functions(called: Iterable[str]) -> list[str]:
+def _array_functions(called: Iterable[str]) -> list[str]:
     """Return a class body that maps the functions called to those of NumPy."""
     return [f"{name} = {FUNCTIONS.get(name, f'np.{name}')}" for name in called]
 
