@@ -15,7 +15,7 @@ from kincompile.errors import UnsupportedError
 from kincompile.ir.inline import Entry, InlineProgram, Section
 from kincompile.quantities import FORMAT, kernels
 from kincompile.targets.evaluators import input_names, inputs_read, schedule
-from kincompile.targets.lines import indented, quoted, wrapped
+from kincompile.targets.lines import indented, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.grouped_solve import (
@@ -30,7 +30,7 @@ from kincompile.targets.numpy.target import (
     public_functions,
     support,
 )
-from kincompile.targets.numpy.text import string_text, tuple_text
+from kincompile.targets.numpy.text import solvability_text, tuple_text
 from kincompile.targets.printer import Printer
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
@@ -208,8 +208,7 @@ def _data(
         "m": len(program.equations),
         "nonzeros": nonzeros,
         "k": len(program.parameters),
-        "redundant": indented(quoted(program.redundant)),
-        "unsolvable": string_text(program.unsolvable),
+        "solvability": solvability_text(program),
         "is_planned": bool(solving),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "parameter_units": indented(

@@ -14,7 +14,7 @@ from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.solve import solve_functions
-from kincompile.targets.numpy.text import assignments, element, packed, string_text, tuple_text
+from kincompile.targets.numpy.text import assignments, element, packed, solvability_text, tuple_text
 from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
@@ -113,9 +113,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "nonzeros": len(code.pattern()),
         "coordinates": tuple_text(f'"{name}"' for name in names),
         "equations": tuple_text(f'"{name}"' for name in program.equations),
-        "redundant": tuple_text(f'"{name}"' for name in program.redundant),
-        "is_redundant": bool(program.redundant),
-        "unsolvable": string_text(program.unsolvable),
+        "solvability": solvability_text(program),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
         "units": tuple_text((f'"{unit}"' for unit in units), WIDTH - 44),

@@ -12,6 +12,8 @@ from kincompile.targets.lines import WIDTH, broken, indented, pieces, wrapped
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from kincompile.ir.program import Program
+
 
 def tuple_text(items: Iterable[str], room: int = WIDTH - 15) -> str:
     """Return a tuple as text: where there is room on one line, else its elements on others."""
@@ -20,9 +22,23 @@ def tuple_text(items: Iterable[str], room: int = WIDTH - 15) -> str:
     return text if len(text) <= room else f"(\n{indented(wrapped(items))}\n)"
 
 
-def string_text(text: str) -> str:
-    """Return the lines of a long string in parentheses, indented; "" for an empty one."""
-    return indented(json.dumps(piece, ensure_ascii=False) for piece in pieces(text))
+def solvability_text(program: Program) -> str:
+    """Return what a module says of its solve where that is not the usual one, else nothing."""
+    lines = []
+    if program.redundant:
+        names = tuple_text(f'"{name}"' for name in program.redundant)
+        lines += [
+            "# equations that repeat others at every assembled position; "
+            "a solve is one of least squares",
+            f"REDUNDANT = {names}",
+        ]
+    if program.unsolvable:
+        sentence = (json.dumps(piece, ensure_ascii=False) for piece in pieces(program.unsolvable))
+        lines += [
+            "# why the equations cannot determine the coordinates: there is no motion to solve for",
+            f"UNSOLVABLE = (\n{indented(sentence)}\n)",
+        ]
+    return "\n".join(lines)
 
 
 def packed(texts: Sequence[str]) -> list[str]:
