@@ -134,6 +134,9 @@ class _Way:
     def end(self) -> None:
         """Clear the results of a grid after the last point reached."""
         self._motion.forget(self._index)
+        if not self._may_be_dense:
+            # Beside the reach of a very large mechanism its parts are small: no singularity.
+            self._motion.near.clear()
         self._count_pivoted()
 
     def _count_pivoted(self) -> None:

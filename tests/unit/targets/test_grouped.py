@@ -18,13 +18,13 @@ from kincompile.structure.stages import Batch, Chain, Sparse, plan_stages
 FUNCTIONS = ("Phi", "Phi_q", "nu", "Phi_q_nonzeros")
 
 
-def loops(count, link):
+def loops(count, link, apart=5.0):
     """Return four-bar loops with lengths of their own, each crank linked to the loop before it."""
     m = kc.Mechanism("loops")
     ratio = m.parameter("ratio", 1.1)
     before = None
     for k in range(count):
-        s, x = 1 + 0.01 * k, 5.0 * k
+        s, x = 1 + 0.01 * k, apart * k
         crank = m.body(f"crank{k}", (x + 0.5 * s, 0, 0))
         coupler = m.body(f"coupler{k}", (x + 2.13 * s, 0.643 * s, 0.517))
         rocker = m.body(f"rocker{k}", (x + 2.63 * s, 0.643 * s, 3.937))
@@ -120,6 +120,12 @@ def test_both_forms_give_the_same_motion(link):
         (ours.q_ddot, theirs.q_ddot),
     ):
         np.testing.assert_allclose(ours_part, theirs_part, rtol=1e-9, atol=1e-9)
+
+
+def test_that_parts_far_from_each_other_are_not_called_nearly_singular():
+    module = kc.compile(loops(120, "equation", apart=1e4))
+    # A warning is an error here. Beside the whole, each loop is small.
+    assert kc.solve(module, [0, 0.01, 0.02], {"ratio": 1.0}).success
 
 
 def test_the_text_does_not_grow_with_the_number_of_constraints():
