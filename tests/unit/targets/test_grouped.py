@@ -182,7 +182,9 @@ def parallel_cranks(count):
     return m
 
 
-@pytest.mark.parametrize("count", [1, 40], ids=["small", "large"])
+@pytest.mark.parametrize(
+    "count", [1, pytest.param(40, marks=pytest.mark.slow)], ids=["small", "large"]
+)
 def test_redundant_equations_are_solved_as_in_the_other_form(count):
     with pytest.warns(kc.RedundantConstraintWarning, match="parallel.*is redundant"):
         grouped = kc.compile(parallel_cranks(count), form="grouped")
