@@ -20,7 +20,7 @@ const cam_flat_follower = (() => {
     "use strict";
 
     const NAME = "cam_flat_follower";
-    const FORMAT = 2;
+    const FORMAT = 3;
     const FINGERPRINT = "b754e12faf3ede9e348c6d86fe905e76";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;

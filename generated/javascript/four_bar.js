@@ -21,7 +21,7 @@ const four_bar = (() => {
     "use strict";
 
     const NAME = "four_bar";
-    const FORMAT = 2;
+    const FORMAT = 3;
     const FINGERPRINT = "cc0bd5779c29cb6873cf0b0a081eaf91";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;

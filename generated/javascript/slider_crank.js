@@ -21,7 +21,7 @@ const slider_crank = (() => {
     "use strict";
 
     const NAME = "slider_crank";
-    const FORMAT = 2;
+    const FORMAT = 3;
     const FINGERPRINT = "a527bb03116fe32da0a1d1f9e0aaa06b";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import kincompile.compiler as compiler
 from kincompile.errors import InputError, RedundantConstraintWarning
-from kincompile.quantities import QUANTITIES, TOGETHER, functions, is_moving
+from kincompile.quantities import OF_EQUATIONS, TOGETHER, functions, states_of
 from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import require_square
@@ -245,7 +245,7 @@ def _is_finite(module: ModuleType, q: Array, t: float) -> bool:
 def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
     """Yield the checks of each equation by the oracles."""
     reference = problem(module, module.DEFAULTS, module.GUESS, 0.0).reference
-    for quantity in QUANTITIES:
+    for quantity in OF_EQUATIONS:
         size = _sizes(module, states, quantity, reference)
         error, limit, judge = _judged(module, states, quantity, size)
         # The entry and the state with the largest error, compared with the allowed one.
@@ -272,7 +272,7 @@ def _sizes(module: ModuleType, states: list[State], quantity: Quantity, referenc
     Phi_q = np.array([module.Phi_q(q, t) for q, _, t in states])
     terms = np.abs(Phi_q) @ reference
     terms = np.where(terms > 0, terms, 1.0)[:, :, np.newaxis]
-    if quantity.is_moving:
+    if len(quantity.states) > 1:
         fastest = np.array([np.max(np.abs(q_dot / reference)) for _, q_dot, _ in states])
         terms = terms * np.maximum(1.0, fastest**2)[:, np.newaxis, np.newaxis]
     return np.asarray(terms / reference if quantity.is_matrix else terms)
@@ -285,7 +285,7 @@ def _forms(module: ModuleType, states: list[State], quantity: Quantity) -> Itera
     """
     shape = len(states), len(module.EQUATIONS), -1
     q, q_dot, t = (np.array(part) for part in zip(*states, strict=True))
-    for name, given in functions().items():
+    for name, given in functions(OF_EQUATIONS).items():
         if quantity.name not in given or name == "Phi":  # all else is judged by Phi
             continue
 
@@ -293,7 +293,7 @@ def _forms(module: ModuleType, states: list[State], quantity: Quantity) -> Itera
             q: Array, q_dot: Array, t: Any, name: str = name, given: tuple[str, ...] = given
         ) -> Array:
             function = getattr(module, name)
-            found = function(q, q_dot, t) if is_moving(given) else function(q, t)
+            found = function(*(q, q_dot)[: len(states_of(given))], t)
             return np.asarray(found if len(given) == 1 else found[given.index(quantity.name)])
 
         yield np.array([value(*state) for state in states]).reshape(shape)
@@ -356,7 +356,7 @@ def _estimates(
     for q, q_dot, t in states:
         along, time = np.eye(q.size), 0.0
         if not quantity.is_matrix:
-            along, time = (q_dot if quantity.is_moving else 0 * q)[np.newaxis], 1.0
+            along, time = (q_dot if len(quantity.states) > 1 else 0 * q)[np.newaxis], 1.0
         try:
             rates = oracle.derivative(module, q, t, along, time).T
         except (ArithmeticError, TypeError, ValueError):
