@@ -1,8 +1,8 @@
 """A disc cam known by twelve measured radii lifts a pointed follower.
 
 Source: section 2.7 of the constraint catalogue (point-follower); the dimensions are ours. Between
-the measured radii the profile is a periodic cubic spline, so that velocity and acceleration are
-continuous. alpha_contact, the polar angle of the tip on the cam, is a coordinate.
+the measured radii the profile is a periodic spline of degree five, so that the acceleration has no
+kinks. alpha_contact, the polar angle of the tip on the cam, is a coordinate.
 """
 
 import numpy as np
