@@ -21,7 +21,7 @@ const cam_by_table = (() => {
 
     const NAME = "cam_by_table";
     const FORMAT = 2;
-    const FINGERPRINT = "e42b6c576dfd520e724037893d1aad71";
+    const FINGERPRINT = "fc5b7a69973968d964191eadf6c68e9b";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;
     const COORDINATES = [

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from kincompile.calculus.expressions import (
         Components,
         Expression,
-        Profile,
+        ProfileFunction,
         Rotation,
         Symbol,
         TimeFunction,
@@ -78,7 +78,7 @@ class NumericEnvironment:
         """Return C(t) or one of its derivatives."""
         return self._number(self._symbolic.time_function(function))
 
-    def profile(self, profile: Profile) -> Value:
+    def profile(self, profile: ProfileFunction) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
         return self._number(self._symbolic.profile(profile))
 

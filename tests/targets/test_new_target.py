@@ -10,10 +10,10 @@ import kincompile as kc
 from kincompile.quantities import singles
 from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
 from kincompile.targets.registry import TARGETS, Listed
-from kincompile.targets.statements import Layout
+from kincompile.targets.statements import Statements
 from kincompile.targets.target import Target
 
-LAYOUT = Layout("#", "{}", "{}[{}]", "{}[{}][{}]", continued=" \\", ending="")
+WRITE = Statements("#", "{}", "{}[{}]", "{}[{}][{}]", continued=" \\", ending="")
 
 
 def function(name, code, listing, printer):
@@ -21,9 +21,9 @@ def function(name, code, listing, printer):
     rates = "q_dot, " if name == "gamma" else ""
     n, m = len(code.program.coordinates), len(code.program.equations)
     zeros = f"[[0.0] * {n} for _ in range({m})]" if name == "Phi_q" else f"[0.0] * {m}"
-    body = LAYOUT.inputs(code.program, listing) + LAYOUT.frames(listing, printer)
-    body += [*LAYOUT.steps(listing, printer), f"{name} = {zeros}"]
-    body += [*LAYOUT.results(name, code, printer), f"return {name}"]
+    body = WRITE.inputs(code.program, listing) + WRITE.frames(listing, printer)
+    body += [*WRITE.steps(listing, printer), f"{name} = {zeros}"]
+    body += [*WRITE.results(name, code, printer), f"return {name}"]
     return [f"def {name}(q, {rates}t, p):", *(f"    {line}" for line in body)]
 
 
