@@ -11,7 +11,7 @@ import sympy
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
-from kincompile.derivation.document import Display, Math, Section, Verbatim, table, text
+from kincompile.derivation.document import Chapter, Display, Math, Verbatim, table, text
 from kincompile.derivation.formulas import (
     GAMMA_TERMS,
     PHI_Q,
@@ -21,7 +21,7 @@ from kincompile.derivation.formulas import (
     Equated,
     Glyph,
     Matrix,
-    Partial,
+    PartialDerivative,
     Sub,
     column,
     decimals,
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from kincompile.model.resolve import Joint
 
 
-def joint_section(evaluation: Evaluation, joint: Joint, rows: Rows) -> Section:
+def joint_section(evaluation: Evaluation, joint: Joint, rows: Rows) -> Chapter:
     """Return the derivation of a joint."""
     columns = [name for name in joint.columns if name is not None]
     blocks = derive(joint.template)
@@ -87,7 +87,7 @@ class _JointSteps(Steps[RowBlock]):
         index = str(k + 1) if len(self.derivatives) > 1 else ""
         return Glyph(letter, index, exponent=self.name)
 
-    def attributes(self) -> Section:
+    def attributes(self) -> Chapter:
         written = type(self.joint.written)
         meaning = (written.__doc__ or "").strip().splitlines()[0]
         rows: list[tuple[Run | Runs, ...]] = []
@@ -112,7 +112,7 @@ class _JointSteps(Steps[RowBlock]):
             return Math(_decimal(joint.scalars[symbol], values))
         return ""
 
-    def constraint(self) -> Section:
+    def constraint(self) -> Chapter:
         blocks: list[Block] = []
         for k, block in enumerate(self.derivatives):
             zero = ZERO_BLOCK if isinstance(block.Phi, Vector) else ZERO
@@ -123,11 +123,11 @@ class _JointSteps(Steps[RowBlock]):
             blocks += [Display(Equated((glyph, item))) for item, glyph in names.items()]
         return self.step(2, "The constraint in vectors", *blocks)
 
-    def rules(self) -> Section:
+    def rules(self) -> Chapter:
         rows = []
         for k, row in enumerate(partials(self.joint.template)):
             for item in row:
-                label = Math(Partial(self.symbol("Phi", k), item.coordinate))
+                label = Math(PartialDerivative(self.symbol("Phi", k), item.coordinate))
                 rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
         note = text(
             "Every rule that fired while ", Math(PHI_Q), " was derived, from the inside out. "
@@ -139,7 +139,7 @@ class _JointSteps(Steps[RowBlock]):
         header = ("derivative", "rule", "applied to", "gives")
         return self.step(3, "The rules used", note, table(header, rows))
 
-    def jacobian(self) -> Section:
+    def jacobian(self) -> Chapter:
         template = self.joint.template
         blocks: list[Block] = []
         for variable, columns in block_columns(template):

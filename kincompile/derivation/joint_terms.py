@@ -31,8 +31,8 @@ from kincompile.derivation.formulas import (
     ZERO_BLOCK,
     Equated,
     Glyph,
-    Partial,
-    Row,
+    Joined,
+    PartialDerivative,
     Transposed,
 )
 from kincompile.derive.partials import partials
@@ -53,8 +53,8 @@ RULES: Mapping[Rule, Runs] = {
     Rule.SUM: ("sum rule",),
     Rule.PRODUCT: ("product rule",),
     Rule.CHAIN: ("chain rule",),
-    Rule.A_TO_B: (Math(Equated((Partial(_A, _PHI, "d"), _B))),),
-    Rule.B_TO_A: (Math(Equated((Partial(_B, _PHI, "d"), Row(("-", _A))))),),
+    Rule.A_TO_B: (Math(Equated((PartialDerivative(_A, _PHI, "d"), _B))),),
+    Rule.B_TO_A: (Math(Equated((PartialDerivative(_B, _PHI, "d"), Joined(("-", _A))))),),
     Rule.DRIVER: ("driver, a function of ", Math(Symbol("t"))),
     Rule.PROFILE: ("profile, chain rule",),
 }
@@ -131,7 +131,7 @@ def block_entry(entry: Expression, coordinate: Expression, Phi: Expression) -> F
 def _times_identity(factor: Scalar) -> Formula:
     if factor == ONE:
         return IDENTITY
-    return Row(("-", IDENTITY)) if factor == -ONE else Row((factor, IDENTITY))
+    return Joined(("-", IDENTITY)) if factor == -ONE else Joined((factor, IDENTITY))
 
 
 def block_columns(template: Template) -> list[tuple[Formula, slice]]:

@@ -35,11 +35,11 @@ from kincompile.derivation.formulas import (
     Decimal,
     Equated,
     Glyph,
+    Joined,
     Matrix,
-    Partial,
+    PartialDerivative,
     Quotient,
     Relation,
-    Row,
     Sub,
     Transposed,
     size,
@@ -367,7 +367,7 @@ class Notation:
         exponent = self._index_text(expr.exponent) if expr.exponent else None
         return self._scripts(base, index, exponent)
 
-    def _print_Row(self, expr: Row) -> Printed:
+    def _print_Joined(self, expr: Joined) -> Printed:
         return self._row([self._part(part) for part in expr.parts])
 
     def _part(self, part: Any) -> Printed:
@@ -384,7 +384,7 @@ class Notation:
             return self._scripts(bare, index, self._index_text(expr.base.exponent))
         return self._scripts(self._print(expr.base), index, None)
 
-    def _print_Partial(self, expr: Partial) -> Printed:
+    def _print_PartialDerivative(self, expr: PartialDerivative) -> Printed:
         top = self._row([self._sign(expr.sign), self._print(expr.numerator)])
         return self._fraction(
             top, self._row([self._sign(expr.sign), self._print(expr.denominator)])
