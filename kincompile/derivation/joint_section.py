@@ -11,6 +11,7 @@ import sympy
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
+from kincompile.derivation.collected import collected
 from kincompile.derivation.document import Chapter, Display, Math, Verbatim, table, text
 from kincompile.derivation.formulas import (
     GAMMA_TERMS,
@@ -25,6 +26,7 @@ from kincompile.derivation.formulas import (
     Sub,
     column,
     decimals,
+    size,
 )
 from kincompile.derivation.joint_terms import (
     RULES,
@@ -166,10 +168,19 @@ class _JointSteps(Steps[RowBlock]):
         for k, block in enumerate(self.derivatives):
             if len(self.derivatives) > 1:
                 blocks.append(text("For ", Math(self.symbol("Phi", k)), ":"))
-            blocks += self.gamma_terms(k)
+            blocks += [*self.gamma_terms(k), *self._gathered(k)]
             for symbol, steps in zip(GAMMA_TERMS, block.gamma_steps, strict=True):
                 lines += [(Math(symbol), *line) for line in _rule_lines(steps)]
         return [*blocks, *self._constant_note(), *_fired(lines)]
+
+    def _gathered(self, k: int) -> list[Block]:
+        """Return the k-th gamma with like terms joined, where that is shorter."""
+        derived = self.derivatives[k].gamma
+        found = collected(derived, abbreviations(self.joint.template))
+        if found == derived or size(found) >= size(derived):
+            return []
+        note = text("Multiplied out, like terms joined; equal in numbers to the line above:")
+        return [note, Display(Equated((self.symbol("gamma", k), found)))]
 
     def _constant_note(self) -> list[Block]:
         """Return the note that the rates of a constant C vanish."""

@@ -80,7 +80,7 @@ def parts(expression: Any) -> Iterator[Expression]:
 
 
 def abbreviations(template: Template) -> dict[Expression, Glyph]:
-    """Name what occurs again and again: the distance vector d, its rate, the angle of a gear."""
+    """Name what occurs again and again: the distance vector d, the angle of a gear, their rates."""
     found = [item for Phi in template.Phi for item in parts(Phi)]
     separations = list(dict.fromkeys(v for item in found for v in _separations(item)))
     q_dot: dict[Expression, Expression] = dict(
@@ -95,6 +95,7 @@ def abbreviations(template: Template) -> dict[Expression, Glyph]:
         match item:
             case Rotated(PlaneRotation(angle), Basis()) if not isinstance(angle, Symbol):
                 names[angle] = Glyph("vartheta", bold=False)
+                names[along(angle, q_dot)] = Glyph("vartheta", dots=1, bold=False)
     return names
 
 

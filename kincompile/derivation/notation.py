@@ -450,6 +450,16 @@ def _place(factor: Any) -> int:
     """Return where a factor stands: numbers first, rates last."""
     if isinstance(factor, Number | Decimal):
         return 0
-    base = factor.base if isinstance(factor, Power) else factor
-    is_rate = isinstance(base, Symbol) and split_name(base.name)[2] > 0
-    return 2 if is_rate else 1
+    return 2 if is_rate(factor) else 1
+
+
+def is_rate(factor: Any) -> bool:
+    """Return whether a factor is the rate of a scalar, a power or a sum of such."""
+    match factor:
+        case Symbol(name):
+            return split_name(name)[2] > 0
+        case Power(base, _):
+            return is_rate(base)
+        case Sum(terms):
+            return all(is_rate(_signed(term)[1]) for term in terms)
+    return False

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.mathml import MathMLPrinter
 from kincompile.derivation.renderer import Renderer
-from kincompile.targets.templates import fill
+from kincompile.targets.templates import fill, read
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,6 +37,7 @@ def as_html(document: Manuscript) -> str:
     """Return a document as an HTML page."""
     renderer = _HtmlRenderer(document)
     data = {
+        "font": read("derivation/math.css"),
         "title": escape(f"Derivation of {document.name}"),
         "heading": f"Derivation of <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
