@@ -26,6 +26,7 @@ from kincompile.files.file_format import model_schema as model_schema
 from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis
 from kincompile.files.files import read_model as read_model
+from kincompile.model import outputs as outputs
 from kincompile.model.catalogue import *
 from kincompile.model.equation import Equation as Equation
 from kincompile.model.expressions import alpha as alpha
