@@ -28,7 +28,7 @@ def watched(example, link, joint, p=None):
         complex(part.subs(values)) if hasattr(part, "subs") else part
         for part in sketch.place(link, joint)
     )
-    t = np.linspace(0, 1, 361)
+    t = np.linspace(0, example.model.end, 361)
     solution = kc.solve(example.module, t, p)
     assert solution.success
     origin = solution[f"{link}.x"] + 1j * solution[f"{link}.y"]
@@ -67,7 +67,7 @@ def test_that_the_jansen_leg_takes_at_most_fourteen_lines_and_no_law_of_cosines(
 
 def test_that_the_foot_of_the_klann_leg_goes_where_dyads_say(example_named):
     t, foot = watched(example_named("klann"), "leg", "G")
-    C = 17.5 * np.exp(-2j * math.pi * t)
+    C = 17.5 * np.exp(-1j * math.pi * t)
     H = meet(-38.8 - 12.5j, 23.7, C, 38.8, +1)
     F = meet(C, 73.4, H, 35.2, -1)
     E = meet(-14.6 + 41.9j, 34.1, F, 57.7, -1)
@@ -94,7 +94,7 @@ def test_that_the_shaper_has_the_time_ratio_of_its_geometry(example_named):
 def test_that_the_wheel_of_a_double_wishbone_has_the_camber_of_dyads(example_named):
     t, wheel = watched(example_named("double_wishbone"), "upright", "P")
     A, C, T = 0.35 + 0.2j, 0.4 + 0.44j, 0.46 + 0.62j
-    strut = 0.45 + 0.04 * np.sin(2 * math.pi * t)
+    strut = 0.45 + 0.04 * np.sin(math.pi * t)
     S = meet(A, 0.25, T, strut, -1)
     B = A + (S - A) * 0.35 / 0.25
     drawn_B, drawn_D, drawn_P = 0.7 + 0.19j, 0.67 + 0.43j, 0.75 + 0j
