@@ -67,7 +67,7 @@ def test_that_the_jansen_leg_takes_at_most_fourteen_lines_and_no_law_of_cosines(
 
 def test_that_the_foot_of_the_klann_leg_goes_where_dyads_say(example_named):
     t, foot = watched(example_named("klann"), "leg", "G")
-    C = 17.5 * np.exp(-1j * math.pi * t)
+    C = 17.5 * np.exp(-0.5j * math.pi * t)
     H = meet(-38.8 - 12.5j, 23.7, C, 38.8, +1)
     F = meet(C, 73.4, H, 35.2, -1)
     E = meet(-14.6 + 41.9j, 34.1, F, 57.7, -1)
