@@ -22,6 +22,7 @@ FIGURES = {
     "klann": "the leg swings from -144.324 to -108.832 degrees",
     "shaper": "the ram's stroke is 0.311110 m",
     "double_wishbone": "camber from -0.012 to +0.549 degrees",
+    "cam_by_table": "highest: 60.000 mm at a cam angle of 270 degrees",
     "slot_follower": "back at 152.95, where it was: 152.95",
 }
 
