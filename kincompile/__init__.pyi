@@ -33,6 +33,7 @@ from kincompile.model.expressions import alpha as alpha
 from kincompile.model.expressions import pi as pi
 from kincompile.model.expressions import t as t
 from kincompile.model.mechanism import Mechanism as Mechanism
+from kincompile.model.sketch import Sketch as Sketch
 from kincompile.model.system import ConstraintSystem as ConstraintSystem
 from kincompile.runtime.load import load as load
 from kincompile.runtime.newton import newton as newton
