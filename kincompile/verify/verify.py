@@ -19,8 +19,7 @@ import kincompile.compiler as compiler
 from kincompile.errors import InputError, RedundantConstraintWarning
 from kincompile.quantities import QUANTITIES, TOGETHER, functions, is_moving
 from kincompile.runtime.contract import check as check_contract
-from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.inputs import require_square
+from kincompile.runtime.engine.code import code_of, require_square
 from kincompile.runtime.newton import newton
 from kincompile.runtime.problem import problem
 from kincompile.runtime.status import Status
