@@ -66,7 +66,8 @@ class Planned:
     def solve_transposed(self, point: Point, b: Array) -> Array:
         """Return x of Phi_q^T x = b: column by column of the inverse, which the plan knows."""
         n = len(self.code.equations)
-        columns = (_stacked(self.solve(point, row), point) for row in np.eye(n)[:, :, np.newaxis])
+        sides = np.eye(n)[:, :, np.newaxis]
+        columns = (stacked(self.solve(point, side), point.q.shape[1]) for side in sides)
         return np.array([np.sum(b * column, axis=0) for column in columns])
 
     def velocity_and_acceleration(self, point: Point) -> tuple[Lanes, Lanes]:
@@ -78,24 +79,24 @@ class Planned:
 
     def rates(self, point: Point, besides: Array | None) -> Rates:
         """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
-        q_dot, q_ddot = (_stacked(x, point) for x in self.velocity_and_acceleration(point))
-        nothing = np.empty(0)
-        movement = nothing if besides is None else _stacked(self.solve(point, besides), point)
-        return Rates(q_dot, q_ddot, movement)
+        q_dot, q_ddot = self.velocity_and_acceleration(point)
+        movement = () if besides is None else self.solve(point, besides)
+        points = point.q.shape[1]
+        return Rates(stacked(q_dot, points), stacked(q_ddot, points), stacked(movement, points))
 
     def determinants(self, point: Point, before: Point | None = None) -> Array:
         """Return the determinants of the blocks, shape (blocks, N)."""
         self.factor(point)
-        return _stacked(point.factors[1], point)
+        return stacked(point.factors[1], point.q.shape[1])
 
     def signs(self, point: Point) -> tuple[float, ...]:
         """Return the signs at the first point."""
         return tuple(np.sign(self.determinants(point)[:, 0]).tolist())
 
 
-def _stacked(lanes: Lanes, point: Point) -> Array:
+def stacked(lanes: Lanes, points: int) -> Array:
     """Return lanes, some of which may be one number for all points, as an array (..., N)."""
-    result = np.empty((len(lanes), point.q.shape[1]))
+    result = np.empty((len(lanes), points))
     for row, lane in zip(result, lanes, strict=True):
         row[:] = lane
     return result
