@@ -222,7 +222,7 @@ class _Analysis:
         best = max(range(len(q)), key=lambda k: _rank_and_gap(matrices[k], limit))
         kept, dependent = _split(matrices[best], self._joints, limit)
         if not dependent or len(kept) == matrices.shape[2]:
-            return matrices[best]
+            return np.asarray(matrices[best])
         tangents = np.linalg.svd(matrices[best][kept])[2][len(kept) :]
         random, lengths = np.random.default_rng(SEED), np.array(ASIDE)[:, np.newaxis]
         steps = random.uniform(-1, 1, (len(ASIDE), len(tangents))) @ tangents
