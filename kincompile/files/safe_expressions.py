@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from kincompile.model.expressions import NotAnExpressionError, as_expression
+from kincompile.model.points import rate
 from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., sympy.Expr], int]] = {
     },
     "atan2": (sympy.atan2, 2), "ln": (sympy.log, 1),
     "arcsin": (sympy.asin, 1), "arccos": (sympy.acos, 1), "arctan": (sympy.atan, 1),
-    "arctan2": (sympy.atan2, 2),
+    "arctan2": (sympy.atan2, 2), "rate": (rate, 1),
 }  # fmt: skip
 """Functions that may be called, each with its number of arguments."""
 
