@@ -92,18 +92,19 @@ class FrameKernel:
         The code, whose inputs are the numbers of the coordinates.
     entries
         Nodes of what it gives.
-    symbols
-        Symbols of those in names, ``c`` and ``s``.
+    letters, symbols
+        Letters of the coordinates, and symbols of the entries: ``c`` and ``s``.
     """
 
     nodes: tuple[Node, ...]
     entries: tuple[int, ...]
+    letters: tuple[str, ...]
     symbols: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class BodyFrame:
-    """A body: the frame kernel bound to its coordinates.
+    """A body: the frame kernel of its kind bound to its coordinates.
 
     Attributes
     ----------
@@ -113,14 +114,17 @@ class BodyFrame:
         Columns of its coordinates.
     entries
         Nodes of `Program.values` that its frame gives: cosine and sine of its angle.
-    labels
-        Their names in emitted code, ``c_crank`` and ``s_crank``.
     """
 
     name: str
+    kernel: FrameKernel
     columns: range
     entries: tuple[int, ...]
-    labels: tuple[str, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the entries in emitted code: ``c_crank`` and ``s_crank``."""
+        return tuple(f"{symbol}_{self.name}" for symbol in self.kernel.symbols)
 
 
 @dataclass(frozen=True, slots=True)

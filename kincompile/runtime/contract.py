@@ -38,7 +38,8 @@ _CONSTANTS: dict[str, type] = {
 
 def functions() -> tuple[str, ...]:
     """Return the functions of an emitted module."""
-    return (*quantities.functions(), "Phi_q_nonzeros")
+    matrices = (item.name for item in quantities.QUANTITIES if item.is_matrix)
+    return (*quantities.functions(), *(f"{name}_nonzeros" for name in matrices))
 
 
 def check(module: ModuleType) -> None:

@@ -14,7 +14,14 @@ from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
 from kincompile.targets.numpy.solve import solve_functions
-from kincompile.targets.numpy.text import assignments, element, packed, solvability_text, tuple_text
+from kincompile.targets.numpy.text import (
+    assignments,
+    element,
+    outputs_text,
+    packed,
+    solvability_text,
+    tuple_text,
+)
 from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
@@ -88,7 +95,6 @@ def files(
         "is_planned": plan is not None,
         **support(
             called,
-            has_frames="cos_sin" in called,
             has_large_blocks=plan is not None and plan.has_large_blocks,
         ),
     }
@@ -113,6 +119,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "nonzeros": len(code.pattern()),
         "coordinates": tuple_text(f'"{name}"' for name in names),
         "equations": tuple_text(f'"{name}"' for name in program.equations),
+        "outputs": outputs_text(program),
         "solvability": solvability_text(program),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
@@ -156,7 +163,7 @@ def _results() -> Iterator[str]:
     sizes = {
         "equations": "N_EQUATIONS",
         "coordinates": "N_COORDINATES",
-        "outputs": "N_OUTPUTS",
+        "outputs": "len(OUTPUTS)",
         "parameters": "len(PARAMETERS)",
     }
     results: dict[str, list[str]] = {}
@@ -203,12 +210,12 @@ def public_functions(
             yield quantity, name, (f"def {name}({states}, t, p=DEFAULTS):", f'    """{text}"""')
 
 
-def support(called: Collection[str], *, has_frames: bool, has_large_blocks: bool) -> dict[str, str]:
+def support(called: Collection[str], *, has_large_blocks: bool) -> dict[str, str]:
     """Return the parts that both forms of a module have in common, by slot."""
     functions = {
         "scalar_functions": indented(_scalar_functions(sorted(called))),
         "array_functions": indented(_array_functions(sorted(called))),
-        "has_frames": has_frames,
+        "has_frames": "cos_sin" in called,
         "has_large_blocks": has_large_blocks,
     }
     files = {"arguments": {}, "spline": {}, "elementary": functions}
