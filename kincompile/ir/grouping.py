@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile import quantities
 from kincompile.ir.graph import Graph, Node, number_of, operands_of
 from kincompile.ir.interpret import Placed, by_kernel
 from kincompile.ir.program import FrameEntry
 from kincompile.names import rate
+from kincompile.quantities import quantity_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -37,8 +37,8 @@ class Source:
     Attributes
     ----------
     kind
-        ``"q"``, ``"q_dot"``, ``"number"`` (an attribute), ``"value"`` (computed from t, p and
-        contact parameters), or an entry of the frames of a group of bodies, as ``"frame_1.c"``.
+        ``"q"``, ``"q_dot"``, ``"q_ddot"``, ``"number"`` (an attribute), ``"value"`` (computed from
+        t, p and contact parameters), or an entry of the frames of bodies, as ``"frame_1.c"``.
     index
         Index for each constraint, into the vector of that kind.
     """
@@ -136,7 +136,7 @@ class GroupedProgram:
 
     def pattern(self) -> NDArray[np.intp]:
         """Return row and column of every entry of Phi_q, shape (nnz, 2), group by group."""
-        return self.entries(quantities.quantity_named("Phi_q"))[0]
+        return self.entries(quantity_named("Phi_q"))[0]
 
     def entries(self, quantity: Quantity) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Return row and column of every entry, shape (entries, 2), group by group, and its value.
@@ -152,10 +152,10 @@ class GroupedProgram:
         return np.concatenate(places), np.concatenate(values)
 
 
-KINDS = ("q", "q_dot", "number", "value")
+KINDS = ("q", "q_dot", "q_ddot", "number", "value")
 """Kinds of sources; entries of frames follow."""
 
-NUMBER, VALUE = 2, 3
+NUMBER, VALUE = 3, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,8 +185,8 @@ class _Nodes:
 
 def _classify(program: Program, groups: Sequence[FrameGroup]) -> _Nodes:
     names = [item.name for item in program.coordinates]
-    places = {name: (0, k) for k, name in enumerate(names)}
-    places.update({rate(name): (1, k) for k, name in enumerate(names)})
+    orders = range(3 if program.observers else 2)
+    places = {rate(name, order): (order, k) for order in orders for k, name in enumerate(names)}
     kinds = (*KINDS, *(kind for item in groups for kind in item.kinds))
     frames: dict[int, tuple[int, int]] = {}
     first = len(KINDS)
@@ -230,7 +230,7 @@ def group(program: Program) -> GroupedProgram:
     """Arrange a program by groups."""
     frames = _frame_groups(program)
     nodes = _classify(program, frames)
-    builder = _Builder(nodes, program.values)
+    builder = _Builder(nodes, program)
     groups: list[Group] = []
     for _, instances in by_kernel(program):
         groups += builder.groups(instances)
@@ -281,8 +281,9 @@ FEW = 8
 class _Builder:
     """Makes groups, and collects the numbers and computed values that they read."""
 
-    def __init__(self, nodes: _Nodes, code: Sequence[Node]) -> None:
-        self._nodes, self._code = nodes, code
+    def __init__(self, nodes: _Nodes, program: Program) -> None:
+        self._nodes, self._code = nodes, program.values
+        self._quantities = program.quantities
         self._counts: dict[str, int] = {}
         self._values: dict[int, int] = {}
         self.numbers: list[float] = []
@@ -340,7 +341,7 @@ class _Builder:
                     if sample.place(quantity, row, column) is not None
                     and not (quantity.is_matrix and graph.value_of(new[node]) == 0)
                 )
-                for quantity in quantities.QUANTITIES
+                for quantity in self._quantities
             },
             placed,
             {

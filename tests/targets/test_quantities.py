@@ -1,6 +1,7 @@
 """A new quantity is an entry in the table and the code that computes it: toys, everywhere."""
 
 import json
+import runpy
 import shutil
 import subprocess
 from dataclasses import replace
@@ -26,8 +27,7 @@ TOYS = (
     Quantity("Phi_q_twice", "equations", "coordinates", AT_POSITION, False, "Phi_q once more."),
     Quantity("diagonal", "coordinates", "coordinates", AT_POSITION, True, "Sums on a diagonal."),
     Quantity("Phi_p", "equations", "parameters", AT_POSITION, False, "Phi by parameters."),
-    Quantity("first", "outputs", "none", AT_POSITION, False, "First row of each constraint."),
-    Quantity("first_p", "outputs", "parameters", AT_POSITION, False, "That by parameters."),
+    Quantity("outputs_p", "outputs", "parameters", AT_POSITION, False, "Outputs by parameters."),
     Quantity("total_p", "outputs", "parameters", AT_POSITION, True, "A sum by parameters."),
 )
 """Rows of every kind, columns of every kind; constraints add to some, vectors and matrices."""
@@ -41,63 +41,68 @@ def toys(monkeypatch):
 
 
 def with_toys(kernel):
-    """Return a kernel that computes the toys from what it has: Phi, nu and entries of Phi_q.
+    """Return a kernel that computes the toys from what it has: Phi, nu, entries of Phi_q, outputs.
 
     In the columns of parameters stands Phi, of row 0 in column 0 and of others in column 1.
     """
-    Phi, Phi_q = kernel.outputs["Phi"], kernel.outputs["Phi_q"]
+    Phi, Phi_q, nu, y = (kernel.outputs.get(name, ()) for name in ("Phi", "Phi_q", "nu", "outputs"))
     own = {
-        "Phi_t": kernel.outputs["nu"],
+        "Phi_t": nu,
         "column_sum": sorted((column, 0, node) for _, column, node in Phi_q),
         "Phi_q_twice": Phi_q,
         "diagonal": [(column, column, node) for _, column, node in Phi_q],
         "Phi_p": [(row, int(row > 0), node) for row, _, node in Phi],
-        "first": Phi[:1],
-        "first_p": [(0, 1, node) for _, _, node in Phi[:1]],
-        "total_p": [(0, 1, node) for _, _, node in Phi],
+        "outputs_p": [(row, 1, node) for row, _, node in y],
+        "total_p": [(0, 1, node) for _, _, node in (*Phi, *y)],
     }
     own = {name: tuple(entries) for name, entries in own.items()}
     return replace(kernel, outputs={**kernel.outputs, **own})
 
 
-def program_of(model):
+def program_of(path):
+    """Return the program of an example with outputs; each adds to the row of its own in total_p."""
+    model = runpy.run_path(str(path))["mechanism"]
+    for body in model.bodies:
+        model.output(f"height_{body.name}", body.y**2 + body.x)
     program = lower(model.system())
-    kernels = {id(item.kernel): with_toys(item.kernel) for item in program.instances}
-    instances = tuple(
-        replace(item, kernel=kernels[id(item.kernel)], first_output=k)
-        for k, item in enumerate(program.instances)
-    )
-    outputs = tuple(f"first row of {item.name}" for item in instances)
-    return replace(program, instances=instances, outputs=outputs)
+    made: dict[int, object] = {}
+
+    def changed(instances):
+        found = []
+        for item in instances:
+            kernel = made.setdefault(id(item.kernel), with_toys(item.kernel))
+            found.append(replace(item, kernel=kernel))
+        return tuple(found)
+
+    parts = changed(program.instances), changed(program.observers)
+    return replace(program, instances=parts[0], observers=parts[1])
 
 
 def expected(program, q, t):
-    """Return the toys by name, from Phi, Phi_q and nu alone."""
-    Phi, Phi_q, nu, _, *_ = interpret(program, q, 0 * q, t)
-    starts = [item.first_row for item in program.instances]
-    sums, first = Phi_q.sum(axis=-2), Phi[..., starts]
-    by_equation = np.zeros((*Phi.shape, len(program.parameters)))
-    by_equation[..., 1] = Phi
-    by_equation[..., starts, 0], by_equation[..., starts, 1] = first, 0
-    by_output = np.zeros((*first.shape, len(program.parameters)))
-    by_output[..., 1] = first
-    totals = np.zeros_like(by_output)
-    totals[..., 1] = np.add.reduceat(Phi, starts, axis=-1)
+    """Return the toys by name, from Phi, Phi_q, nu and the outputs alone."""
+    Phi, Phi_q, nu, _, y, *_ = interpret(program, q, 0 * q, t)
+    sums, starts = Phi_q.sum(axis=-2), [item.first_row for item in program.instances]
+    Phi_p = np.zeros((*Phi.shape, len(program.parameters)))
+    Phi_p[..., 1] = Phi
+    Phi_p[..., starts, 0], Phi_p[..., starts, 1] = Phi[..., starts], 0
+    y_p = np.zeros((*y.shape, len(program.parameters)))
+    y_p[..., 1] = y
+    totals = y_p.copy()
+    totals[..., 0, 1] += Phi.sum(axis=-1)
     return {
         "Phi_t": nu,
         "column_sum": sums,
         "Phi_q_twice": Phi_q,
         "diagonal": sums[..., np.newaxis] * np.eye(len(program.coordinates)),
-        "Phi_p": by_equation,
-        "first": first,
-        "first_p": by_output,
+        "Phi_p": Phi_p,
+        "outputs_p": y_p,
         "total_p": totals,
     }
 
 
 @pytest.fixture(params=["four_bar", "cam_flat_follower", "gear_train"])
 def program(request, toys, example_named):
-    return program_of(example_named(request.param).model)
+    return program_of(example_named(request.param).path)
 
 
 def points(program):
@@ -117,7 +122,7 @@ def assert_toys(module, program, names=NAMES):
 def test_that_the_interpreter_adds_where_a_quantity_adds(program):
     q, t = points(program)
     found = interpret(program, q, 0 * q, t)
-    names = [item.name for item in quantities.QUANTITIES]
+    names = [item.name for item in program.quantities]
     for name, known in expected(program, q, t).items():
         np.testing.assert_allclose(found[names.index(name)], known, rtol=1e-13, atol=1e-13)
 
@@ -137,7 +142,8 @@ def test_that_the_grouped_form_has_it(program):
     emitted = emit_program("numpy", group(program))
     module = from_source(emitted.source, program.name, emitted.arrays)
     assert_toys(module, program)
-    assert program.outputs == module.OUTPUTS
+    named = module.OUTPUTS
+    assert named == tuple(item.name for item in program.outputs)
     q, t = points(program)
     whole = module.diagonal(q, t)
     nonzeros = whole[(..., *module.PATTERN_diagonal.T)]

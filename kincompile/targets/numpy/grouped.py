@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile import quantities
 from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
 from kincompile.quantities import FORMAT, kernels
 from kincompile.targets.evaluators import input_names, inputs_read, schedule
@@ -29,7 +28,7 @@ from kincompile.targets.numpy.target import (
     public_functions,
     support,
 )
-from kincompile.targets.numpy.text import outputs_text, solvability_text, tuple_text
+from kincompile.targets.numpy.text import solvability_text, tuple_text
 from kincompile.targets.printer import Printer
 from kincompile.targets.schedule import count_uses
 from kincompile.targets.target import Emitted
@@ -50,7 +49,7 @@ if TYPE_CHECKING:
 def emit_grouped(grouped: GroupedProgram) -> Emitted:
     """Return a program as a NumPy module with a companion file of arrays."""
     program, module = grouped.program, _Module(grouped)
-    for quantity in quantities.QUANTITIES:
+    for quantity in program.quantities:
         module.add_places(quantity)
     groups = [line for item in grouped.groups for line in module.group(item)]
     frames = [module.frames(item) for item in grouped.frames]
@@ -142,7 +141,9 @@ class _Module:
         lines.append("}, {")
         for name, source in item.inputs.items():
             self.arrays[f"{item.name}.{names[name]}"] = source.index
-        for kernel, computed in _kernels().items():
+        for kernel, computed in _kernels(self.program).items():
+            if not any(item.outputs[name] for name in computed):
+                continue
             listing, body = self._body(code, computed, names, table)
             read = [names[name] for name in item.inputs if name in listing.inputs]
             what = f'{kernel} of {item.size} constraints like "{item.sample.name}"'
@@ -213,15 +214,17 @@ class _Module:
         self.code += [f"    {line}" for line in body]
 
 
-def _kernels() -> dict[str, tuple[str, ...]]:
+def _kernels(program: Program) -> dict[str, tuple[str, ...]]:
     """Return what is computed together; right sides alone, because Phi_q is then at hand."""
-    return {name: computed for name, computed in kernels().items() if name != "kinematics"}
+    found = kernels(program.quantities)
+    del found["kinematics"]
+    return found
 
 
 def _public(program: Program, nonzeros: int) -> Iterator[str]:
     """Yield the public functions of the quantities."""
     for quantity, name, lines in public_functions(program, nonzeros):
-        states = "q, q_dot" if quantity.is_moving else "q"
+        states = ", ".join(quantity.states)
         yield from lines
         yield f'    return _evaluate(("{name}",), t, p, {states})[0]\n\n'
 
@@ -240,7 +243,10 @@ def _data(
         "m": len(program.equations),
         "nonzeros": nonzeros,
         "k": len(program.parameters),
-        "outputs": outputs_text(program),
+        "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
+        "output_units": indented(
+            wrapped(f'"{item.name}": "{item.unit}"' for item in program.outputs)
+        ),
         "solvability": solvability_text(program),
         "is_planned": bool(stages),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
@@ -254,9 +260,11 @@ def _data(
         "defaults": tuple_text((repr(item.default) for item in program.parameters), 62),
         "kernels": "\n".join(module.code),
         "functions": "\n".join(_public(program, nonzeros)),
-        "patterns": "\n".join(_patterns()),
+        "patterns": "\n".join(_patterns(program)),
         "quantities": indented(_results(program)),
-        "kernel_table": "\n".join(f"    {name!r}: {given}," for name, given in _kernels().items()),
+        "kernel_table": indented(
+            f"{name!r}: {given}," for name, given in _kernels(program).items()
+        ),
         "frames": indented(frames),
         "groups": indented(groups),
         "stages": indented(stages),
@@ -264,22 +272,22 @@ def _data(
     }
 
 
-def _matrices() -> list[tuple[Quantity, str]]:
+def _matrices(program: Program) -> list[tuple[Quantity, str]]:
     """Return the matrices, and what the names of their arrays end in."""
-    matrices = [item for item in quantities.QUANTITIES if item.is_matrix]
+    matrices = [item for item in program.quantities if item.is_matrix]
     return [(item, "" if item.name == "Phi_q" else f"_{item.name}") for item in matrices]
 
 
-def _patterns() -> Iterator[str]:
+def _patterns(program: Program) -> Iterator[str]:
     """Yield the lines that read the patterns of matrices."""
-    for _, suffix in _matrices():
+    for _, suffix in _matrices(program):
         yield f'PATTERN{suffix} = np.array(_data["pattern{suffix}"], dtype=int)'
 
 
 def _results(program: Program) -> Iterator[str]:
     """Yield the lines of the table of quantities."""
-    suffixes = dict(_matrices())
-    for item in quantities.QUANTITIES:
+    suffixes = dict(_matrices(program))
+    for item in program.quantities:
         shape = ", ".join(map(str, program.shape_of(item)))
         own = "None" if item.rows == "equations" and not item.adds else "0.0"
         shape, suffix = f"{shape}" if item.is_matrix else f"{shape},", suffixes.get(item)

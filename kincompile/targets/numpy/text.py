@@ -22,12 +22,6 @@ def tuple_text(items: Iterable[str], room: int = WIDTH - 15) -> str:
     return text if len(text) <= room else f"(\n{indented(wrapped(items))}\n)"
 
 
-def outputs_text(program: Program) -> str:
-    """Return the names of the outputs, nothing where there are none."""
-    names = tuple_text(f'"{name}"' for name in program.outputs)
-    return f"OUTPUTS = {names}" if program.outputs else ""
-
-
 def solvability_text(program: Program) -> str:
     """Return what a module says of its solve where that is not the usual one, else nothing."""
     lines = []
