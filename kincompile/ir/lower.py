@@ -131,7 +131,7 @@ def _too_deep(constraint: Joint | FreeEquation) -> str:
 
 
 def _tables(constraint: Joint | FreeEquation) -> dict[str, SplineTable]:
-    if isinstance(constraint, FreeEquation):
+    if isinstance(constraint, FreeEquation) or not constraint.profiles:
         return {}
     splines = (
         item for profile in constraint.profiles.values() for item in profile.atoms(PeriodicSpline)

@@ -252,16 +252,22 @@ class Program:
 
     def names_of(self, kind: Rows | Columns) -> tuple[str, ...]:
         """Return the names of what the rows or columns of a quantity belong to."""
-        names: dict[str, tuple[str, ...]] = {
-            "equations": self.equations,
-            "coordinates": tuple(item.name for item in self.coordinates),
-            "outputs": tuple(item.name for item in self.observers),
-            "parameters": tuple(item.name for item in self.parameters),
-            "none": (),
-        }
-        return names[kind]
+        return tuple(item if isinstance(item, str) else item.name for item in self._owners(kind))
+
+    def _owners(self, kind: Rows | Columns) -> tuple[str | Coordinate | Instance | Parameter, ...]:
+        """Return what the rows or columns of a quantity belong to."""
+        match kind:
+            case "equations":
+                return self.equations
+            case "coordinates":
+                return self.coordinates
+            case "outputs":
+                return self.observers
+            case "parameters":
+                return self.parameters
+        return ()
 
     def shape_of(self, quantity: Quantity) -> tuple[int, ...]:
         """Return the shape of a quantity: (rows,) or (rows, columns)."""
-        shape = (len(self.names_of(quantity.rows)),)
-        return (*shape, len(self.names_of(quantity.columns))) if quantity.is_matrix else shape
+        shape = (len(self._owners(quantity.rows)),)
+        return (*shape, len(self._owners(quantity.columns))) if quantity.is_matrix else shape

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.ir.graph import pruned
 from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
 from kincompile.quantities import FORMAT, kernels
 from kincompile.targets.evaluators import input_names, inputs_read, schedule
@@ -30,7 +31,6 @@ from kincompile.targets.numpy.target import (
 )
 from kincompile.targets.numpy.text import solvability_text, tuple_text
 from kincompile.targets.printer import Printer
-from kincompile.targets.schedule import count_uses
 from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 
@@ -169,18 +169,13 @@ class _Module:
 
     def values(self) -> list[str]:
         """Return the function of the values that depend on t, p and contact parameters."""
-        program, nodes = self.program, self.program.values
+        program = self.program
+        nodes, new = pruned(program.values, self.grouped.values)
         table = NameTable((*RESERVED, *program.tables))
-        read = {
-            nodes[node][1]
-            for node in count_uses(nodes, self.grouped.values)
-            if nodes[node][0] == "input"
-        }
-        names = input_names(program, table, read)
-        entries = tuple(Entry(k, 0, node) for k, node in enumerate(self.grouped.values))
-        listing, body = self._body(
-            self._inline(nodes, {"values": entries}, {}), ("values",), names, table
-        )
+        names = input_names(program, table, {node[1] for node in nodes if node[0] == "input"})
+        entries = tuple(Entry(k, 0, new[node]) for k, node in enumerate(self.grouped.values))
+        code = self._inline(tuple(nodes), {"values": entries}, {})
+        listing, body = self._body(code, ("values",), names, table)
         unpack = [f"{name} = {vector}[{k}]" for vector, k, name in inputs_read(program, listing)]
         return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
 
