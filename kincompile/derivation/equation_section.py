@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from kincompile.derivation.document import Run, Runs
     from kincompile.derivation.evaluation import Evaluation
     from kincompile.derivation.formulas import Glyph
-    from kincompile.ir.inline import Section as Rows
+    from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.resolve import FreeEquation
 
 

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from kincompile.derivation.document import SourceLine
     from kincompile.derivation.emitted_lines import EntryKey
     from kincompile.derivation.formulas import Formula
+    from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.ir.inline import Entry
-    from kincompile.ir.inline import Section as Rows
     from kincompile.model.system import ConstraintSystem
 
 Array = NDArray[np.float64]

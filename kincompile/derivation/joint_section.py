@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from kincompile.derivation.figures import Figures
     from kincompile.derivation.formulas import Formula
     from kincompile.derive.rules import Step
-    from kincompile.ir.inline import Section as Rows
+    from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
 

@@ -20,7 +20,7 @@ from kincompile.calculus.expressions import (
     Perpendicular,
     Power,
     Product,
-    Profile,
+    ProfileFunction,
     Rotated,
     Scaled,
     Sum,
@@ -163,7 +163,7 @@ class Notation:
         base = self._letter(expr.name)
         return self._dotted(base, expr.order) if expr.order else base
 
-    def _print_Profile(self, expr: Profile) -> Printed:
+    def _print_ProfileFunction(self, expr: ProfileFunction) -> Printed:
         letter, index, _ = split_name(expr.name)
         return self._primed(self._letter(letter), self._index_text(index), expr.order)
 
@@ -218,7 +218,7 @@ class Notation:
     def _is_atom(self, expr: Any) -> bool:
         """Return whether something needs no brackets under an exponent."""
         is_unit = isinstance(expr, Perpendicular) and isinstance(expr.vector, Basis)
-        atoms = Symbol | VectorSymbol | TimeFunction | Basis | Call | Profile
+        atoms = Symbol | VectorSymbol | TimeFunction | Basis | Call | ProfileFunction
         return is_unit or isinstance(expr, atoms) or expr in self.abbreviations
 
     def _short(self, expr: Any) -> Printed:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from kincompile.derivation.formulas import Formula, Glyph
     from kincompile.derive.derivation import RowBlock
     from kincompile.derive.equations import EquationDerivatives
-    from kincompile.ir.inline import Section as Rows
+    from kincompile.ir.inline import ConstraintRows as Rows
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
