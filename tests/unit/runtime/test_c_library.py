@@ -314,7 +314,7 @@ def loaded(monkeypatch):
         found.append(Path(path))
         return load(path)
 
-    monkeypatch.setattr(c_library.ctypes, "CDLL", record)
+    monkeypatch.setattr(ctypes, "CDLL", record)
     return found
 
 
@@ -362,7 +362,7 @@ def test_a_folder_that_is_not_the_users_alone_is_not_used(
         folder.symlink_to(tmp_path / "elsewhere")
         reason = "it is a link"
     else:
-        monkeypatch.setattr(c_library.os, "geteuid", lambda: os.getuid() + 1)
+        monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
         reason = "it belongs to another user"
     content = {path: path.read_bytes() for path in cache.iterdir()}
     loaded.clear()
