@@ -16,7 +16,6 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -28,8 +27,8 @@ from kincompile.compare.diagnosis import Diagnostician
 from kincompile.compare.fault import REVERSED, WHOLE_SIGN, WITH_RATES
 from kincompile.compare.hand_file import read_hand_file
 from kincompile.compare.layouts import expected_widths, usual_layout
-from kincompile.compare.matching import Matcher, Matching, Subject
-from kincompile.compare.reference import QUANTITIES, Reference
+from kincompile.compare.matching import Matcher, Matching
+from kincompile.compare.reference import QUANTITIES, Reference, Subject
 from kincompile.compare.report import Report
 from kincompile.compare.states import given_states
 from kincompile.compare.written import read_written, vocabulary
@@ -282,11 +281,8 @@ class _Comparer:
         """Return whether one fault explains all that differs in the Jacobian of a constraint."""
         spots = [spot for spot in self._wrong(block) if spot[0] == "Phi_q"]
         return bool(spots) and self._diagnostician.is_one_fault(
-            block, "Phi_q", self._in_system_terms(spots), self._is_exchanged(block)
+            block, self._in_system_terms(spots), self._matching.form(block.rows[0])
         )
-
-    def _is_exchanged(self, block: ConstraintBlock) -> bool:
-        return self._matching.exchanged.issuperset(block.rows)
 
     def _in_system_terms(self, spots: Sequence[Spot]) -> dict[Index, Array]:
         """Return written entries of a quantity by place, with the conventions taken out."""
@@ -324,7 +320,7 @@ class _Comparer:
         for block in self._subject.blocks:
             spots = [spot for spot in self._wrong(block) if not self._is_mistake(spot)]
             for rows in (block.rows, range(len(self._reference.equations))) if spots else ():
-                states = self._reference.consistent(self._subject.states, rows)
+                states = self._subject.near(rows)
                 if states is not None:
                     self._compare_on_manifold(states, spots)
 
@@ -384,7 +380,7 @@ class _Comparer:
                     found |= dict.fromkeys(spots, (self._opposite[name],))
                     continue
                 explained = self._diagnostician.explain(
-                    block, name, self._in_system_terms(spots), self._is_exchanged(block)
+                    block, name, self._in_system_terms(spots), self._matching.form(block.rows[0])
                 )
                 for spot in spots:
                     found[spot] = explained[self._index(spot)] or (self._unexplained(spot),)
@@ -428,22 +424,22 @@ class _Comparer:
     @cached_property
     def _diagnostician(self) -> Diagnostician:
         """The catalogue of faults, kept where many are compared with one model."""
-        if self._subject.states is not self._reference.random:
-            return Diagnostician(self._reference, self._subject.states)
-        if self._reference not in _DIAGNOSTICIANS:
-            found = Diagnostician(self._reference, self._subject.states)
-            _DIAGNOSTICIANS[self._reference] = found
-        return _DIAGNOSTICIANS[self._reference]
+        subject = self._subject
+        return subject.kept("faults", lambda: Diagnostician(subject.reference, subject.states))
 
     def _entry(self, spot: Spot, diagnoses: tuple[Diagnosis, ...]) -> ComparedEntry:
         name, row, column = spot
         system_row, system_column = self._index(spot)
         is_accepted = self._is_accepted(spot)
+        reference, form_row = self._reference, system_row
+        form = self._matching.form(system_row)
+        if form is not None and form.formulas is not None:
+            reference, form_row = form.formulas, form.rows.index(system_row)
         return ComparedEntry(
             name,
             self._reference.equations[system_row],
             self._reference.coordinates[system_column] if name == "Phi_q" else None,
-            self._reference.text(name, system_row, system_column),
+            reference.text(name, form_row, system_column),
             self._quantities[name].texts[row][column],
             self._verdicts[spot],
             is_accepted,
@@ -459,6 +455,3 @@ class _Comparer:
         k = int(np.argmax(np.nan_to_num(np.abs(written - expected), nan=np.inf, posinf=np.inf)))
         state = self._reference.named(self._subject.states, k)
         return Difference(state, float(expected[k]), float(written[k]))
-
-
-_DIAGNOSTICIANS: WeakKeyDictionary[Reference, Diagnostician] = WeakKeyDictionary()

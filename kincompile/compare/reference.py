@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import sympy
 
 from kincompile import quantities
 from kincompile.compare.states import (
+    SEED,
     Array,
     States,
     consistent_states,
@@ -18,6 +19,7 @@ from kincompile.compare.states import (
     is_angular,
     random_states,
 )
+from kincompile.criteria import size_of
 from kincompile.errors import InputError
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
@@ -28,13 +30,18 @@ from kincompile.model.mechanism import system_of
 from kincompile.names import listed, rate, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Mapping, Sequence
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.system import ConstraintSystem
 
+Kept = TypeVar("Kept")
+
 QUANTITIES = tuple(item.name for item in quantities.QUANTITIES)
+
+ASIDE = 0.4
+"""How far from the guess the states lie that are brought onto the manifold, in sizes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +81,11 @@ class Reference:
     ------
     ModelError
         If the model cannot be used as written.
+
+    Attributes
+    ----------
+    kept
+        What comparisons at the random states have found out about the system, for the next ones.
     """
 
     def __init__(self, model: Mechanism | ConstraintSystem) -> None:
@@ -83,19 +95,21 @@ class Reference:
         self.equations = self.system.equations
         self.angular = is_angular(self.system)
         self.defaults = default_parameters(self.system)
+        self.columns = {name: k for k, name in enumerate(self.coordinates)}
+        guess = np.array([item.guess for item in self.system.coordinates])
+        self.sizes = np.where(self.angular, 1.0, size_of(self.angular, guess) or 1.0)
         self._latest: tuple[States, Values] | None = None
-        self._consistent: dict[tuple[int, ...], States | None] = {}
+        self.kept: dict[Hashable, Any] = {}
         self._texts: dict[tuple[str, int, int], str] = {}
 
     @cached_property
     def blocks(self) -> tuple[ConstraintBlock, ...]:
         """The blocks of the constraints, in order."""
-        number = {name: k for k, name in enumerate(self.coordinates)}
         return tuple(
             ConstraintBlock(
                 item,
                 tuple(range(first, first + len(item.equation_names))),
-                tuple(None if name is None else number[name] for name in item.columns),
+                tuple(None if name is None else self.columns[name] for name in item.columns),
             )
             for first, item in zip(self.system.row_offsets, self.system.constraints, strict=True)
         )
@@ -150,17 +164,24 @@ class Reference:
 
         return random_states(self.system, is_usable)
 
-    def consistent(self, start: States, rows: Sequence[int]) -> States | None:
-        """Return states near `start` at which the given equations hold, with rates that fit.
+    def near(self, rows: Sequence[int], like: States) -> States | None:
+        """Return states near the assembled guess at which the given equations hold.
 
-        Those near the random states are kept: many comparisons with one model need them.
+        Times and parameters are those of `like`, rates are near them. Near the guess, for an
+        equation may hold in other assemblies too: where the sine of an angle vanishes, the angle is
+        0 or pi. None where no states are found.
         """
-        if start is not self.random:
-            return self._on_manifold(start, list(rows))
-        key = tuple(rows)
-        if key not in self._consistent:
-            self._consistent[key] = self._on_manifold(start, list(rows))
-        return self._consistent[key]
+        aside = np.random.default_rng(SEED).uniform(-ASIDE, ASIDE, like.q.shape)
+        return self._on_manifold(replace(like, q=self._start + self.sizes * aside), list(rows))
+
+    @cached_property
+    def _start(self) -> Array:
+        """The guess, assembled where that is possible."""
+        guess = np.array([item.guess for item in self.system.coordinates])
+        states = replace(self.random.take(np.arange(2)), q=np.tile(guess, (2, 1)), t=np.zeros(2))
+        states = states.with_default_parameters(self.defaults)
+        found = self._on_manifold(states, list(range(len(self.equations))))
+        return guess if found is None else found.q[0]
 
     def _on_manifold(self, start: States, rows: list[int]) -> States | None:
         def constraints(states: States) -> tuple[Array, Array, Array]:
@@ -214,3 +235,37 @@ class Reference:
             inputs[name] = states.q[:, k]
             inputs[rate(name)] = states.q_dot[:, k]
         return inputs
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What is compared: the equations of a system, or of one constraint, at some states."""
+
+    reference: Reference
+    block: ConstraintBlock | None
+    states: States
+
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """The equations, as rows of the system."""
+        if self.block is not None:
+            return self.block.rows
+        return tuple(range(len(self.reference.equations)))
+
+    @property
+    def blocks(self) -> tuple[ConstraintBlock, ...]:
+        """The constraints."""
+        return self.reference.blocks if self.block is None else (self.block,)
+
+    def kept(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
+        """Return what `make` gives; what belongs to the random states is made once."""
+        if self.states is not self.reference.random:
+            return make()
+        if key not in self.reference.kept:
+            self.reference.kept[key] = make()
+        found: Kept = self.reference.kept[key]
+        return found
+
+    def near(self, rows: Sequence[int]) -> States | None:
+        """Return states near the guess at which some of the system's equations hold, if any."""
+        return self.kept(("near", tuple(rows)), lambda: self.reference.near(rows, self.states))

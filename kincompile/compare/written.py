@@ -41,6 +41,8 @@ class Written:
         The text of each entry; empty for functions and for arrays of values at states.
     evaluate
         Gives the values and the sizes of their terms at states, both (N, rows, columns).
+    expressions
+        The formula of each row of a vector; None for functions and arrays.
     takes_parameters
         Whether it may be evaluated at other parameters than the default ones.
     takes_states
@@ -49,6 +51,7 @@ class Written:
 
     texts: Texts
     evaluate: Callable[[States], tuple[Array, Array]]
+    expressions: tuple[sympy.Expr, ...] | None = None
     takes_parameters: bool = True
     takes_states: bool = True
 
@@ -245,7 +248,7 @@ def _from_expressions(
         tuple(" ".join(cell.text.split()) if isinstance(cell, Cell) else str(cell) for cell in row)
         for row in rows
     )
-    return Written(texts, evaluate)
+    return Written(texts, evaluate, tuple(expressions))
 
 
 def _no_texts(shape: tuple[int, ...]) -> Texts:
@@ -288,8 +291,9 @@ def _from_function(quantity: str, function: Callable[..., object], reference: Re
 
     def at(states: States, k: int) -> Array:
         """Return the values at one state, (rows, columns)."""
-        arguments = [getattr(states, name)[k] for name in names]
-        arguments += [states.p[k]] if takes_parameters else []
+        # Copies: what a function does to its arguments must not change the states.
+        arguments = [np.copy(getattr(states, name)[k])[()] for name in names]
+        arguments += [states.p[k].copy()] if takes_parameters else []
         value = np.asarray(function(*arguments), dtype=float)
         return value if quantity == "Phi_q" else value.reshape(-1, 1)
 
