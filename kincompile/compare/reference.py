@@ -25,7 +25,7 @@ from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
 from kincompile.ir.interpret import interpret, run
 from kincompile.ir.lower import lower
-from kincompile.model.matrices import Row, assemble
+from kincompile.model.matrices import EquationRow, assemble
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed, rate, suggestion
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 Kept = TypeVar("Kept")
 
-QUANTITIES = tuple(item.name for item in quantities.QUANTITIES)
+QUANTITIES = tuple(item.name for item in quantities.OF_EQUATIONS)
 
 ASIDE = 0.4
 """How far from the guess the states lie that are brought onto the manifold, in sizes."""
@@ -125,7 +125,7 @@ class Reference:
         return blocks[name]
 
     @cached_property
-    def _rows(self) -> list[Row]:
+    def _rows(self) -> list[EquationRow]:
         """The rows as SymPy expressions, which people read."""
         return assemble(self.system)
 
@@ -150,7 +150,7 @@ class Reference:
         if self._latest is None or self._latest[0] is not states:
             with np.errstate(all="ignore"):
                 found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
-            self._latest = states, Values(dict(zip(QUANTITIES, found, strict=True)))
+            self._latest = states, Values(dict(zip(QUANTITIES, found, strict=False)))
         return self._latest[1]
 
     @cached_property

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.assembled import assembled_section, unknowns_section
-from kincompile.derivation.document import Document, Section
+from kincompile.derivation.document import Chapter, Manuscript
 from kincompile.derivation.equation_section import equation_section
 from kincompile.derivation.evaluation import Evaluation, evaluation
+from kincompile.derivation.figures import Figures
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
 from kincompile.derivation.to_html import as_html
@@ -46,10 +47,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Derivation(Document):
+class Derivation(Manuscript):
     """The derivation of a mechanism's equations, to be printed.
 
-    The attributes are those of `Document`: the name, and what the page says as data.
+    The attributes are those of `Manuscript`: the name, and what the page says as data.
     """
 
     def to_html(self) -> str:
@@ -142,8 +143,9 @@ def derivation(
     """
     system = system_of(model)
     chosen = evaluation(system, state)
+    figures = Figures(chosen)
     sections = tuple(
-        joint_section(chosen, item, rows)
+        joint_section(figures, item, rows)
         if isinstance(item, Joint)
         else equation_section(chosen, item, rows)
         for item, rows in zip(system.constraints, chosen.code.sections, strict=True)
@@ -152,11 +154,11 @@ def derivation(
     for item in system.constraints:
         if isinstance(item, Joint):
             names |= abbreviations(item.template)
-    constraints = Section("constraints", ("The constraints, one by one",), (), sections)
+    constraints = Chapter("constraints", ("The constraints, one by one",), (), sections)
     return Derivation(
         system.name,
         _summary(chosen),
-        (unknowns_section(chosen), constraints, assembled_section(chosen)),
+        (unknowns_section(figures), constraints, assembled_section(chosen)),
         names,
         chosen.source,
         _state_code(chosen),

@@ -11,19 +11,28 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.document import Math
 from kincompile.derivation.renderer import Renderer
+from kincompile.derivation.svg import svg_address
 from kincompile.derivation.tex import TexPrinter
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.derivation.document import Display, Document, Link, Pattern, Section, Table
+    from kincompile.derivation.document import (
+        Chapter,
+        CrossReference,
+        Display,
+        Manuscript,
+        Pattern,
+        Table,
+    )
     from kincompile.derivation.formulas import Formula
+    from kincompile.view.picture import Picture
 
 SPECIAL = str.maketrans({character: f"\\{character}" for character in "\\`*_{}[]<>#|$~"})
 
 
 @dataclass(frozen=True, slots=True)
-class Dialect:
+class FormulaMarks:
     """The marks of formulas: around those on lines of their own, and within a line."""
 
     before: str
@@ -31,11 +40,11 @@ class Dialect:
     inline: str
 
 
-GITHUB = Dialect("```math", "```", "$`{}`$")
-NOTEBOOK = Dialect("$$", "$$", "${}$")
+GITHUB = FormulaMarks("```math", "```", "$`{}`$")
+NOTEBOOK = FormulaMarks("$$", "$$", "${}$")
 
 
-def as_markdown(document: Document) -> str:
+def as_markdown(document: Manuscript) -> str:
     """Return a document as Markdown for GitHub."""
     renderer = MarkdownRenderer(document, GITHUB)
     lines = [f"# Derivation of `{document.name}`", "", escape(document.summary), ""]
@@ -52,11 +61,11 @@ def escape(text: str) -> str:
 class MarkdownRenderer(Renderer):
     """Prints Markdown in a dialect."""
 
-    def __init__(self, document: Document, dialect: Dialect) -> None:
+    def __init__(self, document: Manuscript, dialect: FormulaMarks) -> None:
         self._printer = TexPrinter(document.abbreviations)
         self._dialect = dialect
 
-    def heading(self, section: Section, depth: int) -> Iterator[str]:
+    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
         """Yield the title of a section, after its anchor."""
         level = f" *({section.level})*" if section.level else ""
         title = f"{'#' * (depth + 2)} {self.runs(section.title)}{level}"
@@ -91,13 +100,18 @@ class MarkdownRenderer(Renderer):
             yield _line([f"`{name}`", *marks])
         yield ""
 
+    def _figure(self, picture: Picture) -> Iterator[str]:
+        """Yield nothing on GitHub, which shows no picture that is part of a text."""
+        if self._dialect is NOTEBOOK:
+            yield from (f"![{escape(picture.title)}]({svg_address(picture)})", "")
+
     def _verbatim(self, text: str) -> str:
         return f"`{text}`"
 
     def _math(self, formula: Formula) -> str:
         return self._dialect.inline.format(self._printer.math(formula))
 
-    def _link(self, link: Link) -> str:
+    def _link(self, link: CrossReference) -> str:
         content = self.run(link.content)
         if isinstance(link.content, Math):
             # A formula inside the brackets of a link is not understood everywhere.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from kincompile.calculus.expand import Expansion
@@ -22,7 +23,7 @@ from kincompile.calculus.template import Template
 from kincompile.derive.derivation import derive
 from kincompile.ir.differentiate import negated_tangents, tangents
 from kincompile.ir.from_sympy import Converter
-from kincompile.ir.graph import Graph, pruned
+from kincompile.ir.graph import Graph, pruned, reachable
 from kincompile.ir.program import (
     Attribute,
     FrameEntry,
@@ -31,41 +32,49 @@ from kincompile.ir.program import (
     Hint,
     Input,
     Kernel,
-    Motion,
+    StateEntry,
 )
 from kincompile.names import rate
+from kincompile.quantities import TOGETHER
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from fractions import Fraction
 
-    from kincompile.calculus.expressions import Components, Profile, Rotation, TimeFunction, Value
+    from kincompile.calculus.expressions import (
+        Components,
+        ProfileFunction,
+        Rotation,
+        TimeFunction,
+        Value,
+    )
     from kincompile.calculus.symbols import CoordinateSymbol, Frame
     from kincompile.model.bodies import BodyKind
+    from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.resolve import FreeEquation
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class Operand:
     """A node that adds and multiplies like a number."""
 
     graph: Graph
     node: int
 
-    def __add__(self, other: Code) -> Code:
-        return Code(self.graph, self.graph.add(self.node, other.node))
+    def __add__(self, other: Operand) -> Operand:
+        return Operand(self.graph, self.graph.add(self.node, other.node))
 
-    def __sub__(self, other: Code) -> Code:
-        return Code(self.graph, self.graph.sub(self.node, other.node))
+    def __sub__(self, other: Operand) -> Operand:
+        return Operand(self.graph, self.graph.sub(self.node, other.node))
 
-    def __mul__(self, other: Code) -> Code:
-        return Code(self.graph, self.graph.mul(self.node, other.node))
+    def __mul__(self, other: Operand) -> Operand:
+        return Operand(self.graph, self.graph.mul(self.node, other.node))
 
-    def __neg__(self) -> Code:
-        return Code(self.graph, self.graph.neg(self.node))
+    def __neg__(self) -> Operand:
+        return Operand(self.graph, self.graph.neg(self.node))
 
-    def __pow__(self, exponent: int) -> Code:
-        return Code(self.graph, self.graph.pow(self.node, exponent))
+    def __pow__(self, exponent: int) -> Operand:
+        return Operand(self.graph, self.graph.pow(self.node, exponent))
 
 
 class KernelEnvironment:
@@ -78,17 +87,17 @@ class KernelEnvironment:
         self._frames = {frame.rotation: frame for frame in template.frames}
         self._template = template
 
-    def _input(self, item: Input) -> Code:
+    def _input(self, item: Input) -> Operand:
         node = self.inputs[item] = self.graph.input(item)
-        return Code(self.graph, node)
+        return Operand(self.graph, node)
 
     def number(self, value: Fraction) -> Value:
         """Return an exact number."""
-        return Code(self.graph, self.graph.const(value))
+        return Operand(self.graph, self.graph.const(value))
 
     def pi(self) -> Value:
         """Return pi."""
-        return Code(self.graph, self.graph.pi())
+        return Operand(self.graph, self.graph.pi())
 
     def symbol(self, symbol: Symbol) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
@@ -104,7 +113,7 @@ class KernelEnvironment:
         """Return C(t) or one of its derivatives."""
         return self._input(Function(function.name, function.order))
 
-    def profile(self, profile: Profile) -> Value:
+    def profile(self, profile: ProfileFunction) -> Value:
         """Return rho(alpha) or one of its derivatives."""
         (contact,) = self._motion[profile.argument]
         indices = [owner.index for owner in self._template.owners]
@@ -120,7 +129,7 @@ class KernelEnvironment:
 
     def call(self, function: str, value: Value) -> Value:
         """Return an elementary function."""
-        return Code(self.graph, self.graph.call(function, value.node))
+        return Operand(self.graph, self.graph.call(function, value.node))
 
 
 AXES = "xyz"
@@ -138,16 +147,16 @@ def frame_entries(template: Template, frame: Frame) -> tuple[FrameEntry, ...]:
     return tuple(FrameEntry(owner, k, f"{name}_{frame.index}") for k, name in enumerate(names))
 
 
-def motion_of(template: Template, owner: int, order: int) -> tuple[Motion, ...]:
+def motion_of(template: Template, owner: int, order: int) -> tuple[StateEntry, ...]:
     """Return the coordinates of an owner, or their rates, as inputs."""
     item, ending = template.owners[owner], "_dot" * order
     return tuple(
-        Motion(owner, k, order, f"{letter}_{item.index}{ending}")
+        StateEntry(owner, k, order, f"{letter}_{item.index}{ending}")
         for k, letter in enumerate(item.letters)
     )
 
 
-def _motion(template: Template) -> dict[CoordinateSymbol, tuple[Motion, ...]]:
+def _motion(template: Template) -> dict[CoordinateSymbol, tuple[StateEntry, ...]]:
     """Return the inputs of each coordinate and rate of a template."""
     found = {}
     for owner, item in enumerate(template.owners):
@@ -166,7 +175,9 @@ def frame_kernel(kind: BodyKind) -> FrameKernel:
     found = Expansion(environment).entries(own.rotation)
     graph = Graph()
     numbers = {
-        item: graph.input(item.component) for item in environment.inputs if isinstance(item, Motion)
+        item: graph.input(item.component)
+        for item in environment.inputs
+        if isinstance(item, StateEntry)
     }
     new = graph.instantiate(environment.graph.nodes, numbers)
     entries = tuple(new[item.node] for item in found)
@@ -257,6 +268,31 @@ def equation_kernel(equation: FreeEquation) -> Kernel:
     return differentiated(graph, [convert(item) for item in equation.expressions], equation.columns)
 
 
+def output_kernel(output: ResolvedOutput) -> Kernel:
+    r"""Return the kernel of an output y, with :math:`\dot y`, :math:`\ddot y` and :math:`y_q`.
+
+    A derivative that would need a third derivative of q is not a number.
+    """
+    graph = Graph()
+    names = output.columns
+    motion = {graph.input("t"): graph.const(1)}
+    for name in names:
+        orders = [graph.input(rate(name, order)) for order in range(3)]
+        motion |= dict(pairwise(orders))
+    last = {graph.input(rate(name, 2)) for name in names}
+    y = Converter(graph, graph.input).convert(output.expression)
+    found = [y]
+    for _ in range(2):
+        is_known = last.union([graph.nan()]).isdisjoint(reachable(graph.nodes, found[-1:]))
+        found += tangents(graph, found[-1:], motion) if is_known else [graph.nan()]
+    by_column = [tangents(graph, [y], {graph.input(name): graph.const(1)})[0] for name in names]
+    outputs = {name: [(0, 0, node)] for name, node in zip(TOGETHER["observe"], found, strict=True)}
+    outputs["outputs_q"] = [
+        (0, column, node) for column, node in enumerate(by_column) if graph.value_of(node) != 0
+    ]
+    return _pruned_kernel("Output", graph, outputs)
+
+
 def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> Kernel:
     r"""Return the kernel of equations given as nodes, in the coordinates that are named.
 
@@ -279,14 +315,21 @@ def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> 
         name: [(row, 0, node) for row, node in enumerate(found)] for name, found in vectors.items()
     }
     outputs["Phi_q"] = entries
+    return _pruned_kernel("Equation", graph, outputs)
+
+
+def _pruned_kernel(
+    name: str, graph: Graph, outputs: Mapping[str, Sequence[tuple[int, int, int]]]
+) -> Kernel:
+    """Return the kernel of what outputs need of a graph; its inputs are names."""
     nodes, new = pruned(graph.nodes, [node for found in outputs.values() for _, _, node in found])
     return Kernel(
-        "Equation",
+        name,
         tuple(node[1] for node in nodes if node[0] == "input"),
         tuple(nodes),
         {
-            name: tuple((row, column, new[node]) for row, column, node in found)
-            for name, found in outputs.items()
+            quantity: tuple((row, column, new[node]) for row, column, node in found)
+            for quantity, found in outputs.items()
         },
         (),
     )

@@ -20,6 +20,7 @@ from kincompile.ir.kernels import (
     frame_entries,
     frame_kernel,
     motion_of,
+    output_kernel,
 )
 from kincompile.ir.program import Attribute, BodyFrame, Function, Input, Instance, Kernel, Program
 from kincompile.model.expressions import alpha, t
@@ -57,6 +58,17 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
         binder.frame_of(body, own)
         for body, own in zip(system.bodies, system.body_columns, strict=True)
     )
+    observers = tuple(
+        Instance(
+            kernel := output_kernel(item),
+            item,
+            len(system.equations),
+            tuple(columns[name] for name in item.columns),
+            tuple(graph.input(name) for name in kernel.inputs),
+            row,
+        )
+        for row, item in enumerate(system.outputs)
+    )
     return Program(
         system.name,
         system.coordinates,
@@ -66,9 +78,10 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
         tuple(graph.nodes),
         tuple(instances),
         tables,
-        _fingerprint(system, graph, instances, tables),
+        _fingerprint(system, graph, [*instances, *observers], tables),
         system.end,
         system.points,
+        observers=observers,
     )
 
 

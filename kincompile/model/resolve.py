@@ -28,7 +28,7 @@ from kincompile.model.expressions import (
     unknown_problem,
 )
 from kincompile.model.spline import PeriodicSpline, fit
-from kincompile.names import listed, suggestion
+from kincompile.names import listed, rate, suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -139,6 +139,12 @@ class Scope:
         return {name: place for place, name in enumerate(self.coordinates)}
 
     @cached_property
+    def motion(self) -> dict[str, tuple[str, int]]:
+        """The coordinate, and the order of the derivative, by names of coordinates and rates."""
+        orders = range(3)
+        return {rate(name, k): (name, k) for name in self.coordinates for k in orders}
+
+    @cached_property
     def columns(self) -> dict[str, tuple[str | None, ...]]:
         """The names of the columns of each body, by its name; the ground has none."""
         found: dict[str, tuple[str | None, ...]] = {
@@ -166,7 +172,7 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
     expressions = []
     for name, given in zip(equation.equation_names, equation.expressions, strict=True):
         where = f"equation {name!r}"
-        value = _expression(given, where, scope.declared, scope)
+        value = checked_expression(given, where, scope.declared, scope)
         if value is not None and not depends_on(value, scope.coordinate_names):
             scope.problems.append(
                 f"{where} contains no coordinate, so it cannot constrain anything; coordinates "
@@ -191,9 +197,9 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     for name, item in constraint.arguments().items():
         given, where = getattr(constraint, name), f"{title}, {name}"
         if item.kind is Kind.BODY:
-            bodies.append(_body(given, where, scope))
+            bodies.append(body_named(given, where, scope))
         elif item.kind in (Kind.POINT, Kind.AXIS):
-            points[item.symbol] = _point(given, item.kind, where, scope)
+            points[item.symbol] = checked_point(given, item.kind, where, scope)
         elif item.kind is Kind.PROFILE:
             table_name = f"{item.symbol}_{constraint.name}"
             profiles[item.symbol] = _profile(given, table_name, where, scope)
@@ -220,7 +226,7 @@ def _title(constraint: Constraint) -> str:
     return f"{type(constraint).__name__} {constraint.name!r}"
 
 
-def _body(given: Any, where: str, scope: Scope) -> Body | None:
+def body_named(given: Any, where: str, scope: Scope) -> Body | None:
     """Return the body with the given name, None where there is none."""
     name = given.name if isinstance(given, Body) else given
     if isinstance(name, str) and name == GROUND.name:
@@ -249,7 +255,9 @@ def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> N
         )
 
 
-def _expression(given: Any, where: str, declared: Collection[str], scope: Scope) -> Scalar | None:
+def checked_expression(
+    given: Any, where: str, declared: Collection[str], scope: Scope
+) -> Scalar | None:
     """Return a checked expression, or None where a problem was noted."""
     try:
         value = as_expression(given)
@@ -271,7 +279,7 @@ def _expression(given: Any, where: str, declared: Collection[str], scope: Scope)
 
 def _attribute(given: Any, where: str, scope: Scope) -> Scalar:
     """Return an attribute: a number or an expression of parameters."""
-    value = _expression(given, where, scope.declared, scope)
+    value = checked_expression(given, where, scope.declared, scope)
     if value is None:
         return 1
     if not isinstance(value, sympy.Expr):
@@ -295,7 +303,7 @@ def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
                 "(negative for an internal gear)"
             )
         return value
-    value_or_none = _expression(given, where, scope.declared, scope)
+    value_or_none = checked_expression(given, where, scope.declared, scope)
     if value_or_none is None:
         return 1
     coordinates = sorted(symbol_names(value_or_none) & scope.coordinate_names)
@@ -316,7 +324,8 @@ def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
     return value_or_none
 
 
-def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
+def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
+    """Return a pair (xi, eta) of numbers or expressions of parameters."""
     # A generator would be used up here, a set has no order.
     is_list = type(given) is tuple or (
         isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
@@ -358,7 +367,7 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
             f"{where}: {given!r} is neither a radius rho(alpha) nor a table (angles, radii)"
         )
         return sympy.S.One
-    value = _expression(given, where, {*scope.parameters, alpha.name}, scope)
+    value = checked_expression(given, where, {*scope.parameters, alpha.name}, scope)
     rho: sympy.Expr = as_sympy(1 if value is None else value)
     return rho
 

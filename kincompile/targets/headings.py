@@ -10,14 +10,14 @@ from kincompile.targets.lines import indented, labelled, quoted, table, wrapped
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
 
 
 def header(code: InlineProgram, first: int = 0) -> list[str]:
     """Return the docstring's tables: coordinates, parameters, rows, which count from `first`."""
     program = code.program
     rows = [("row", "constraint", "", "source")]
-    for section in code.sections:
+    for section in code.constraints:
         instance, constraint = section.instance, section.instance.constraint
         driver = " (driver)" if constraint.is_driver else ""
         name = f'{instance.kernel.name} "{instance.name}"{driver}'
@@ -25,6 +25,8 @@ def header(code: InlineProgram, first: int = 0) -> list[str]:
     lines = labelled("q", [f"{item.name}{_unit(item.unit)}" for item in program.coordinates])
     if program.parameters:
         lines += labelled("p", [f"{item.name}{_unit(item.unit)}" for item in program.parameters])
+    if program.observers:
+        lines += labelled("y", [f"{item.name}{_unit(item.unit)}" for item in program.outputs])
     return [*lines, "", *table(rows)]
 
 
@@ -61,13 +63,13 @@ def constants(code: InlineProgram, level: int, pair: str) -> dict[str, object]:
     }
 
 
-def short_title(section: Section, first: int = 0) -> str:
-    """Return rows, type and name of a constraint, for a comment above its code."""
+def short_title(section: ConstraintRows, first: int = 0) -> str:
+    """Return rows, type and name of a constraint or output, for a comment above its code."""
     instance = section.instance
     return f'{_rows(section, first)}  {instance.kernel.name} "{instance.name}"'
 
 
-def title(section: Section, first: int = 0) -> str:
+def title(section: ConstraintRows, first: int = 0) -> str:
     """Return rows, type, name and points of a constraint, for a comment above its rows."""
     return f"{short_title(section, first)}: {section.text}"
 
@@ -85,7 +87,10 @@ def _unit(unit: str) -> str:
     return f" [{unit}]" if unit else ""
 
 
-def _rows(section: Section, first: int) -> str:
+def _rows(section: ConstraintRows, first: int) -> str:
+    count = len(section.entries["Phi"])
+    if count == 0:  # an output
+        return str(first + section.instance.first_output)
     first += section.instance.first_row
-    last = first + len(section.entries["Phi"]) - 1
+    last = first + count - 1
     return str(first) if first == last else f"{first}-{last}"

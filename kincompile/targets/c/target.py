@@ -8,7 +8,7 @@ from kincompile import criteria, quantities
 from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
 from kincompile.quantities import nonzeros_of
 from kincompile.targets.c.dialect import C
-from kincompile.targets.c.functions import LAYOUT, evaluator, solve_functions
+from kincompile.targets.c.functions import WRITE, evaluator, solve_functions
 from kincompile.targets.lines import WIDTH, indented, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.planned_solve import schedule_solve
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 DIALECT = C
 
 LANES = 32
-"""Points in a block: enough for the widest registers, few enough for the nearest cache."""
+"""Points in a strip: enough for the widest registers, few enough for the nearest cache."""
 
 CRITERIA = (
     "KINK", "MAX_CORRECTIONS", "MAX_SUBSTEPS", "NEARLY_SINGULAR", "NO_SIZE", "RESIDUAL_FACTOR",
@@ -54,13 +54,13 @@ RESERVED: tuple[str, ...] = (
 """Names that the functions of a mechanism use."""
 
 
-def evaluators() -> dict[str, tuple[str, ...]]:
+def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the kernels."""
-    return quantities.kernels()
+    return quantities.kernels(given)
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return the lines of a function of a point, and of the one for a block of points."""
+    """Return the lines of a function of a point, and of the one for a strip of points."""
     return ["", *evaluator(name, code, listing, printer)]
 
 
@@ -75,7 +75,7 @@ def files(
         listing = schedule_solve(code, plan, NameTable(RESERVED))
     about = _about(code, listing)
     lines = [line for own in functions.values() for line in own]
-    body = [_block(code, lines, called, listing)]
+    body = [_strip(code, lines, called, listing)]
     body.append(fill("c/batch.c.jinja", {**_only(about, "name", "is_planned"), **_batch(code)}))
     if listing is not None:
         body.append(fill("c/march.c.jinja", {**_only(about, "name", "NAME"), **_scales(program)}))
@@ -92,7 +92,7 @@ def _about(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
     return {
         "name": program.name,
         "NAME": program.name.upper(),
-        "header": LAYOUT.heading(code),
+        "header": WRITE.heading(code),
         "n": len(program.coordinates),
         "m": len(program.equations),
         "k": len(program.parameters),
@@ -113,7 +113,7 @@ def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]
     """Return the constants of the source file: names, numbers and the patterns of matrices."""
     program = code.program
     patterns, entries = [], []
-    for quantity in quantities.QUANTITIES:
+    for quantity in program.quantities:
         values = [code.number(entry.node) for entry in code.entries(quantity.name)]
         numbers = [f"{{{k}, {float(x)!r}}}" for k, x in enumerate(values) if x is not None]
         computed = [str(k) for k, value in enumerate(values) if value is None]
@@ -133,7 +133,7 @@ def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]
     return {
         "patterns": "\n".join(patterns),
         "entries": "\n".join(entries),
-        "numbers": sum(len(code.entries(item.name)) for item in quantities.QUANTITIES),
+        "numbers": sum(len(code.entries(item.name)) for item in program.quantities),
         "lanes": LANES,
         "n_factors": 0 if listing is None else len(listing.factors),
         "n_blocks": 0 if listing is None else len(listing.plan.determinants),
@@ -160,21 +160,21 @@ def _array(declaration: str, items: Sequence[str], placeholder: str = "0") -> st
 def _batch(code: InlineProgram) -> dict[str, Any]:
     """Return the tables of quantities and kernels by which a batch is evaluated."""
     program, rows, matrices = code.program, [], 0
-    for quantity in quantities.QUANTITIES:
+    for quantity in program.quantities:
         height, width = (*program.shape_of(quantity), 0)[:2]
         entries, name = code.entries(quantity.name), quantity.name
         constants = sum(code.number(entry.node) is not None for entry in entries)
         nonzeros = f"offsetof({program.name}_batch, {nonzeros_of(quantity)})"
         rows += [
-            f"{{offsetof(block, {name}), offsetof({program.name}_batch, {name}),",
+            f"{{offsetof(strip, {name}), offsetof({program.name}_batch, {name}),",
             f"    {nonzeros if quantity.is_matrix else 0}, {height}, {width}, {matrices},",
             f"    {len(entries)}, {constants}, {len(entries) - constants},",
             f"    {_pattern_name(code, quantity) if quantity.is_matrix else 'NULL'},",
             f"    {name}_constant, {name}_computed, {f'{name}_place' if width else 'NULL'}}},",
         ]
         matrices += height * width
-    bits = {item.name: 1 << k for k, item in enumerate(quantities.QUANTITIES)}
-    kernels = quantities.kernels()
+    bits = {item.name: 1 << k for k, item in enumerate(program.quantities)}
+    kernels = quantities.kernels(program.quantities)
     return {
         "quantities": indented(rows),
         "n_quantities": len(bits),
@@ -189,18 +189,25 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
         ),
         "matrices": max(matrices, 1),
         "kernels": indented(
-            f"{{{sum(bits[item] for item in given)}, {name}_of_block}},"
+            f"{{{sum(bits[item] for item in given)}, {name}_of_strip}},"
             for name, given in kernels.items()
         ),
         "n_kernels": len(kernels),
-        "moving": sum(bits[item.name] for item in quantities.QUANTITIES if item.is_moving),
+        **{
+            f"reads_{state}": sum(
+                bits[item.name] for item in program.quantities if state in item.reads
+            )
+            for state in ("q_dot", "q_ddot")
+        },
     }
 
 
 def _outputs(code: InlineProgram) -> list[str]:
     """Return the results of a batch as the header declares them."""
     program, lines = code.program, []
-    for quantity in quantities.QUANTITIES:
+    if program.observers:
+        lines.append(f"{program.name}_input q_ddot;  // second rates, of which outputs may depend")
+    for quantity in program.quantities:
         size = " x ".join(map(str, program.shape_of(quantity)))
         lines.append(f"{program.name}_output {quantity.name};  // {size}: {quantity.about}")
         if quantity.is_matrix:
@@ -215,10 +222,10 @@ def _array_lines(items: Sequence[str], placeholder: str = "0") -> str:
     return "\n".join(f"    {line}" for line in wrapped(items or [placeholder]))
 
 
-def _block(
+def _strip(
     code: InlineProgram, lines: list[str], called: Collection[str], listing: SolveListing | None
 ) -> str:
-    """Return the functions that work on a block of points, and what they need."""
+    """Return the functions that work on a strip of points, and what they need."""
     largest = 0
     if listing is not None:
         lines = [*lines, "", *solve_functions(code, listing)]
@@ -229,10 +236,10 @@ def _block(
         "functions": "\n".join(lines),
         "results": indented(
             f"double {item.name}[{max(len(code.entries(item.name)), 1)}][LANES];"
-            for item in quantities.QUANTITIES
+            for item in code.program.quantities
         ),
     }
-    return fill("c/block.c.jinja", data)
+    return fill("c/strip.c.jinja", data)
 
 
 def _elementary(program: Program, called: Collection[str], largest: int) -> str:

@@ -13,20 +13,21 @@ from kincompile import quantities
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.targets.lines import indented, pieces
 from kincompile.targets.octave.dialect import NAMES, OCTAVE
-from kincompile.targets.statements import Layout
+from kincompile.targets.statements import Statements
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.model.spline import SplineTable
+    from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.printer import Printer
 
 DIALECT = OCTAVE
 
-LAYOUT = Layout("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, continued=" ...")
+WRITE = Statements("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, continued=" ...")
 
 LONGEST_NAME = 63
 """Longest name; MATLAB truncates longer ones."""
@@ -40,15 +41,15 @@ KEYWORDS = (
 """Words of MATLAB and of Octave."""
 
 RESERVED: tuple[str, ...] = (
-    *KEYWORDS, *quantities.singles(), *NAMES.values(), "q", "q_dot", "t", "p", "pi", "zeros",
-    "nargin", "either", "in_reals", "NaN", "isreal",
+    *KEYWORDS, *quantities.singles(quantities.QUANTITIES), *NAMES.values(), "q",
+    "q_dot", "q_ddot", "t", "p", "pi", "zeros", "nargin", "either", "in_reals", "NaN", "isreal",
 )  # fmt: skip
 """Names that the functions use."""
 
 
-def evaluators() -> dict[str, tuple[str, ...]]:
+def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the functions: one a quantity."""
-    return quantities.singles()
+    return quantities.singles(given)
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
@@ -61,10 +62,10 @@ def function(name: str, code: InlineProgram, listing: Listing, printer: Printer)
     """
     _require_short(listing.names.values())
     rows, columns = (*code.program.shape_of(quantities.quantity_named(name)), 1)[:2]
-    lines = LAYOUT.inputs(code.program, listing)
-    values = LAYOUT.frames(listing, printer) + LAYOUT.steps(listing, printer)
+    lines = WRITE.inputs(code.program, listing)
+    values = WRITE.frames(listing, printer) + WRITE.steps(listing, printer)
     zeros = f"{name} = zeros({rows}, {columns});"
-    results = LAYOUT.results(name, code, printer)
+    results = WRITE.results(name, code, printer)
     return [*lines, *values, *([""] if values else []), zeros, *results]
 
 
@@ -108,10 +109,10 @@ def _function_file(name: str, code: InlineProgram, body: str) -> str:
     data = {
         "quantity": name,
         "name": program.name,
-        "arguments": ", ".join(quantity.arguments),
-        "n_arguments": len(quantity.arguments),
+        "arguments": ", ".join(quantity.reads),
+        "n_arguments": len(quantity.reads),
         "about": f"{quantity.about[:-1]}{shape}.",
-        "header": LAYOUT.header(code),
+        "header": WRITE.header(code),
         "fingerprint": program.fingerprint,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 2),
         "body": body,
@@ -157,7 +158,7 @@ def _script(code: InlineProgram) -> str:
         )
     data = {
         "name": program.name,
-        "header": LAYOUT.header(code),
+        "header": WRITE.header(code),
         "n": len(program.coordinates),
         "unsolvable": indented(_literal(piece) for piece in pieces(program.unsolvable)),
         "end": repr(end),
