@@ -19,6 +19,7 @@ from kincompile.compare.fault import LEFT_ZERO, OTHER_FORM, Fault
 from kincompile.compare.forms import known_forms
 from kincompile.compare.joint_faults import Index, JointFaults, NumericFault
 from kincompile.compare.reference import Subject
+from kincompile.compare.states import Array
 from kincompile.model.resolve import Joint
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     from kincompile.compare.forms import Form
     from kincompile.compare.reference import ConstraintBlock, Reference
-    from kincompile.compare.states import Array, States
+    from kincompile.compare.states import States
 
 CLOSE = 1e-8
 """Relative; wider than for equality, so that the fault named is not missed by rounding."""
@@ -41,6 +42,10 @@ _NOT_DEFINED = Diagnosis(
     "it has no finite value at some states where the right one has: it divides by zero, or "
     "takes a root or logarithm of a negative number",
 )
+
+
+Given = tuple[Array, Array]
+"""Values of an entry and what rounding may have taken from them, (N,) each."""
 
 
 class Diagnostician:
@@ -65,7 +70,7 @@ class Diagnostician:
         self,
         block: ConstraintBlock,
         quantity: str,
-        written: Mapping[Index, Array],
+        written: Mapping[Index, Given],
         form: Form | None,
     ) -> dict[Index, tuple[Diagnosis, ...]]:
         """Return the explanations of every entry of a constraint that differs.
@@ -77,12 +82,12 @@ class Diagnostician:
         quantity
             Phi, Phi_q, nu or gamma.
         written
-            Values by row and column of the system, shape (N,), with the author's conventions taken
-            out: comparable to the generated values as they are.
+            By row and column of the system, with the author's conventions taken out: comparable to
+            the generated values as they are.
         form
             The form in which its author has it, None where it is written as generated.
         """
-        left = {place: values for place, values in written.items() if np.isfinite(values).all()}
+        left = {place: item for place, item in written.items() if np.isfinite(item[0]).all()}
         found: dict[Index, tuple[Diagnosis, ...]] = {}
         found |= dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
         catalogue = self._catalogue(block, quantity, form)
@@ -91,13 +96,13 @@ class Diagnostician:
         typed = [fault for place in left for fault in self._typed(quantity, place, form)]
         catalogue = [*typed, *catalogue]
         found |= _explained(left, catalogue)
-        for place, values in left.items():
+        for place, given in left.items():
             right = self._right(quantity, form)[:, place[0], place[1]]
-            found[place] = _one_entry(place, values, right, catalogue)
+            found[place] = _one_entry(place, given, right, catalogue)
         return found
 
     def is_one_fault(
-        self, block: ConstraintBlock, written: Mapping[Index, Array], form: Form | None
+        self, block: ConstraintBlock, written: Mapping[Index, Given], form: Form | None
     ) -> bool:
         """Return whether a single fault in vectors explains entries of Phi_q; see `explain`."""
         return any(
@@ -178,17 +183,17 @@ class Diagnostician:
 
 
 def _one_entry(
-    place: Index, values: Array, right: Array, catalogue: Sequence[NumericFault]
+    place: Index, given: Given, right: Array, catalogue: Sequence[NumericFault]
 ) -> tuple[Diagnosis, ...]:
     """Explain an entry alone: by a fault that should show elsewhere too, or not at all."""
     partly = _named(
         fault
         for fault in catalogue
-        if place in fault.result and _close(fault.result[place], values)
+        if place in fault.result and _close(fault.result[place], *given)
     )
     if partly:
         return tuple(replace(item, text=f"{item.text} (in this entry alone)") for item in partly)
-    size, off = np.max(np.abs(right)), np.max(np.abs(values - right))
+    size, off = np.max(np.abs(right)), np.max(np.abs(given[0] - right))
     if size > ABSOLUTE and off <= ROUNDED * size:
         text = (
             f"it is right to {off / size:.1e} of its size: a number was rounded; write more "
@@ -199,7 +204,7 @@ def _one_entry(
 
 
 def _explained(
-    left: dict[Index, Array], catalogue: Sequence[NumericFault]
+    left: dict[Index, Given], catalogue: Sequence[NumericFault]
 ) -> dict[Index, tuple[Diagnosis, ...]]:
     """Take out the entries that faults explain, those first that explain the most."""
     found: dict[Index, tuple[Diagnosis, ...]] = {}
@@ -212,16 +217,16 @@ def _explained(
     return found
 
 
-def _fits(fault: NumericFault, left: Mapping[Index, Array]) -> bool:
+def _fits(fault: NumericFault, left: Mapping[Index, Given]) -> bool:
     """Return whether a fault shows in entries that differ only, with the author's numbers."""
     return all(
-        place in left and _close(values, left[place]) for place, values in fault.result.items()
+        place in left and _close(values, *left[place]) for place, values in fault.result.items()
     )
 
 
-def _close(one: Array, other: Array) -> bool:
+def _close(one: Array, other: Array, lost: Array | float = 0.0) -> bool:
     size = np.maximum(np.max(np.abs(one)), np.max(np.abs(other)))
-    return bool(np.max(np.abs(one - other)) <= CLOSE * size + ABSOLUTE)
+    return bool(np.all(np.abs(one - other) <= CLOSE * size + ABSOLUTE + lost))
 
 
 def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:

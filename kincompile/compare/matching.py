@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.compare.agreement import agrees, finite, multiple
+from kincompile.compare.agreement import OF_TERMS, agrees, finite, multiple
 from kincompile.compare.forms import Form, exchanged, jacobian_form, known_forms, own_form
 from kincompile.compare.layouts import Layout, other_layouts, usual_layout
 from kincompile.compare.reference import QUANTITIES
@@ -150,11 +150,29 @@ class Matcher:
             result[name] = values * (factors * matching.sign(name))[:, :, None]
         return result
 
-    def written(self, matching: Matching, states: States) -> dict[str, tuple[Array, Array]]:
-        """Return values and sizes of the written formulas, (N, rows, columns) each."""
+    def written(
+        self, matching: Matching, states: States, exact: bool = False
+    ) -> dict[str, tuple[Array, Array]]:
+        """Return values and sizes of the written formulas, (N, rows, columns) each.
+
+        Unless they shall be exact, what rounding may have taken from a value counts as so large a
+        term in its size that it is within the tolerance.
+        """
         if matching.units.takes_degrees:
-            states = states.in_degrees(self._reference.angular)
-        return {name: item.evaluate(states) for name, item in self._quantities.items()}
+            states = self._subject.in_degrees(states)
+        found = {name: item.evaluate(states) for name, item in self._quantities.items()}
+        for name, item in self._quantities.items() if not exact else ():
+            values, sizes = found[name]
+            if item.lost is not None:
+                sizes = sizes + item.lost(states, values) / OF_TERMS
+            for form in matching.forms:
+                rows = [k for k, row in enumerate(matching.rows) if row in form.rows]
+                if form.accuracy:
+                    largest = np.max(np.abs(values[:, rows]), axis=-1, keepdims=True)
+                    sizes = sizes.copy()
+                    sizes[:, rows] += largest * form.accuracy / OF_TERMS
+            found[name] = values, sizes
+        return found
 
     def _generated(self, matching: Matching, states: States) -> dict[str, Array]:
         """Return the right quantities of the system, in the forms the author gave."""
@@ -237,8 +255,8 @@ class Matcher:
         if matching.units != Units():
             return matching
         written = self.written(matching, self._subject.states)
-        name = next((name for name in ("Phi", "Phi_q") if name in written), None)
-        shown = written if name is None else {name: written[name]}
+        defining = [name for name in ("Phi", "Phi_q") if name in written][:1]
+        shown = {name: written[name] for name in defining or written}
         right = self._right_rows(matching, shown)
         for block in self._subject.blocks:
             own = [k for k, row in enumerate(matching.rows) if row in block.rows]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import sympy
@@ -92,15 +93,16 @@ class Reference:
         self.system = system_of(model)
         self.program = lower(self.system)
         self.coordinates = tuple(item.name for item in self.system.coordinates)
+        self.rates = frozenset(map(rate, self.coordinates))
         self.equations = self.system.equations
         self.angular = is_angular(self.system)
         self.defaults = default_parameters(self.system)
         self.columns = {name: k for k, name in enumerate(self.coordinates)}
         guess = np.array([item.guess for item in self.system.coordinates])
         self.sizes = np.where(self.angular, 1.0, size_of(self.angular, guess) or 1.0)
-        self._latest: tuple[States, Values] | None = None
+        self._values: WeakKeyDictionary[States, Values] = WeakKeyDictionary()
         self.kept: dict[Hashable, Any] = {}
-        self._texts: dict[tuple[str, int, int], str] = {}
+        self._evaluated: WeakKeyDictionary[States, dict[sympy.Expr, Array]] = WeakKeyDictionary()
 
     @cached_property
     def blocks(self) -> tuple[ConstraintBlock, ...]:
@@ -140,18 +142,22 @@ class Reference:
 
     def text(self, quantity: str, row: int, column: int) -> str:
         """Return an entry as people type it."""
-        key = (quantity, row, column)
-        if key not in self._texts:
-            self._texts[key] = str(self.expression(*key))
-        return self._texts[key]
+        return self.printed(self.expression(quantity, row, column))
+
+    def printed(self, expression: object) -> str:
+        """Return an expression, or a number, as text; SymPy takes long over it."""
+        key = ("text", type(expression), expression)
+        if key not in self.kept:
+            self.kept[key] = str(expression)
+        return str(self.kept[key])
 
     def values(self, states: States) -> Values:
-        """Evaluate the generated quantities; those of the latest states are kept."""
-        if self._latest is None or self._latest[0] is not states:
+        """Evaluate the generated quantities, once at each states."""
+        if states not in self._values:
             with np.errstate(all="ignore"):
                 found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
-            self._latest = states, Values(dict(zip(QUANTITIES, found, strict=False)))
-        return self._latest[1]
+            self._values[states] = Values(dict(zip(QUANTITIES, found, strict=False)))
+        return self._values[states]
 
     @cached_property
     def random(self) -> States:
@@ -171,8 +177,12 @@ class Reference:
         equation may hold in other assemblies too: where the sine of an angle vanishes, the angle is
         0 or pi. None where no states are found.
         """
+        return self._on_manifold(self.about_guess(like), list(rows))
+
+    def about_guess(self, like: States) -> States:
+        """Return states with other positions, about the assembled guess."""
         aside = np.random.default_rng(SEED).uniform(-ASIDE, ASIDE, like.q.shape)
-        return self._on_manifold(replace(like, q=self._start + self.sizes * aside), list(rows))
+        return replace(like, q=self._start + self.sizes * aside)
 
     @cached_property
     def _start(self) -> Array:
@@ -191,36 +201,34 @@ class Reference:
 
         return consistent_states(start, constraints)
 
-    def compiled(
-        self, expressions: Sequence[sympy.Expr]
-    ) -> Callable[[States], tuple[Array, Array]]:
-        """Prepare SymPy expressions of coordinates, rates, parameters and time for evaluation.
+    def evaluate(self, expressions: Sequence[sympy.Expr], states: States) -> tuple[Array, Array]:
+        """Evaluate SymPy expressions of coordinates, rates, parameters and time.
 
         Returns
         -------
-        callable
-            Gives, at states, the values and the sizes of their terms: the sum of the absolute
-            values of the terms on the topmost level. Both of shape (N, number of expressions).
+        tuple of arrays
+            The values and the sizes of their terms: the sum of the absolute values of the terms on
+            the topmost level. Both of shape (N, number of expressions).
         """
+        known = self._evaluated.setdefault(states, {})
+        self._add(known, [item for item in expressions if item not in known], states)
+        values, sizes = np.array([known[item] for item in expressions]).transpose(1, 2, 0)
+        return values, sizes
+
+    def _add(
+        self, known: dict[sympy.Expr, Array], expressions: Sequence[sympy.Expr], states: States
+    ) -> None:
+        """Evaluate expressions that are not known yet: value and size of each, (2, N)."""
         graph = Graph()
         convert = Converter(graph, graph.input).convert
         terms = [[convert(term) for term in sympy.Add.make_args(item)] for item in expressions]
-
-        def evaluate(states: States) -> tuple[Array, Array]:
-            values, sizes = np.zeros((2, len(states), len(terms)))
-            with np.errstate(all="ignore"):
-                results = run(graph.nodes, self.inputs(states), self.program.tables)
-                for k, nodes in enumerate(terms):
-                    for node in nodes:
-                        values[:, k] += results[node]
-                        sizes[:, k] += np.abs(results[node])
-            return values, sizes
-
-        return evaluate
-
-    def evaluate(self, expressions: Sequence[sympy.Expr], states: States) -> tuple[Array, Array]:
-        """Evaluate SymPy expressions once; see `compiled`."""
-        return self.compiled(expressions)(states)
+        with np.errstate(all="ignore"):
+            results = run(graph.nodes, self.inputs(states), self.program.tables)
+            for item, nodes in zip(expressions, terms, strict=True):
+                known[item] = np.zeros((2, len(states)))
+                for node in nodes:
+                    known[item][0] += results[node]
+                    known[item][1] += np.abs(results[node])
 
     def named(self, states: States, k: int) -> dict[str, float]:
         """Return one of the states as numbers by name."""
@@ -265,6 +273,12 @@ class Subject:
             self.reference.kept[key] = make()
         found: Kept = self.reference.kept[key]
         return found
+
+    def in_degrees(self, states: States) -> States:
+        """Return states with angles and their rates as numbers of degrees."""
+        if states is not self.states:
+            return states.in_degrees(self.reference.angular)
+        return self.kept("degrees", lambda: states.in_degrees(self.reference.angular))
 
     def near(self, rows: Sequence[int]) -> States | None:
         """Return states near the guess at which some of the system's equations hold, if any."""
