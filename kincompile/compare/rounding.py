@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 MOST_DECIMALS, MOST_DIGITS = 8, 12
 """With more than these, a number has all the digits of a double."""
 FEWEST_DECIMALS, FEWEST_DIGITS = 3, 4
+MOST_LITERALS = 20
+"""Different numbers in one formula that are looked at."""
 OF_FUNCTION = 1e-6
 """Relative, of the largest number."""
 
@@ -41,7 +43,7 @@ def of_array(array: Array) -> Array:
 def of_literals(expression: sympy.Expr) -> list[sympy.Expr]:
     """Return by how much an expression may be off, a term for each rounded number in it."""
     found = []
-    for number in expression.atoms(sympy.Float):
+    for number in sorted(expression.atoms(sympy.Float), key=float)[:MOST_LITERALS]:
         exact = Decimal(repr(float(number))).normalize().as_tuple()
         if FEWEST_DIGITS <= len(exact.digits) <= MOST_DIGITS:
             symbol = sympy.Dummy()
