@@ -12,6 +12,7 @@ from kincompile.html import picture_html
 from kincompile.runtime.engine.code import JOINT_POINTS
 from kincompile.runtime.results.columns import MotionTable, Observed
 from kincompile.runtime.results.html import solution_html
+from kincompile.runtime.results.measures import measures
 from kincompile.runtime.results.observed import observed
 from kincompile.runtime.results.plot import plot_columns, plot_html
 from kincompile.runtime.singular.branches import counted_signatures, signatures
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
+
+    from kincompile.runtime.results.measures import Measures
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -83,14 +86,14 @@ class Solution(MotionTable):
     def observed(self) -> Observed:
         """The outputs and their rates; evaluated on first access."""
         if "outputs" not in self._observed:
-            self._observed["outputs"] = self._over_motion(self._require_module("its outputs"))
+            self._observed["outputs"] = self._over_motion(self.require_module("its outputs"))
         return self._observed["outputs"]
 
     @property
     def joints(self) -> Observed:
         """The points of the joints, as outputs ``x_<joint>`` and ``y_<joint>``, on request."""
         if JOINT_POINTS not in self._observed:
-            module = self._require_module("its joints")
+            module = self.require_module("its joints")
             compiled = vars(module).get(JOINT_POINTS)
             own = module if compiled is None else compiled()
             self._observed[JOINT_POINTS] = self._over_motion(own)
@@ -102,7 +105,8 @@ class Solution(MotionTable):
             p = np.zeros((len(self.q), 0))
         return observed(module, (self.q, self.q_dot, self.q_ddot), self.t, p)
 
-    def _require_module(self, wanted: str) -> ModuleType:
+    def require_module(self, wanted: str) -> ModuleType:
+        """Return the emitted module; raise an error that names what needs it if it is not here."""
         if self.module is None:
             raise InputError(
                 f"this Solution of {self.name} was pickled, and the compiled module was not: read "
@@ -133,7 +137,7 @@ class Solution(MotionTable):
 
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
         """Return a function of module, q, t and p for the motion, or for that of each variant."""
-        module = self._require_module(".condition and .branch")
+        module = self.require_module(".condition and .branch")
         p = np.array(list(self.parameters.values()), dtype=np.float64)
         if self.q.ndim == 2:
             return function(module, self.q, self.t, p)
@@ -152,6 +156,25 @@ class Solution(MotionTable):
         """Restore the attributes that `__getstate__` returned."""
         for item, value in zip(fields(self), state, strict=True):
             object.__setattr__(self, item.name, value)
+
+    def measures(self) -> Measures:
+        """Measure what every output does, points included, and how far every driver can go.
+
+        Returns
+        -------
+        Measures
+            Of each output the extremes with their times, stroke, dead points, period and time
+            ratio, mean and root mean square; of each driver the values at which the mechanism
+            locks up. ``print(solution.measures())`` shows tables. Times are located between those
+            of the grid, to 1e-9 of the span; a reversal that the grid does not show is missed.
+
+        Raises
+        ------
+        InputError
+            If the solution is one of variants, holds no point that was found, or was pickled.
+        """
+        p = np.array(list(self.parameters.values()), dtype=np.float64)
+        return measures(self, self.require_module("its measures"), p)
 
     def plot(self, *names: str, ax: Axes | None = None) -> Axes:
         """Draw columns over time: coordinates, rates, second rates; events and gaps are marked.

@@ -1,4 +1,4 @@
-"""A solution in a few lines of text: the extremes of every coordinate, and how the solving went."""
+"""A solution in a few lines of text: extremes, measures of outputs, and how the solving went."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 
 
 def summary(solution: Solution) -> str:
-    """Return the extremes of every coordinate and output, and a line on how the solving went.
+    """Return the extremes of every coordinate, the measures, and a line on how the solving went.
 
     Parameters
     ----------
@@ -32,27 +32,25 @@ def summary(solution: Solution) -> str:
     -------
     str
         Per coordinate its unit, its least and largest value with their times, and the largest
-        absolute values of its first and second derivative [unit/s, unit/s^2]; then the points by
-        status, the Newton iterations and the largest residual.
+        absolute values of its first and second derivative [unit/s, unit/s^2]; the tables of
+        `Solution.measures`; then the points by status, the Newton iterations and the largest
+        residual.
     """
-    own = solution.observed
     motion = solution.q, solution.q_dot, solution.q_ddot
-    lines = _table("coordinate", solution, solution.coordinates, motion)
-    if own.names:
-        lines += ["", *_table("output", solution, own.names, (own.y, own.y_dot, own.y_ddot))]
-    return "\n".join([*lines, "", _verdict(solution)])
+    parts = ["\n".join(_table(solution, motion))]
+    if solution.q.ndim == 2 and np.isfinite(solution.q_dot).any():
+        parts.append(str(solution.measures()))
+    return "\n\n".join(part for part in (*parts, _verdict(solution)) if part)
 
 
-def _table(
-    kind: str, solution: Solution, names: tuple[str, ...], motion: tuple[NDArray[np.float64], ...]
-) -> list[str]:
-    """Return the lines of the table of coordinates or outputs."""
+def _table(solution: Solution, motion: tuple[NDArray[np.float64], ...]) -> list[str]:
+    """Return the lines of the table of coordinates."""
     shown = [_without_noise(values).T for values in motion]
     rows = [
         [name, solution.units[name], *_extremes(solution.t, q), _largest(q_dot), _largest(q_ddot)]
-        for name, q, q_dot, q_ddot in zip(names, *shown, strict=True)
+        for name, q, q_dot, q_ddot in zip(solution.coordinates, *shown, strict=True)
     ]
-    header = (kind, "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
+    header = ("coordinate", "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
     return table(header, rows, right=_NUMBERS)
 
 
