@@ -118,10 +118,9 @@ def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> Chapter:
         ", gamma is what stands on the right side of the acceleration equation.",
     )  # fmt: skip
     rows: list[tuple[Run | Runs, ...]] = [
-        (Verbatim(item.name), Math(_symbol(item, system)), Verbatim(item.label(system)), LINE)
-        for item in blanks
+        (Verbatim(item.name), Math(_symbol(item, system)), LINE) for item in blanks
     ]
-    shown = table(("blank", "entry", "also called", "formula"), rows)
+    shown = table(("blank", "entry", "formula"), rows)
     return Chapter("tasks", ("The blanks",), (note, shown))
 
 

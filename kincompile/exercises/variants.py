@@ -222,7 +222,8 @@ class _Builder:
 
     def _number(self, given: Any, factor: float = 1.0) -> float:
         value = sympy.sympify(given).subs(self._values) * _exact(factor)
-        return float(f"{float(value):.6g}")
+        number = float(f"{float(value):.6g}")
+        return int(number) if number.is_integer() else number
 
 
 def _exact(value: float) -> sympy.Expr:
