@@ -132,6 +132,21 @@ def test_that_all_signs_wrong_is_no_convention(four_bar: Path) -> None:
     assert rows_of(four_bar)["02"]["points"] == "0"
 
 
+def test_that_the_sign_of_a_whole_row_is_that_of_the_given_constraint(tmp_path: Path) -> None:
+    m = kc.Mechanism("tethered")
+    plate = m.body("plate", guess=(1.0, 1.2, 0.0))
+    m.add(kc.AbsoluteDistance("rod", plate, (-0.3, 0.2), (0, 0), 1.5))
+    m.add(kc.AbsoluteX("push", plate, (0.2, 0.1), 1.2 + kc.t / 10))
+    m.add(kc.AbsoluteAngle("turn", plate, kc.t / 2))
+    folder = kc.exercise(m, 1, 1).write(tmp_path / "kit")
+    blanks = json.loads((folder / "instructor" / "blanks.json").read_text())["blanks"]
+    rod = [item["name"] for item in blanks if item["constraint"] == "rod"]
+    assert len(rod) == 4  # the whole row of Phi_q, and gamma
+    fill(folder, "01", {name: (lambda x: -x) for name in rod})
+    row = rows_of(folder)["01"]
+    assert [row[name] for name in rod] == ["0"] * 4
+
+
 def test_that_another_form_of_an_answer_is_right(four_bar: Path) -> None:
     fill(four_bar, "03", {"B1": lambda x: f"({x})*(cos(1)^2 + sin(1)^2)", "B3": sympy.factor})
     row = rows_of(four_bar)["03"]
