@@ -29,6 +29,13 @@ def test_that_right_outputs_pass(model):
     assert {("outputs_dot", "speed"), ("outputs_ddot", "x_end"), ("outputs_q", "angle")} <= names
 
 
+def test_that_a_wrong_sign_in_outputs_is_found(model):
+    source = kc.emit(model).source
+    at = source.index(" - ", source.index("def _observe("))
+    assert not kc.verify(from_source(f"{source[:at]} + {source[at + 3 :]}", "wrong")).passed
+
+
+@pytest.mark.slow
 def test_that_every_wrong_sign_in_outputs_is_found(model):
     source = kc.emit(model).source
     start = source.index("def _outputs_q(")
