@@ -23,7 +23,7 @@ import kincompile as kc
 from kincompile.cli.shared import INTERRUPTED, USAGE_OR_MODEL
 from kincompile.errors import InternalError, KincompileError
 
-COMMANDS = ("compare", "compile", "derive", "inspect", "run", "schema", "view")
+COMMANDS = ("assemblies", "compare", "compile", "derive", "inspect", "run", "schema", "view")
 """The commands: each is the `command` of the file of its name."""
 
 TRACEBACK = "KINCOMPILE_TRACEBACK"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 import kincompile as kc
@@ -31,6 +33,7 @@ def command(
     points: int | None,
     values: dict[str, float],
     through: str | None,
+    assembly: int | None,
     analysis: str | None,
     output: str | None,
 ) -> None:
@@ -51,7 +54,8 @@ def command(
     times = time_grid(mechanism, end, points)
     module = kc.compile(mechanism)
     with progress_bar() as progress:
-        solution = kc.solve(module, times, values, through=through, progress=progress)
+        options: dict[str, Any] = {"through": through, "assembly": assembly}
+        solution = kc.solve(module, times, values, progress=progress, **options)
     if output is None:
         print_data(summary(solution) + "\n")
     else:

@@ -13,7 +13,7 @@ from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.engine import Point
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
-from kincompile.runtime.march import March, Outcome, State, give_up, leaves_branch, start
+from kincompile.runtime.march import March, Outcome, State, give_up, is_folded, leaves_branch, start
 from kincompile.runtime.problem import problem
 from kincompile.runtime.singular.events import branch_switch, locate, singular_start
 from kincompile.runtime.status import Status
@@ -69,6 +69,10 @@ class _Way:
             self._leave_stages(inputs.guess)
             outcome = start(self._march, time, inputs)
         self._put(outcome)
+        guess = self._march.equations.at(inputs.guess, time) if self._may_be_dense else None
+        if guess is not None and outcome.position is not None:
+            equations = self._march.equations
+            self._motion.is_folded = is_folded(equations, guess, outcome.position)
         if self._may_be_dense and self._is_on_other_branch(outcome):
             self._motion.note = (
                 f" The position at t = {time:.10g} is on another branch than the guess: "

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from kincompile.errors import InputError, StructuralError
-from kincompile.names import listed, suggestion
+from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.engine.code import Code, code_of
 
 if TYPE_CHECKING:
@@ -175,7 +175,8 @@ def _overridden(
 ) -> NDArray[np.float64]:
     """Replace the defaults that a mapping names."""
     values = defaults.copy()
-    for name, value in given.items():
+    for key, value in given.items():
+        name = column_name(str(key)) if what == "coordinate" else key
         if name not in names:
             near = suggestion(str(name), names) or "."
             problems.append(f"there is no {what} {name!r}{near} The {what}s are {listed(names)}.")

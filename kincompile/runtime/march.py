@@ -18,6 +18,7 @@ import numpy as np
 
 from kincompile.criteria import (
     ALLOWED_PART,
+    FOLDED,
     KINK,
     LARGE_ERROR,
     LAST_CORRECTION,
@@ -345,6 +346,12 @@ def leaves_branch(equations: Problem, guess: Point, found: Point) -> bool:
     """Say whether a guess shows a branch, and a position found from it lies on another."""
     wanted = equations.engine.signs(guess)
     return all(wanted) and equations.engine.signs(found) != wanted
+
+
+def is_folded(equations: Problem, guess: Point, found: Point) -> bool:
+    """Say whether a guess shows no branch: beside a position, a determinant is zero there."""
+    here, there = (equations.engine.determinants(point, point) for point in (guess, found))
+    return bool((np.abs(here) <= FOLDED * np.abs(there)).any())
 
 
 def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome:

@@ -43,6 +43,8 @@ class Motion:
         Points so near to a singular configuration that their rates are uncertain.
     note : str
         A remark for the message of the solution.
+    is_folded : bool
+        Whether the guess shows no branch: a determinant is zero there.
     """
 
     q: Vector
@@ -56,6 +58,7 @@ class Motion:
     passed: list[Event] = field(default_factory=list)
     near: list[int] = field(default_factory=list)
     note: str = ""
+    is_folded: bool = False
 
     @classmethod
     def over(cls, inputs: Inputs) -> Motion:

@@ -13,12 +13,14 @@ inputs    checked, in the solver's form            inputs.read_inputs
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import (
+    AssemblyWarning,
     BranchSwitchWarning,
     InputError,
     SingularConfigurationWarning,
@@ -26,10 +28,11 @@ from kincompile.errors import (
 )
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import Inputs, read_inputs
-from kincompile.runtime.march import Outcome, leaves_branch
+from kincompile.runtime.march import Outcome, is_folded, leaves_branch
 from kincompile.runtime.motion import Motion
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
+from kincompile.runtime.singular.assemblies import assembly_guess, unchosen
 from kincompile.runtime.status import Status
 from kincompile.runtime.variants import read_variants, solve_in_turn, solve_variants
 from kincompile.runtime.verdict import verdict
@@ -39,7 +42,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from kincompile.runtime.engine.code import Code
+    from kincompile.runtime.engine.code import Array, Code
     from kincompile.runtime.inputs import Values
     from kincompile.runtime.motion import Progress
 
@@ -58,6 +61,7 @@ def solve(
     max_iterations: int = MAX_ITERATIONS,
     method: str | None = None,
     through: str | None = None,
+    assembly: int | None = None,
     throw: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
@@ -88,6 +92,9 @@ def solve(
     through : {"smooth"}, optional
         Go on past a bifurcation, along the branch on which velocity and acceleration are
         continuous; a `BranchSwitchWarning` says when. Without it the motion ends there.
+    assembly : int, optional
+        Start in this one of the ways to assemble the mechanism at the first time, counted from 1 in
+        the order of `kc.assemblies`, instead of at a guess.
     throw : bool
         Raise `SolveError` unless every point converged.
     progress : callable, optional
@@ -112,12 +119,16 @@ def solve(
     -----
     BranchSwitchWarning
         When the motion went through a bifurcation, with the time.
+    AssemblyWarning
+        When there are several ways to assemble the mechanism, and no guess chooses one.
     SingularConfigurationWarning
         When it converged at points so near to a singular configuration that their rates have lost
         digits, with the time. A motion that ends at one has a status and an event instead.
     """
     sets = read_variants(module, p)
     inputs = read_inputs(module, t, p if sets is None else None, guess, tolerance, max_iterations)
+    if assembly is not None:
+        inputs = _assembled(inputs, sets, guess, assembly)
     on_grid = _takes_grid(inputs.code, inputs.t.size, method)
     if through not in (None, "smooth"):
         raise InputError(f"through is {through!r}: give 'smooth', or nothing.")
@@ -128,12 +139,20 @@ def solve(
     if sets is None:
         solution = solve_one(inputs, progress)
     elif inputs.code.lanes is not None:
-        solution = solve_variants(inputs, sets, progress)
+        solution = _with_start(inputs, sets, solve_variants(inputs, sets, progress))
     else:
         solution = solve_in_turn(inputs, sets, solve_one, progress)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution
+
+
+def _assembled(inputs: Inputs, sets: Array | None, guess: Values, assembly: int) -> Inputs:
+    """Return inputs whose guess is one of the assemblies, of variants those of the first."""
+    if guess is not None:
+        raise InputError("guess and assembly are both given: give one of them.")
+    inputs = inputs if sets is None else replace(inputs, p=sets[0])
+    return replace(inputs, guess=assembly_guess(inputs, assembly))
 
 
 def _solve_one(
@@ -146,12 +165,34 @@ def _solve_one(
             outcome = Outcome(Status.CONVERGED, 0, None)
         else:
             outcome = follow(inputs, motion, on_grid, smooth, progress)
+        start = ""
+        if motion.status[0] == Status.CONVERGED:
+            start = unchosen(inputs, motion.q[0].copy(), motion.is_folded)
+    if start:
+        warnings.warn(start, AssemblyWarning, stacklevel=4)
     for event in motion.passed:
         text = f"{inputs.module.NAME} goes through a bifurcation at t = {event.t:.10g}, and on"
         warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=3)
     if motion.near and outcome.status is Status.CONVERGED:
         warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=3)
-    return _solution(inputs, motion, outcome)
+    return _solution(inputs, motion, outcome, start)
+
+
+def _with_start(inputs: Inputs, sets: Array, solution: Solution) -> Solution:
+    """Say of variants what is said of the start of the first."""
+    if solution.status[0, 0] != Status.CONVERGED:
+        return solution
+    inputs, time = replace(inputs, p=sets[0]), float(inputs.t[0])
+    with np.errstate(all="ignore"):
+        equations = problem(inputs.module, inputs.p, inputs.guess, time, inputs.guess)
+        q = solution.q[0, 0].copy()
+        guess, found = (equations.at(position, time) for position in (inputs.guess, q))
+        folded = bool(guess and found and is_folded(equations, guess, found))
+        start = unchosen(inputs, q, folded)
+    if not start:
+        return solution
+    warnings.warn(start, AssemblyWarning, stacklevel=3)
+    return replace(solution, message=f"{start} {solution.message}")
 
 
 def _nearly(inputs: Inputs, near: list[int]) -> str:
@@ -196,15 +237,17 @@ def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
     guess, found = (equations.at(q, time) for q in (inputs.guess, motion.q[0].copy()))
     if guess is None or found is None or leaves_branch(equations, guess, found):
         return False
+    motion.is_folded = is_folded(equations, guess, found)
     motion.status[:], motion.iterations[:] = status, iterations
     motion.statistics["compiled"] = inputs.t.size
     return True
 
 
-def _solution(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
-    """Put names, parameters and the verdict to the numbers."""
+def _solution(inputs: Inputs, motion: Motion, outcome: Outcome, start: str) -> Solution:
+    """Put names, parameters and the verdict to the numbers; what is said of the start is first."""
     module = inputs.module
     message = verdict(inputs, motion.status, motion.residual, outcome, motion.events)
+    message = f"{start} {message}" if start else message
     return Solution(
         t=inputs.t,
         q=motion.q,

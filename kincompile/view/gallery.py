@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kincompile.errors import InputError
+import numpy as np
+
+from kincompile.errors import InputError, KincompileWarning
 from kincompile.names import listed
+from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.page_data import as_json
+from kincompile.view.page_data import as_json, page_data
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
+    from types import ModuleType
 
+    from numpy.typing import NDArray
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.results.solution import Solution
     from kincompile.view.page import Page
 
 FRAMES = 120
@@ -42,20 +52,10 @@ class Gallery:
     def html(self) -> str:
         """The page that shows every mechanism in motion, and links to its own page."""
         cards = [
-            {
-                "file": f"{item.name}.html",
-                "name": escape(item.name),
-                "sizes": _sizes(item.data),
-                "data": as_json(_thinned(item.data)),
-            }
+            _card(item.data, item.name, _sizes(item.data), f"{item.name}.html")
             for item in self.pages
         ]
-        slots = {
-            "style": read("view/style.css") + read("view/gallery.css"),
-            "scripts": [read(f"view/{name}") for name in SCRIPTS],
-            "cards": cards,
-        }
-        return fill("view/gallery.html.jinja", slots)
+        return _filled("Mechanisms", cards)
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the pages and index.html to a folder, which is made, and return their paths.
@@ -95,6 +95,83 @@ def gallery(pages: Iterable[Page]) -> Gallery:
     return Gallery(found)
 
 
+@dataclass(frozen=True, slots=True)
+class Cards:
+    """The ways to assemble a mechanism on one page, ready to be written."""
+
+    html: str
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page to a file, in one step, and return its path."""
+        return write_atomically(path, self.html)
+
+
+def assembly_cards(
+    model: Mechanism | ConstraintSystem,
+    module: ModuleType,
+    found: NDArray[np.float64],
+    t: NDArray[np.float64],
+    p: Mapping[str, float],
+) -> Cards:
+    """Return a page with a card for each assembly, which shows the motion from it.
+
+    Parameters
+    ----------
+    model, module
+        The mechanism, and what it was compiled to.
+    found : ndarray, shape (k, n)
+        Its assemblies, from `kc.assemblies`.
+    t : ndarray, shape (N,)
+        The times of the motion, the first that of the assemblies.
+    p
+        Parameters by name; others have their defaults.
+    """
+    system = model.system()
+    cards = []
+    for number, guess in enumerate(found, 1):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", KincompileWarning)  # each card says how it went
+            solution = solve(module, t, p, guess)
+        data = page_data(system, _moved(solution, guess), solution.message)
+        good = int(np.count_nonzero(solution.status == 0))
+        way = "moves to the end" if solution.success else f"moves to t = {t[max(good - 1, 0)]:g}"
+        cards.append(_card({**data, "rest": 0.0}, f"Assembly {number}", way))
+    return Cards(_filled(f"Assemblies of {escape(system.name)} at t = {t[0]:g}", cards))
+
+
+def _moved(solution: Solution, guess: NDArray[np.float64]) -> Solution:
+    """Return the points that were found, or the assembly alone where there are none."""
+    good = max(1, int(np.count_nonzero(solution.status == 0)))
+    q = solution.q[:good].copy()
+    if np.isnan(q[0]).any():
+        q[0] = guess
+    arrays = {name: getattr(solution, name)[:good] for name in ("t", "status", "residual")}
+    rates = {name: np.nan_to_num(getattr(solution, name)[:good]) for name in ("q_dot", "q_ddot")}
+    return replace(solution, q=q, **arrays, **rates)
+
+
+def _filled(title: str, cards: Sequence[Mapping[str, str]]) -> str:
+    """Return a page of cards."""
+    slots = {
+        "title": title,
+        "style": read("view/style.css") + read("view/gallery.css"),
+        "scripts": [read(f"view/{name}") for name in SCRIPTS],
+        "cards": cards,
+    }
+    return fill("view/gallery.html.jinja", slots)
+
+
+def _card(data: Mapping[str, Any], name: str, sizes: str, file: str = "") -> dict[str, str]:
+    """Return a card: its data, what is written on it, and the page it links to, if there is one."""
+    return {
+        "tag": "a" if file else "div",
+        "link": f' href="{escape(file)}"' if file else "",
+        "name": escape(name),
+        "sizes": sizes,
+        "data": as_json(_thinned(data)),
+    }
+
+
 def _sizes(data: Mapping[str, Any]) -> str:
     """Return the sizes of a mechanism in words."""
     bodies = len(data["drawing"]["bodies"])
@@ -106,5 +183,5 @@ def _thinned(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of a page's data that a small moving picture needs."""
     step = -(-len(data["arrays"]["t"]) // FRAMES)
     arrays = {name: data["arrays"][name][::step] for name in ("t", "q", "q_dot", "q_ddot")}
-    kept = ("coordinates", "guess", "drawing", "extent")
-    return {**{name: data[name] for name in kept}, "arrays": arrays}
+    kept = ("coordinates", "guess", "drawing", "extent", "rest")
+    return {**{name: data[name] for name in kept if name in data}, "arrays": arrays}
