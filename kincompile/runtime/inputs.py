@@ -16,11 +16,12 @@ from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.engine.code import Code, code_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
 
     from numpy.typing import ArrayLike, NDArray
 
-    Values: TypeAlias = ArrayLike | Mapping[str, float] | None
+    Values: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,9 +58,17 @@ class Inputs:
 
 
 def read_inputs(
-    module: ModuleType, t: ArrayLike, p: Values, guess: Values, tolerance: Any, max_iterations: Any
+    module: ModuleType,
+    t: ArrayLike,
+    p: Values,
+    guess: Values,
+    tolerance: Any,
+    max_iterations: Any,
+    known: Sequence[str] = (),
 ) -> Inputs:
     """Check all inputs of the solver and bring them into the form in which it uses them.
+
+    Problems that are known already are told with those found here.
 
     Raises
     ------
@@ -71,7 +80,7 @@ def read_inputs(
     _require_module(module)
     code = code_of(module)
     require_square(code)
-    problems: list[str] = []
+    problems = list(known)
     inputs = Inputs(
         code,
         _times(t, problems),

@@ -62,6 +62,7 @@ def solve(
     method: str | None = None,
     through: str | None = None,
     assembly: int | None = None,
+    product: bool = False,
     throw: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
@@ -75,9 +76,10 @@ def solve(
     t : float or array_like, shape (N,)
         Times, rising or falling. One time gives a solution with N = 1.
     p : array_like, shape (k,), or mapping, or None
-        Parameters; a mapping from names to values overrides the module's DEFAULTS. An array of
-        shape (B, 1, k) holds B variants: all are solved, and the solution's arrays get a leading
-        axis of length B.
+        Parameters; a mapping from names to values overrides the module's DEFAULTS. Where a value is
+        an array, ``{"L": [0.2, 0.3, 0.4]}``, or `p` is one of shape (B, 1, k), B variants are
+        solved, and the solution's arrays get a leading axis of length B. Several arrays are taken
+        in pairs.
     guess : array_like, shape (n,), or mapping, or None
         Where Newton starts at the first time; a mapping overrides the module's GUESS.
     tolerance : float
@@ -95,6 +97,8 @@ def solve(
     assembly : int, optional
         Start in this one of the ways to assemble the mechanism at the first time, counted from 1 in
         the order of `kc.assemblies`, instead of at a guess.
+    product : bool
+        Solve every combination of the arrays in `p`, the values of the last one running fastest.
     throw : bool
         Raise `SolveError` unless every point converged.
     progress : callable, optional
@@ -125,8 +129,10 @@ def solve(
         When it converged at points so near to a singular configuration that their rates have lost
         digits, with the time. A motion that ends at one has a status and an event instead.
     """
-    sets = read_variants(module, p)
-    inputs = read_inputs(module, t, p if sets is None else None, guess, tolerance, max_iterations)
+    given = read_variants(module, p, product)
+    limits = (tolerance, max_iterations)
+    inputs = read_inputs(module, t, given.common, guess, *limits, given.problems)
+    sets = given.parameters(inputs)
     if assembly is not None:
         inputs = _assembled(inputs, sets, guess, assembly)
     on_grid = _takes_grid(inputs.code, inputs.t.size, method)
@@ -142,6 +148,8 @@ def solve(
         solution = _with_start(inputs, sets, solve_variants(inputs, sets, progress))
     else:
         solution = solve_in_turn(inputs, sets, solve_one, progress)
+    if given.sweep:
+        solution = replace(solution, sweep=dict(given.sweep))
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution
@@ -263,6 +271,7 @@ def _solution(inputs: Inputs, motion: Motion, outcome: Outcome, start: str) -> S
         equations=module.EQUATIONS,
         units=dict(module.UNITS),
         parameters=dict(zip(module.PARAMETERS, inputs.p.tolist(), strict=True)),
+        sweep={},
         statistics=motion.statistics,
         events=motion.events,
         module=module,

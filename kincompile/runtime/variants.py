@@ -7,7 +7,9 @@ variant notices.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,12 +24,12 @@ from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.inputs import Inputs
+    from kincompile.runtime.inputs import Inputs, Values
 
     Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]
@@ -36,16 +38,57 @@ CHUNK = 2048
 """Variants at a time, so that intermediate arrays stay in the cache and memory is bounded."""
 
 
-def read_variants(module: ModuleType, p: object) -> Array | None:
-    """Return parameter sets of shape (B, k) where `p` has the shape (B, 1, k), else None.
+@dataclass(frozen=True, slots=True, eq=False)
+class Variants:
+    """Parameter sets as they were given.
+
+    Attributes
+    ----------
+    common
+        Parameters of all sets, as `solve` takes those of one; of the first set, where they differ.
+    sets : ndarray, shape (B, k), or None
+        The sets, where an array of them was given.
+    sweep
+        Arrays of values by the names of their parameters.
+    is_product
+        Whether every value of one goes with every value of the others; else they go in pairs.
+    problems
+        What is wrong with them.
+    """
+
+    common: Values = None
+    sets: Array | None = None
+    sweep: Mapping[str, Array] = field(default_factory=dict)
+    is_product: bool = False
+    problems: tuple[str, ...] = ()
+
+    def parameters(self, inputs: Inputs) -> Array | None:
+        """Return the parameters of each set, shape (B, k); None where there is one set."""
+        if not self.sweep:
+            return self.sets
+        values = [array.ravel() for array in self._grid()]
+        result = np.tile(inputs.p, (values[0].size, 1))
+        for name, column in zip(self.sweep, values, strict=True):
+            result[:, inputs.module.PARAMETERS.index(name)] = column
+        return result
+
+    def _grid(self) -> Sequence[Array]:
+        arrays = tuple(self.sweep.values())
+        return np.meshgrid(*arrays, indexing="ij") if self.is_product else arrays
+
+
+def read_variants(module: ModuleType, p: Values, product: bool) -> Variants:
+    """Read parameters that may be those of several sets: see `solve`.
 
     Raises
     ------
     InputError
-        When a set has the wrong size or a value is not finite.
+        When an array of sets has the wrong size or a value is not finite.
     """
+    if isinstance(p, Mapping):
+        return _read_sweep(p, product)
     if not isinstance(p, np.ndarray) or p.ndim != 3:
-        return None
+        return Variants(p)
     count, one, size = p.shape
     if one != 1 or size != len(module.PARAMETERS) or count == 0 or p.dtype.kind not in "iuf":
         raise InputError(
@@ -60,7 +103,33 @@ def read_variants(module: ModuleType, p: object) -> Array | None:
             f"parameter {module.PARAMETERS[which]!r} of variant {variant} is "
             f"{sets[variant, which]}: give a finite number."
         )
-    return sets
+    return Variants(sets[0], sets)
+
+
+def _read_sweep(p: Mapping[str, Any], product: bool) -> Variants:
+    """Read parameters by name, of which some have an array of values."""
+    problems: list[str] = []
+    common, sweep = dict(p), {}
+    for name, given in p.items():
+        if isinstance(given, str) or np.ndim(given) != 1:
+            continue
+        values = np.asarray(given)
+        if values.size == 0 or values.dtype.kind not in "iuf":
+            problems.append(f"parameter {name!r} has the values {given!r}: give real numbers.")
+            common.pop(name)
+            continue
+        sweep[name] = values.astype(np.float64)
+        bad = values[~np.isfinite(values)]
+        common[name] = bad[0] if bad.size else values[0]
+    sizes = {name: values.size for name, values in sweep.items()}
+    if len(set(sizes.values())) > 1 and not product:
+        counts = listed(f"{size} of {name!r}" for name, size in sizes.items())
+        problems.append(
+            f"the parameters have values of different numbers, {counts}: arrays are taken in "
+            "pairs, so give them one length, or product=True (--product) to solve every "
+            f"combination, {math.prod(sizes.values())} of them."
+        )
+    return Variants(common, None, sweep, product, tuple(problems))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -271,6 +340,7 @@ def _solution(inputs: Inputs, sets: Array, arrays: _Arrays) -> Solution:
         equations=module.EQUATIONS,
         units=dict(module.UNITS),
         parameters=dict(zip(module.PARAMETERS, sets.T, strict=True)),
+        sweep={},
         statistics={"coarse": 0, "marched": 0},
         events=[],
         module=module,

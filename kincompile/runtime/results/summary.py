@@ -31,10 +31,13 @@ def summary(solution: Solution) -> str:
     Returns
     -------
     str
-        Per coordinate its unit, its least and largest value with their times, and the largest
-        absolute values of its first and second derivative [unit/s, unit/s^2]; then the points by
-        status, the Newton iterations and the largest residual.
+        Of variants a part for each, under the values of its parameters. Per coordinate its unit,
+        its least and largest value with their times, and the largest absolute values of its first
+        and second derivative [unit/s, unit/s^2]; then the points by status, the Newton iterations
+        and the largest residual.
     """
+    if solution.q.ndim > 2:
+        return "\n\n".join(_variant(solution, k) for k in range(len(solution.q)))
     motion = [_without_noise(values).T for values in (solution.q, solution.q_dot, solution.q_ddot)]
     rows = [
         [name, solution.units[name], *_extremes(solution.t, q), _largest(q_dot), _largest(q_ddot)]
@@ -42,6 +45,15 @@ def summary(solution: Solution) -> str:
     ]
     header = ("coordinate", "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
     return "\n".join([*table(header, rows, right=_NUMBERS), "", _verdict(solution)])
+
+
+def _variant(solution: Solution, number: int) -> str:
+    """Return the summary of a variant, under the values of its parameters."""
+    values = ((name, axis[number]) for name, axis in solution.variants.items())
+    named = (
+        f"{name} = {value:g} {solution.units.get(name, '')}".rstrip() for name, value in values
+    )
+    return f"{', '.join(named)}\n{summary(solution.variant(number))}"
 
 
 def _without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
