@@ -46,6 +46,7 @@ from kincompile.runtime.solve import solve as solve
 from kincompile.runtime.status import Status as Status
 from kincompile.verify.verify import verify as verify
 from kincompile.view.animation import animate as animate
+from kincompile.view.gallery import assembly_gallery as assembly_gallery
 from kincompile.view.gallery import gallery as gallery
 from kincompile.view.mechanism_plot import plot_mechanism as plot_mechanism
 from kincompile.view.page import page as page

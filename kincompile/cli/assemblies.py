@@ -9,11 +9,9 @@ import click
 import numpy as np
 
 import kincompile as kc
-from kincompile.cli.motion import time_grid
 from kincompile.cli.shared import NOT_CONVERGED, output_option, print_data, read_model, set_option
 from kincompile.errors import InputError
 from kincompile.tables import table
-from kincompile.view.gallery import assembly_cards
 from kincompile.writing import require_writable
 
 if TYPE_CHECKING:
@@ -47,17 +45,18 @@ def command(
             raise InputError(f"cannot write {output}: end its name in .html")
         require_writable(output)
     read = read_model(model)
-    module = kc.compile(read)
-    found = kc.assemblies(module, at, values)
+    if output is None:
+        module = kc.compile(read)
+        found = kc.assemblies(module, at, values)
+    else:
+        drawn = kc.assembly_gallery(read, at, values)
+        module, found = drawn.module, drawn.positions
     if not len(found):
         click.echo(f"Error: {module.NAME} cannot be assembled at t = {at:g}", err=True)
         context.exit(NOT_CONVERGED)
     print_data("\n".join(_listed(module, found, at)) + "\n")
     if output is not None:
-        times = time_grid(read, None, None)
-        times = at + times[: 1 if read.end == 0 else None]
-        path = assembly_cards(read, module, found, times, values).write(output)
-        click.echo(f"Wrote {path}", err=True)
+        click.echo(f"Wrote {drawn.write(output)}", err=True)
 
 
 def _listed(module: ModuleType, found: Array, t: float) -> list[str]:

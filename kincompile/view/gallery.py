@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.compiler import compile as compile_model
 from kincompile.errors import InputError, KincompileWarning
+from kincompile.model.mechanism import system_of
 from kincompile.names import listed
+from kincompile.runtime.singular.assemblies import assemblies
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
 from kincompile.view.page_data import as_json, page_data
@@ -96,9 +99,21 @@ def gallery(pages: Iterable[Page]) -> Gallery:
 
 
 @dataclass(frozen=True, slots=True)
-class Cards:
-    """The ways to assemble a mechanism on one page, ready to be written."""
+class AssemblyGallery:
+    """The ways to assemble a mechanism on one page, ready to be written.
 
+    Attributes
+    ----------
+    module
+        What the mechanism was compiled to.
+    positions : ndarray, shape (k, n)
+        The assemblies, in the order of `kc.assemblies`.
+    html
+        The whole page; it loads nothing else.
+    """
+
+    module: ModuleType
+    positions: NDArray[np.float64]
     html: str
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -106,37 +121,44 @@ class Cards:
         return write_atomically(path, self.html)
 
 
-def assembly_cards(
-    model: Mechanism | ConstraintSystem,
-    module: ModuleType,
-    found: NDArray[np.float64],
-    t: NDArray[np.float64],
-    p: Mapping[str, float],
-) -> Cards:
-    """Return a page with a card for each assembly, which shows the motion from it.
+def assembly_gallery(
+    model: Mechanism | ConstraintSystem, t: float = 0.0, p: Mapping[str, float] | None = None
+) -> AssemblyGallery:
+    """Return a page that draws every assembly of a mechanism, and the motion from it.
 
     Parameters
     ----------
-    model, module
-        The mechanism, and what it was compiled to.
-    found : ndarray, shape (k, n)
-        Its assemblies, from `kc.assemblies`.
-    t : ndarray, shape (N,)
-        The times of the motion, the first that of the assemblies.
+    model
+        A mechanism, or a system of free equations.
+    t
+        The time of the assemblies; the motion from there lasts as long as that of the model.
     p
         Parameters by name; others have their defaults.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written; every problem is listed.
+    InputError
+        If the time or parameters cannot be used.
+    StructuralError
+        If the equations cannot determine the coordinates.
     """
-    system = model.system()
+    system = system_of(model)
+    module = compile_model(system)
+    positions = assemblies(module, t, p)
+    times = t + np.linspace(0, system.end, system.points)
     cards = []
-    for number, guess in enumerate(found, 1):
+    for number, guess in enumerate(positions, 1):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", KincompileWarning)  # each card says how it went
-            solution = solve(module, t, p, guess)
+            solution = solve(module, times, p, guess)
         data = page_data(system, _moved(solution, guess), solution.message)
         good = int(np.count_nonzero(solution.status == 0))
-        way = "moves to the end" if solution.success else f"moves to t = {t[max(good - 1, 0)]:g}"
-        cards.append(_card({**data, "rest": 0.0}, f"Assembly {number}", way))
-    return Cards(_filled(f"Assemblies of {escape(system.name)} at t = {t[0]:g}", cards))
+        last = "the end" if solution.success else f"t = {times[max(good - 1, 0)]:g}"
+        cards.append(_card({**data, "rest": 0.0}, f"Assembly {number}", f"moves to {last}"))
+    title = f"Assemblies of {escape(system.name)} at t = {t:g}"
+    return AssemblyGallery(module, positions, _filled(title, cards))
 
 
 def _moved(solution: Solution, guess: NDArray[np.float64]) -> Solution:

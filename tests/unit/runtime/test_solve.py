@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from kincompile.errors import SolveError
+from kincompile.errors import AssemblyWarning, SolveError
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.solve import solve
 from kincompile.runtime.status import Status
@@ -212,7 +212,8 @@ def test_a_guess_of_zeros_is_assembled(edited, size):
     guess = "GUESS = np.array([5, 0, 0, 20, 10, math.pi / 4, 20, 9, 1.5 * math.pi])"
     module = edited("four_bar", (guess, "GUESS = np.zeros(9)"))
     p = module.DEFAULTS * (size, size, size, size, 1)
-    solution = solve(module, np.linspace(0, 1, 5), p)
+    with pytest.warns(AssemblyWarning, match="there is no guess of coupler, rocker"):
+        solution = solve(module, np.linspace(0, 1, 5), p)
     assert solution.success
     for t, q in zip(solution.t, solution.q, strict=True):
         np.testing.assert_allclose(module.Phi(q, t, p), 0, atol=1e-10 * size)
