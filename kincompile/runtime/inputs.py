@@ -6,14 +6,14 @@ import math
 import operator
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from kincompile.errors import InputError, StructuralError
+from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
-from kincompile.runtime.engine.code import Code, code_of
+from kincompile.runtime.engine.code import Code, code_of, require_square
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Values: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | None
+
+
+SMALLEST_GRID = 32
+"""Points from which on a grid is faster than a march."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +46,12 @@ class Inputs:
         Bound for the last correction, in scales of the coordinates.
     max_iterations : int
         Newton iterations after which an attempt is given up.
+    method : str or None
+        How a grid is solved: ``"grid"``, ``"march"``, or the faster.
+    on_grid : bool
+        Whether the points of a grid are solved together, rather than one after the other.
+    smooth : bool
+        Whether to go on past a bifurcation.
     """
 
     code: Code
@@ -50,11 +60,103 @@ class Inputs:
     guess: NDArray[np.float64]
     tolerance: float
     max_iterations: int
+    method: str | None = None
+    on_grid: bool = False
+    smooth: bool = False
 
-    @property
-    def module(self) -> ModuleType:
-        """The emitted module."""
-        return self.code.module
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variants:
+    """Parameter sets as they were given.
+
+    Attributes
+    ----------
+    common
+        Parameters of all sets, as `solve` takes those of one; of the first set, where they differ.
+    sets : ndarray, shape (B, k), or None
+        The sets, where an array of them was given.
+    sweep
+        NDArray[np.float64]s of values by the names of their parameters.
+    is_product
+        Whether every value of one goes with every value of the others; else they go in pairs.
+    problems
+        What is wrong with them.
+    """
+
+    common: Values = None
+    sets: NDArray[np.float64] | None = None
+    sweep: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    is_product: bool = False
+    problems: tuple[str, ...] = ()
+
+    def parameters(self, inputs: Inputs) -> NDArray[np.float64] | None:
+        """Return the parameters of each set, shape (B, k); None where there is one set."""
+        if not self.sweep:
+            return self.sets
+        values = [array.ravel() for array in self._grid()]
+        result = np.tile(inputs.p, (values[0].size, 1))
+        for name, column in zip(self.sweep, values, strict=True):
+            result[:, inputs.code.parameters.index(name)] = column
+        return result
+
+    def _grid(self) -> Sequence[NDArray[np.float64]]:
+        arrays = tuple(self.sweep.values())
+        return np.meshgrid(*arrays, indexing="ij") if self.is_product else arrays
+
+
+def read_variants(module: ModuleType, p: Values, product: bool) -> Variants:
+    """Read parameters that may be those of several sets: see `solve`.
+
+    Raises
+    ------
+    InputError
+        When an array of sets has the wrong size or a value is not finite.
+    """
+    if isinstance(p, Mapping):
+        return _read_sweep(p, product)
+    if not isinstance(p, np.ndarray) or p.ndim != 3:
+        return Variants(p)
+    count, one, size = p.shape
+    if one != 1 or size != len(module.PARAMETERS) or count == 0 or p.dtype.kind not in "iuf":
+        raise InputError(
+            f"p has shape {p.shape} and type {p.dtype}: give real numbers of shape "
+            f"(B, 1, {len(module.PARAMETERS)}) for B variants of {listed(module.PARAMETERS)}."
+        )
+    sets = np.ascontiguousarray(p[:, 0], dtype=np.float64)
+    bad = np.argwhere(~np.isfinite(sets))
+    if bad.size:
+        variant, which = bad[0].tolist()
+        raise InputError(
+            f"parameter {module.PARAMETERS[which]!r} of variant {variant} is "
+            f"{sets[variant, which]}: give a finite number."
+        )
+    return Variants(sets[0], sets)
+
+
+def _read_sweep(p: Mapping[str, Any], product: bool) -> Variants:
+    """Read parameters by name, of which some have an array of values."""
+    problems: list[str] = []
+    common, sweep = dict(p), {}
+    for name, given in p.items():
+        if isinstance(given, str) or np.ndim(given) != 1:
+            continue
+        values = np.asarray(given)
+        if values.size == 0 or values.dtype.kind not in "iuf":
+            problems.append(f"parameter {name!r} has the values {given!r}: give real numbers.")
+            common.pop(name)
+            continue
+        sweep[name] = values.astype(np.float64)
+        bad = values[~np.isfinite(values)]
+        common[name] = bad[0] if bad.size else values[0]
+    sizes = {name: values.size for name, values in sweep.items()}
+    if len(set(sizes.values())) > 1 and not product:
+        counts = listed(f"{size} of {name!r}" for name, size in sizes.items())
+        problems.append(
+            f"the parameters have values of different numbers, {counts}: arrays are taken in "
+            "pairs, so give them one length, or product=True (--product) to solve every "
+            f"combination, {math.prod(sizes.values())} of them."
+        )
+    return Variants(common, None, sweep, product, tuple(problems))
 
 
 def read_inputs(
@@ -64,6 +166,8 @@ def read_inputs(
     guess: Values,
     tolerance: Any,
     max_iterations: Any,
+    method: str | None = None,
+    through: str | None = None,
     known: Sequence[str] = (),
 ) -> Inputs:
     """Check all inputs of the solver and bring them into the form in which it uses them.
@@ -78,20 +182,31 @@ def read_inputs(
         When the equations cannot determine the coordinates: what is wrong, and what to do.
     """
     _require_module(module)
-    code = code_of(module)
-    require_square(code)
     problems = list(known)
-    inputs = Inputs(
-        code,
+    values = (
         _times(t, problems),
         _values("parameter", module.PARAMETERS, module.DEFAULTS, p, problems),
         _values("coordinate", module.COORDINATES, module.GUESS, guess, problems),
         _tolerance(tolerance, problems),
         _count(max_iterations, problems),
     )
+    if method not in (None, "grid", "march"):
+        problems.append(f"method is {method!r}: give 'grid', 'march', or nothing.")
+    if through not in (None, "smooth"):
+        problems.append(f"through is {through!r}: give 'smooth', or nothing.")
+    code = code_of(module)
+    require_square(code)
+    if method == "grid" and code.lanes is None:
+        problems.append(
+            f"{code.name} goes from point to point, as all redundant mechanisms and those in the "
+            "grouped form do: use method='march', or compile it with form='inline'."
+        )
     if problems:
         raise InputError(problems)
-    return inputs
+    on_grid = method == "grid" or (
+        method is None and values[0].size >= SMALLEST_GRID and code.lanes is not None
+    )
+    return Inputs(code, *values, method, on_grid, through == "smooth")
 
 
 def _require_module(module: object) -> None:
@@ -103,31 +218,6 @@ def _require_module(module: object) -> None:
     else:
         remedy = "compile the mechanism first: module = kc.compile(m)"
     raise InputError(f"expected a compiled module, got a {type(module).__name__}: {remedy}.")
-
-
-def require_square(code: Code) -> None:
-    """Refuse a module whose equations cannot determine its coordinates.
-
-    What the compiler has written into the module says why; else they are counted.
-
-    Raises
-    ------
-    StructuralError
-        With what is wrong, and what to do.
-    """
-    if code.unsolvable:
-        raise StructuralError(code.unsolvable)
-    m, n = len(code.equations), len(code.coordinates)
-    if m == n or (m > n and code.redundant):
-        return
-    if m < n:
-        remedy = f"add {n - m} more (joints or drivers), or hold coordinates that are free"
-    else:
-        remedy = f"remove {m - n} of them: {listed(code.equations)}"
-    raise StructuralError(
-        f"{code.name} has {m} equations for {n} coordinates ({listed(code.coordinates)}), "
-        f"and the motion needs as many equations as coordinates: {remedy}."
-    )
 
 
 def _times(t: ArrayLike, problems: list[str]) -> NDArray[np.float64]:

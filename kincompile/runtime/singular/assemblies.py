@@ -12,7 +12,7 @@ from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.newton import iterate, safeguarded_step
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import norm, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
     is_folded
         Whether a determinant is zero at the guess, so that it shows no branch.
     """
-    without = _without_guess(inputs) if inputs.guess is inputs.module.GUESS else []
+    without = _without_guess(inputs) if inputs.guess is inputs.code.module.GUESS else []
     if q.size > MOST_COORDINATES or not (is_folded or _is_open(inputs, q, without)):
         return ""
     found = assembled_positions(inputs)
@@ -170,7 +170,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
 def _equations(inputs: Inputs) -> Problem:
     """Return the equations as a search judges them, with angles that have no unit among them."""
     time = float(inputs.t[0])
-    equations = problem(inputs.module, inputs.p, inputs.guess, time, inputs.guess)
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
     equations.angular = equations.angular | _periodic(equations, time, inputs.guess)
     return equations
 
@@ -189,7 +189,7 @@ def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
     if np.max(np.abs(q[angles]), initial=0.0) < NOTICEABLE:
         return False
     time = float(inputs.t[0])
-    equations = problem(inputs.module, inputs.p, inputs.guess, time, inputs.guess)
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
     mirrored = q.copy()
     mirrored[angles] = -q[angles]
     other = _assembled(equations, time, mirrored)
@@ -220,7 +220,7 @@ def _periodic(equations: Problem, t: float, guess: Vector) -> NDArray[np.bool_]:
         q[column] += math.tau
         turned = equations.at(q, t)
         periodic[column] = turned is not None and bool(
-            np.allclose(turned.Phi, generic.Phi, rtol=1e-11, atol=1e-11 * generic.residual)
+            np.allclose(turned.Phi, generic.Phi, rtol=1e-11, atol=1e-11 * norm(generic.Phi))
         )
     return periodic
 

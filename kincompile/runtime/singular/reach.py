@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import ASSEMBLED
-from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.march import State
+from kincompile.runtime.problem import Dense
 from kincompile.runtime.singular.assemblies import MOST_COORDINATES, SAME
 from kincompile.runtime.singular.curve import Curve
 

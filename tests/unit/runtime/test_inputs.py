@@ -29,7 +29,7 @@ from kincompile.runtime.solve import solve
         ({"p": {"size": 1}}, r"no parameter 'size'\. The parameters are omega, phi_0"),
         ({"p": {3: 1}}, r"no parameter 3\."),
         ({"p": {"omega": "fast"}}, "parameter 'omega' is str: give real numbers"),
-        ({"p": {"omega": [1, 2]}}, r"parameter 'omega' has shape \(2,\): give one number"),
+        ({"p": {"omega": [[1, 2]]}}, r"parameter 'omega' has shape \(1, 2\): give one number"),
         ({"p": [1, 2, 3]}, r"parameter vector has shape \(3,\), expected \(2,\): .*omega, phi_0"),
         ({"p": np.array([1, object()])}, "the parameter vector is an array of object"),
         ({"guess": (1, 0)}, r"coordinate vector has shape \(2,\), expected \(3,\): .*x_rod"),

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from kincompile.errors import InputError, UnsupportedError
+from kincompile.errors import UnsupportedError
 from kincompile.runtime.results.columns import rate_unit
 from kincompile.runtime.solve import solve
 
