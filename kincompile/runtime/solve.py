@@ -33,6 +33,7 @@ from kincompile.runtime.inputs import read_inputs, read_variants
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.assemblies import assembly_guess, unchosen
+from kincompile.runtime.singular.reach import impossible, missed
 from kincompile.runtime.status import Status
 from kincompile.runtime.variants import solve_in_turn, solve_variants
 
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from kincompile.runtime.follow import Motion, Progress
     from kincompile.runtime.inputs import Inputs, Values
     from kincompile.runtime.march import Outcome
+    from kincompile.runtime.problem import Problem
     from kincompile.runtime.singular.events import Event
 
 NAMED_EQUATIONS = 3
@@ -58,8 +60,10 @@ NAMED_BODIES = 6
 LOCATED = 1e-6
 """How exactly an event is located in time."""
 
+CANNOT_BE = "No position was found: the mechanism cannot be assembled"
+
 NOT_ASSEMBLED = (
-    "No position was found: the mechanism cannot be assembled at this time (change lengths, or "
+    f"{CANNOT_BE} at this time (change lengths, or "
     "what the drivers demand), or the guess is too far away (give one nearer to the assembled "
     "mechanism; kc.assemblies(module) looks for positions)."
 )
@@ -246,12 +250,13 @@ def _verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
         largest = motion.residual.max()
         return f"{name}: {points} converged; the largest residual is {largest:.2g}.{passed}"
     index = int(np.argmax(motion.status != Status.CONVERGED))
+    asked = _asked(inputs, outcome)
     parts = [
         f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
         f" ({outcome.status.name}).",
         _before(outcome, index),
-        _why(outcome, events, times[index]),
-        _there(inputs.code, outcome),
+        _why(outcome, events, times[index], asked),
+        _there(inputs, outcome),
     ]
     return " ".join(part for part in parts if part)
 
@@ -265,37 +270,50 @@ def _before(outcome: Outcome, index: int) -> str:
     return f"{good}{'' if outcome.position else reached}."
 
 
-def _why(outcome: Outcome, events: Sequence[Event], t: float) -> str:
+def _asked(inputs: Inputs, outcome: Outcome) -> str:
+    """Say which drivers and distances ask for more than the mechanism can give, and how much."""
+    point = outcome.nearest
+    if point is None or outcome.jumps or outcome.status is not Status.NOT_CONVERGED:
+        return ""
+    return " ".join(impossible(_equations_at(inputs, point), point.q, point.t))
+
+
+def _equations_at(inputs: Inputs, point: Point) -> Problem:
+    return problem(inputs.code.module, inputs.p, point.q, point.t, inputs.guess)
+
+
+def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str:
     """Say why the motion ended, and what to do: by the event between its end and the failed time.
 
     Without one, what the status may mean is said in general, and the last event on the way.
     """
     if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
-        return NOT_ASSEMBLED
+        return f"{CANNOT_BE} at this time: {asked}" if asked else NOT_ASSEMBLED
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
-    if not events or outcome.state is None:
-        return general
-    event, end = events[-1], outcome.state.t
-    is_between = abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LOCATED
-    return event.message if is_between else general
+    if events and outcome.state is not None:
+        event, end = events[-1], outcome.state.t
+        if abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LOCATED:
+            general = event.message
+    return f"{general} {asked}".rstrip()
 
 
-def _there(code: Code, outcome: Outcome) -> str:
+def _there(inputs: Inputs, outcome: Outcome) -> str:
     """Name the equations that do not hold at the time of failure, or say what else is there."""
     if outcome.position is not None:
         return "The position there was found."
     if outcome.jumps:
         return "A position exists at that time, but the motion does not lead there continuously."
-    return "" if outcome.nearest is None else _unmet(code, outcome.nearest)
+    return "" if outcome.nearest is None else _unmet(inputs, outcome.nearest)
 
 
-def _unmet(code: Code, point: Point) -> str:
+def _unmet(inputs: Inputs, point: Point) -> str:
     """Say by how much which equations are missed at the best position, and where its bodies are."""
     sizes = np.abs(point.Phi)
     order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
     rows = [row for row in order.tolist() if sizes[row] > MET * sizes[order[0]]]
-    worst = ", ".join(f"{code.equations[row]} = {point.Phi[row]:.3g}" for row in rows)
-    places = listed(_places(code, point.q), most=NAMED_BODIES)
+    equations = _equations_at(inputs, point)
+    worst = ", ".join(missed(equations, point, row) for row in rows)
+    places = listed(_places(inputs.code, point.q), most=NAMED_BODIES)
     return (
         f"The equations with the largest residuals at the nearest position: {worst}. "
         f"There: {places}."

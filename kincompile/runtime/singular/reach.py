@@ -8,6 +8,7 @@ Phi_row(q) = s, the others zero, in q and s together, which `curve` follows.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,8 @@ from kincompile.runtime.singular.curve import Curve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.engine.engine import Point
@@ -38,6 +41,9 @@ MOST_TURNS = 24
 
 CORRECTIONS = 60
 """Corrections of a position towards the equations that are left."""
+
+LATER = (0.0, 0.01, 0.3, 2.0)
+"""Times after one that is looked at, at which a driver may move."""
 
 MOST_NAMED = 3
 """Equations of which a message says what they ask for."""
@@ -120,6 +126,19 @@ def _origins(equations: Problem, slope: Array) -> Iterator[list[int]]:
         yield np.flatnonzero(~code.angular).tolist()
 
 
+def missed(equations: Problem, point: Point, row: int) -> str:
+    """Say by how much an equation is missed at a position, in its units as far as they are seen."""
+    name, residual = equations.code.equations[row], float(point.Phi[row])
+    form = None
+    if point.q.size <= MOST_COORDINATES:
+        form = measure(equations, row, point.q, point.t)
+    if form is None:
+        return f"{name} = {residual:.3g}"
+    if not form.is_square:
+        return f"{name} = {residual:.3g} {form.unit}".rstrip()
+    return f"{name} is {form.text(form.value(residual))} instead of {form.text(form.value(0.0))}"
+
+
 def impossible(equations: Problem, q: Array, t: float) -> list[str]:
     """Say of drivers and distances what they ask for, and what the others can give at most.
 
@@ -141,22 +160,31 @@ def impossible(equations: Problem, q: Array, t: float) -> list[str]:
     if q.size > MOST_COORDINATES or len(code.equations) != q.size:
         return []
     found = []
-    nu = code.nu(q, t, equations.p)
+    driven = _driven(equations, q, t)
     for row in range(q.size):
         form = measure(equations, row, q, t)
-        if form is not None and (form.is_square or nu[row] != 0):
+        if form is not None and (form.is_square or driven[row]):
             span = _span(equations, row, q, t)
             if span is not None and not span[0] <= 0 <= span[1]:
                 found.append(_sentence(code.equations[row], form, *span))
     return found[:MOST_NAMED]
 
 
+def _driven(equations: Problem, q: Array, t: float) -> NDArray[np.bool_]:
+    """Return which equations depend on time, now or soon: a driver may begin at rest."""
+    found = np.zeros(q.size, dtype=bool)
+    for later in LATER:
+        with suppress(ArithmeticError, ValueError):
+            found |= np.asarray(equations.code.nu(q, t + later, equations.p)) != 0
+    return found
+
+
 def _sentence(name: str, form: Measure, least: float, most: float) -> str:
     """Say what an equation asks for and what it can have."""
     if form.offset is None:
         miss = least if least > 0 else -most
-        way = "less" if least > 0 else "more"
-        text = f"{name} asks for at least {form.text(miss)} {way} than it can have"
+        end = "less than the least" if least > 0 else "more than the most"
+        text = f"{name} asks for {form.text(miss)} {end} that it can have"
     else:
         ends = (("at least", least), ("at most", most))
         limits = [f"{form.text(form.value(end))} {word}" for word, end in ends if np.isfinite(end)]
