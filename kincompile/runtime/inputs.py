@@ -52,6 +52,12 @@ class Inputs:
         Whether the points of a grid are solved together, rather than one after the other.
     smooth : bool
         Whether to go on past a bifurcation.
+    sets : ndarray, shape (B, k), or None
+        Values of the parameters in each of several sets.
+    sweep
+        The arrays that were given of them, by name.
+    without_guess
+        Bodies that have no guess.
     """
 
     code: Code
@@ -63,10 +69,13 @@ class Inputs:
     method: str | None = None
     on_grid: bool = False
     smooth: bool = False
+    sets: NDArray[np.float64] | None = None
+    sweep: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    without_guess: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Variants:
+class _Variants:
     """Parameter sets as they were given.
 
     Attributes
@@ -89,14 +98,16 @@ class Variants:
     is_product: bool = False
     problems: tuple[str, ...] = ()
 
-    def parameters(self, inputs: Inputs) -> NDArray[np.float64] | None:
+    def parameters(
+        self, names: Sequence[str], common: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
         """Return the parameters of each set, shape (B, k); None where there is one set."""
         if not self.sweep:
             return self.sets
         values = [array.ravel() for array in self._grid()]
-        result = np.tile(inputs.p, (values[0].size, 1))
+        result = np.tile(common, (values[0].size, 1))
         for name, column in zip(self.sweep, values, strict=True):
-            result[:, inputs.code.parameters.index(name)] = column
+            result[:, names.index(name)] = column
         return result
 
     def _grid(self) -> Sequence[NDArray[np.float64]]:
@@ -104,7 +115,7 @@ class Variants:
         return np.meshgrid(*arrays, indexing="ij") if self.is_product else arrays
 
 
-def read_variants(module: ModuleType, p: Values, product: bool) -> Variants:
+def _read_variants(module: ModuleType, p: Values, product: bool) -> _Variants:
     """Read parameters that may be those of several sets: see `solve`.
 
     Raises
@@ -115,7 +126,7 @@ def read_variants(module: ModuleType, p: Values, product: bool) -> Variants:
     if isinstance(p, Mapping):
         return _read_sweep(p, product)
     if not isinstance(p, np.ndarray) or p.ndim != 3:
-        return Variants(p)
+        return _Variants(p)
     count, one, size = p.shape
     if one != 1 or size != len(module.PARAMETERS) or count == 0 or p.dtype.kind not in "iuf":
         raise InputError(
@@ -130,10 +141,10 @@ def read_variants(module: ModuleType, p: Values, product: bool) -> Variants:
             f"parameter {module.PARAMETERS[which]!r} of variant {variant} is "
             f"{sets[variant, which]}: give a finite number."
         )
-    return Variants(sets[0], sets)
+    return _Variants(sets[0], sets)
 
 
-def _read_sweep(p: Mapping[str, Any], product: bool) -> Variants:
+def _read_sweep(p: Mapping[str, Any], product: bool) -> _Variants:
     """Read parameters by name, of which some have an array of values."""
     problems: list[str] = []
     common, sweep = dict(p), {}
@@ -156,7 +167,7 @@ def _read_sweep(p: Mapping[str, Any], product: bool) -> Variants:
             "pairs, so give them one length, or product=True (--product) to solve every "
             f"combination, {math.prod(sizes.values())} of them."
         )
-    return Variants(common, None, sweep, product, tuple(problems))
+    return _Variants(common, None, sweep, product, tuple(problems))
 
 
 def read_inputs(
@@ -168,11 +179,11 @@ def read_inputs(
     max_iterations: Any,
     method: str | None = None,
     through: str | None = None,
-    known: Sequence[str] = (),
+    product: bool | None = None,
 ) -> Inputs:
     """Check all inputs of the solver and bring them into the form in which it uses them.
 
-    Problems that are known already are told with those found here.
+    There may be several parameter sets unless `product` is None.
 
     Raises
     ------
@@ -182,10 +193,11 @@ def read_inputs(
         When the equations cannot determine the coordinates: what is wrong, and what to do.
     """
     _require_module(module)
-    problems = list(known)
+    given = _Variants(p) if product is None else _read_variants(module, p, product)
+    problems = list(given.problems)
     values = (
         _times(t, problems),
-        _values("parameter", module.PARAMETERS, module.DEFAULTS, p, problems),
+        _values("parameter", module.PARAMETERS, module.DEFAULTS, given.common, problems),
         _values("coordinate", module.COORDINATES, module.GUESS, guess, problems),
         _tolerance(tolerance, problems),
         _count(max_iterations, problems),
@@ -194,6 +206,8 @@ def read_inputs(
         problems.append(f"method is {method!r}: give 'grid', 'march', or nothing.")
     if through not in (None, "smooth"):
         problems.append(f"through is {through!r}: give 'smooth', or nothing.")
+    sweep = dict(given.sweep)
+    sets = None if problems else given.parameters(module.PARAMETERS, values[1])
     code = code_of(module)
     require_square(code)
     if method == "grid" and code.lanes is None:
@@ -206,7 +220,13 @@ def read_inputs(
     on_grid = method == "grid" or (
         method is None and values[0].size >= SMALLEST_GRID and code.lanes is not None
     )
-    return Inputs(code, *values, method, on_grid, through == "smooth")
+    # Where none is given it is zero.
+    without = [
+        body
+        for body, first, size in code.bodies
+        if guess is None and not code.guess[first : first + size].any()
+    ]
+    return Inputs(code, *values, method, on_grid, through == "smooth", sets, sweep, tuple(without))
 
 
 def _require_module(module: object) -> None:

@@ -29,7 +29,7 @@ from kincompile.errors import (
 )
 from kincompile.names import listed
 from kincompile.runtime.follow import follow
-from kincompile.runtime.inputs import read_inputs, read_variants
+from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.assemblies import assembly_guess, unchosen
@@ -152,12 +152,11 @@ def solve(
         When it converged at points so near to a singular configuration that their rates have lost
         digits, with the time. A motion that ends at one has a status and an event instead.
     """
-    given = read_variants(module, p, product)
     limits = (tolerance, max_iterations)
-    inputs = read_inputs(module, t, given.common, guess, *limits, method, through, given.problems)
-    sets = given.parameters(inputs)
+    inputs = read_inputs(module, t, p, guess, *limits, method, through, product)
+    sets = inputs.sets
     if assembly is not None:
-        inputs = _at_assembly(inputs, sets, guess, assembly)
+        inputs = _at_assembly(inputs, guess, assembly)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if sets is None:
             motion, outcome = follow(inputs, progress)
@@ -165,7 +164,7 @@ def solve(
             solution = _solution(inputs, motion, outcome)
         else:
             solve_all = solve_in_turn if inputs.code.lanes is None else solve_variants
-            solution = replace(solve_all(inputs, sets, progress), sweep=dict(given.sweep))
+            solution = replace(solve_all(inputs, sets, progress), sweep=dict(inputs.sweep))
             start = _start_of_first(replace(inputs, p=sets[0]), solution)
     if start:
         warnings.warn(start, AssemblyWarning, stacklevel=2)
@@ -175,17 +174,18 @@ def solve(
     return solution
 
 
-def _at_assembly(inputs: Inputs, sets: Array | None, guess: Values, number: int) -> Inputs:
+def _at_assembly(inputs: Inputs, guess: Values, number: int) -> Inputs:
     """Return inputs whose guess is one of the assemblies, of variants those of the first."""
     if guess is not None:
         raise InputError("guess and assembly are both given: give one of them.")
-    first = inputs if sets is None else replace(inputs, p=sets[0])
-    return replace(inputs, guess=assembly_guess(first, number))
+    first = inputs if inputs.sets is None else replace(inputs, p=inputs.sets[0])
+    return replace(inputs, guess=assembly_guess(first, number), without_guess=())
 
 
 def _start(inputs: Inputs, motion: Motion) -> str:
     """Say that a start does not choose between ways to assemble the mechanism, if it does not."""
-    if motion.status[0] != Status.CONVERGED:
+    may_be_open = motion.is_folded or inputs.without_guess
+    if motion.status[0] != Status.CONVERGED or not may_be_open:
         return ""
     return unchosen(inputs, motion.q[0].copy(), motion.is_folded)
 

@@ -144,7 +144,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
     is_folded
         Whether a determinant is zero at the guess, so that it shows no branch.
     """
-    without = _without_guess(inputs) if inputs.guess is inputs.code.module.GUESS else []
+    without = inputs.without_guess
     if q.size > MOST_COORDINATES or not (is_folded or _is_open(inputs, q, without)):
         return ""
     found = assembled_positions(inputs)
@@ -173,12 +173,6 @@ def _equations(inputs: Inputs) -> Problem:
     equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
     equations.angular = equations.angular | _periodic(equations, time, inputs.guess)
     return equations
-
-
-def _without_guess(inputs: Inputs) -> list[str]:
-    """Return the bodies whose guess is zero, as it is where none is given."""
-    guess = inputs.guess
-    return [body for body, first, count in inputs.code.bodies if not guess[first:][:count].any()]
 
 
 def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:

@@ -55,7 +55,7 @@ def test_all_that_is_wrong_is_said_at_once(pendulum):
             pendulum,
             "now",
             {"omega": np.nan, "rho": 1},
-            {"x_rod": "left", "phi_rod": np.inf},  # type: ignore[dict-item]  # what is refused
+            {"x_rod": "left", "phi_rod": np.inf},  # what is refused
             tolerance=-1,
             max_iterations=0,
         )
