@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from kincompile.ir.grouping import GroupedProgram
     from kincompile.ir.program import Program
     from kincompile.model.system import ConstraintSystem
-    from kincompile.runtime.results.reach import Driver
+    from kincompile.runtime.results.driver_range import Driver
     from kincompile.structure.report import Inspection
     from kincompile.targets.target import Emitted
 
@@ -236,7 +236,7 @@ def _joint_points(system: ConstraintSystem) -> ModuleType:
 
 def _drivers(system: ConstraintSystem, t: float, p: NDArray[np.float64]) -> tuple[Driver, ...]:
     """Return the drivers of a system at a time and parameters, for who asks how far they can go."""
-    from kincompile.runtime.results.reach import Driver
+    from kincompile.runtime.results.driver_range import Driver
 
     values = {item.name: float(x) for item, x in zip(system.parameters, p, strict=True)} | {"t": t}
     found = []

@@ -23,7 +23,7 @@ from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.march import March, State
 from kincompile.runtime.problem import problem
-from kincompile.runtime.results.reach import DriverRange, driver_ranges
+from kincompile.runtime.results.driver_range import DriverRange, driver_ranges
 from kincompile.tables import table
 
 if TYPE_CHECKING:
@@ -153,8 +153,12 @@ class Measures:
 def measures(solution: MotionTable, module: ModuleType, p: Array) -> Measures:
     """Measure the motion of a module with parameters p, as `Solution.measures` describes."""
     solution.require_one_motion("measures are those of", "solve with one of the parameter sets")
-    motion = _Motion(solution, module, p)
-    found = tuple(_measured(motion, k) for k in range(len(motion.names)))
+    if not np.isfinite(solution.q_dot).any():
+        raise InputError(f"{solution.name} has no motion to measure. {solution.message}")
+    found: tuple[OutputMeasures, ...] = ()
+    if solution.observed.names:
+        motion = _Motion(solution, module, p)
+        found = tuple(_measured(motion, k) for k in range(len(motion.names)))
     return Measures(solution.name, found, driver_ranges(solution, module, p))
 
 
@@ -164,8 +168,6 @@ class _Motion:
     def __init__(self, solution: MotionTable, module: ModuleType, p: Array) -> None:
         own = solution.observed
         good = np.flatnonzero(np.isfinite(solution.q_dot).all(axis=1))
-        if not good.size:
-            raise InputError(f"{solution.name} has no motion to measure. {solution.message}")
         self.t, order = np.unique(solution.t[good], return_index=True)
         self.rows = good[order]
         self.names, self.units = own.names, own.units

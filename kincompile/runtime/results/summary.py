@@ -31,16 +31,27 @@ def summary(solution: Solution) -> str:
     Returns
     -------
     str
-        Per coordinate its unit, its least and largest value with their times, and the largest
-        absolute values of its first and second derivative [unit/s, unit/s^2]; the tables of
-        `Solution.measures`; then the points by status, the Newton iterations and the largest
-        residual.
+        Of variants a part for each, under the values of its parameters. Per coordinate its unit,
+        its least and largest value with their times, and the largest absolute values of its first
+        and second derivative [unit/s, unit/s^2]; the tables of `Solution.measures`; then the points
+        by status, the Newton iterations and the largest residual.
     """
+    if solution.q.ndim > 2:
+        return "\n\n".join(_variant(solution, k) for k in range(len(solution.q)))
     motion = solution.q, solution.q_dot, solution.q_ddot
     parts = ["\n".join(_table(solution, motion))]
-    if solution.q.ndim == 2 and np.isfinite(solution.q_dot).any():
+    if np.isfinite(solution.q_dot).any():
         parts.append(str(solution.measures()))
     return "\n\n".join(part for part in (*parts, _verdict(solution)) if part)
+
+
+def _variant(solution: Solution, number: int) -> str:
+    """Return the summary of a variant, under the values of its parameters."""
+    values = ((name, axis[number]) for name, axis in solution.variants.items())
+    named = (
+        f"{name} = {value:g} {solution.units.get(name, '')}".rstrip() for name, value in values
+    )
+    return f"{', '.join(named)}\n{summary(solution.variant(number))}"
 
 
 def _table(solution: Solution, motion: tuple[NDArray[np.float64], ...]) -> list[str]:

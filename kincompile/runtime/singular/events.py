@@ -197,7 +197,7 @@ def branch_switch(code: Code, state: State, t: float, q: Vector, spread: Vector)
         The distance that is large for each coordinate.
     """
     jump = (q - state.point.q) / spread
-    bodies = _involved(code, jump)
+    bodies = involved(code, jump)
     return Event(
         BRANCH_SWITCH, state.t, bodies,
         f"Branch switch at t = {state.t:.10g}: at t = {t:.10g} the mechanism can be assembled, but "
@@ -215,7 +215,7 @@ def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) ->
     code = equations.code
     # Equal loops become singular together: then several movements are free.
     free = directions[np.append(sizes[:-1] <= IN_RANGE * sizes[0], True)]
-    bodies = _involved(code, np.linalg.norm(free, axis=0))
+    bodies = involved(code, np.linalg.norm(free, axis=0))
     return Event(
         kind, t, bodies, _message(kind, t, bodies), q,
         dict(zip(code.coordinates, null.tolist(), strict=True)),
@@ -239,7 +239,7 @@ def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
     )
 
 
-def _involved(code: Code, movement: Vector) -> tuple[str, ...]:
+def involved(code: Code, movement: Vector) -> tuple[str, ...]:
     """Return the bodies that take part in a movement, and coordinates that belong to none."""
     large = np.abs(movement) > INVOLVED * np.max(np.abs(movement), initial=0.0)
     owners = code.owners()

@@ -1,0 +1,148 @@
+"""How far a driver can go either way before the mechanism locks up.
+
+At the start of a motion time stands still, and one driver is freed: the curve on which all other
+equations hold is followed to the first place where the value of the driver turns back.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.names import listed
+from kincompile.runtime.engine.code import DRIVERS
+from kincompile.runtime.problem import problem
+from kincompile.runtime.singular.events import BIFURCATION, LOCK_UP, involved
+from kincompile.runtime.singular.reach import freed_curve
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.problem import Problem
+    from kincompile.runtime.results.columns import MotionTable
+
+LARGEST_FREED = 100
+"""Coordinates up to which a range is searched for: it solves dense matrices, some hundred times."""
+
+ROUND = math.tau
+"""How far an angle is driven; further on everything comes again."""
+
+SIZES = 4.0
+"""How far a length is driven, in sizes of the mechanism."""
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """A driver at one time, as the compiler describes it.
+
+    Attributes
+    ----------
+    name, unit
+        Its name, and the unit of its value.
+    row
+        Its row in Phi.
+    value
+        C at that time.
+    is_squared
+        Whether the row is that of C^2, as of a distance.
+    """
+
+    name: str
+    unit: str
+    row: int
+    value: float
+    is_squared: bool
+
+    def moved(self, value: float) -> float:
+        """Return what its row of Phi has where the driver has another value; none below zero."""
+        return max(value, 0.0) ** 2 - self.value**2 if self.is_squared else value - self.value
+
+    def at(self, moved: float) -> float:
+        """Return the driver's value where its row of Phi has a value."""
+        return math.sqrt(max(self.value**2 + moved, 0.0)) if self.is_squared else self.value + moved
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limit:
+    """Where a driver can go no further.
+
+    Attributes
+    ----------
+    value : float
+        The driver's value there, infinite where nothing was met.
+    kind : str
+        Of the event: ``"lock-up"`` or ``"bifurcation"``; "" where nothing was met.
+    bodies : tuple of str
+        The bodies whose movement nothing determines there.
+    q : ndarray, shape (n,)
+        The position there; empty where nothing was met.
+    """
+
+    value: float
+    kind: str
+    bodies: tuple[str, ...]
+    q: Array
+
+    def __str__(self) -> str:
+        """Return value, kind and bodies."""
+        if not self.kind:
+            return "no limit met"
+        return f"{self.value:.6g} ({self.kind}: {listed(self.bodies)})"
+
+
+@dataclass(frozen=True, slots=True)
+class DriverRange:
+    """How far a driver can go either way from where the motion starts.
+
+    Attributes
+    ----------
+    name, unit
+        Of the driver.
+    start : float
+        Its value at the first time.
+    low, high : Limit
+        Where it ends below and above; an angle is tried for a turn, a length for four times the
+        size of the mechanism, with the other drivers held.
+    """
+
+    name: str
+    unit: str
+    start: float
+    low: Limit
+    high: Limit
+
+
+def driver_ranges(solution: MotionTable, module: ModuleType, p: Array) -> tuple[DriverRange, ...]:
+    """Return the range of every driver from the first position of a motion."""
+    describe = vars(module).get(DRIVERS)
+    q, t = np.ascontiguousarray(solution.q[0]), float(solution.t[0])
+    if describe is None or q.size > LARGEST_FREED or not np.isfinite(solution.q_ddot[0]).all():
+        return ()
+    with np.errstate(all="ignore"):
+        equations = problem(module, p, q, t, q)
+        return tuple(_range(equations, driver, q, t) for driver in describe(t, p))
+
+
+def _range(equations: Problem, driver: Driver, q: Array, t: float) -> DriverRange:
+    low, high = (_limit(equations, driver, q, t, sign) for sign in (-1.0, 1.0))
+    return DriverRange(driver.name, driver.unit, driver.value, low, high)
+
+
+def _limit(equations: Problem, driver: Driver, q: Array, t: float, sign: float) -> Limit:
+    """Follow the driver one way, up to the first singular configuration."""
+    reach = ROUND if driver.unit == "rad" else SIZES * float(np.max(equations.spread(q)))
+    point = equations.at(q, t)
+    assert point is not None  # it was solved
+    curve, state = freed_curve(equations, driver.row, point, t)
+    start = curve.start(state, sign)
+    bracket = start and curve.next_singular(start, driver.moved(driver.value + sign * reach))
+    found = bracket and curve.singular_point(bracket)
+    if not (bracket and found):
+        return Limit(sign * math.inf, "", (), np.empty(0))
+    place = found[0]
+    kind = LOCK_UP if bracket.turns else BIFURCATION
+    return Limit(driver.at(place.t), kind, involved(equations.code, place.tangent[:-1]), place.q)
