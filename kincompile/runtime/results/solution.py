@@ -194,13 +194,20 @@ class Solution(MotionTable):
         p = np.array(list(self.parameters.values()), dtype=np.float64)
         return measures(self, self.require_module("its measures"), p)
 
-    def plot(self, *names: str, ax: Axes | None = None) -> Axes:
-        """Draw columns over time: coordinates, rates, second rates; events and gaps are marked.
+    def plot(self, *names: str, x: str | None = None, ax: Axes | None = None) -> Axes:
+        """Draw columns over time, or over another column: ``plot("ram.y", x="crank.phi")``.
+
+        Over time events and gaps are marked. Over another column dots stand at equal times, and
+        ``plot("foot.y", x="foot.x")`` is the path of a point, with equal scales. Variants are told
+        apart by colour, with a legend, or a colour bar where they are many.
 
         Parameters
         ----------
         *names
-            Columns, as ``"phi_rod_dot"`` or ``"rod.phi_dot"``; without any, all coordinates.
+            Columns, as ``"phi_rod_dot"`` or ``"rod.phi_dot"``; without any, the outputs that move,
+            and of a model without outputs the coordinates that do.
+        x : str, optional
+            The column along the horizontal axis; without it, time.
         ax : matplotlib.axes.Axes, optional
             Draws all of them into this plot. Without it there is a new figure with a panel for
             each unit, so that metres and radians do not share an axis.
@@ -217,7 +224,7 @@ class Solution(MotionTable):
         UnsupportedError
             When matplotlib is not installed.
         """
-        return plot_columns(self, names, ax)
+        return plot_columns(self, names, x, ax)
 
     def _repr_html_(self) -> str:
         return solution_html(self) + (picture_html(self) or plot_html(self))

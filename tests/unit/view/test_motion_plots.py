@@ -1,6 +1,7 @@
 """`Solution.plot`: the curves are the closed form's, the labels have units, gaps are said."""
 
 import dataclasses
+import math
 import sys
 
 import numpy as np
@@ -71,7 +72,7 @@ def test_that_there_is_a_panel_for_each_unit(arm):
     assert [panel.get_xlabel() for panel in panels] == ["", "", "t [s]"]
 
 
-def test_that_no_name_means_all_coordinates(arm):
+def test_that_no_name_means_all_that_moves(arm):
     panels = arm.plot().figure.axes
     assert [[line.get_label() for line in panel.lines] for panel in panels] == [
         ["x_bar", "y_bar"],
@@ -109,15 +110,78 @@ def test_that_a_failed_point_is_a_gap_even_if_it_has_a_position(arm):
     assert legend(ax) == ["phi_bar", f"no solution: 3 of {T.size} points"]
 
 
-def test_that_variants_are_curves_of_one_name(example_named):
-    module = example_named("simple_pendulum").module
-    p = np.stack([module.DEFAULTS, 2 * module.DEFAULTS])[:, None]
-    solution = kc.solve(module, T, p)
-    ax = solution.plot(solution.coordinates[0])
-    assert len(ax.lines) == 2
-    for line, values in zip(ax.lines, solution.q[..., 0], strict=True):
-        np.testing.assert_array_equal(line.get_ydata(), values)
-    assert len({line.get_color() for line in ax.lines}) == 1
+@pytest.fixture(scope="module")
+def arms():
+    """A point at the end of a bar of length L, which turns by 2 pi t, and a bar that stands."""
+    m = kc.Mechanism("arms")
+    length = m.parameter("L", 1.0, unit="m")
+    bar, post = m.body("bar"), m.body("post")
+    tip = m.point("tip", bar, (length, 0))
+    m.add(kc.Revolute("pin", m.ground, (0, 0), bar, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", bar, 2 * kc.pi * kc.t))
+    m.add(kc.Revolute("hold", m.ground, (1, 2), post, (0, 0)))
+    m.add(kc.AbsoluteAngle("stand", post, 1))
+    return m, tip
+
+
+def swept(arms, count):
+    module = kc.compile(arms[0])
+    return kc.solve(module, np.linspace(0, 1, 49), {"L": np.linspace(1, 2, count)})
+
+
+def test_that_variants_are_told_apart_by_their_parameters(arms):
+    solution = swept(arms, 3)
+    ax = solution.plot("tip.x")
+    for line, length in zip(ax.lines, (1, 1.5, 2), strict=True):
+        np.testing.assert_allclose(data(line)[1], length * np.cos(math.tau * solution.t), atol=1e-12)
+    assert legend(ax) == ["x_tip, L = 1 m", "x_tip, L = 1.5 m", "x_tip, L = 2 m"]
+    assert len({line.get_color() for line in ax.lines}) == 3
+
+
+def test_that_many_variants_have_a_colour_bar(arms):
+    ax = swept(arms, 12).plot("tip.x")
+    bar = ax.figure.axes[-1]
+    assert bar.get_ylabel() == "L [m]"
+    assert bar.get_ylim() == (1, 2)
+    assert len(ax.lines) == 12
+    assert ax.get_legend() is None
+
+
+def test_that_a_path_has_equal_scales_and_dots_at_equal_times(arms):
+    solution = swept(arms, 1).variant(0)
+    ax = solution.plot("tip.y", x="tip.x")
+    (line,) = ax.lines
+    angle = math.tau * solution.t
+    np.testing.assert_allclose(data(line), (np.cos(angle), np.sin(angle)), atol=1e-12)
+    assert ax.get_aspect() == 1
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x_tip [m]", "y_tip [m]")
+    assert (line.get_marker(), line.get_markevery()) == (".", 2)
+
+
+def test_that_a_column_is_drawn_over_another(arms):
+    solution = swept(arms, 1).variant(0)
+    ax = solution.plot("tip.y_dot", x="bar.phi")
+    t, rate = data(ax.lines[0])
+    np.testing.assert_allclose(rate, math.tau * np.cos(t), atol=1e-9)
+    assert ax.get_xlabel() == "phi_bar [rad]"
+    assert ax.get_aspect() == "auto"
+    with pytest.raises(kc.InputError, match=r"no column 'bar\.fi'"):
+        solution.plot("tip.y", x="bar.fi")
+
+
+def test_that_outputs_are_shown_first_and_nothing_that_never_moves(arms):
+    solution = swept(arms, 1).variant(0)
+    labels = [line.get_label() for panel in solution.plot().figure.axes for line in panel.lines]
+    assert labels == ["x_tip", "y_tip"]
+    m = kc.Mechanism("without")
+    bar, post = m.body("bar"), m.body("post")
+    m.add(kc.Revolute("pin", m.ground, (0, 0), bar, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", bar, kc.t))
+    m.add(kc.Revolute("hold", m.ground, (1, 2), post, (0, 0)))
+    m.add(kc.AbsoluteAngle("stand", post, 1))
+    ax = kc.solve(kc.compile(m), T).plot()
+    assert [line.get_label() for line in ax.lines] == ["phi_bar"]
+    assert "bar" in kc.solve(kc.compile(m), 0.0).plot().lines[0].get_label()
 
 
 def test_that_one_point_can_be_seen(arm):
@@ -128,7 +192,7 @@ def test_that_one_point_can_be_seen(arm):
 
 def test_that_many_columns_are_counted_not_named():
     u = sympy.symbols("u:40")
-    s = kc.ConstraintSystem("many", u, [u[k] - k * kc.t for k in range(40)])
+    s = kc.ConstraintSystem("many", u, [u[k] - (k + 1) * kc.t for k in range(40)])
     ax = kc.solve(kc.compile(s), T).plot()
     assert len(ax.lines) == 40
     assert len({(line.get_color(), line.get_linestyle()) for line in ax.lines}) == 40
