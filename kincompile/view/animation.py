@@ -17,7 +17,7 @@ from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import BodyPoint
-from kincompile.view.mechanism_plot import draw, move, require_bodies
+from kincompile.view.mechanism_plot import NAME, draw, move, require_bodies
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def animate(
     *,
     model: Mechanism | ConstraintSystem | None = None,
     seconds: float | None = None,
-    trace: Iterable[str] = (),
+    trace: Iterable[str] | None = None,
 ) -> FuncAnimation | Path:
     """Animate a motion.
 
@@ -66,7 +66,8 @@ def animate(
     seconds
         Playing time; without, that of the motion, but at least 2 s and at most 20 s.
     trace
-        Names of bodies and constraints, whose origins and points leave a line.
+        Names of points, bodies and constraints: points, origins and places that leave a line.
+        Without, the points of the model do.
 
     Returns
     -------
@@ -117,13 +118,19 @@ def _first_frame(
     artists = draw(ax, system, drawn, positions)
     for point in traced:
         ax.plot(*point.at(positions).T, color="0.5", linewidth=1, zorder=1)
+    labels = [(ax.annotate(dot.name, (0, 0), **NAME), dot.place) for dot in drawn.dots]
     captions = _captions(solution, rows)
-    ax.set_title(captions[0], loc="left")
+
+    for text, _ in labels:
+        text.set_in_layout(False)
 
     def show(frame: int) -> None:
         move(artists, solution.q[rows[frame]])
+        for text, place in labels:
+            text.xy = tuple(place.at(solution.q[rows[frame]]).tolist())
         ax.set_title(captions[frame], loc="left")
 
+    show(0)
     return show
 
 
@@ -183,16 +190,18 @@ def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
     require_writable(path)
 
 
-def _traced(drawn: Drawing, names: Iterable[str]) -> list[BodyPoint]:
+def _traced(drawn: Drawing, names: Iterable[str] | None) -> list[BodyPoint]:
     """Return the points to be traced."""
     frames = zip(drawn.bodies, drawn.frames, strict=True)
     places = {body: BodyPoint(frame, (0.0, 0.0)) for body, frame in frames}
     places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
-    for name in (chosen := list(names)):
+    dots = {dot.name: dot.place for dot in drawn.dots}
+    places |= dots
+    for name in (chosen := list(dots if names is None else names)):
         if name not in places:
             raise InputError(
                 f"{drawn.name} has nothing called {name!r} to trace{suggestion(name, places)}; "
-                f"bodies and constraints are: {listed(places)}"
+                f"bodies, constraints and points are: {listed(places)}"
             )
     return [places[name] for name in chosen]
 

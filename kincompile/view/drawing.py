@@ -16,6 +16,7 @@ from kincompile.view.joint_shapes import marks_of
 from kincompile.view.marks import (
     GROUND_FRAME,
     BodyPoint,
+    Dot,
     Drive,
     Mark,
     Pin,
@@ -92,6 +93,11 @@ class Drawing:
     joints: tuple[JointLabel, ...]
     size: float
 
+    @property
+    def dots(self) -> tuple[Dot, ...]:
+        """The named points of bodies, in order."""
+        return tuple(mark for mark in self.marks if isinstance(mark, Dot))
+
     def extent(self, q: ArrayLike) -> tuple[float, float, float, float]:
         """Return smallest x, largest x, smallest y, largest y of all marks.
 
@@ -154,7 +160,9 @@ def drawing(
     bodies: list[Mark] = [*outlines(system.bodies, geometry)]
     marks = _uncovered(itertools.chain(*by_joint.values()), set().union(*map(moves_with, bodies)))
     marks = [*bodies, *marks]
-    marks += links(frames, geometry.points(joints), marks)
+    dots = [Dot(item.name, geometry.on_body(item)) for item in system.body_points]
+    marks += links(frames, [*geometry.points(joints), *(dot.place for dot in dots)], marks)
+    marks += dots
     size = _size(marks, positions)
     places = {
         joint.name: _pointed_at(by_joint[joint.name], geometry.points([joint])) for joint in joints
@@ -245,7 +253,7 @@ def _uncovered(marks: Iterable[Mark], outlined: set[PlaneFrame]) -> list[Mark]:
     ]
 
 
-_DEPTHS = ("rail", "wheel", "contour", "outline", "link", "span", "slider", "pin", "drive")
+_DEPTHS = ("rail", "wheel", "contour", "outline", "link", "span", "slider", "pin", "drive", "dot")
 
 
 def _depth(mark: Mark) -> int:

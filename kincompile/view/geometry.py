@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from kincompile.model.expressions import Scalar, Scalars
+    from kincompile.model.points import BodyPoint as NamedPoint
     from kincompile.model.resolve import Joint
     from kincompile.view.marks import Array, PlaneFrame, Point
 
@@ -70,6 +71,11 @@ class Geometry:
     def point(self, joint: Joint, symbol: str) -> BodyPoint:
         """Return a point of a joint, in the frame of its body."""
         return BodyPoint(self.frame_of(joint, symbol), self.pair(joint.points[symbol]))
+
+    def on_body(self, point: NamedPoint) -> BodyPoint:
+        """Return a named point of a body, in its frame."""
+        frame = self.frames.get(point.body.name, GROUND_FRAME)
+        return BodyPoint(frame, self.pair(point.local))
 
     def points(self, joints: Iterable[Joint]) -> list[BodyPoint]:
         """Return every point that joints hold; the pitch line of a rack is drawn as such."""

@@ -169,7 +169,15 @@ class Drive:
     axis: Point | None
 
 
-Mark: TypeAlias = Link | Outline | Pin | Rail | Slider | Span | Wheel | Contour | Drive
+@dataclass(frozen=True, slots=True)
+class Dot:
+    """A named point of a body: it has its name beside it, and leaves a line."""
+
+    name: str
+    place: BodyPoint
+
+
+Mark: TypeAlias = Link | Outline | Pin | Rail | Slider | Span | Wheel | Contour | Drive | Dot
 
 
 def moves_with(mark: Mark) -> set[PlaneFrame]:
@@ -188,6 +196,6 @@ def reach(mark: Mark) -> list[tuple[BodyPoint, float]]:
             points = (mark.start, mark.end)
         case Pin() | Span():
             return [(mark.first, 0.0), (mark.second, 0.0)]
-        case Slider() | Drive():
+        case Slider() | Drive() | Dot():
             return [(mark.place, 0.0)]
     return [(BodyPoint(mark.frame, point), 0.0) for point in points]

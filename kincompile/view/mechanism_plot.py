@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
     from kincompile.view.drawing import Drawing
+    from kincompile.view.marks import BodyPoint
     from kincompile.view.polylines import Polyline
 
 NAME: dict[str, Any] = {
@@ -58,7 +59,7 @@ def plot_mechanism(
     p : mapping, optional
         Values of parameters by name, such as ``solution.parameters``; others have their defaults.
     names
-        Whether the names of the constraints are written at their places.
+        Whether the names of the constraints are written at their places; those of points are.
 
     Returns
     -------
@@ -82,8 +83,10 @@ def plot_mechanism(
         _, ax = plt.subplots(layout="constrained")
         ax.set_title(drawn.name)
     draw(ax, model, drawn, position[None])
+    labels = {dot.name: dot.place for dot in drawn.dots}
     if names:
-        _write_names(ax, drawn, position)
+        labels |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
+    _write_names(ax, drawn.size, labels, position)
     return ax
 
 
@@ -201,14 +204,15 @@ def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) ->
     return line
 
 
-def _write_names(ax: Axes, drawn: Drawing, q: NDArray[np.float64]) -> None:
-    """Write the names of constraints at their places; those of one place together."""
+def _write_names(
+    ax: Axes, size: float, labels: Mapping[str, BodyPoint], q: NDArray[np.float64]
+) -> None:
+    """Write names at their places; those of one place together."""
     at: dict[tuple[float, float], list[str]] = {}
-    for joint in drawn.joints:
-        if joint.place is not None:
-            x, y = joint.place.at(q)
-            step = drawn.size * 1e-3
-            at.setdefault((round(x / step) * step, round(y / step) * step), []).append(joint.name)
-    for place, names in at.items():
-        text = ax.annotate(", ".join(names), place, **NAME)
+    for name, place in labels.items():
+        x, y = place.at(q)
+        step = size * 1e-3
+        at.setdefault((round(x / step) * step, round(y / step) * step), []).append(name)
+    for corner, names in at.items():
+        text = ax.annotate(", ".join(names), corner, **NAME)
         text.set_in_layout(False)  # a long name may leave the plot, but must not shrink it

@@ -53,14 +53,20 @@ def page_data(system: ConstraintSystem, solution: Solution | None, message: str)
     arrays, status, events = _motion(guess, solution)
     t, q = arrays["t"], arrays["q"]
     shapes = drawing(system, values, q)
+    outputs: list[dict[str, str]] = []
     if solution is not None and solution.module is not None:
         arrays |= _checks(solution, solution.module, shapes, p)
+        own = solution.observed
+        if own.names:
+            outputs = [{"name": name, "unit": own.units[name]} for name in own.names]
+            arrays |= {"y": own.y, "y_dot": own.y_dot, "y_ddot": own.y_ddot}
     return {
         "name": system.name,
         "message": message,
         "success": solution is not None and solution.success,
         "lengthUnit": system.length_unit,
         "coordinates": [{"name": item.name, "unit": item.unit} for item in system.coordinates],
+        "outputs": outputs,
         "equations": list(system.equations),
         "parameters": [
             {"name": item.name, "value": values[item.name], "unit": item.unit}
@@ -144,5 +150,5 @@ def _at_guess(
     By the interpreter, which also takes systems that cannot be compiled.
     """
     with np.errstate(all="ignore"):
-        Phi, _, _, _ = interpret(lower(system), guess, np.zeros_like(guess), t, p)
+        Phi = interpret(lower(system), guess, np.zeros_like(guess), t, p)[0]
     return [float(value) if np.isfinite(value) else None for value in residuals(Phi, shapes)]

@@ -15,6 +15,7 @@ from kincompile.view.marks import (
     GROUND_FRAME,
     BodyPoint,
     Contour,
+    Dot,
     Drive,
     Link,
     Mark,
@@ -80,6 +81,7 @@ LOOKS: Mapping[str, Look] = {
     "slide": Look(3, opacity=0.5),
     "dimension": Look(1, "#666666", dash="--"),
     "pin": Look(1.2, "#1a1a1a", "#ffffff"),
+    "dot": Look(1, "#1a1a1a", "#1a1a1a"),
     "stand": Look(1.2, GROUND_COLOUR, "#ebebeb"),
     "ground": Look(1),
     "arrow": Look(1.3, DRIVER_COLOUR),
@@ -87,6 +89,9 @@ LOOKS: Mapping[str, Look] = {
     "gap": Look(2, "#ff0000", dash=":"),
 }
 """Look of each kind of polyline."""
+
+DOT = 0.3
+"""Radius of a named point, in sizes of the drawing."""
 
 PIN, BLOCK_LENGTH, BLOCK_HEIGHT, HATCH, TURN = 0.45, 1.6, 0.9, 0.8, 1.9
 """Radius of a pin, half sides of a slider, length of a hatch line, radius of a turning arrow, in
@@ -168,6 +173,9 @@ def of_mark(mark: Mark, size: float) -> Iterable[Polyline]:
             return _profile(mark)
         case Drive():
             return _drive(mark, size)
+        case Dot():
+            frame, place = mark.place.frame, mark.place
+            return [Polyline("dot", frame, DOT * size * CIRCLE, place, is_area=True)]
 
 
 def _array(points: ArrayLike) -> Array:

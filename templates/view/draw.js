@@ -320,6 +320,11 @@ const DRAW = {
     pen.stroke(pen.palette.paper, 1.7 * pen.unit);
   },
 
+  dot(pen, mark) {
+    pen.circle(pen.place(mark.place), 0.45 * pen.unit);
+    pen.fill(pen.style.ghost || pen.palette.ink);
+  },
+
   drive(pen, mark) {
     const [x, y] = pen.place(mark.place), radius = 2 * pen.unit;
     const violated = pen.style.violated && pen.style.violated.has(mark.joint);

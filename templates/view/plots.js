@@ -5,17 +5,21 @@ const PLOT_HEIGHT = 165;
 
 /* Everything that can be plotted: groups of { label, unit, values, isLog }. */
 function plottable(data) {
-  const { n, count } = player;
+  const { count } = player;
   const column = (name, k, width) => Array.from({ length: count },
     (_, row) => finite(data.arrays[name][row * width + k]));
-  const rates = [['q', '', ''], ['q_dot', '_dot', '/s'], ['q_ddot', '_ddot', '/s²']];
-  const titles = ['Position', 'Velocity', 'Acceleration'];
-  const groups = rates.map(([name, ending, per], order) => ({
-    title: titles[order],
-    items: data.coordinates.map(({ name: coordinate, unit }, k) => ({
-      label: coordinate + ending, unit: unit ? unit + per : '', values: () => column(name, k, n),
+  const rates = [['', '', ''], ['_dot', '_dot', '/s'], ['_ddot', '_ddot', '/s²']];
+  const titled = (titles, owners, array) => rates.map(([order, ending, per], k) => ({
+    title: titles[k],
+    items: owners.map(({ name, unit }, place) => ({
+      label: name + ending, unit: unit ? unit + per : '',
+      values: () => column(array + order, place, owners.length),
     })),
   }));
+  const groups = [
+    ...titled(['Output', 'Rate of an output', 'Second rate of an output'], data.outputs, 'y'),
+    ...titled(['Position', 'Velocity', 'Acceleration'], data.coordinates, 'q'),
+  ];
   const joints = data.drawing.joints;
   groups.push({
     title: 'Residual',
@@ -215,7 +219,7 @@ const plots = {
     Object.assign(more, { type: 'button', textContent: 'Another plot', id: 'another' });
     more.addEventListener('click', () => this.add(this.groups[0].items[0].label));
     panel.append(this.holder, more);
-    const name = liveliest();
+    const name = movingOutput() ?? liveliest();
     this.first = [name, `${name}_dot`, `${name}_ddot`];
   },
 
@@ -258,6 +262,17 @@ const plots = {
     for (const plot of this.list) plot.redraw();
   },
 };
+
+/* The first output that moves; none where there is no such. */
+function movingOutput() {
+  const { outputs, arrays } = player.data, width = outputs.length;
+  const moves = k => {
+    const values = arrays.y?.filter((value, place) => place % width === k && Number.isFinite(value)) ?? [];
+    const size = values.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+    return values.some(value => Math.abs(value - values[0]) > 1e-9 * Math.max(size, 1e-12));
+  };
+  return outputs.find((_, k) => moves(k))?.name;
+}
 
 /* The coordinate that is plotted first: of bodies an angle, that of the largest acceleration, so that
    it is not one that a motor turns steadily; where all angles are steady, as of a cam and its follower,

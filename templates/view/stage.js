@@ -6,7 +6,7 @@
    stage.overlays        functions (ctx, view, palette) that draw on top: ghost bodies, handles
    stage.pointer         null, or { down, move, up } that get (world point, event) before hovering;
                          true from `down` keeps the event
-   stage.points          what can be pointed at: joints and the origins of bodies */
+   stage.points          what can be pointed at: named points, joints and the origins of bodies */
 
 const NEAR = 16;  // pixels within which a point is meant, twice that with a finger
 const PLACES = 1000;  // points of a traced path
@@ -20,7 +20,7 @@ class Stage {
     this.overlays = [];
     this.pointer = null;
     this.points = pointsOf(player.data.drawing);
-    this.traced = new Set();
+    this.traced = new Set(this.points.filter(point => point.isNamed));
     this.selected = null;  // kept by a click
     this.hovered = null;
     this.showsNames = false;
@@ -46,12 +46,12 @@ class Stage {
     this.view = new View(this.extent(), this.width, this.height, NEAR);
     const { ctx, view, palette } = this;
     ctx.clearRect(0, 0, this.width, this.height);
-    for (const point of this.traced) this.drawPath(point);
     const violated = state.isFound ? null : violatedJoints();
     const style = { view, palette, violated, alpha: state.isFound || !hasMotion() ? 1 : 0.55 };
     drawShapes(ctx, state.q, style);
+    for (const point of this.traced) this.drawPath(point);
     for (const overlay of this.overlays) overlay(ctx, view, palette);
-    if (this.showsNames) this.drawNames(state);
+    this.drawNames(state, this.points.filter(point => this.showsNames || point.isNamed));
     const point = this.hovered || this.selected;
     if (point) this.drawPoint(point, state);
   }
@@ -80,11 +80,11 @@ class Stage {
     ctx.setLineDash([]);
   }
 
-  drawNames(state) {
+  drawNames(state, points) {
     const { ctx, palette } = this;
     Object.assign(ctx, { font: '12px system-ui, sans-serif', textBaseline: 'bottom', lineWidth: 3 });
     const taken = [];
-    for (const point of this.points) {
+    for (const point of points) {
       const [x, y] = this.view.toScreen(this.where(point, state));
       const isTaken = taken.some(([a, b]) => Math.abs(a - x) < 60 && Math.abs(b - y) < 13);
       if (isTaken) continue;
@@ -177,8 +177,12 @@ class Stage {
   }
 }
 
-/* Joints that are somewhere, then the origins of bodies. */
+/* Named points, joints that are somewhere, then the origins of bodies. */
 function pointsOf(drawing) {
+  const named = drawing.marks.filter(mark => mark.kind === 'dot').map(({ name, place }) => ({
+    name, kind: `point of ${drawing.bodies[place.frame.index] || 'the ground'}`,
+    frame: place.frame, point: place.point, isNamed: true,
+  }));
   const joints = drawing.joints.filter(joint => joint.place).map(joint => ({
     name: joint.name, kind: joint.is_driver ? `${joint.kind}, a driver` : joint.kind,
     frame: joint.place.frame, point: joint.place.point,
@@ -188,7 +192,7 @@ function pointsOf(drawing) {
     name, kind: 'origin of the body', frame: drawing.frames[body], point: [0, 0],
   }));
   // Of several at one place a joint comes first: it is the one that is met by the pointer.
-  return [...joints.filter(isBearing), ...joints.filter(joint => !isBearing(joint)), ...origins];
+  return [...named, ...joints.filter(isBearing), ...joints.filter(joint => !isBearing(joint)), ...origins];
 }
 
 function hasMotion() {

@@ -155,9 +155,10 @@ function placeOfTip(tip, [x, y], state) {
   return places.reduce((best, place) => (hidden(place) < hidden(best) ? place : best));
 }
 
-/* The longest path is traced from the start: of bodies that are not hung on the ground, where there
+/* Where the model names no point, the longest path is traced from the start: of bodies that are not hung on the ground, where there
    are such, since the others go in circles. */
 function traceLongest() {
+  if (stage.traced.size) return;
   const pins = player.data.drawing.marks.filter(mark => mark.kind === 'pin');
   const hung = new Set(pins.filter(pin => isGround(pin.first.frame)).map(pin => pin.second.frame.index));
   const free = stage.points.filter(point => !hung.has(point.frame.index));

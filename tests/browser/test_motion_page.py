@@ -480,3 +480,23 @@ def test_that_the_gallery_shows_and_links_every_page(
     assert page.url.endswith(f"{EXAMPLES[0]}.html")
     assert [url for url in page.asked if not url.startswith(("data:", "file:"))] == []
     page.close()
+
+
+def test_that_named_points_are_traced_and_outputs_are_plotted_first(open_page):
+    m = four_bar("pointed", 1.0)
+    rod = m.bodies[1]
+    point = m.point("P", rod, (0, 1))
+    m.output("still", 3, "m")
+    m.output("height", point.y, "m")
+    page = open_page(m)
+    page.wait_for_function("plots.list.length === 3")
+    assert page.evaluate("[...stage.traced].map(point => point.name)") == ["P"]
+    shown = page.evaluate("plots.list.map(plot => plot.choice.value)")
+    assert shown == ["x_P", "x_P_dot", "x_P_ddot"]
+    solution = kc.solve(kc.compile(m), np.linspace(0, m.end, m.points))
+    for k, name in enumerate(shown):
+        drawn = page.evaluate(f"Array.from(plots.list[{k}].chart.data[1])")
+        np.testing.assert_allclose(drawn, solution[name], atol=1e-12)
+    labels = page.evaluate("[...plots.list[0].choice.options].map(option => option.label)")
+    assert {"height", "height_dot", "still", "x_rod"} <= set(labels)
+    assert page.said == []

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import package_of_extra
-from kincompile.names import listed
 from kincompile.runtime.results.columns import TIME_UNIT, titled
 from kincompile.runtime.results.html import figure_html
 
@@ -70,7 +69,8 @@ def plot_columns(
 def plot_html(solution: MotionTable) -> str:
     """Return the first plot as HTML; "" where matplotlib is not installed."""
     panels = _by_unit(solution, ())
-    title = f"{listed([x.name for panel in panels for x in panel])} of {solution.name} over time"
+    shown = "outputs" if panels[0][0].name in solution.observed.names else "coordinates"
+    title = f"the {shown} of {solution.name} over time"
     return figure_html(
         title, _size_of(panels), lambda figure: _draw_panels(figure, solution, panels, None)
     )

@@ -133,7 +133,9 @@ def test_that_variants_are_told_apart_by_their_parameters(arms):
     solution = swept(arms, 3)
     ax = solution.plot("tip.x")
     for line, length in zip(ax.lines, (1, 1.5, 2), strict=True):
-        np.testing.assert_allclose(data(line)[1], length * np.cos(math.tau * solution.t), atol=1e-12)
+        np.testing.assert_allclose(
+            data(line)[1], length * np.cos(math.tau * solution.t), atol=1e-12
+        )
     assert legend(ax) == ["x_tip, L = 1 m", "x_tip, L = 1.5 m", "x_tip, L = 2 m"]
     assert len({line.get_color() for line in ax.lines}) == 3
 
