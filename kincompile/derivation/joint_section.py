@@ -230,11 +230,16 @@ def _attribute_symbol(symbol: str, kind: Kind) -> Formula:
 def _attribute(joint: Joint, symbol: str) -> Formula:
     """Return an attribute as the user wrote it."""
     if symbol in joint.points:
-        return Matrix(tuple((sympy.sympify(value),) for value in joint.points[symbol]))
+        return column(tuple(_as_written(value) for value in joint.points[symbol]))
     if symbol in joint.profiles:
         return joint.profiles[symbol]
-    written: sympy.Expr = sympy.sympify(joint.scalars[symbol])
-    return written
+    return _as_written(joint.scalars[symbol])
+
+
+def _as_written(value: Scalar) -> Formula:
+    """Return a number in its digits, or an expression."""
+    expression: sympy.Expr = sympy.sympify(value)
+    return Decimal(float(expression), 12) if expression.is_Float else expression
 
 
 def _rule_lines(
