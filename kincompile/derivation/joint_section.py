@@ -143,8 +143,8 @@ class _JointSteps(Steps[RowBlock]):
                 label = Math(PartialDerivative(self.symbol("Phi", k), item.coordinate))
                 rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
         note = text(
-            "Every rule that fired while ", Math(PHI_Q), " was derived, from the inside out. "
-            "Whatever the coordinate does not occur in is constant."
+            "The rules that give ", Math(PHI_Q), ", the innermost first. A term in which the "
+            "coordinate does not occur is constant."
         )  # fmt: skip
         if not rows:
             note = text("Nothing but constants and coordinates themselves: no rule is needed.")
@@ -253,9 +253,9 @@ def _rule_lines(
 
 
 def _fired(lines: list[tuple[Run | Runs, ...]]) -> list[Block]:
-    """Return the rules that fired as a table that can be folded away."""
+    """Return the rules used as a table that can be folded away."""
     header = ("for", "rule", "applied to", "gives")
-    return [table(header, lines, "The rules that fired")] if lines else []
+    return [table(header, lines, "The rules used")] if lines else []
 
 
 def _column(values: Sequence[Scalar], known: Mapping[str, float]) -> Matrix:
