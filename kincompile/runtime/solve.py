@@ -185,7 +185,7 @@ def _at_assembly(inputs: Inputs, guess: Values, number: int) -> Inputs:
 def _start(inputs: Inputs, motion: Motion) -> str:
     """Say that a start does not choose between ways to assemble the mechanism, if it does not."""
     may_be_open = motion.is_folded or inputs.without_guess
-    if motion.status[0] != Status.CONVERGED or not may_be_open:
+    if not may_be_open or motion.status[0] != Status.CONVERGED:
         return ""
     return unchosen(inputs, motion.q[0].copy(), motion.is_folded)
 

@@ -120,7 +120,8 @@ def driver_ranges(solution: MotionTable, module: ModuleType, p: Array) -> tuple[
     """Return the range of every driver from the first position of a motion."""
     describe = vars(module).get(DRIVERS)
     q, t = np.ascontiguousarray(solution.q[0]), float(solution.t[0])
-    if describe is None or q.size > LARGEST_FREED or not np.isfinite(solution.q_ddot[0]).all():
+    is_square = len(module.EQUATIONS) == q.size <= LARGEST_FREED
+    if describe is None or not is_square or not np.isfinite(solution.q_ddot[0]).all():
         return ()
     with np.errstate(all="ignore"):
         equations = problem(module, p, q, t, q)
