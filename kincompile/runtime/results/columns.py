@@ -137,11 +137,13 @@ class MotionTable:
             When no column has this name; the message lists those that exist.
         """
         wanted = column_name(str(name))
-        for order in range(3):
-            stem = wanted.removesuffix(rate("", order))
-            if stem in self.names and rate(stem, order) == wanted:
+        stems = ((wanted.removesuffix(rate("", order)), order) for order in range(3))
+        known = [(stem, order) for stem, order in stems if rate(stem, order) == wanted]
+        for stem, order in known:
+            if stem in self.names:
                 return self._column(self.names.index(stem), order)
-            if wanted != name and rate(stem, order) == wanted and stem in self.joints.names:
+        for stem, order in known:  # what nobody asked for is compiled now, so it comes last
+            if wanted != name and stem in self.joints.names:
                 return self.joints.column(stem, order)
         near = suggestion(wanted, (column.name for column in self.columns())) or "."
         outputs = f", the outputs {listed(self.observed.names)}" if self.observed.names else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,14 +20,19 @@ if TYPE_CHECKING:
 def observed(module: ModuleType, motion: tuple[Array, Array, Array], t: Array, p: Any) -> Observed:
     """Evaluate the outputs of a module over a motion (..., N, n) with parameters p (..., k)."""
     names = getattr(module, "OUTPUTS", ())
-    shape = (*motion[0].shape[:-1], len(names))
-    results = np.full((3, *shape), np.nan)
+    units = {name: module.UNITS[name] for name in names}
+    sets = np.asarray(p, dtype=np.float64)
+    if sets.ndim > 1:
+        sets = sets[:, np.newaxis]
+    # Where second rates were found, so were position and velocity; nearly always that is all.
+    if names and math.isfinite(float(motion[2].sum())):
+        return Observed(names, units, *module.observe(*motion, t, sets))
+    results = np.full((3, *motion[0].shape[:-1], len(names)), np.nan)
     if names:
         found = np.isfinite(sum(part.sum(axis=-1) for part in motion))
         times = np.broadcast_to(t, found.shape)[found]
-        sets = np.asarray(p, dtype=np.float64)
         if sets.ndim > 1:
-            sets = np.broadcast_to(sets[:, np.newaxis], (*found.shape, sets.shape[-1]))[found]
+            sets = np.broadcast_to(sets, (*found.shape, sets.shape[-1]))[found]
         if times.size:
             results[:, found] = module.observe(*(part[found] for part in motion), times, sets)
-    return Observed(names, {name: module.UNITS[name] for name in names}, *results)
+    return Observed(names, units, *results)
