@@ -451,17 +451,20 @@ def _derivative(t: Array, values: Array) -> Array:
 
 def _output_table(outputs: tuple[OutputMeasures, ...]) -> list[str]:
     """Return the lines of the table of outputs."""
-    numbers = ("min", "at t", "max", "stroke", "dead points at", "time ratio", "mean", "rms")
-    rows = [
-        [
-            item.name, item.unit, _text(item.least), _text(item.t_least), _text(item.greatest),
-            _text(item.t_greatest), _text(item.stroke), _times(item.dead_points), _ratio(item),
-            _text(item.mean), _text(item.rms),
-        ]
-        for item in outputs
-    ]  # fmt: skip
-    header = ("output", "unit", "min", "at t", "max", "at t", *numbers[3:])
-    return table(header, rows, right=numbers) if rows else []
+    right = ("min", "at t", "max", "stroke", "dead points at", "time ratio", "mean", "rms")
+    header = ("output", "unit", "min", "at t", "max", "at t", *right[3:])
+    return table(header, [_output_row(item) for item in outputs], right=right) if outputs else []
+
+
+def _output_row(item: OutputMeasures) -> list[str]:
+    """Return the cells of an output, with zero for rounding errors."""
+    noise = STILL * max(abs(item.least), abs(item.greatest))
+    numbers = item.least, item.t_least, item.greatest, item.t_greatest, item.stroke, item.mean
+    *parts, mean = (_text(0.0 if abs(x) < noise else x) for x in numbers)
+    ratio = "not cyclic"
+    if item.period is not None:
+        ratio = "-" if item.time_ratio is None else _text(item.time_ratio)
+    return [item.name, item.unit, *parts, _times(item.dead_points), ratio, mean, _text(item.rms)]
 
 
 def _driver_table(drivers: tuple[DriverRange, ...]) -> list[str]:
@@ -472,12 +475,6 @@ def _driver_table(drivers: tuple[DriverRange, ...]) -> list[str]:
     ]
     header = ("driver", "unit", "at start", "goes down to", "goes up to")
     return table(header, rows, right=header[2:3]) if rows else []
-
-
-def _ratio(item: OutputMeasures) -> str:
-    if item.period is None:
-        return "not cyclic"
-    return "-" if item.time_ratio is None else _text(item.time_ratio)
 
 
 def _times(times: tuple[float, ...]) -> str:
