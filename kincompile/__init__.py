@@ -22,6 +22,7 @@ _HOME = {
     name: module for module, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.MULTILINE)
 }
 _CATALOGUE = "kincompile.model.catalogue"
+_MODULES = ("motion",)
 _WITHOUT_SYMPY = ("kincompile.runtime", "kincompile.errors")
 
 __version__ = "0.1.0"
@@ -42,7 +43,8 @@ def __getattr__(name: str) -> Any:
         import_module("kincompile.files.write_model")
         if "IPython" in sys.modules:
             import_module("kincompile.view.notebook")
-    value = globals()[name] = getattr(import_module(module), name)
+    found = import_module(f"{module}.{name}" if name in _MODULES else module)
+    value = globals()[name] = found if name in _MODULES else getattr(found, name)
     return value
 
 

@@ -12,6 +12,7 @@ from kincompile.compiler import inspect as inspect
 from kincompile.derivation.derivation import derivation as derivation
 from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
 from kincompile.errors import ContractError as ContractError
+from kincompile.errors import CornerWarning as CornerWarning
 from kincompile.errors import InputError as InputError
 from kincompile.errors import InternalError as InternalError
 from kincompile.errors import KincompileError as KincompileError
@@ -26,9 +27,11 @@ from kincompile.files.file_format import model_schema as model_schema
 from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis
 from kincompile.files.files import read_model as read_model
+from kincompile.model import motion as motion
 from kincompile.model.catalogue import *
 from kincompile.model.equation import Equation as Equation
 from kincompile.model.expressions import alpha as alpha
+from kincompile.model.expressions import deg as deg
 from kincompile.model.expressions import pi as pi
 from kincompile.model.expressions import t as t
 from kincompile.model.mechanism import Mechanism as Mechanism

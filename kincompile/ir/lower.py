@@ -23,11 +23,14 @@ from kincompile.ir.kernels import (
 )
 from kincompile.ir.program import Attribute, BodyFrame, Function, Input, Instance, Kernel, Program
 from kincompile.model.expressions import alpha, t
+from kincompile.model.laws import MotionTable
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.spline import PeriodicSpline, SplineTable
 from kincompile.names import rate
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
     from kincompile.model.expressions import Scalar
@@ -119,11 +122,12 @@ def _too_deep(constraint: Joint | FreeEquation) -> str:
 
 def _tables(constraint: Joint | FreeEquation) -> dict[str, SplineTable]:
     if isinstance(constraint, FreeEquation):
-        return {}
-    splines = (
-        item for profile in constraint.profiles.values() for item in profile.atoms(PeriodicSpline)
-    )
-    return {item.table_name: item.table for item in splines}
+        values: Iterable[Scalar] = constraint.expressions
+    else:
+        values = (*constraint.profiles.values(), *constraint.scalars.values())
+    written = (item for item in values if isinstance(item, sympy.Expr))
+    found = (table for item in written for table in item.atoms(PeriodicSpline, MotionTable))
+    return {item.table_name: item.table for item in sorted(found, key=str)}
 
 
 class _Binder:

@@ -232,6 +232,11 @@ class Program:
     unsolvable: str = ""
     outputs: tuple[str, ...] = ()
 
+    @property
+    def corners(self) -> bool:
+        """Whether drivers may have corners."""
+        return any(instance.constraint.corners for instance in self.instances)
+
     def names_of(self, kind: Rows | Columns) -> tuple[str, ...]:
         """Return the names of what the rows or columns of a quantity belong to."""
         names: dict[str, tuple[str, ...]] = {

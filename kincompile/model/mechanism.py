@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import sympy
 
@@ -17,7 +17,7 @@ from kincompile.model.text_views import TextViews
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from kincompile.model.expressions import Scalars
+    from kincompile.model.expressions import Scalar, Scalars
 
 Item = TypeVar("Item", bound=Constraint | Equation)
 
@@ -55,7 +55,7 @@ class Mechanism(MatrixViews, TextViews):
         self.parameters: list[Parameter] = []
         self.constraints: list[Constraint | Equation] = []
 
-    def parameter(self, name: str, default: float | None = None, unit: str = "") -> sympy.Symbol:
+    def parameter(self, name: str, default: Scalar | None = None, unit: str = "") -> sympy.Symbol:
         """Declare a parameter and return its symbol, to be used in attributes and drivers.
 
         Parameters
@@ -63,11 +63,12 @@ class Mechanism(MatrixViews, TextViews):
         name
             Name of the parameter.
         default
-            Its value where none is given at run time.
+            Its value where none is given at run time; an angle may be ``30*kc.deg``.
         unit
             Its unit, for documentation.
         """
-        self.parameters.append(Parameter(name, default, unit))
+        # `system` makes a number of it.
+        self.parameters.append(Parameter(name, cast("float", default), unit))
         return sympy.Symbol(str(name))
 
     def body(self, name: str, guess: Scalars = (0, 0, 0), outline: Sequence[Scalars] = ()) -> Body:

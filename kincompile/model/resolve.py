@@ -21,12 +21,16 @@ from kincompile.model.expressions import (
     alpha,
     as_expression,
     as_sympy,
+    degrees_problem,
     depends_on,
     evaluate,
+    in_radians,
     smoothness_problem,
     symbol_names,
+    t,
     unknown_problem,
 )
+from kincompile.model.laws import MotionLaw, MotionTable
 from kincompile.model.spline import PeriodicSpline, fit
 from kincompile.names import listed, suggestion
 
@@ -34,6 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from kincompile.calculus.template import Template
+    from kincompile.model.arguments import Argument
     from kincompile.model.constraint import Constraint
     from kincompile.model.equation import Equation
 
@@ -88,6 +93,11 @@ class Joint:
         return _text(self.written)
 
     @property
+    def corners(self) -> bool:
+        """Whether the slope of its value may jump."""
+        return self.written.corners
+
+    @property
     def is_driver(self) -> bool:
         """Whether its value is a function of time."""
         return depends_on(self.scalars.get("C", 0), ("t",))
@@ -102,6 +112,7 @@ class FreeEquation:
     columns: tuple[str, ...]
     equation_names: tuple[str, ...]
     source: str = "free equation"
+    corners: bool = False
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -163,21 +174,28 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
     before = len(scope.problems)
     if not equation.expressions:
         scope.problems.append(f"Equation {equation.name!r} has no expression; give at least one")
+    corners = _corners(equation.corners, f"Equation {equation.name!r}", scope)
     expressions = []
     for name, given in zip(equation.equation_names, equation.expressions, strict=True):
         where = f"equation {name!r}"
-        value = _expression(given, where, scope.declared, scope)
+        value = _expression(given, where, scope.declared, scope, corners=corners)
         if value is not None and not depends_on(value, scope.coordinate_names):
             scope.problems.append(
                 f"{where} contains no coordinate, so it cannot constrain anything; coordinates "
                 f"are: {listed(scope.coordinates)}"
             )
-        expressions.append(as_sympy(0 if value is None else value))
+        expressions.append(_named_tables(as_sympy(0 if value is None else value), name))
     if len(scope.problems) > before:
         return None
     occurring = set().union(*(symbol_names(expression) for expression in expressions))
     columns = tuple(sorted(occurring & scope.places.keys(), key=scope.places.__getitem__))
-    return FreeEquation(equation.name, tuple(expressions), columns, equation.equation_names)
+    return FreeEquation(
+        equation.name,
+        tuple(expressions),
+        columns,
+        equation.equation_names,
+        corners=corners,
+    )
 
 
 def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
@@ -188,17 +206,23 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
     title = _title(constraint)
+    corners = _corners(constraint.corners, title, scope)
     for name, item in constraint.arguments().items():
         given, where = getattr(constraint, name), f"{title}, {name}"
         if item.kind is Kind.BODY:
             bodies.append(_body(given, where, scope))
         elif item.kind in (Kind.POINT, Kind.AXIS):
-            points[item.symbol] = _point(given, item.kind, where, scope)
+            points[item.symbol] = _point(given, item, where, scope)
         elif item.kind is Kind.PROFILE:
             table_name = f"{item.symbol}_{constraint.name}"
             profiles[item.symbol] = _profile(given, table_name, where, scope)
         else:
-            scalars[item.symbol] = _scalar(given, item.kind, where, scope)
+            value = _scalar(given, item, where, scope, corners=corners)
+            scalars[item.symbol] = _named_tables(value, constraint.name)
+    if "C" not in scalars and corners:
+        scope.problems.append(
+            f"{title}: it drives nothing, so it has no corners; leave corners out"
+        )
     known = [body for body in bodies if body is not None]
     if len(known) == len(bodies):
         _check_bodies(constraint, known, scope)
@@ -218,6 +242,13 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
 
 def _title(constraint: Constraint) -> str:
     return f"{type(constraint).__name__} {constraint.name!r}"
+
+
+def _corners(given: Any, title: str, scope: Scope) -> bool:
+    """Return whether corners are allowed."""
+    if not isinstance(given, bool):
+        scope.problems.append(f"{title}, corners: {given!r} is neither True nor False")
+    return given is True
 
 
 def _body(given: Any, where: str, scope: Scope) -> Body | None:
@@ -249,8 +280,16 @@ def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> N
         )
 
 
-def _expression(given: Any, where: str, declared: Collection[str], scope: Scope) -> Scalar | None:
-    """Return a checked expression, or None where a problem was noted."""
+def _expression(
+    given: Any,
+    where: str,
+    declared: Collection[str],
+    scope: Scope,
+    *,
+    unit: str = "",
+    corners: bool = False,
+) -> Scalar | None:
+    """Return a checked expression, with radians for degrees; None where a problem was noted."""
     try:
         value = as_expression(given)
     except NotAnExpressionError as error:
@@ -258,7 +297,8 @@ def _expression(given: Any, where: str, declared: Collection[str], scope: Scope)
         return None
     if not isinstance(value, sympy.Expr):
         return value
-    problem = smoothness_problem(value)
+    problem = smoothness_problem(value, corners=corners) or degrees_problem(value, unit)
+    problem = problem or _falling_problem(value, scope)
     if problem is not None:
         scope.problems.append(f"{where}: {problem}")
         return None
@@ -266,12 +306,40 @@ def _expression(given: Any, where: str, declared: Collection[str], scope: Scope)
     if problem is not None:
         scope.problems.append(problem)
         return None
-    return value
+    return in_radians(value)
 
 
-def _attribute(given: Any, where: str, scope: Scope) -> Scalar:
+def _falling_problem(value: sympy.Expr, scope: Scope) -> str | None:
+    """Return a message about a motion law whose argument falls with time, or None."""
+    for law in sorted(value.atoms(MotionLaw), key=str):
+        slope = evaluate(law.args[0].diff(t), scope.defaults)
+        if slope is not None and slope <= 0 and law.args[0].has(t):
+            return (
+                f"the times of {law} must rise, but at the default parameters its argument changes "
+                f"by {slope:g} per unit of time"
+            )
+    return None
+
+
+def _named_tables(value: Any, name: str) -> Any:
+    """Return an expression whose tables over time are called after a constraint."""
+    if not isinstance(value, sympy.Expr) or not value.has(MotionTable):
+        return value
+    tables = sorted(value.atoms(MotionTable), key=lambda item: item.given)
+    numbers = {given: k for k, given in enumerate(dict.fromkeys(item.given for item in tables))}
+    stem = f"C_{name}".replace(".", "_")
+    named = {
+        item: item.called(f"{stem}_{numbers[item.given]}" if numbers[item.given] else stem)(
+            *item.args
+        )
+        for item in tables
+    }
+    return value.xreplace(named)
+
+
+def _attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar:
     """Return an attribute: a number or an expression of parameters."""
-    value = _expression(given, where, scope.declared, scope)
+    value = _expression(given, where, scope.declared, scope, unit=unit)
     if value is None:
         return 1
     if not isinstance(value, sympy.Expr):
@@ -286,16 +354,18 @@ def _attribute(given: Any, where: str, scope: Scope) -> Scalar:
     return value
 
 
-def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
+def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bool) -> Scalar:
+    kind, unit = item.kind, item.unit
     if kind in (Kind.SCALAR, Kind.RADIUS):
-        value = _attribute(given, where, scope)
+        value = _attribute(given, where, scope, unit)
         if kind is Kind.RADIUS and evaluate(value, scope.defaults) == 0:
             scope.problems.append(
                 f"{where}: the radius is zero; give the pitch radius "
                 "(negative for an internal gear)"
             )
         return value
-    value_or_none = _expression(given, where, scope.declared, scope)
+    declared = scope.declared
+    value_or_none = _expression(given, where, declared, scope, unit=unit, corners=corners)
     if value_or_none is None:
         return 1
     coordinates = sorted(symbol_names(value_or_none) & scope.coordinate_names)
@@ -316,7 +386,7 @@ def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
     return value_or_none
 
 
-def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
+def _point(given: Any, item: Argument, where: str, scope: Scope) -> Point:
     # A generator would be used up here, a set has no order.
     is_list = type(given) is tuple or (
         isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
@@ -328,8 +398,9 @@ def _point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
             f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame"
         )
         return 1, 1
-    point = _attribute(xi, where, scope), _attribute(eta, where, scope)
-    if kind is Kind.AXIS and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
+    point = _attribute(xi, where, scope, item.unit), _attribute(eta, where, scope, item.unit)
+    is_axis = item.kind is Kind.AXIS
+    if is_axis and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
         scope.problems.append(f"{where}: the axis has length zero; give a direction such as (1, 0)")
     return point
 
@@ -358,7 +429,7 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
             f"{where}: {given!r} is neither a radius rho(alpha) nor a table (angles, radii)"
         )
         return sympy.S.One
-    value = _expression(given, where, {*scope.parameters, alpha.name}, scope)
+    value = _expression(given, where, {*scope.parameters, alpha.name}, scope, unit="length")
     rho: sympy.Expr = as_sympy(1 if value is None else value)
     return rho
 

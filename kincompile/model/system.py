@@ -13,7 +13,12 @@ from kincompile.errors import ModelError
 from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter, body_columns
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.equation import Equation
-from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
+from kincompile.model.expressions import (
+    NotAnExpressionError,
+    as_expression,
+    degrees_problem,
+    evaluate,
+)
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
 from kincompile.model.text_views import TextViews
@@ -189,13 +194,18 @@ def _name_of(item: Any) -> str:
     return str(item.func.__name__) if isinstance(item, sympy.Function) else str(item)
 
 
-def _number(given: Any, where: str, values: dict[str, float], problems: list[str]) -> float:
-    """Return a finite number from a number or an expression of parameters."""
+def _number(
+    given: Any, where: str, values: dict[str, float], problems: list[str], unit: str = ""
+) -> float:
+    """Return a finite number, angles in radians, from a number or an expression of parameters."""
     try:
         number = evaluate(as_expression(given), values)
     except NotAnExpressionError as error:
         problems.append(f"{where}: {error}; give a finite number")
         return 0.0
+    problem = degrees_problem(given, unit)
+    if problem:
+        problems.append(f"{where}: {problem}")
     if number is None:
         problems.append(
             f"{where}: {given} is not a number at the default parameters; give a finite number"
@@ -226,7 +236,8 @@ def _parameters(
                 f"parameter({item.name!r}, 1.0)"
             )
         else:
-            default = _number(default, f"parameter {item.name!r}", {}, problems)
+            unit = str(item.unit)
+            default = _number(default, f"parameter {item.name!r}", {}, problems, unit)
         checked.append(Parameter(item.name, default, item.unit))
     return tuple(checked)
 
@@ -246,8 +257,10 @@ def _body_coordinates(
             problems.append(f"body {body.name!r}: the guess {body.guess!r} is not ({expected})")
             guess = kind.ground
         for name, value, own in zip(body.coordinates, guess, kind.units, strict=True):
-            number = _number(value, f"guess of {name}", values, problems)
-            found.append(Coordinate(name, number, unit if own is None else own))
+            where, own_unit = f"guess of {name}", unit if own is None else own
+            found.append(
+                Coordinate(name, _number(value, where, values, problems, own_unit), own_unit)
+            )
     return found
 
 

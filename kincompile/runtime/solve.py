@@ -24,6 +24,7 @@ from kincompile.errors import (
     SingularConfigurationWarning,
     SolveError,
 )
+from kincompile.runtime.corners import after_corners, corners_of, with_corners
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import Inputs, read_inputs
 from kincompile.runtime.march import Outcome, leaves_branch
@@ -112,6 +113,8 @@ def solve(
     -----
     BranchSwitchWarning
         When the motion went through a bifurcation, with the time.
+    CornerWarning
+        When a driver has a corner at one of the times, with the times.
     SingularConfigurationWarning
         When it converged at points so near to a singular configuration that their rates have lost
         digits, with the time. A motion that ends at one has a status and an event instead.
@@ -125,12 +128,15 @@ def solve(
     def solve_one(inputs: Inputs, progress: Progress | None = None) -> Solution:
         return _solve_one(inputs, on_grid, method is None, through == "smooth", progress)
 
+    t_given, corners = inputs.t, corners_of(inputs, sets)
+    inputs = after_corners(inputs, corners)
     if sets is None:
         solution = solve_one(inputs, progress)
     elif inputs.code.lanes is not None:
         solution = solve_variants(inputs, sets, progress)
     else:
         solution = solve_in_turn(inputs, sets, solve_one, progress)
+    solution = with_corners(solution, t_given, corners)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from kincompile.errors import InputError, package_of_extra
 from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     import xarray
     from numpy.typing import NDArray
@@ -157,6 +159,11 @@ class MotionTable:
         times = {"t": ("t", self.t, {"units": TIME_UNIT})}
         about = {"name": self.name, "message": self.message}
         return xarray.Dataset(variables, coords=times, attrs=about)
+
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """Where position and velocity were found, shape (N,): at corners of drivers too."""
+        return np.asarray((self.status == Status.CONVERGED) | (self.status == Status.CORNER))
 
     def require_one_motion(self, what: str, remedy: str) -> None:
         """Check that the motion is not one of variants.

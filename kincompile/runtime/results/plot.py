@@ -87,7 +87,7 @@ def _draw_panels(figure: Figure, solution: MotionTable, panels: Panels) -> Axes:
 def _draw_panel(ax: Axes, solution: MotionTable, columns: Sequence[Column]) -> None:
     """Draw columns into one plot, with units, events, and the times without a solution."""
     units = list(dict.fromkeys(column.unit for column in columns))
-    good = solution.status == 0
+    good = solution.good
     # A line needs two points; one that stands alone is drawn as a dot.
     marker = "" if solution.t.size > 1 else "o"
     for k, column in enumerate(columns):

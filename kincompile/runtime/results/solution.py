@@ -160,7 +160,7 @@ class Solution(MotionTable):
         """Return the outcome in a few words."""
         if self.success:
             return f"converged, largest residual {np.max(self.residual):.1e}"
-        good = np.count_nonzero(self.status == 0)
+        good = np.count_nonzero(self.good)
         return f"failed, {good} of {self.status.size} points converged; see .message"
 
 

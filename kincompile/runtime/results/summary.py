@@ -90,5 +90,5 @@ def _verdict(solution: Solution) -> str:
 
 def _largest_residual(solution: Solution) -> str:
     """Return the largest residual of the converged points; failures are in `.message`."""
-    found = solution.residual[solution.status == Status.CONVERGED]
+    found = solution.residual[solution.good]
     return f"{found.max():.1e}" if found.size else "-"
