@@ -99,7 +99,7 @@ def emit(
             raise UnsupportedError(
                 f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
             )
-        return emit_program(target, _lowered(system, target, form))
+        return emit_program(target, _lowered(system, form))
 
 
 @contextmanager
@@ -129,10 +129,8 @@ def _is_grouped(system: ConstraintSystem, form: str | None) -> bool:
     return form == "grouped" or (form is None and len(system.coordinates) > LARGEST_INLINE)
 
 
-def _lowered(
-    system: ConstraintSystem, target: str, form: str | None
-) -> InlineProgram | GroupedProgram:
-    """Return the program of a system in the form that a target is to print.
+def _lowered(system: ConstraintSystem, form: str | None) -> InlineProgram | GroupedProgram:
+    """Return the program of a system in the form that is to be printed.
 
     Where its equations cannot determine the coordinates, it knows why.
     """
@@ -143,7 +141,7 @@ def _lowered(
     if len(system.equations) <= n or n > LARGEST_REDUNDANT:
         problem = counting_problem(system, code.pattern())
         return replace(code, program=replace(code.program, unsolvable=problem))
-    return _with_redundancy(system, code, target)
+    return _with_redundancy(system, code)
 
 
 def _grouped(program: Program) -> GroupedProgram:
@@ -154,7 +152,7 @@ def _grouped(program: Program) -> GroupedProgram:
 
 
 def _with_redundancy(
-    system: ConstraintSystem, code: InlineProgram | GroupedProgram, target: str
+    system: ConstraintSystem, code: InlineProgram | GroupedProgram
 ) -> InlineProgram | GroupedProgram:
     """Return a program that knows which of its equations repeat others, and warn of them."""
     from kincompile.ir.redundancy import redundancy_warning, redundant_equations
@@ -163,11 +161,6 @@ def _with_redundancy(
     if problem:
         return replace(code, program=replace(code.program, unsolvable=problem))
     redundant = tuple(name for item in found for name in item.equations)
-    if not TARGETS[target].has_redundancy:
-        raise UnsupportedError(
-            f"the target {target!r} has no redundant equations, such as {listed(redundant)}; "
-            "use target='numpy', or replace their joint by one with fewer equations"
-        )
     text = redundancy_warning(system, found)
     warnings.warn(text, RedundantConstraintWarning, stacklevel=4)
     return replace(code, program=replace(code.program, redundant=redundant))
@@ -216,7 +209,7 @@ def compile(  # noqa: A001 - the public name kc.compile
         if target == "c" and _is_grouped(system, form):
             LOG.info("%s is in grouped form, which C does not have: it stays NumPy's", system.name)
             target = "numpy"
-        code = _lowered(system, target, form)
+        code = _lowered(system, form)
         # The NumPy module has the constants, the checks and the careful march of the compiled one.
         emitted = emit_program("numpy", code)
         module = from_source(emitted.source, system.name, emitted.arrays)

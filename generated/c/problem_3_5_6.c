@@ -10,7 +10,7 @@
 // 2    Equation "equation_3" (driver)    free equation
 //
 // C99, no library but libm, no memory from the heap. The code of the mechanism is in the functions
-// whose names end in _at. They work on one point of a block of points, in which the points are the
+// whose names end in _at. They work on one point of a strip of points, in which the points are the
 // last axis, so that the compiler can take several at once:
 //
 //     cc -std=c99 -O3 -march=native -fno-math-errno -fno-trapping-math -c problem_3_5_6.c
@@ -29,7 +29,7 @@ enum {
     M = 3,  // equations
     K = 0,  // parameters
     NONZEROS = 6,  // of Phi_q
-    LANES = 32,  // points in a block
+    LANES = 32,  // points in a strip
     FAR = (4 << 20) / 8 / (15),  // points whose results leave little of a cache
     FACTORS = 5,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 1,  // blocks of the planned solve
@@ -60,7 +60,7 @@ static const int nu_computed[] = { 2 };
 static const constant gamma_constant[] = { {0, 0.0} };
 static const int gamma_computed[] = { 0, 1, 2 };
 
-// A block of points: the last axis is the point.
+// A strip of points: the last axis is the point.
 typedef struct {
     double t[LANES];
     double p[K > 0 ? K : 1][LANES];
@@ -70,7 +70,7 @@ typedef struct {
     double Phi_q[6][LANES];
     double nu[3][LANES];
     double gamma[3][LANES];
-} block;
+} strip;
 
 #ifdef __GNUC__
 #define INLINE static inline __attribute__((always_inline, unused))
@@ -139,7 +139,7 @@ INLINE double sine(double angle, int exact, int64_t *far)
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-INLINE int64_t position_at(block *at, size_t lane, int exact)
+INLINE int64_t position_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double x2 = at->q[0][lane];
@@ -165,7 +165,7 @@ INLINE int64_t position_at(block *at, size_t lane, int exact)
     return far;
 }
 
-static void position_of_block(block *at, size_t count)
+static void position_of_strip(strip *at, size_t count)
 {
     int64_t far = 0;
     for (size_t lane = 0; lane < count; lane++)
@@ -175,7 +175,7 @@ static void position_of_block(block *at, size_t count)
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
-INLINE void nu_at(block *at, size_t lane)
+INLINE void nu_at(strip *at, size_t lane)
 {
     const double t = at->t[lane];
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
@@ -186,14 +186,14 @@ INLINE void nu_at(block *at, size_t lane)
     at->nu[2][lane] = (t / 10.0 + 2.0 / 5.0) / 5.0;
 }
 
-static void nu_of_block(block *at, size_t count)
+static void nu_of_strip(strip *at, size_t count)
 {
     for (size_t lane = 0; lane < count; lane++)
         nu_at(at, lane);
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-INLINE int64_t gamma_at(block *at, size_t lane, int exact)
+INLINE int64_t gamma_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double phi3 = at->q[2][lane];
@@ -211,7 +211,7 @@ INLINE int64_t gamma_at(block *at, size_t lane, int exact)
     return far;
 }
 
-static void gamma_of_block(block *at, size_t count)
+static void gamma_of_strip(strip *at, size_t count)
 {
     int64_t far = 0;
     for (size_t lane = 0; lane < count; lane++)
@@ -221,7 +221,7 @@ static void gamma_of_block(block *at, size_t count)
 }
 
 // Phi, Phi_q, nu and gamma in one go.
-INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
+INLINE int64_t kinematics_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double x2 = at->q[0][lane];
@@ -267,7 +267,7 @@ INLINE int64_t kinematics_at(block *at, size_t lane, int exact)
     return far;
 }
 
-static void kinematics_of_block(block *at, size_t count)
+static void kinematics_of_strip(strip *at, size_t count)
 {
     int64_t far = 0;
     for (size_t lane = 0; lane < count; lane++)
@@ -279,7 +279,7 @@ static void kinematics_of_block(block *at, size_t count)
 // What a solve needs of Phi_q, and the determinants of its blocks.
 // eliminated: x2 by equation_1, y2 by equation_2
 // block: phi3 by equation_3
-INLINE void factor_at(block *at, size_t lane)
+INLINE void factor_at(strip *at, size_t lane)
 {
     const double equation_1_phi3 = at->Phi_q[1][lane];
     const double equation_2_phi3 = at->Phi_q[3][lane];
@@ -296,7 +296,7 @@ INLINE void factor_at(block *at, size_t lane)
     at->determinants[0][lane] = determinant;
 }
 
-static void factor_of_block(block *at, size_t count)
+static void factor_of_strip(strip *at, size_t count)
 {
     for (size_t lane = 0; lane < count; lane++)
         factor_at(at, lane);
@@ -323,7 +323,7 @@ INLINE void solve_at(const double (*restrict F)[LANES],
     to[2][lane] = phi3;
 }
 
-static void solve_of_block(const block *at, double (*right)[LANES], double (*to)[LANES],
+static void solve_of_strip(const strip *at, double (*right)[LANES], double (*to)[LANES],
     size_t count)
 {
     for (size_t lane = 0; lane < count; lane++)
@@ -394,7 +394,7 @@ static void store_rows(problem_3_5_6_output to, double (*rows)[LANES], const int
         }
 }
 
-// A quantity: where its entries are in a block and its results in a batch, its size, which entries
+// A quantity: where its entries are in a strip and its results in a batch, its size, which entries
 // never change, and which are computed. A vector has no columns, and a matrix a place in `matrices`.
 typedef struct {
     size_t rows, result, nonzeros;
@@ -405,22 +405,22 @@ typedef struct {
 } quantity;
 
 static const quantity QUANTITY[] = {
-    {offsetof(block, Phi), offsetof(problem_3_5_6_batch, Phi),
+    {offsetof(strip, Phi), offsetof(problem_3_5_6_batch, Phi),
         0, 3, 0, 0,
         3, 0, 3,
         NULL,
         Phi_constant, Phi_computed, NULL},
-    {offsetof(block, Phi_q), offsetof(problem_3_5_6_batch, Phi_q),
+    {offsetof(strip, Phi_q), offsetof(problem_3_5_6_batch, Phi_q),
         offsetof(problem_3_5_6_batch, nonzeros), 3, 3, 0,
         6, 2, 4,
         problem_3_5_6_pattern,
         Phi_q_constant, Phi_q_computed, Phi_q_place},
-    {offsetof(block, nu), offsetof(problem_3_5_6_batch, nu),
+    {offsetof(strip, nu), offsetof(problem_3_5_6_batch, nu),
         0, 3, 0, 9,
         3, 2, 1,
         NULL,
         nu_constant, nu_computed, NULL},
-    {offsetof(block, gamma), offsetof(problem_3_5_6_batch, gamma),
+    {offsetof(strip, gamma), offsetof(problem_3_5_6_batch, gamma),
         0, 3, 0, 9,
         3, 0, 3,
         NULL,
@@ -431,17 +431,17 @@ enum { QUANTITIES = 4, MATRICES = 9 };
 // The kernels, the quantities that each gives, as bits, and the quantities that depend on rates.
 static const struct {
     unsigned gives;
-    void (*run)(block *, size_t);
+    void (*run)(strip *, size_t);
 } KERNEL[] = {
-    {3, position_of_block},
-    {4, nu_of_block},
-    {8, gamma_of_block},
-    {15, kinematics_of_block},
+    {3, position_of_strip},
+    {4, nu_of_strip},
+    {8, gamma_of_strip},
+    {15, kinematics_of_strip},
 };
 enum { KERNELS = 4, MOVING = 8 };
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
-static void run_kernels(unsigned wanted, block *b, size_t count)
+static void run_kernels(unsigned wanted, strip *b, size_t count)
 {
     for (int k = 0; k < KERNELS; k++)
         if ((wanted & ~KERNEL[k].gives) == 0) {
@@ -474,8 +474,8 @@ INLINE void write_matrices(problem_3_5_6_output to, const quantity *q, double (*
     }
 }
 
-// The entries of a quantity in a block, and the outputs of a batch.
-INLINE double (*rows_of(block *b, const quantity *q))[LANES]
+// The entries of a quantity in a strip, and the outputs of a batch.
+INLINE double (*rows_of(strip *b, const quantity *q))[LANES]
 {
     return (double (*)[LANES])((char *)b + q->rows);
 }
@@ -485,8 +485,8 @@ INLINE problem_3_5_6_output output_of(const problem_3_5_6_batch *batch, size_t o
     return *(const problem_3_5_6_output *)((const char *)batch + offset);
 }
 
-// Put the entries of matrices that never change in place: in a block, and in whole matrices.
-static void place_constants(block *b, double *matrices, size_t count)
+// Put the entries of matrices that never change in place: in a strip, and in whole matrices.
+static void place_constants(strip *b, double *matrices, size_t count)
 {
     memset(matrices, 0, MATRICES * sizeof *matrices);
     for (const quantity *q = QUANTITY; q < QUANTITY + QUANTITIES; q++)
@@ -499,9 +499,9 @@ static void place_constants(block *b, double *matrices, size_t count)
         }
 }
 
-// Write a quantity of a block of points: as vectors or nonzeros, and as whole matrices. It is called
+// Write a quantity of a strip of points: as vectors or nonzeros, and as whole matrices. It is called
 // once a quantity, so that a compiler knows the sizes.
-INLINE void write_quantity(const problem_3_5_6_batch *batch, const quantity *q, block *b,
+INLINE void write_quantity(const problem_3_5_6_batch *batch, const quantity *q, strip *b,
     double *matrices, size_t start, size_t count, int is_far)
 {
     const problem_3_5_6_output whole = output_of(batch, q->result);
@@ -514,7 +514,7 @@ INLINE void write_quantity(const problem_3_5_6_batch *batch, const quantity *q, 
 
 int problem_3_5_6_evaluate(const problem_3_5_6_batch *batch)
 {
-    block b;
+    strip b;
     double matrices[MATRICES], check[LANES] = { 0 };
     unsigned wanted = 0;
     for (int k = 0; k < QUANTITIES; k++)
@@ -564,27 +564,27 @@ int problem_3_5_6_evaluate(const problem_3_5_6_batch *batch)
 
 void problem_3_5_6_solve(const problem_3_5_6_system *system)
 {
-    block b;
+    strip b;
     double matrices[MATRICES], right[M][LANES], x[N][LANES], check[LANES] = { 0 };
     place_constants(&b, matrices, LANES);
     for (size_t start = 0; start < system->count; start += LANES) {
         const size_t rest = system->count - start, count = rest < LANES ? rest : LANES;
         read_rows(b.Phi_q, NONZEROS, system->nonzeros, start, count, check);
         read_rows(right, M, system->b, start, count, check);
-        factor_of_block(&b, count);
-        solve_of_block(&b, right, x, count);
+        factor_of_strip(&b, count);
+        solve_of_strip(&b, right, x, count);
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
 
-// By what the numbers of a motion are judged; each point of a block has its own.
+// By what the numbers of a motion are judged; each point of a strip has its own.
 typedef struct {
     double reference[N][LANES];  // scale of each coordinate: 1 rad, or the size of the mechanism
     double magnitude[M][LANES];  // what the terms of each equation contribute at a generic position
     double tolerance;
 } scales;
 
-// What became of the points of a block; those that are over are not looked at any more.
+// What became of the points of a strip; those that are over are not looked at any more.
 typedef struct {
     int status[LANES], iterations[LANES], is_over[LANES];
     double residual[LANES], sensitivity[LANES];
@@ -617,8 +617,8 @@ enum { MAX_CORRECTIONS = 6 };
 static const double SMALLEST_PART = 9.5367431640625e-07;
 enum { MAX_SUBSTEPS = 10000 };
 
-// Measure the mechanism by a guess and the positions in a block, which stay as they are.
-static void measure(block *b, const double *guess, size_t count, scales *s)
+// Measure the mechanism by a guess and the positions in a strip, which stay as they are.
+static void measure(strip *b, const double *guess, size_t count, scales *s)
 {
     double q[N][LANES], size[LANES] = { 0 };
     memcpy(q, b->q, sizeof q);
@@ -630,7 +630,7 @@ static void measure(block *b, const double *guess, size_t count, scales *s)
             s->reference[i][k] = ANGULAR[i] || size[k] <= 1e-12 ? 1 : size[k];
             b->q[i][k] += s->reference[i][k] * PROBE[i];
         }
-    position_of_block(b, count);
+    position_of_strip(b, count);
     memset(s->magnitude, 0, sizeof s->magnitude);
     for (int e = 0; e < NONZEROS; e++) {
         const int *place = problem_3_5_6_pattern[e];
@@ -642,7 +642,7 @@ static void measure(block *b, const double *guess, size_t count, scales *s)
 
 // Apply corrections until they are small, in scales of the coordinates; a point whose corrections
 // are stays where it is. Returns how many points are left that did not get there.
-static int correct(block *b, const scales *s, size_t count, int max_iterations, outcome *o)
+static int correct(strip *b, const scales *s, size_t count, int max_iterations, outcome *o)
 {
     double change[N][LANES], going[LANES], iterations[LANES];
     int left = 1;
@@ -652,9 +652,9 @@ static int correct(block *b, const scales *s, size_t count, int max_iterations, 
     }
     for (int iteration = 0; left && iteration < max_iterations; iteration++) {
         double larger[LANES] = { 0 };
-        position_of_block(b, count);
-        factor_of_block(b, count);
-        solve_of_block(b, b->Phi, change, count);
+        position_of_strip(b, count);
+        factor_of_strip(b, count);
+        solve_of_strip(b, b->Phi, change, count);
         for (int i = 0; i < N; i++)
             for (size_t k = 0; k < count; k++) {
                 b->q[i][k] -= going[k] != 0 ? change[i][k] : 0;
@@ -677,12 +677,12 @@ static int correct(block *b, const scales *s, size_t count, int max_iterations, 
 }
 
 // Check that the equations hold and that Phi_q is regular, and solve for velocity and acceleration.
-static void complete(block *b, const scales *s, size_t count, outcome *o)
+static void complete(strip *b, const scales *s, size_t count, outcome *o)
 {
     double right[M][LANES], answer[N][LANES];
     double excess[LANES] = { 0 }, total[LANES] = { 0 };
-    position_of_block(b, count);
-    factor_of_block(b, count);
+    position_of_strip(b, count);
+    factor_of_strip(b, count);
     memset(o->residual, 0, sizeof o->residual);
     memset(o->sensitivity, 0, sizeof o->sensitivity);
     for (int i = 0; i < M; i++) {
@@ -695,11 +695,11 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
             right[i][k] = s->magnitude[i][k] * PROBE[i];
         }
     }
-    solve_of_block(b, right, answer, count);
-    nu_of_block(b, count);
-    solve_of_block(b, b->nu, b->q_dot, count);
-    gamma_of_block(b, count);
-    solve_of_block(b, b->gamma, b->q_ddot, count);
+    solve_of_strip(b, right, answer, count);
+    nu_of_strip(b, count);
+    solve_of_strip(b, b->nu, b->q_dot, count);
+    gamma_of_strip(b, count);
+    solve_of_strip(b, b->gamma, b->q_ddot, count);
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
             const double size = fabs(answer[i][k]) / s->reference[i][k];
@@ -719,31 +719,31 @@ static void complete(block *b, const scales *s, size_t count, outcome *o)
     }
 }
 
-// A good point of a motion: its numbers in the rows of a block from t to determinants.
-enum { ROWS = offsetof(block, F) / sizeof(double[LANES]) };
+// A good point of a motion: its numbers in the rows of a strip from t to determinants.
+enum { ROWS = offsetof(strip, F) / sizeof(double[LANES]) };
 typedef union {
     double t, row[ROWS];
 } state;
 
-static void take_up(state *at, const block *b, size_t k)
+static void take_up(state *at, const strip *b, size_t k)
 {
     for (int i = 0; i < ROWS; i++)
         at->row[i] = ((const double *)b)[i * LANES + (int)k];
 }
 
-// Put lanes of a block at a good point.
-static void put_at(block *b, const state *at, size_t first, size_t end)
+// Put lanes of a strip at a good point.
+static void put_at(strip *b, const state *at, size_t first, size_t end)
 {
     for (int i = 0; i < ROWS; i++)
         for (size_t k = first; k < end; k++)
             ((double *)b)[(size_t)i * LANES + k] = at->row[i];
 }
 
-// Take the points of a block from where they are to other times. Those that end too far from the
+// Take the points of a strip from where they are to other times. Those that end too far from the
 // prediction q + h q_dot + h^2 q_ddot / 2 have not converged. Where the determinant of a block has
 // changed its sign, a singular configuration lies between; near one, the velocity must be where it
 // was predicted too, compared with the position's error.
-static void step(block *b, const scales *s, const double *t, size_t count, outcome *o)
+static void step(strip *b, const scales *s, const double *t, size_t count, outcome *o)
 {
     double q[N][LANES], q_dot[N][LANES], determinants[BLOCKS > 0 ? BLOCKS : 1][LANES];
     double h[LANES], error[LANES] = { 0 }, kink[LANES] = { 0 }, crossed[LANES] = { 0 };
@@ -780,13 +780,13 @@ static void step(block *b, const scales *s, const double *t, size_t count, outco
             o->status[k] = PROBLEM_3_5_6_SINGULAR;
 }
 
-// Take one point of a block from a good point to a time, in sub-steps that are halved where they
+// Take one point of a strip from a good point to a time, in sub-steps that are halved where they
 // fail and doubled where they do not.
-static void advance(block *b, const scales *s, state *at, double t, size_t k, outcome *o)
+static void advance(strip *b, const scales *s, state *at, double t, size_t k, outcome *o)
 {
     const double smallest = fabs(t - at->t) * SMALLEST_PART;
     double h = 0.5 * (t - at->t), matrices[MATRICES];
-    block alone;
+    strip alone;
     scales own;
     outcome found;
     place_constants(&alone, matrices, 1);
@@ -818,8 +818,8 @@ static void advance(block *b, const scales *s, state *at, double t, size_t k, ou
     put_at(b, at, k, k + 1);
 }
 
-// Write the points of a block at one time; variants that are over have no numbers.
-static void record(const problem_3_5_6_variants *all, block *b, const outcome *o, size_t time,
+// Write the points of a strip at one time; variants that are over have no numbers.
+static void record(const problem_3_5_6_variants *all, strip *b, const outcome *o, size_t time,
     size_t first, size_t count)
 {
     const problem_3_5_6_output to[3] = { all->q, all->q_dot, all->q_ddot };
@@ -841,7 +841,7 @@ static void record(const problem_3_5_6_variants *all, block *b, const outcome *o
 }
 
 // Assemble variants from the guess, at the first time.
-static void assemble(const problem_3_5_6_variants *all, block *b, scales *s, size_t first,
+static void assemble(const problem_3_5_6_variants *all, strip *b, scales *s, size_t first,
     size_t count, outcome *o)
 {
     double matrices[MATRICES], check[LANES] = { 0 };
@@ -863,14 +863,14 @@ static void assemble(const problem_3_5_6_variants *all, block *b, scales *s, siz
 
 size_t problem_3_5_6_march(const problem_3_5_6_motion *motion)
 {
-    // The lanes of a block are times of the motion, as if each were a variant at its own.
+    // The lanes of a strip are times of the motion, as if each were a variant at its own.
     const problem_3_5_6_variants all = {
         .t = motion->t, .p = { motion->p, 1, 0 }, .guess = motion->guess,
         .tolerance = motion->tolerance, .max_iterations = motion->max_iterations,
         .q = motion->q, .q_dot = motion->q_dot, .q_ddot = motion->q_ddot,
         .residual = motion->residual, .status = motion->status, .iterations = motion->iterations,
     };
-    block b;
+    strip b;
     scales s;
     outcome o;
     state at;
@@ -910,7 +910,7 @@ size_t problem_3_5_6_march(const problem_3_5_6_motion *motion)
 }
 
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
-static void put_to_rest(const problem_3_5_6_variants *all, block *b, outcome *o, size_t count)
+static void put_to_rest(const problem_3_5_6_variants *all, strip *b, outcome *o, size_t count)
 {
     for (size_t k = 0; k < count; k++) {
         if (o->is_over[k])
@@ -927,7 +927,7 @@ static void put_to_rest(const problem_3_5_6_variants *all, block *b, outcome *o,
 
 size_t problem_3_5_6_march_variants(const problem_3_5_6_variants *all)
 {
-    block b;
+    strip b;
     scales s;
     outcome o;
     state from[LANES];

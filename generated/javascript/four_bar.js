@@ -22,7 +22,7 @@ const four_bar = (() => {
 
     const NAME = "four_bar";
     const FORMAT = 2;
-    const FINGERPRINT = "cc0bd5779c29cb6873cf0b0a081eaf91";
+    const FINGERPRINT = "026fefbfb06f3b341fb7723f8ec67fcb";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

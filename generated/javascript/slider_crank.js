@@ -22,7 +22,7 @@ const slider_crank = (() => {
 
     const NAME = "slider_crank";
     const FORMAT = 2;
-    const FINGERPRINT = "a527bb03116fe32da0a1d1f9e0aaa06b";
+    const FINGERPRINT = "367a7ab757cf5203ac73fe4edd6c86ae";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;
     const COORDINATES = [

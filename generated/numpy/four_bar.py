@@ -29,7 +29,7 @@ import numpy as np
 
 NAME = "four_bar"
 FORMAT = 2
-FINGERPRINT = "cc0bd5779c29cb6873cf0b0a081eaf91"
+FINGERPRINT = "026fefbfb06f3b341fb7723f8ec67fcb"
 N_COORDINATES, N_EQUATIONS = 9, 9
 COORDINATES = (
     "x_crank", "y_crank", "phi_crank", "x_coupler", "y_coupler", "phi_coupler", "x_rocker",
@@ -375,7 +375,7 @@ _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _
 _PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
 _STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
-_PARAMETER_LIST, _BLOCK = DEFAULTS.tolist(), 4000  # points at a time: they stay in the cache
+_PARAMETER_LIST, _STRIP = DEFAULTS.tolist(), 4000  # points at a time: they stay in the cache
 _empty = np.empty  # the loader's function in its place uses the memory of earlier results again
 DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = False
 
@@ -402,12 +402,12 @@ def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
     """Return quantities as arrays (size, N), in memory point by point or with the batch last."""
     count, dtype = states[0].shape[1], np.result_type(*states, t, p)
     results = [item.empty(count, dtype, is_last) for item in quantities]
-    for start in range(0, count, _BLOCK):
-        block = ..., slice(start, start + _BLOCK)
-        at, parameters = t[block] if t.ndim else t, p[block] if p.ndim > 1 else p
+    for start in range(0, count, _STRIP):
+        strip = ..., slice(start, start + _STRIP)
+        at, parameters = t[strip] if t.ndim else t, p[strip] if p.ndim > 1 else p
         with np.errstate(all="ignore"):
-            found = iter(kernel(ARRAYS, *(part[block] for part in states), at, parameters)[skip:])
-            for item, part in zip(quantities, [result[block] for result in results]):
+            found = iter(kernel(ARRAYS, *(part[strip] for part in states), at, parameters)[skip:])
+            for item, part in zip(quantities, [result[strip] for result in results]):
                 for place, value in zip(item.places, found):
                     part[place] = value
     return tuple(results)

@@ -21,7 +21,7 @@ from kincompile.calculus.expressions import (
     Pi,
     Power,
     Product,
-    Profile,
+    ProfileFunction,
     Rotated,
     Scalar,
     Scaled,
@@ -57,7 +57,7 @@ class Environment(Protocol):
     def time_function(self, function: TimeFunction) -> Value:
         """Return C(t) or one of its derivatives."""
 
-    def profile(self, profile: Profile) -> Value:
+    def profile(self, profile: ProfileFunction) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
 
     def entries(self, rotation: Rotation, expand: Expansion) -> Components:
@@ -113,7 +113,7 @@ class Expansion:
                 return environment.symbol(expression)
             case TimeFunction():
                 return environment.time_function(expression)
-            case Profile():
+            case ProfileFunction():
                 return environment.profile(expression)
             case Sum(terms):
                 return self._total([self.scalar(term) for term in terms])

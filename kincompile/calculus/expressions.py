@@ -105,7 +105,7 @@ class TimeFunction(Scalar):
 
 
 @dataclass(frozen=True, slots=True)
-class Profile(Scalar):
+class ProfileFunction(Scalar):
     """The polar radius rho(alpha) of a cam, or its derivative of the given order."""
 
     name: str

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from kincompile.calculus.expressions import (
     Basis,
-    Profile,
+    ProfileFunction,
     Scalar,
     Symbol,
     TimeFunction,
@@ -92,9 +92,9 @@ class Contact:
         """What turns e_x into the direction of the contact."""
         return PlaneRotation(self.alpha)
 
-    def rho(self, order: int = 0) -> Profile:
+    def rho(self, order: int = 0) -> ProfileFunction:
         """Return the polar radius, or its derivative of the given order."""
-        return Profile(f"rho_{self.index}", self.alpha, order)
+        return ProfileFunction(f"rho_{self.index}", self.alpha, order)
 
     @property
     def a(self) -> Vector:

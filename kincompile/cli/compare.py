@@ -19,6 +19,7 @@ from kincompile.writing import write_atomically
 @click.argument("hand")
 @click.option("--constraint", metavar="NAME", help="Check this constraint alone.")
 @click.option("--reveal", is_flag=True, help="Show the right formulas.")
+@click.option("--strict", is_flag=True, help="Accept no convention: equal everywhere, or wrong.")
 @output_option("Write the report: .html, .json or .txt.", required=False)
 @click.option("--gradescope", metavar="FILE", help="Write a results.json for Gradescope.")
 @click.pass_context
@@ -28,6 +29,7 @@ def command(
     hand: str,
     constraint: str | None,
     reveal: bool,
+    strict: bool,
     output: str | None,
     gradescope: str | None,
 ) -> None:
@@ -35,8 +37,8 @@ def command(
 
     HAND is a TOML or JSON file, or lines such as "Phi_q = [[1, 0, cos(phi)], ...]", with any of
     Phi, Phi_q, nu and gamma. Its formulas are parsed, never run. The exit code is 0 where all
-    entries are equal, up to a convention that is named or on the constraint manifold; 1 where one
-    is different.
+    entries are accepted: equal, equal up to a convention that is named, or, in nu and gamma, equal
+    on the constraint manifold; 1 where one is not.
     """
     writers = {".html": "to_html", ".json": "to_json", ".txt": "to_text"}
     if output is not None and Path(output).suffix not in writers:
@@ -44,7 +46,7 @@ def command(
     for path in filter(None, (output, gradescope)):
         require_output(path, model, "the model itself")
         require_output(path, hand, "the file to compare")
-    report = kc.compare_file(read_model(model), hand, constraint=constraint)
+    report = kc.compare_file(read_model(model), hand, constraint=constraint, strict=strict)
     if output is not None:
         write_atomically(output, getattr(report, writers[Path(output).suffix])(reveal))
     if gradescope is not None:

@@ -18,17 +18,27 @@ if TYPE_CHECKING:
 OF_TERMS = 1e-9
 OF_ROW = 1e-12
 ABSOLUTE = 1e-13
+ON_MANIFOLD = 1e-8
+"""Relative; the states on the manifold are themselves accurate to 1e-12 only."""
+
+
+def finite(array: Array) -> Array:
+    """Return an array with zeros for what is not finite."""
+    return np.asarray(np.where(np.isfinite(array), array, 0.0))
 
 
 def tolerance(written: Array, sizes: Array, generated: Array) -> Array:
-    """Return the difference that is rounding, entry by entry; arrays are (N, rows, columns)."""
-    terms = np.nan_to_num(sizes, nan=0.0, posinf=0.0) + np.abs(np.nan_to_num(generated))
-    largest = np.max(np.abs(np.nan_to_num(written)) + terms, axis=-1, keepdims=True, initial=0.0)
+    """Return the difference that is rounding, entry by entry; arrays are (N, rows, columns).
+
+    What is not finite does not enter it: next to infinity every number would be rounding.
+    """
+    terms = finite(sizes) + np.abs(finite(generated))
+    largest = np.max(np.abs(finite(written)) + terms, axis=-1, keepdims=True, initial=0.0)
     return np.asarray(OF_TERMS * terms + OF_ROW * largest + ABSOLUTE)
 
 
 def agrees(written: Array, sizes: Array, generated: Array) -> Array:
-    """Return for every state and entry whether the two are equal; NaN is equal to nothing."""
+    """Return for every state and entry whether the two are equal; only finite numbers are."""
     with np.errstate(invalid="ignore"):
         return np.asarray(np.abs(written - generated) <= tolerance(written, sizes, generated))
 
@@ -96,7 +106,7 @@ def _ratios(written: Array, generated: Array, group: Array) -> list[Array]:
     if np.min(np.bincount(group)[group]) < 2:
         return found  # one state says nothing about a factor: any two numbers have one
     for w, g in zip(written.T, generated.T, strict=True):
-        if np.all(np.abs(g) > ABSOLUTE) and np.all(np.abs(w) > ABSOLUTE):
+        if np.all((np.abs(g) > ABSOLUTE) & (np.abs(w) > ABSOLUTE) & np.isfinite(w)):
             ratio = w / g
             first = np.array([ratio[np.argmax(group == k)] for k in group])
             if np.all(np.abs(ratio - first) <= OF_TERMS * np.abs(first)):

@@ -20,11 +20,12 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from kincompile.compare.agreement import agrees
+from kincompile.compare.agreement import ABSOLUTE, ON_MANIFOLD, agrees
 from kincompile.compare.comparison import ComparedEntry, Diagnosis, Difference, Verdict
-from kincompile.compare.conventions import conventions_found
+from kincompile.compare.conventions import OPPOSITE, conventions_found, stated_signs
 from kincompile.compare.dependence import Dependence
 from kincompile.compare.diagnosis import Diagnostician
+from kincompile.compare.fault import REVERSED, WHOLE_SIGN, WITH_RATES
 from kincompile.compare.hand_file import read_hand_file
 from kincompile.compare.layouts import expected_widths, usual_layout
 from kincompile.compare.matching import Matcher, Matching, Subject
@@ -50,9 +51,6 @@ if TYPE_CHECKING:
 
 UNEXPLAINED = "not in the catalogue"
 
-ON_MANIFOLD = 1e-8
-"""Relative; the states on the manifold are themselves accurate to 1e-12 only."""
-
 Spot = tuple[str, int, int]
 """A quantity, and row and column of one of its entries as written."""
 
@@ -66,7 +64,9 @@ def compare(
     *,
     constraint: str | None = None,
     aliases: Mapping[str, object] | None = None,
+    conventions: Mapping[str, str] | None = None,
     states: Mapping[str, ArrayLike] | None = None,
+    strict: bool = False,
 ) -> Report:
     r"""Compare hand-derived Phi, Phi_q, nu and gamma with the generated ones.
 
@@ -87,9 +87,15 @@ def compare(
         system, or of the constraint's bodies, i before j.
     aliases
         Names of the author's own, each with its expression, for instance ``{"w": "phi3_dot"}``.
+    conventions
+        What the author says that nu and gamma are: ``{"nu": "Phi_t"}`` and ``{"gamma": "left
+        side"}`` have the opposite sign, which is a mistake where it is not stated.
     states
         States at which the values of arrays belong: ``q`` (N, n), and where they matter ``q_dot``
         (N, n), ``t`` (N,), ``p`` (N, k). Random states where None.
+    strict
+        Whether an entry must be equal to the generated one to be accepted, without a convention
+        and at states off the constraint manifold too.
 
     Returns
     -------
@@ -116,7 +122,8 @@ def compare(
         at = reference.random
     else:
         at = reference.random.with_default_parameters(reference.defaults)
-    return _Comparer(Subject(reference, block, at), written).report()
+    signs = stated_signs(conventions or {})
+    return _Comparer(Subject(reference, block, at), written, signs, strict).report()
 
 
 def compare_file(
@@ -124,6 +131,7 @@ def compare_file(
     path: str | os.PathLike[str],
     *,
     constraint: str | None = None,
+    strict: bool = False,
 ) -> Report:
     """Compare a hand file with the generated formulas.
 
@@ -135,6 +143,8 @@ def compare_file(
         The hand file: TOML, JSON or lines ``Name = [[...]]``; see `read_hand_file`.
     constraint
         Name of the one constraint that is checked alone; the file's own where None.
+    strict
+        As for `compare`.
 
     Returns
     -------
@@ -152,9 +162,10 @@ def compare_file(
     block = None if constraint is None else reference.block(constraint)
     try:
         written = _read(reference, block, file.quantities, file.aliases)
+        signs = stated_signs(file.conventions)
     except InputError as error:
         raise InputError([f"{file.name}, {problem}" for problem in error.problems]) from error
-    return _Comparer(Subject(reference, block, reference.random), written).report()
+    return _Comparer(Subject(reference, block, reference.random), written, signs, strict).report()
 
 
 def _read(
@@ -201,11 +212,18 @@ def _shape_problems(
 class _Comparer:
     """One comparison, from the matching to the report."""
 
-    def __init__(self, subject: Subject, written: Mapping[str, Written]) -> None:
+    def __init__(
+        self,
+        subject: Subject,
+        written: Mapping[str, Written],
+        signs: Mapping[str, float],
+        strict: bool,
+    ) -> None:
         self._subject = subject
         self._quantities = written
+        self._strict = strict
         self._reference = subject.reference
-        self._matcher = Matcher(subject, written)
+        self._matcher = Matcher(subject, written, signs)
         self._adopt(self._matcher.match())
         self._drop_doubtful_factors()
 
@@ -304,7 +322,7 @@ class _Comparer:
         if not all(item.takes_states for item in self._quantities.values()):
             return
         for block in self._subject.blocks:
-            spots = [spot for spot in self._wrong(block) if spot[0] != "Phi"]
+            spots = [spot for spot in self._wrong(block) if not self._is_mistake(spot)]
             for rows in (block.rows, range(len(self._reference.equations))) if spots else ():
                 states = self._reference.consistent(self._subject.states, rows)
                 if states is not None:
@@ -318,16 +336,53 @@ class _Comparer:
             size = np.max(np.abs(self._expected[name][:, row, column]))
             values, sizes = (item[:, row, column] for item in written[name])
             off = np.abs(values - expected[name][:, row, column])
-            if np.all(off <= ON_MANIFOLD * (size + np.max(sizes))):
+            is_defined = np.isfinite(sizes).all()
+            if is_defined and np.all(off <= ON_MANIFOLD * (size + np.max(sizes))):
                 self._verdicts[name, row, column] = Verdict.MANIFOLD
+
+    def _is_mistake(self, spot: Spot) -> bool:
+        """Return whether an entry is wrong wherever it may have the right value.
+
+        Phi is zero on the manifold, right or wrong; a sign is wrong where it makes no difference.
+        """
+        name, row, column = spot
+        place = np.s_[:, row : row + 1, column : column + 1]
+        values, sizes = (item[place] for item in self._written[name])
+        is_opposite = agrees(values, sizes, -self._expected[name][place]).all()
+        return name == "Phi" or bool(is_opposite) or self._has_rates(spot)
+
+    def _has_rates(self, spot: Spot) -> bool:
+        """Return whether an entry of Phi, Phi_q or nu depends on the rates of the coordinates."""
+        name, row, column = spot
+        return name != "gamma" and bool(self._rates[name][row, column])
+
+    @cached_property
+    def _rates(self) -> dict[str, Array]:
+        """The entries of every quantity that depend on rates, (rows, columns) each."""
+        states = self._subject.states
+        faster = self._matcher.written(self._matching, replace(states, q_dot=2 * states.q_dot))
+        return {
+            name: np.any(values != faster[name][0], axis=0)
+            for name, (values, _) in self._written.items()
+        }
+
+    def _is_accepted(self, spot: Spot) -> bool:
+        """Return whether an entry counts as right."""
+        verdict = self._verdicts[spot]
+        if self._strict:
+            return verdict is Verdict.EQUAL
+        return verdict.is_right or (verdict is Verdict.MANIFOLD and spot[0] in ("nu", "gamma"))
 
     def _diagnoses(self) -> dict[Spot, tuple[Diagnosis, ...]]:
         """Return the explanations of every entry that is not right."""
         found: dict[Spot, tuple[Diagnosis, ...]] = {}
         for block in self._subject.blocks:
-            wrong = self._wrong(block)
+            wrong = [spot for spot in self._wrong(block) if not self._is_accepted(spot)]
             for name in dict.fromkeys(name for name, _, _ in wrong):
                 spots = [spot for spot in wrong if spot[0] == name]
+                if name in self._opposite:
+                    found |= dict.fromkeys(spots, (self._opposite[name],))
+                    continue
                 explained = self._diagnostician.explain(
                     block, name, self._in_system_terms(spots), self._is_exchanged(block)
                 )
@@ -335,7 +390,28 @@ class _Comparer:
                     found[spot] = explained[self._index(spot)] or (self._unexplained(spot),)
         return found
 
+    @cached_property
+    def _opposite(self) -> dict[str, Diagnosis]:
+        """The diagnosis of nu or gamma where the whole vector has the opposite sign."""
+        found = {}
+        for name, kind in (("nu", REVERSED), ("gamma", WHOLE_SIGN)):
+            expected = self._expected.get(name, np.zeros(1))
+            is_opposite = name in self._written and agrees(*self._written[name], -expected).all()
+            if is_opposite and np.any(np.abs(expected) > ABSOLUTE):
+                text = (
+                    f"{name} has the opposite sign throughout; if that is how you define it, state "
+                    f'{name} = "{OPPOSITE[name]}" in [conventions].'
+                )
+                found[name] = Diagnosis(kind, text)
+        return found
+
     def _unexplained(self, spot: Spot) -> Diagnosis:
+        if self._has_rates(spot):
+            text = f"rates stand in it; {spot[0]} depends on positions and time alone."
+            return Diagnosis(WITH_RATES, text)
+        if self._verdicts[spot] is Verdict.MANIFOLD:
+            text = "right only where the constraints hold; Newton's method needs it elsewhere too."
+            return Diagnosis(UNEXPLAINED, text)
         if self._quantities[spot[0]].takes_states:
             return Diagnosis(UNEXPLAINED, self._dependence.explanation(*spot))
         return Diagnosis(UNEXPLAINED, "no fault of the catalogue fits.")
@@ -362,16 +438,17 @@ class _Comparer:
     def _entry(self, spot: Spot, diagnoses: tuple[Diagnosis, ...]) -> ComparedEntry:
         name, row, column = spot
         system_row, system_column = self._index(spot)
-        verdict = self._verdicts[spot]
+        is_accepted = self._is_accepted(spot)
         return ComparedEntry(
             name,
             self._reference.equations[system_row],
             self._reference.coordinates[system_column] if name == "Phi_q" else None,
             self._reference.text(name, system_row, system_column),
             self._quantities[name].texts[row][column],
-            verdict,
+            self._verdicts[spot],
+            is_accepted,
             diagnoses,
-            None if verdict.is_right else self._difference(spot),
+            None if is_accepted else self._difference(spot),
         )
 
     def _difference(self, spot: Spot) -> Difference:

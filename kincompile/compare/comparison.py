@@ -83,10 +83,14 @@ class ComparedEntry:
         The formula as written; empty for arrays and functions.
     verdict
         Equal, equal up to convention, equal on the manifold, or different.
+    accepted
+        Whether it counts as right. On the manifold alone nu and gamma are needed, where velocity
+        and acceleration are solved; Newton's method needs Phi_q elsewhere too.
     diagnoses
-        Explanations of the difference. Several are equivalent: they give the same numbers.
+        Explanations of the difference, of an entry that is not accepted. Several are equivalent:
+        they give the same numbers.
     difference
-        The state at which it differs most; None for an entry that is right.
+        The state at which it differs most; None for an entry that is accepted.
     """
 
     quantity: str
@@ -95,6 +99,7 @@ class ComparedEntry:
     generated: str
     hand: str
     verdict: Verdict
+    accepted: bool
     diagnoses: tuple[Diagnosis, ...] = ()
     difference: Difference | None = None
 
@@ -110,10 +115,12 @@ class ComparedEntry:
         return f"{self.quantity}-{self.row}-{self.column or ''}"
 
     def explanation(self, reveal: bool) -> list[str]:
-        """Return verdict and diagnoses in lines; none for an entry that is right."""
-        if self.verdict.is_right:
+        """Return verdict and diagnoses in lines; none for an entry that is right everywhere."""
+        if self.accepted and self.verdict.is_right:
             return []
         lines = [f"{self.label}: {self.verdict.value}"]
+        if self.accepted:
+            return [*lines, "  right wherever the constraints hold; there it is used"]
         for k, item in enumerate(self.diagnoses):
             lines.append(("  " if k == 0 else "  or ") + item.text)
             if reveal and item.detail:
@@ -180,17 +187,18 @@ class Comparison:
 
     @property
     def equal(self) -> bool:
-        """Whether no entry is different.
+        """Whether every entry is accepted.
 
-        Equal up to a named convention counts, and so does equal on the constraint manifold, where
-        velocity and acceleration are solved: a textbook's formula is not wrong.
+        Equal up to a named convention counts, and so does an entry of nu or gamma that is equal on
+        the constraint manifold, where velocity and acceleration are solved: a textbook's formula is
+        not wrong. Where the comparison is strict, equal alone counts.
         """
-        return self.verdict is not Verdict.DIFFERENT
+        return all(entry.accepted for entry in self.entries)
 
     @property
     def different(self) -> tuple[ComparedEntry, ...]:
-        """The entries that are different."""
-        return tuple(entry for entry in self.entries if entry.verdict is Verdict.DIFFERENT)
+        """The entries that are not accepted."""
+        return tuple(entry for entry in self.entries if not entry.accepted)
 
     @property
     def quantities(self) -> tuple[str, ...]:

@@ -7,12 +7,42 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.compare.comparison import Convention
+from kincompile.errors import InputError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.compare.matching import Matching
+
+OPPOSITE = {"nu": "Phi_t", "gamma": "left side"}
+"""What an author may state that nu and gamma are; they then have the opposite sign."""
+
+USUAL = {"nu": "-Phi_t", "gamma": "right side"}
+
+
+def stated_signs(stated: Mapping[str, str]) -> dict[str, float]:
+    """Return the signs of nu and gamma as their author states them.
+
+    Raises
+    ------
+    InputError
+        If a quantity or its convention is unknown.
+    """
+    problems = [
+        f"the convention {name} = {value!r} is not known; write {_choices()}"
+        for name, value in stated.items()
+        if name not in OPPOSITE or value not in (OPPOSITE[name], USUAL[name])
+    ]
+    if problems:
+        raise InputError(problems)
+    return {name: -1.0 for name, value in stated.items() if value == OPPOSITE[name]}
+
+
+def _choices() -> str:
+    return "; ".join(
+        f'{name} = "{opposite}" or "{USUAL[name]}"' for name, opposite in OPPOSITE.items()
+    )
 
 
 def conventions_found(matching: Matching, equations: Sequence[str]) -> Iterator[Convention]:
@@ -35,7 +65,8 @@ def conventions_found(matching: Matching, equations: Sequence[str]) -> Iterator[
     yield from _row_factors(matching, names)
     for name, sign in matching.signs.items():
         if sign < 0:
-            yield Convention(f"sign of {name}", f"{name} has the opposite sign throughout.")
+            text = f"{name} is the {OPPOSITE[name]}, as stated: it has the opposite sign."
+            yield Convention(f"sign of {name}", text)
 
 
 def _row_factors(matching: Matching, names: Sequence[str]) -> Iterator[Convention]:

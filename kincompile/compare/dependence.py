@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.compare.agreement import finite
 from kincompile.compare.states import Array, States
 from kincompile.names import listed, rate
 
@@ -90,7 +91,7 @@ def _scaled(array: Array, column: int) -> Array:
 
 def _differs(one: Array, other: Array) -> Array:
     """Return for every entry whether two evaluations differ, shape (rows, columns)."""
-    one, other = np.nan_to_num(one), np.nan_to_num(other)
+    one, other = finite(one), finite(other)
     size = np.max(np.abs(one) + np.abs(other), axis=0)
     return np.asarray(np.max(np.abs(one - other), axis=0) > SAME * size)
 

@@ -21,7 +21,7 @@ from kincompile.compare.vectors import with_roles_exchanged
 from kincompile.model.resolve import Joint
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from kincompile.compare.reference import ConstraintBlock, Reference
     from kincompile.compare.states import Array, States
@@ -79,15 +79,12 @@ class Diagnostician:
         left = {place: values for place, values in written.items() if np.isfinite(values).all()}
         found: dict[Index, tuple[Diagnosis, ...]] = {}
         found |= dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
-        catalogue = list(self._catalogue(block, quantity, exchanged))
-        for place in left:
-            catalogue += self._entry_catalogue(quantity, place)
-        while fitting := [fault for fault in catalogue if _fits(fault, left)]:
-            places = max(fitting, key=lambda fault: len(fault.result)).result.keys()
-            named = _named(fault for fault in fitting if fault.result.keys() == places)
-            for place in places:
-                del left[place]
-                found[place] = named
+        catalogue = self._catalogue(block, quantity, exchanged)
+        found |= _explained(left, [fault for fault in catalogue if len(fault.result) > 1])
+        # One entry alone is looked at as it is typed first, in sines and cosines.
+        typed = [fault for place in left for fault in self._entry_catalogue(quantity, place)]
+        catalogue = [*typed, *catalogue]
+        found |= _explained(left, catalogue)
         for place, values in left.items():
             found[place] = self._one_entry(quantity, place, values, catalogue)
         return found
@@ -158,6 +155,20 @@ class Diagnostician:
             )
             return (Diagnosis(ROUNDED_NUMBER, text),)
         return ()
+
+
+def _explained(
+    left: dict[Index, Array], catalogue: Sequence[NumericFault]
+) -> dict[Index, tuple[Diagnosis, ...]]:
+    """Take out the entries that faults explain, those first that explain the most."""
+    found: dict[Index, tuple[Diagnosis, ...]] = {}
+    while fitting := [fault for fault in catalogue if _fits(fault, left)]:
+        places = max(fitting, key=lambda fault: len(fault.result)).result.keys()
+        named = _named(fault for fault in fitting if fault.result.keys() == places)
+        for place in places:
+            del left[place]
+            found[place] = named
+    return found
 
 
 def _fits(fault: NumericFault, left: Mapping[Index, Array]) -> bool:

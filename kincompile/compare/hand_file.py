@@ -47,12 +47,15 @@ class HandFile:
         The author's own names, each with its expression.
     constraint
         The constraint that is checked alone, or None.
+    conventions
+        What its author says that nu and gamma are.
     """
 
     name: str
     quantities: Mapping[str, Rows]
     aliases: Mapping[str, Cell]
     constraint: str | None
+    conventions: Mapping[str, str]
 
 
 class _Draft:
@@ -64,6 +67,7 @@ class _Draft:
         self._aliases: dict[str, Cell] = {}
         self._problems: list[str] = []
         self.constraint: str | None = None
+        self.conventions: dict[str, str] = {}
 
     def problem(self, place: Place, text: str) -> None:
         """Add a problem."""
@@ -86,7 +90,7 @@ class _Draft:
 
     def unknown(self, name: str, place: Place) -> None:
         """Add the problem of a key that means nothing."""
-        keys = (*QUANTITIES, "constraint", "aliases")
+        keys = (*QUANTITIES, "constraint", "aliases", "conventions")
         hint = suggestion(name, keys)
         self.problem(place, f"there is no quantity {name!r}{hint}; expected: {listed(keys)}")
 
@@ -98,7 +102,9 @@ class _Draft:
             )
         if self._problems:
             raise InputError(self._problems)
-        return HandFile(self._name, self._quantities, self._aliases, self.constraint)
+        return HandFile(
+            self._name, self._quantities, self._aliases, self.constraint, self.conventions
+        )
 
 
 def read_hand_file(path: str | os.PathLike[str]) -> HandFile:
@@ -108,9 +114,9 @@ def read_hand_file(path: str | os.PathLike[str]) -> HandFile:
     ----------
     path
         A ``.json`` or ``.toml`` file with the keys Phi, Phi_q, nu, gamma (each a text as one writes
-        it, or lists of numbers and texts), constraint (a name) and aliases (a table of names and
-        expressions); or any other text file with lines ``Name = [[...], ...]``, where further names
-        are aliases.
+        it, or lists of numbers and texts), constraint (a name), aliases (a table of names and
+        expressions) and conventions (``nu = "Phi_t"``, ``gamma = "left side"``); or any other text
+        file with lines ``Name = [[...], ...]``, where further names are aliases.
 
     Raises
     ------
@@ -188,7 +194,9 @@ def _from_lines(file: str, text: str) -> HandFile:
 
 
 def _add_statement(draft: _Draft, section: str | None, name: str, value: str, place: Place) -> None:
-    if name in QUANTITIES:
+    if section == "conventions":
+        draft.conventions[name] = value.strip()
+    elif name in QUANTITIES:
         draft.add_matrix(name, value, place)
     elif section is None and name == "constraint":
         draft.constraint = value.strip()
@@ -226,6 +234,8 @@ def _from_data(file: str, text: str, data: object) -> HandFile:
             _add_data(draft, key, value, locate)
         elif key == "constraint" and isinstance(value, str):
             draft.constraint = value
+        elif key == "conventions" and isinstance(value, dict):
+            draft.conventions |= {name: str(text) for name, text in value.items()}
         elif key == "aliases" and isinstance(value, dict):
             for alias, expression in value.items():
                 written = str(expression)

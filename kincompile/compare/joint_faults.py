@@ -52,7 +52,7 @@ from kincompile.compare.fault import (
 )
 from kincompile.compare.formula_faults import Symbols, everywhere, one_place, swaps, times
 from kincompile.compare.plain_text import described
-from kincompile.compare.vectors import column_values, component_values, numeric_expansion
+from kincompile.compare.vectors import NumericExpansion, column_values, component_values
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
 
@@ -96,7 +96,7 @@ class JointFaults:
         self._quantity = quantity
         self._blocks = derive(joint.template)
         self._partials = partials(joint.template)
-        self._expansion = numeric_expansion(joint, reference, states)
+        self._expansion = NumericExpansion(joint, reference, states)
         angles = frozenset(frame.phi.name for frame in joint.template.frames)
         partners = joint.written.partners()
         self._symbols = Symbols(angles, frozenset(joint.points), partners)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.compare.agreement import ABSOLUTE, agrees, multiple
+from kincompile.compare.agreement import ON_MANIFOLD, agrees, finite, multiple
 from kincompile.compare.layouts import Layout, other_layouts, usual_layout
 from kincompile.compare.reference import QUANTITIES
 from kincompile.compare.rows import match_rows
@@ -79,7 +79,7 @@ class Matching:
     exchanged
         Rows of the system whose constraint has the roles of its bodies exchanged.
     signs
-        -1 for nu or gamma where the whole vector has the opposite sign.
+        -1 for nu or gamma where its author states that the whole vector has the opposite sign.
     """
 
     layout: Layout
@@ -120,11 +120,24 @@ class _Candidate:
 
 
 class Matcher:
-    """Finds the matching that explains the most, the plain one first."""
+    """Finds the matching that explains the most, the plain one first.
 
-    def __init__(self, subject: Subject, written: Mapping[str, Written]) -> None:
+    Parameters
+    ----------
+    subject
+        What is compared.
+    written
+        The formulas by quantity.
+    signs
+        The signs of whole vectors that their author states.
+    """
+
+    def __init__(
+        self, subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float]
+    ) -> None:
         self._subject = subject
         self._quantities = written
+        self._signs = signs
         self._reference = subject.reference
 
     def match(self) -> Matching:
@@ -136,9 +149,7 @@ class Matcher:
             best = self._better(best, ((usual, item) for item in units))
         if "Phi_q" in self._quantities and best.share < 0.5:
             best = self._better(best, ((item, Units()) for item in self._promising(usual)))
-        # A relative angle counted from the other body flips nu as well: its roles come first.
-        matching = self._with_signs(self._with_roles(best.matching))
-        return self._with_roles(matching)
+        return self._with_roles(best.matching)
 
     def expected(self, matching: Matching, states: States) -> dict[str, Array]:
         """Return the right values by the author's conventions, (N, rows, columns) each.
@@ -202,11 +213,12 @@ class Matcher:
         """Return the other layouts that are worth a closer look, the best first.
 
         The look at all of them is quick: rows in the usual order, each divided by its length.
-        Where rows and columns both have another order, it sees nothing; then a few are tried.
+        Where rows and columns both have another order, it sees nothing; then a few are tried. An
+        order that explains no more rows than the usual one is none: a row with the wrong sign.
         """
-        layouts = list(other_layouts(self._reference, usual, len(self._subject.rows)))
+        layouts = [usual, *other_layouts(self._reference, usual, len(self._subject.rows))]
         values, _ = self._quantities["Phi_q"].evaluate(self._subject.states)
-        written = _directions(np.nan_to_num(values))
+        written = _directions(finite(values))
         Phi_q = self._reference.values(self._subject.states)["Phi_q"][:, list(self._subject.rows)]
         scores = []
         for layout in layouts:
@@ -217,9 +229,10 @@ class Matcher:
             w = _directions(written[..., known])
             off = np.minimum(np.abs(w - right).max((0, 2)), np.abs(w + right).max((0, 2)))
             scores.append(int(np.sum(off <= _ALIKE)))
-        if max(scores, default=0) == 0:
-            return layouts[:_MOST_TRIED]
-        order = sorted(range(len(layouts)), key=lambda k: -scores[k])
+        if max(scores) == 0:
+            return layouts[1 : _MOST_TRIED + 1]
+        better = [k for k, score in enumerate(scores) if score > scores[0]]
+        order = sorted(better, key=lambda k: -scores[k])
         return [layouts[k] for k in order[:_MOST_TRIED]]
 
     def _better(self, best: _Candidate, others: Iterable[tuple[Layout, Units]]) -> _Candidate:
@@ -235,7 +248,7 @@ class Matcher:
     def _rows_matched(self, layout: Layout, units: Units) -> _Candidate:
         """Find order and factors of the rows under a layout."""
         states, rows = self._subject.states, self._subject.rows
-        plain = Matching(layout, units, rows, np.ones((len(rows), len(states))))
+        plain = Matching(layout, units, rows, np.ones((len(rows), len(states))), signs=self._signs)
         written, expected = self.written(plain, states), self.expected(plain, states)
         defining: list[str] = [name for name in ("Phi_q", "Phi") if name in written]
         names = defining or list(written)
@@ -249,21 +262,6 @@ class Matcher:
         matching = replace(plain, rows=tuple(rows[k] for k in order), factors=factors)
         return _Candidate(matching, float(np.mean([item.share == 1.0 for item in found])))
 
-    def _with_signs(self, matching: Matching) -> Matching:
-        """Find out whether nu or gamma has the opposite sign as a whole."""
-        written = self.written(matching, self._subject.states)
-        expected = self.expected(matching, self._subject.states)
-        flipped: dict[str, bool] = {}
-        nonzero: dict[str, int] = {}
-        for name in [name for name in written if name not in ("Phi", "Phi_q")]:
-            nonzero[name] = np.sum(np.any(np.abs(expected[name]) > ABSOLUTE, axis=(0, 2)))
-            opposite = agrees(*written[name], -expected[name])
-            flipped[name] = bool(nonzero[name] and opposite.all())
-        # One row alone may be a slip. It is a convention where several agree, or all there is.
-        every = all(flipped[name] for name in flipped if nonzero[name])
-        signs = {name: -1.0 for name in flipped if flipped[name] and (every or nonzero[name] > 1)}
-        return replace(matching, signs=signs)
-
     def _with_roles(self, matching: Matching) -> Matching:
         """Exchange the roles of i and j in the constraints that this explains entirely.
 
@@ -275,23 +273,23 @@ class Matcher:
         right = self._right_rows(matching, written)
         for block in self._subject.blocks:
             rows = [k for k, row in enumerate(matching.rows) if row in block.rows]
-            if not all(right[rows]):
+            if not all(right[rows]) and self._is_same_constraint(block):
                 trial = self._with_exchanged(matching, block, rows, written)
-                if (
-                    trial is not None
-                    and self._is_natural(trial, rows)
-                    and all(self._right_rows(trial, written)[rows])
-                ):
+                if all(self._right_rows(trial, written)[rows]):
                     matching = trial
         return matching
 
-    def _is_natural(self, trial: Matching, rows: list[int]) -> bool:
-        """Return whether the rows have the sign that the exchanged roles give them.
+    def _is_same_constraint(self, block: ConstraintBlock) -> bool:
+        """Return whether a constraint holds where it holds with its bodies exchanged.
 
-        Exchanged and written with the opposite sign, a relative angle has its usual Phi_q and a
-        reversed nu: without Phi that is a driver's rate reversed.
+        A relative angle that is driven does not: it would turn the other way.
         """
-        return "Phi" in self._quantities or bool(np.all(trial.factors[rows] > 0))
+        states = self._reference.consistent(self._subject.states, block.rows)
+        other = None if states is None else self._exchanged(block, states)
+        if states is None or other is None:
+            return False
+        size = 1 + np.max(np.abs(states.q))
+        return bool(np.all(np.abs(other["Phi"]) <= ON_MANIFOLD * size**2))
 
     def _with_exchanged(
         self,
@@ -299,11 +297,9 @@ class Matcher:
         block: ConstraintBlock,
         rows: list[int],
         written: Mapping[str, tuple[Array, Array]],
-    ) -> Matching | None:
+    ) -> Matching:
         """Return the matching with one constraint exchanged and the factors that it then has."""
         states = self._subject.states
-        if self._exchanged(block, states) is None:
-            return None
         factors = matching.factors.copy()
         factors[rows] = 1.0
         exchanged = matching.exchanged.union(block.rows)

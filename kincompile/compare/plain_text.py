@@ -14,7 +14,7 @@ from kincompile.calculus.expressions import (
     Pi,
     Power,
     Product,
-    Profile,
+    ProfileFunction,
     Rotated,
     Scalar,
     Scaled,
@@ -47,7 +47,7 @@ def _scalar(expression: Scalar) -> str:
             return "pi"
         case Symbol(name):
             return _symbol(name)
-        case TimeFunction(name, order) | Profile(name, _, order):
+        case TimeFunction(name, order) | ProfileFunction(name, _, order):
             return name + "'" * order
         case Sum(terms):
             return _sum([_scalar(term) for term in terms])

@@ -23,7 +23,7 @@ from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
 from kincompile.ir.interpret import interpret, run
 from kincompile.ir.lower import lower
-from kincompile.model.matrices import Row, assemble
+from kincompile.model.matrices import EquationRow, assemble
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed, rate, suggestion
 
@@ -111,7 +111,7 @@ class Reference:
         return blocks[name]
 
     @cached_property
-    def _rows(self) -> list[Row]:
+    def _rows(self) -> list[EquationRow]:
         """The rows as SymPy expressions, which people read."""
         return assemble(self.system)
 

@@ -105,8 +105,8 @@ def as_gradescope(found: Comparison, reveal: bool) -> str:
 
 
 def _test(name: str, entries: list[ComparedEntry], reveal: bool) -> dict[str, Any]:
-    """Return the test of one row: a point where no entry is different."""
-    is_wrong = any(entry.verdict is Verdict.DIFFERENT for entry in entries)
+    """Return the test of one row: a point where all entries are accepted."""
+    is_wrong = not all(entry.accepted for entry in entries)
     lines = [line for entry in entries for line in entry.explanation(reveal)]
     return {
         "name": name,

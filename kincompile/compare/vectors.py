@@ -7,19 +7,30 @@ it, written in vectors, gets its numbers in the same way as the right one.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.expressions import VectorSymbol
+from kincompile.calculus.expressions import (
+    Dot,
+    Norm,
+    Perpendicular,
+    Power,
+    Product,
+    Rotated,
+    Scaled,
+    Sum,
+    VectorSum,
+    VectorSymbol,
+)
 from kincompile.compare.reference import Values
 from kincompile.derive.derivation import derive
 from kincompile.model.matrices import SymbolicEnvironment
 from kincompile.quantities import QUANTITIES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from fractions import Fraction
 
     import sympy
@@ -27,15 +38,19 @@ if TYPE_CHECKING:
     from kincompile.calculus.expressions import (
         Components,
         Expression,
-        Profile,
+        ProfileFunction,
         Rotation,
+        Scalar,
         Symbol,
         TimeFunction,
         Value,
+        Vector,
     )
     from kincompile.compare.reference import Reference
     from kincompile.compare.states import Array, States
     from kincompile.model.resolve import Joint
+
+_COMPOUND = (Dot, Norm, Perpendicular, Power, Product, Rotated, Scaled, Sum, VectorSum)
 
 
 class Exchanged(VectorSymbol):
@@ -78,7 +93,7 @@ class NumericEnvironment:
         """Return C(t) or one of its derivatives."""
         return self._number(self._symbolic.time_function(function))
 
-    def profile(self, profile: Profile) -> Value:
+    def profile(self, profile: ProfileFunction) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
         return self._number(self._symbolic.profile(profile))
 
@@ -91,9 +106,34 @@ class NumericEnvironment:
         return getattr(np, function)(value)
 
 
-def numeric_expansion(joint: Joint, reference: Reference, states: States) -> Expansion:
-    """Return the expansion of a joint's template to arrays over states."""
-    return Expansion(NumericEnvironment(joint, reference, states))
+class NumericExpansion(Expansion):
+    """The expansion of a joint's template to arrays over states.
+
+    A thousand formulas with a fault share all their parts but one with the right formula, as the
+    same objects: those are looked up by identity. To hash a formula takes longer than to add it up.
+    """
+
+    def __init__(self, joint: Joint, reference: Reference, states: States) -> None:
+        super().__init__(NumericEnvironment(joint, reference, states))
+        self._known: dict[int, tuple[Expression, Any]] = {}
+
+    def scalar(self, expression: Scalar) -> Value:
+        """Return the value of a scalar expression."""
+        if isinstance(expression, _COMPOUND):
+            return self._kept(expression, self._scalar)
+        return super().scalar(expression)
+
+    def vector(self, expression: Vector) -> Components:
+        """Return the components of a vector expression."""
+        if isinstance(expression, _COMPOUND):
+            components: Components = self._kept(expression, self._vector)
+            return components
+        return super().vector(expression)
+
+    def _kept(self, expression: Any, evaluate: Callable[[Any], Any]) -> Any:
+        if id(expression) not in self._known:  # with the value the object is kept, and its id
+            self._known[id(expression)] = expression, evaluate(expression)
+        return self._known[id(expression)][1]
 
 
 def component_values(expression: Expression, expansion: Expansion) -> Array:
@@ -108,7 +148,7 @@ def column_values(columns: Iterable[Expression], expansion: Expansion) -> Array:
 
 def joint_values(joint: Joint, reference: Reference, states: States) -> Values:
     """Evaluate a joint by itself."""
-    expansion = numeric_expansion(joint, reference, states)
+    expansion = NumericExpansion(joint, reference, states)
     arrays = {}
     for quantity in QUANTITIES:
         formulas = [getattr(block, quantity.name) for block in derive(joint.template)]

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kincompile.derivation.document import (
-    Code,
+    Chapter,
+    CrossReference,
     Display,
-    Link,
     Math,
+    NotebookCode,
     Pattern,
-    Section,
     Verbatim,
     row_range,
     table,
@@ -30,8 +30,8 @@ from kincompile.derivation.formulas import (
     Decimal,
     Equated,
     Glyph,
+    Joined,
     Q,
-    Row,
     decimals,
 )
 from kincompile.structure.report import gruebler
@@ -60,7 +60,7 @@ MOST_COORDINATES = 12
 ITERATE_DIGITS = 10
 
 
-def assembled_section(evaluation: Evaluation) -> Section:
+def assembled_section(evaluation: Evaluation) -> Chapter:
     """Return the part of the page on the whole system."""
     parts = (
         _offsets(evaluation),
@@ -71,10 +71,10 @@ def assembled_section(evaluation: Evaluation) -> Section:
         _newton(evaluation),
         _rates(evaluation),
     )
-    return Section("assembled", ("The assembled system",), (), parts)
+    return Chapter("assembled", ("The assembled system",), (), parts)
 
 
-def unknowns_section(evaluation: Evaluation) -> Section:
+def unknowns_section(evaluation: Evaluation) -> Chapter:
     """Return the coordinates and parameters, with the chosen state."""
     values, q = evaluation.values, evaluation.shown["q"]
     rows: Rows = [
@@ -88,7 +88,7 @@ def unknowns_section(evaluation: Evaluation) -> Section:
             for item in evaluation.system.parameters
         ]
         blocks.append(table(("parameter", "unit", "value"), known))
-    return Section("unknowns", ("Coordinates and parameters",), tuple(blocks))
+    return Chapter("unknowns", ("Coordinates and parameters",), tuple(blocks))
 
 
 def _math(value: float, digits: int = 6) -> Math:
@@ -97,7 +97,7 @@ def _math(value: float, digits: int = 6) -> Math:
 
 def _column_rule(bodies: Sequence[Body]) -> str:
     """Return how the column offset of a body follows from the kinds of the bodies before it."""
-    sizes = {len(body.kind.letters) for body in bodies}
+    sizes = {len(body.coordinates) for body in bodies}
     if len(sizes) != 1:
         return "The column offset of a body is the number of coordinates of the bodies before it."
     (size,) = sizes
@@ -105,14 +105,14 @@ def _column_rule(bodies: Sequence[Body]) -> str:
     return f"The column offset of a body is {times}the number of bodies before it."
 
 
-def _offsets(evaluation: Evaluation) -> Section:
+def _offsets(evaluation: Evaluation) -> Chapter:
     system = evaluation.system
     rows: Rows = []
     for item, first in zip(
         evaluation.system.constraints, evaluation.system.row_offsets, strict=True
     ):
         count = len(item.equation_names)
-        name = Link(f"constraint-{item.name}", Verbatim(item.name))
+        name = CrossReference(f"constraint-{item.name}", Verbatim(item.name))
         rows.append((name, str(count), str(first), row_range(first, count), str(first + 1)))
     note = text(
         "The row offset of a constraint is the number of equations before it: the exclusive prefix "
@@ -127,10 +127,10 @@ def _offsets(evaluation: Evaluation) -> Section:
     blocks: list[Block] = [note, table(header, rows)]
     if columns:
         blocks.append(table(("body", "column offset", "columns from 0"), columns))
-    return Section("offsets", ("Row and column offsets",), tuple(blocks), (), "expanded")
+    return Chapter("offsets", ("Row and column offsets",), tuple(blocks), (), "expanded")
 
 
-def _pattern(evaluation: Evaluation) -> Section:
+def _pattern(evaluation: Evaluation) -> Chapter:
     entries = {
         (entry.row, entry.column): anchor("Phi_q", entry)
         for section in evaluation.code.sections
@@ -145,13 +145,14 @@ def _pattern(evaluation: Evaluation) -> Section:
     )  # fmt: skip
     picture = Pattern(evaluation.system.equations, tuple(evaluation.coordinates), entries, bands)
     title = ("The pattern of the Jacobian",)
-    return Section("pattern", title, (note, picture), (), "expanded")
+    return Chapter("pattern", title, (note, picture), (), "expanded")
 
 
-def _mobility(evaluation: Evaluation) -> Section:
+def _mobility(evaluation: Evaluation) -> Chapter:
     mobility = gruebler(evaluation.system)
+    of_bodies = mobility.coordinates - mobility.others
     rows: Rows = [
-        ("coordinates", f"3 \N{MULTIPLICATION SIGN} {mobility.bodies} + {mobility.others}",
+        ("coordinates", f"{of_bodies} of bodies + {mobility.others} others",
          str(mobility.coordinates)),
         ("equations of joints", "", f"\N{MINUS SIGN}{mobility.joint_equations}"),
         ("degrees of freedom", "", str(mobility.degrees_of_freedom)),
@@ -161,10 +162,10 @@ def _mobility(evaluation: Evaluation) -> Section:
     blocks: list[Block] = [table(("what", "count", "number"), rows)]
     if evaluation.problem:
         blocks.append(text(evaluation.problem))
-    return Section("mobility", ("Mobility",), tuple(blocks))
+    return Chapter("mobility", ("Mobility",), tuple(blocks))
 
 
-def _vectors(evaluation: Evaluation) -> Section:
+def _vectors(evaluation: Evaluation) -> Chapter:
     rows: Rows = []
     for section in evaluation.code.sections:
         quantities = (section.entries[name] for name in ("Phi", "nu", "gamma"))
@@ -173,7 +174,7 @@ def _vectors(evaluation: Evaluation) -> Section:
             for quantity, entry in (("Phi", Phi), ("nu", nu), ("gamma", gamma)):
                 shown = evaluation.brief(quantity, entry)
                 row += [
-                    Link(anchor(quantity, entry), shown),
+                    CrossReference(anchor(quantity, entry), shown),
                     _math(evaluation.value(quantity, entry)),
                 ]
             rows.append(tuple(row))
@@ -182,10 +183,10 @@ def _vectors(evaluation: Evaluation) -> Section:
     )  # fmt: skip
     title = ("The arrays ", Math(PHI), ", ", Math(NU), " and ", Math(GAMMA))
     note = text(f"Numbers at {evaluation.origin}. Each formula leads to its derivation.")
-    return Section("arrays", title, (note, table(header, rows)), (), "expanded")
+    return Chapter("arrays", title, (note, table(header, rows)), (), "expanded")
 
 
-def _jacobian(evaluation: Evaluation) -> Section:
+def _jacobian(evaluation: Evaluation) -> Chapter:
     found = {
         (entry.row, entry.column): entry
         for section in evaluation.code.sections
@@ -197,9 +198,9 @@ def _jacobian(evaluation: Evaluation) -> Section:
         "Each entry leads to its derivation, where its line in the emitted module stands. ",
         f"Numbers at {evaluation.origin}.",
     )
-    check = Code("print(np.round(Phi_q(q, t, p), 6))")
+    check = NotebookCode("print(np.round(Phi_q(q, t, p), 6))")
     title = ("The Jacobian ", Math(PHI_Q))
-    return Section("jacobian", title, (note, entries, check), (), "expanded")
+    return Chapter("jacobian", title, (note, entries, check), (), "expanded")
 
 
 def _square_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> Block:
@@ -230,15 +231,15 @@ def _listed_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entr
 def _cell(evaluation: Evaluation, entry: Entry) -> Runs:
     shown, number = evaluation.brief("Phi_q", entry), _math(evaluation.value("Phi_q", entry))
     if is_number(evaluation.expanded(entry)):
-        return (Link(anchor("Phi_q", entry), shown),)
-    return (Link(anchor("Phi_q", entry), shown), " = ", number)
+        return (CrossReference(anchor("Phi_q", entry), shown),)
+    return (CrossReference(anchor("Phi_q", entry), shown), " = ", number)
 
 
-def _newton(evaluation: Evaluation) -> Section:
+def _newton(evaluation: Evaluation) -> Chapter:
     blocks: list[Block] = [
         text(
             "From the guess, each step solves ",
-            Math(Equated((Row((PHI_Q, DELTA_Q)), Row(("-", PHI))))),
+            Math(Equated((Joined((PHI_Q, DELTA_Q)), Joined(("-", PHI))))),
             " and adds the correction. It stops when the correction is small; that correction has "
             "been applied.",
         )
@@ -249,7 +250,7 @@ def _newton(evaluation: Evaluation) -> Section:
     else:
         blocks += _iterations(evaluation, result)
         blocks += _first_step(evaluation, result)
-    return Section("newton", ("Position: Newton's method",), tuple(blocks), (), "numeric")
+    return Chapter("newton", ("Position: Newton's method",), tuple(blocks), (), "numeric")
 
 
 def _iterations(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]:
@@ -259,7 +260,7 @@ def _iterations(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]
         correction = _math(result.corrections[k], 7) if k < len(result.corrections) else ""
         numbers = (_math(value, ITERATE_DIGITS) for value in q[: len(names)])
         rows.append((str(k), *numbers, _math(residual, 7), correction))
-    norms = (Math(Row(("|", PHI, "|"))), Math(Row(("|", DELTA_Q, "|"))))
+    norms = (Math(Joined(("|", PHI, "|"))), Math(Joined(("|", DELTA_Q, "|"))))
     yield table(("step", *(Verbatim(name) for name in names), *norms), rows)
     outcome = result.status.name.lower().replace("_", " ")
     yield text(f"{counted(result.iterations, 'correction')}; the outcome: {outcome}.")
@@ -274,28 +275,28 @@ def _first_step(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]
     correction = result.iterates[1] - guess
     yield text("The first step in numbers:")
     if guess.size <= LARGEST_MATRIX:
-        product = Row((decimals(Phi_q, 4), decimals(correction)))
-        yield Display(Equated((Row((PHI_Q, DELTA_Q)), product, decimals(-Phi))))
+        product = Joined((decimals(Phi_q, 4), decimals(correction)))
+        yield Display(Equated((Joined((PHI_Q, DELTA_Q)), product, decimals(-Phi))))
     columns = zip(evaluation.coordinates, guess, correction, result.iterates[1], strict=True)
     rows: Rows = [
         (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
         for name, *values in columns
     ]
     yield table(("coordinate", "guess", Math(DELTA_Q), "after the step"), rows)
-    yield Code(
+    yield NotebookCode(
         "correction = np.linalg.solve(Phi_q(GUESS, t, p), -Phi(GUESS, t, p))\n"
         "print(np.round(correction, 6))"
     )
 
 
-def _rates(evaluation: Evaluation) -> Section:
+def _rates(evaluation: Evaluation) -> Chapter:
     shown = evaluation.shown
     title = ("Velocity and acceleration",)
     if not evaluation.is_assembled:
         note = text(f"Not solved: the numbers on this page are those of {evaluation.origin}.")
-        return Section("rates", title, (note,), (), "numeric")
-    velocity = Equated((Row((PHI_Q, Q_DOT)), NU))
-    acceleration = Equated((Row((PHI_Q, Q_DDOT)), GAMMA))
+        return Chapter("rates", title, (note,), (), "numeric")
+    velocity = Equated((Joined((PHI_Q, Q_DOT)), NU))
+    acceleration = Equated((Joined((PHI_Q, Q_DDOT)), GAMMA))
     determinant = float(np.linalg.det(evaluation.Phi_q))
     rows: Rows = [
         (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
@@ -310,18 +311,18 @@ def _rates(evaluation: Evaluation) -> Section:
     ]
     if evaluation.q.size <= LARGEST_MATRIX:
         blocks += [
-            Display(Equated((Row((decimals(shown["Phi_q"], 4), Q_DOT)), decimals(shown["nu"])))),
+            Display(Equated((Joined((decimals(shown["Phi_q"], 4), Q_DOT)), decimals(shown["nu"])))),
             Display(Equated((Q_DOT, decimals(shown["q_dot"])))),
-            Display(Equated((Row((PHI_Q, Q_DDOT)), decimals(shown["gamma"])))),
+            Display(Equated((Joined((PHI_Q, Q_DDOT)), decimals(shown["gamma"])))),
             Display(Equated((Q_DDOT, decimals(shown["q_ddot"])))),
         ]
-    det = Row((Glyph("det", bold=False), PHI_Q))
+    det = Joined((Glyph("det", bold=False), PHI_Q))
     blocks.append(Display(Equated((det, Decimal(determinant, ITERATE_DIGITS)))))
     blocks.append(table(("coordinate", Math(Q), Math(Q_DOT), Math(Q_DDOT)), rows))
     blocks.append(
-        Code(
+        NotebookCode(
             "print(np.linalg.solve(Phi_q(q, t, p), nu(q, t, p)))\n"
             "print(np.linalg.solve(Phi_q(q, t, p), gamma(q, q_dot, t, p)))"
         )
     )
-    return Section("rates", title, tuple(blocks), (), "numeric")
+    return Chapter("rates", title, tuple(blocks), (), "numeric")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.assembled import assembled_section, unknowns_section
-from kincompile.derivation.document import Document, Section
+from kincompile.derivation.document import Chapter, Manuscript
 from kincompile.derivation.equation_section import equation_section
 from kincompile.derivation.evaluation import Evaluation, evaluation
 from kincompile.derivation.joint_section import joint_section
@@ -46,10 +46,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Derivation(Document):
+class Derivation(Manuscript):
     """The derivation of a mechanism's equations, to be printed.
 
-    The attributes are those of `Document`: the name, and what the page says as data.
+    The attributes are those of `Manuscript`: the name, and what the page says as data.
     """
 
     def to_html(self) -> str:
@@ -152,7 +152,7 @@ def derivation(
     for item in system.constraints:
         if isinstance(item, Joint):
             names |= abbreviations(item.template)
-    constraints = Section("constraints", ("The constraints, one by one",), (), sections)
+    constraints = Chapter("constraints", ("The constraints, one by one",), (), sections)
     return Derivation(
         system.name,
         _summary(chosen),

@@ -31,14 +31,14 @@ class Math:
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class CrossReference:
     """A reference to an anchor of the page."""
 
     anchor: str
     content: Run
 
 
-Run: TypeAlias = str | Verbatim | Math | Link
+Run: TypeAlias = str | Verbatim | Math | CrossReference
 """A piece of a text; a plain string is prose."""
 
 Runs: TypeAlias = tuple[Run, ...]
@@ -126,17 +126,17 @@ class Pattern:
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class NotebookCode:
     """Code that a notebook runs; other media leave it out."""
 
     text: str
 
 
-Block: TypeAlias = Text | Display | Table | Pattern | Code
+Block: TypeAlias = Text | Display | Table | Pattern | NotebookCode
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class Chapter:
     """A titled part of the page.
 
     Attributes
@@ -156,12 +156,12 @@ class Section:
     anchor: str
     title: Runs
     blocks: tuple[Block, ...] = ()
-    sections: tuple[Section, ...] = ()
+    sections: tuple[Chapter, ...] = ()
     level: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Document:
+class Manuscript:
     """A whole page.
 
     Attributes
@@ -182,7 +182,7 @@ class Document:
 
     name: str
     summary: str
-    sections: tuple[Section, ...]
+    sections: tuple[Chapter, ...]
     abbreviations: Mapping[Expression, Glyph]
     source: str
     state: str

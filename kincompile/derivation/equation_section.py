@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.derivation.document import Display, Math, Section, Verbatim, table, text
-from kincompile.derivation.formulas import Equated, Partial
+from kincompile.derivation.document import Chapter, Display, Math, Verbatim, table, text
+from kincompile.derivation.formulas import Equated, PartialDerivative
 from kincompile.derivation.steps import Steps
 from kincompile.derive.equations import EquationDerivatives, derive_equation
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from kincompile.derivation.document import Run, Runs
     from kincompile.derivation.evaluation import Evaluation
     from kincompile.derivation.formulas import Glyph
-    from kincompile.ir.inline import Section as Rows
+    from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.resolve import FreeEquation
 
 
-def equation_section(evaluation: Evaluation, equation: FreeEquation, rows: Rows) -> Section:
+def equation_section(evaluation: Evaluation, equation: FreeEquation, rows: Rows) -> Chapter:
     """Return the derivation of a free equation."""
     found = [derive_equation(item, equation.columns) for item in equation.expressions]
     steps = _EquationSteps(
@@ -53,10 +53,10 @@ class _EquationSteps(Steps[EquationDerivatives]):
     def symbol(self, letter: str, k: int) -> Glyph:
         return self.evaluation.symbol(letter, self.rows.instance.first_row + k)
 
-    def _partial(self, k: int, name: str) -> Partial:
-        return Partial(self.symbol("Phi", k), sympy.Symbol(name))
+    def _partial(self, k: int, name: str) -> PartialDerivative:
+        return PartialDerivative(self.symbol("Phi", k), sympy.Symbol(name))
 
-    def coordinates(self) -> Section:
+    def coordinates(self) -> Chapter:
         parameters = {item.name for item in self.evaluation.system.parameters}
         expressions = self.equation.expressions
         occurring = {str(symbol) for item in expressions for symbol in item.free_symbols}
@@ -67,14 +67,14 @@ class _EquationSteps(Steps[EquationDerivatives]):
         note = text("An equation in ", *names, end)
         return self.step(1, "The equation and what occurs in it", note, level="")
 
-    def constraint(self) -> Section:
+    def constraint(self) -> Chapter:
         lines = [
             Display(Equated((self.symbol("Phi", k), item.Phi, sympy.Integer(0))))
             for k, item in enumerate(self.derivatives)
         ]
         return self.step(2, "The constraint", *lines)
 
-    def rules(self) -> Section:
+    def rules(self) -> Chapter:
         rows: list[tuple[Run | Runs, ...]] = []
         for k, item in enumerate(self.derivatives):
             for name in self.columns:
@@ -86,7 +86,7 @@ class _EquationSteps(Steps[EquationDerivatives]):
         header = ("derivative", "of the term", "gives")
         return self.step(3, "The rules used", note, table(header, rows))
 
-    def jacobian(self) -> Section:
+    def jacobian(self) -> Chapter:
         lines = [
             Display(Equated((self._partial(k, name), entry)))
             for k, item in enumerate(self.derivatives)

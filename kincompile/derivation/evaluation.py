@@ -14,7 +14,7 @@ from kincompile.calculus.expressions import Symbol
 from kincompile.derivation.document import Display, Math
 from kincompile.derivation.emitted_lines import emitted_lines
 from kincompile.derivation.expanded import Writer
-from kincompile.derivation.formulas import Decimal, Equated, Glyph, Partial, size
+from kincompile.derivation.formulas import Decimal, Equated, Glyph, PartialDerivative, size
 from kincompile.errors import InputError
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from kincompile.derivation.document import SourceLine
     from kincompile.derivation.emitted_lines import EntryKey
     from kincompile.derivation.formulas import Formula
+    from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.ir.inline import Entry
-    from kincompile.ir.inline import Section as Rows
     from kincompile.model.system import ConstraintSystem
 
 Array = NDArray[np.float64]
@@ -139,9 +139,11 @@ class Evaluation:
         values = self.shown[quantity]
         return float(values[entry.row, entry.column] if values.ndim == 2 else values[entry.row])
 
-    def partial(self, entry: Entry) -> Partial:
+    def partial(self, entry: Entry) -> PartialDerivative:
         """Return the symbol of an entry of Phi_q."""
-        return Partial(self.symbol("Phi", entry.row), Symbol(self.coordinates[entry.column]))
+        return PartialDerivative(
+            self.symbol("Phi", entry.row), Symbol(self.coordinates[entry.column])
+        )
 
     def brief(self, quantity: str, entry: Entry) -> Math:
         """Return an entry in sines and cosines where that is short, else its symbol."""

@@ -40,7 +40,7 @@ class Glyph:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class Joined:
     """Formulas side by side; a string is an operator, a bracket or a word."""
 
     parts: tuple[Formula | str, ...]
@@ -55,7 +55,7 @@ class Sub:
 
 
 @dataclass(frozen=True, slots=True)
-class Partial:
+class PartialDerivative:
     """The derivative of one formula by another: partial, or total with d."""
 
     numerator: Formula
@@ -127,20 +127,28 @@ class Relation(Scalar):
 
 
 Formula: TypeAlias = (
-    Expression | sympy.Basic | Glyph | Row | Sub | Partial | Transposed | Equated | Matrix
+    Expression
+    | sympy.Basic
+    | Glyph
+    | Joined
+    | Sub
+    | PartialDerivative
+    | Transposed
+    | Equated
+    | Matrix
 )
 
 PHI, PHI_Q, PHI_T = Glyph("Phi"), Glyph("Phi", "q"), Glyph("Phi", "t")
 PHI_QT, PHI_TT = Glyph("Phi", "qt"), Glyph("Phi", "tt")
 NU, GAMMA = Glyph("nu"), Glyph("gamma")
 Q, Q_DOT, Q_DDOT = Glyph("q"), Glyph("q", dots=1), Glyph("q", dots=2)
-DELTA_Q = Row((Glyph("Delta", bold=False), Q))
+DELTA_Q = Joined((Glyph("Delta", bold=False), Q))
 IDENTITY, ZERO_BLOCK = Glyph("I"), Glyph("0")
-VELOCITY_TERM = Row((PHI_Q, Q_DOT))
+VELOCITY_TERM = Joined((PHI_Q, Q_DOT))
 GAMMA_TERMS = (
-    Row(("-", Sub(Row(("(", PHI_Q, Q_DOT, ")")), Q), Q_DOT)),
-    Row(("-", "2", PHI_QT, Q_DOT)),
-    Row(("-", PHI_TT)),
+    Joined(("-", Sub(Joined(("(", PHI_Q, Q_DOT, ")")), Q), Q_DOT)),
+    Joined(("-", "2", PHI_QT, Q_DOT)),
+    Joined(("-", PHI_TT)),
 )
 """The three terms of gamma as the textbook writes them."""
 

@@ -11,7 +11,8 @@ import sympy
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
-from kincompile.derivation.document import Display, Math, Section, Verbatim, table, text
+from kincompile.derivation.collected import collected
+from kincompile.derivation.document import Chapter, Display, Math, Verbatim, table, text
 from kincompile.derivation.formulas import (
     GAMMA_TERMS,
     PHI_Q,
@@ -21,10 +22,11 @@ from kincompile.derivation.formulas import (
     Equated,
     Glyph,
     Matrix,
-    Partial,
+    PartialDerivative,
     Sub,
     column,
     decimals,
+    size,
 )
 from kincompile.derivation.joint_terms import (
     RULES,
@@ -51,12 +53,12 @@ if TYPE_CHECKING:
     from kincompile.derivation.evaluation import Evaluation
     from kincompile.derivation.formulas import Formula
     from kincompile.derive.rules import Step
-    from kincompile.ir.inline import Section as Rows
+    from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
 
 
-def joint_section(evaluation: Evaluation, joint: Joint, rows: Rows) -> Section:
+def joint_section(evaluation: Evaluation, joint: Joint, rows: Rows) -> Chapter:
     """Return the derivation of a joint."""
     columns = [name for name in joint.columns if name is not None]
     blocks = derive(joint.template)
@@ -87,7 +89,7 @@ class _JointSteps(Steps[RowBlock]):
         index = str(k + 1) if len(self.derivatives) > 1 else ""
         return Glyph(letter, index, exponent=self.name)
 
-    def attributes(self) -> Section:
+    def attributes(self) -> Chapter:
         written = type(self.joint.written)
         meaning = (written.__doc__ or "").strip().splitlines()[0]
         rows: list[tuple[Run | Runs, ...]] = []
@@ -112,7 +114,7 @@ class _JointSteps(Steps[RowBlock]):
             return Math(_decimal(joint.scalars[symbol], values))
         return ""
 
-    def constraint(self) -> Section:
+    def constraint(self) -> Chapter:
         blocks: list[Block] = []
         for k, block in enumerate(self.derivatives):
             zero = ZERO_BLOCK if isinstance(block.Phi, Vector) else ZERO
@@ -123,11 +125,11 @@ class _JointSteps(Steps[RowBlock]):
             blocks += [Display(Equated((glyph, item))) for item, glyph in names.items()]
         return self.step(2, "The constraint in vectors", *blocks)
 
-    def rules(self) -> Section:
+    def rules(self) -> Chapter:
         rows = []
         for k, row in enumerate(partials(self.joint.template)):
             for item in row:
-                label = Math(Partial(self.symbol("Phi", k), item.coordinate))
+                label = Math(PartialDerivative(self.symbol("Phi", k), item.coordinate))
                 rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
         note = text(
             "Every rule that fired while ", Math(PHI_Q), " was derived, from the inside out. "
@@ -139,7 +141,7 @@ class _JointSteps(Steps[RowBlock]):
         header = ("derivative", "rule", "applied to", "gives")
         return self.step(3, "The rules used", note, table(header, rows))
 
-    def jacobian(self) -> Section:
+    def jacobian(self) -> Chapter:
         template = self.joint.template
         blocks: list[Block] = []
         for variable, columns in block_columns(template):
@@ -166,10 +168,19 @@ class _JointSteps(Steps[RowBlock]):
         for k, block in enumerate(self.derivatives):
             if len(self.derivatives) > 1:
                 blocks.append(text("For ", Math(self.symbol("Phi", k)), ":"))
-            blocks += self.gamma_terms(k)
+            blocks += [*self.gamma_terms(k), *self._gathered(k)]
             for symbol, steps in zip(GAMMA_TERMS, block.gamma_steps, strict=True):
                 lines += [(Math(symbol), *line) for line in _rule_lines(steps)]
         return [*blocks, *self._constant_note(), *_fired(lines)]
+
+    def _gathered(self, k: int) -> list[Block]:
+        """Return the k-th gamma with like terms joined, where that is shorter."""
+        derived = self.derivatives[k].gamma
+        found = collected(derived, abbreviations(self.joint.template))
+        if found == derived or size(found) >= size(derived):
+            return []
+        note = text("Multiplied out, like terms joined; equal in numbers to the line above:")
+        return [note, Display(Equated((self.symbol("gamma", k), found)))]
 
     def _constant_note(self) -> list[Block]:
         """Return the note that the rates of a constant C vanish."""

@@ -31,8 +31,8 @@ from kincompile.derivation.formulas import (
     ZERO_BLOCK,
     Equated,
     Glyph,
-    Partial,
-    Row,
+    Joined,
+    PartialDerivative,
     Transposed,
 )
 from kincompile.derive.partials import partials
@@ -53,8 +53,8 @@ RULES: Mapping[Rule, Runs] = {
     Rule.SUM: ("sum rule",),
     Rule.PRODUCT: ("product rule",),
     Rule.CHAIN: ("chain rule",),
-    Rule.A_TO_B: (Math(Equated((Partial(_A, _PHI, "d"), _B))),),
-    Rule.B_TO_A: (Math(Equated((Partial(_B, _PHI, "d"), Row(("-", _A))))),),
+    Rule.A_TO_B: (Math(Equated((PartialDerivative(_A, _PHI, "d"), _B))),),
+    Rule.B_TO_A: (Math(Equated((PartialDerivative(_B, _PHI, "d"), Joined(("-", _A))))),),
     Rule.DRIVER: ("driver, a function of ", Math(Symbol("t"))),
     Rule.PROFILE: ("profile, chain rule",),
 }
@@ -80,7 +80,7 @@ def parts(expression: Any) -> Iterator[Expression]:
 
 
 def abbreviations(template: Template) -> dict[Expression, Glyph]:
-    """Name what occurs again and again: the distance vector d, its rate, the angle of a gear."""
+    """Name what occurs again and again: the distance vector d, the angle of a gear, their rates."""
     found = [item for Phi in template.Phi for item in parts(Phi)]
     separations = list(dict.fromkeys(v for item in found for v in _separations(item)))
     q_dot: dict[Expression, Expression] = dict(
@@ -95,6 +95,7 @@ def abbreviations(template: Template) -> dict[Expression, Glyph]:
         match item:
             case Rotated(PlaneRotation(angle), Basis()) if not isinstance(angle, Symbol):
                 names[angle] = Glyph("vartheta", bold=False)
+                names[along(angle, q_dot)] = Glyph("vartheta", dots=1, bold=False)
     return names
 
 
@@ -131,7 +132,7 @@ def block_entry(entry: Expression, coordinate: Expression, Phi: Expression) -> F
 def _times_identity(factor: Scalar) -> Formula:
     if factor == ONE:
         return IDENTITY
-    return Row(("-", IDENTITY)) if factor == -ONE else Row((factor, IDENTITY))
+    return Joined(("-", IDENTITY)) if factor == -ONE else Joined((factor, IDENTITY))
 
 
 def block_columns(template: Template) -> list[tuple[Formula, slice]]:

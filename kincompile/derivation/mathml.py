@@ -24,11 +24,30 @@ VARTHETA = "\N{GREEK THETA SYMBOL}"
 DOTS = ("", "\N{DOT ABOVE}", "\N{DIAERESIS}")
 
 
+def _alphabet(latin: str, greek: str, capital_greek: str) -> dict[int, int]:
+    """Return plain letters as those of a mathematical alphabet, given the first of each range."""
+    ranges = (("A", "Z", latin, 0), ("a", "z", latin, 26), ("\u03b1", "\u03c9", greek, 0),
+              ("\u0391", "\u03a9", capital_greek, 0))  # fmt: skip
+    return {
+        code: ord(to) + start + code - ord(first)
+        for first, last, to, start in ranges
+        if to
+        for code in range(ord(first), ord(last) + 1)
+    }
+
+
+BOLD = _alphabet("\U0001d400", "\U0001d6c2", "\U0001d6a8") | {ord("0"): 0x1D7CE}
+SLANTED = _alphabet("\U0001d434", "\U0001d6fc", "") | {
+    ord("h"): ord("\N{PLANCK CONSTANT}"), ord(VARTHETA): 0x1D717,
+}  # fmt: skip
+"""Bold and slanted letters of Unicode; the page brings a font that has them."""
+
+
 class MathMLPrinter(Notation, MathMLPresentationPrinter):
     """Prints formulas as the children of a `math` element.
 
-    Letters are upright or slanted by style sheet (class "v" is a bold vector): not every device has
-    the mathematical alphabets of Unicode in a font.
+    Letters are those of Unicode's mathematical alphabets, and brackets grow with what they hold:
+    for devices without a mathematical font, a page has one (`templates/derivation/math.css`).
     """
 
     def __init__(self, abbreviations: Mapping[Any, Glyph] | None = None) -> None:
@@ -59,18 +78,19 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
     def _letter(self, name: str, *, bold: bool = False) -> Element:
         text = VARTHETA if name == "vartheta" else greek_unicode.get(name, name)
         if bold:
-            return self._element("mi", text, class_="v", mathvariant="normal")
-        if len(text) > 1:
-            return self._element("mi", text, class_="w", mathvariant="normal")
-        return self._element("mi", text)
+            return self._element("mi", text.translate(BOLD), mathvariant="normal")
+        return self._slanted(text) if len(text) == 1 else self._upright(text)
+
+    def _slanted(self, text: str) -> Element:
+        return self._element("mi", text.translate(SLANTED), mathvariant="normal")
+
+    def _upright(self, text: str) -> Element:
+        return self._element("mi", text, mathvariant="normal")
 
     def _index_text(self, index: str) -> Element:
         if index.isdigit():
             return self._numeral(index)
-        if len(index) == 1:
-            return self._element("mi", index)
-        kind = "u" if len(index) > 2 else "i"
-        return self._element("mi", index, class_=kind, mathvariant="normal")
+        return self._slanted(index) if len(index) <= 2 else self._upright(index)
 
     def _operator(self, text: str) -> Element:
         text = OPERATORS.get(text, text)
@@ -98,9 +118,8 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
         return self._element("mfrac", numerator, denominator)
 
     def _function(self, name: str) -> Element:
-        text = self._element("mi", name, class_="w", mathvariant="normal")
         space = self._element("mspace", width="0.17em")
-        return self._element("mrow", text, space)
+        return self._element("mrow", self._upright(name), space)
 
     def _root(self, value: Element) -> Element:
         return self._element("msqrt", value)
@@ -110,7 +129,8 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
 
     def _array(self, rows: Sequence[Sequence[Element]]) -> Element:
         lines = [self._element("mtr", *(self._element("mtd", x) for x in row)) for row in rows]
-        return self._element("mtable", *lines, class_="m")
+        left, right = (self._element("mo", text, stretchy="true") for text in "[]")
+        return self._element("mrow", left, self._element("mtable", *lines), right)
 
     def _print_Integer(self, expr: Any) -> Element:
         minus = [self._operator("-")] if expr < 0 else []
@@ -124,7 +144,7 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
 
     def _print_Exp1(self, expr: Any) -> Element:
         del expr
-        return self._element("mi", "e", class_="u", mathvariant="normal")
+        return self._upright("e")
 
 
 def _xml(element: Element) -> str:

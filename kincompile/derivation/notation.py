@@ -20,7 +20,7 @@ from kincompile.calculus.expressions import (
     Perpendicular,
     Power,
     Product,
-    Profile,
+    ProfileFunction,
     Rotated,
     Scaled,
     Sum,
@@ -35,11 +35,11 @@ from kincompile.derivation.formulas import (
     Decimal,
     Equated,
     Glyph,
+    Joined,
     Matrix,
-    Partial,
+    PartialDerivative,
     Quotient,
     Relation,
-    Row,
     Sub,
     Transposed,
     size,
@@ -162,7 +162,7 @@ class Notation:
         base = self._letter(expr.name)
         return self._dotted(base, expr.order) if expr.order else base
 
-    def _print_Profile(self, expr: Profile) -> Printed:
+    def _print_ProfileFunction(self, expr: ProfileFunction) -> Printed:
         letter, index, _ = split_name(expr.name)
         return self._primed(self._letter(letter), self._index_text(index), expr.order)
 
@@ -217,7 +217,7 @@ class Notation:
     def _is_atom(self, expr: Any) -> bool:
         """Return whether something needs no brackets under an exponent."""
         is_unit = isinstance(expr, Perpendicular) and isinstance(expr.vector, Basis)
-        atoms = Symbol | VectorSymbol | TimeFunction | Basis | Call | Profile
+        atoms = Symbol | VectorSymbol | TimeFunction | Basis | Call | ProfileFunction
         return is_unit or isinstance(expr, atoms) or expr in self.abbreviations
 
     def _short(self, expr: Any) -> Printed:
@@ -367,7 +367,7 @@ class Notation:
         exponent = self._index_text(expr.exponent) if expr.exponent else None
         return self._scripts(base, index, exponent)
 
-    def _print_Row(self, expr: Row) -> Printed:
+    def _print_Joined(self, expr: Joined) -> Printed:
         return self._row([self._part(part) for part in expr.parts])
 
     def _part(self, part: Any) -> Printed:
@@ -384,7 +384,7 @@ class Notation:
             return self._scripts(bare, index, self._index_text(expr.base.exponent))
         return self._scripts(self._print(expr.base), index, None)
 
-    def _print_Partial(self, expr: Partial) -> Printed:
+    def _print_PartialDerivative(self, expr: PartialDerivative) -> Printed:
         top = self._row([self._sign(expr.sign), self._print(expr.numerator)])
         return self._fraction(
             top, self._row([self._sign(expr.sign), self._print(expr.denominator)])
@@ -450,6 +450,16 @@ def _place(factor: Any) -> int:
     """Return where a factor stands: numbers first, rates last."""
     if isinstance(factor, Number | Decimal):
         return 0
-    base = factor.base if isinstance(factor, Power) else factor
-    is_rate = isinstance(base, Symbol) and split_name(base.name)[2] > 0
-    return 2 if is_rate else 1
+    return 2 if is_rate(factor) else 1
+
+
+def is_rate(factor: Any) -> bool:
+    """Return whether a factor is the rate of a scalar, a power or a sum of such."""
+    match factor:
+        case Symbol(name):
+            return split_name(name)[2] > 0
+        case Power(base, _):
+            return is_rate(base)
+        case Sum(terms):
+            return all(is_rate(_signed(term)[1]) for term in terms)
+    return False

@@ -5,19 +5,28 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
-from kincompile.derivation.document import Code, Display, Link, Math, Pattern, Table, Text, Verbatim
+from kincompile.derivation.document import (
+    CrossReference,
+    Display,
+    Math,
+    NotebookCode,
+    Pattern,
+    Table,
+    Text,
+    Verbatim,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.derivation.document import Block, Run, Runs, Section
+    from kincompile.derivation.document import Block, Chapter, Run, Runs
     from kincompile.derivation.formulas import Formula
 
 
 class Renderer(ABC):
     """Prints sections line by line; a medium gives the methods below `run`."""
 
-    def section(self, section: Section, depth: int) -> Iterator[str]:
+    def section(self, section: Chapter, depth: int) -> Iterator[str]:
         """Yield the lines of a section and its parts; `depth` counts from 0."""
         yield from self.heading(section, depth)
         for block in section.blocks:
@@ -36,7 +45,7 @@ class Renderer(ABC):
                 return self._table(block)
             case Pattern():
                 return self._pattern(block)
-            case Code():
+            case NotebookCode():
                 return ()
         raise TypeError(f"cannot print {block!r}")
 
@@ -51,12 +60,12 @@ class Renderer(ABC):
                 return self._verbatim(text)
             case Math(formula):
                 return self._math(formula)
-            case Link():
+            case CrossReference():
                 return self._link(run)
         return self._prose(run)
 
     @abstractmethod
-    def heading(self, section: Section, depth: int) -> Iterator[str]:
+    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
         """Yield the title of a section."""
 
     @abstractmethod
@@ -78,7 +87,7 @@ class Renderer(ABC):
     def _math(self, formula: Formula) -> str: ...
 
     @abstractmethod
-    def _link(self, link: Link) -> str: ...
+    def _link(self, link: CrossReference) -> str: ...
 
     @abstractmethod
     def _prose(self, text: str) -> str: ...

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from kincompile.derivation.document import (
-    Code,
+    Chapter,
     Display,
     Math,
-    Section,
+    NotebookCode,
     Verbatim,
     row_range,
     table,
@@ -26,7 +26,7 @@ from kincompile.derivation.formulas import (
     VELOCITY_TERM,
     Decimal,
     Equated,
-    Row,
+    Joined,
     decimals,
 )
 from kincompile.tables import counted
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from kincompile.derivation.formulas import Formula, Glyph
     from kincompile.derive.derivation import RowBlock
     from kincompile.derive.equations import EquationDerivatives
-    from kincompile.ir.inline import Section as Rows
+    from kincompile.ir.inline import ConstraintRows as Rows
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
@@ -78,20 +78,20 @@ class Steps(ABC, Generic[Derived]):
     def symbol(self, letter: str, k: int) -> Glyph:
         """Return the symbol of the k-th Phi, nu or gamma."""
 
-    def section(self, kind: str, is_driver: bool, *steps: Section) -> Section:
+    def section(self, kind: str, is_driver: bool, *steps: Chapter) -> Chapter:
         """Return the steps under the kind and the name of the constraint."""
         title = f"{kind} (driver) " if is_driver else f"{kind} "
-        return Section(f"constraint-{self.name}", (title, Verbatim(self.name)), (), steps)
+        return Chapter(f"constraint-{self.name}", (title, Verbatim(self.name)), (), steps)
 
-    def step(self, number: int, title: str, *blocks: Block, level: str | None = None) -> Section:
+    def step(self, number: int, title: str, *blocks: Block, level: str | None = None) -> Chapter:
         """Return one step, of the level of the derived ones unless another is given."""
         level = self.level if level is None else level
-        return Section(f"{self.name}-step-{number}", (f"{number}. {title}",), blocks, (), level)
+        return Chapter(f"{self.name}-step-{number}", (f"{number}. {title}",), blocks, (), level)
 
-    def nu(self, *notes: Block) -> Section:
+    def nu(self, *notes: Block) -> Chapter:
         """Return the step of the velocity equation, with notes below it."""
         lines = [
-            Display(Equated((self.symbol("nu", k), Row(("-", PHI_T)), item.nu)))
+            Display(Equated((self.symbol("nu", k), Joined(("-", PHI_T)), item.nu)))
             for k, item in enumerate(self.derivatives)
         ]
         return self.step(5, "The right side of the velocity equation", *lines, *notes)
@@ -104,12 +104,12 @@ class Steps(ABC, Generic[Derived]):
         terms.append((self.symbol("gamma", k), item.gamma))
         return [Display(Equated(pair)) for pair in terms]
 
-    def gamma(self, *blocks: Block) -> Section:
+    def gamma(self, *blocks: Block) -> Chapter:
         """Return the step of the acceleration equation."""
         title = "The right side of the acceleration equation, term by term"
         return self.step(6, title, *blocks)
 
-    def expansion(self) -> Section:
+    def expansion(self) -> Chapter:
         """Return the step in which everything becomes sines and cosines: the emitted code."""
         note = text(
             "This is what the emitted module computes, with its intermediate values written out. "
@@ -118,7 +118,7 @@ class Steps(ABC, Generic[Derived]):
         lines = self.evaluation.expansion(self.rows, QUANTITIES)
         return self.step(7, "Expanded to sines and cosines", note, *lines, level="expanded")
 
-    def placement(self) -> Section:
+    def placement(self) -> Chapter:
         """Return the step that gives the rows and columns of the constraint."""
         first, count = self.rows.instance.first_row, len(self.rows.entries["Phi"])
         note = text(
@@ -135,7 +135,7 @@ class Steps(ABC, Generic[Derived]):
     def _column_numbers(self) -> list[int]:
         return sorted({entry.column for entry in self.rows.entries["Phi_q"]})
 
-    def numbers(self, *vectors: Block) -> Section:
+    def numbers(self, *vectors: Block) -> Chapter:
         """Return the step in numbers: the state, vectors, then Phi, Phi_q, nu and gamma."""
         blocks = (text(f"At {self.evaluation.origin}:"), self._state(), *vectors)
         return self.step(9, "In numbers", *blocks, *self._results(), level="numeric")
@@ -164,4 +164,4 @@ class Steps(ABC, Generic[Derived]):
             for key, symbol in zip(QUANTITIES, (PHI, PHI_Q, NU, GAMMA), strict=True)
         )
         code = f"rows = slice({first}, {first + count})  # {self.name}\nprint(Phi_q(q, t, p)[rows])"
-        return (phi, text("In the columns of ", *names, ":"), phi_q, nu, gamma, Code(code))
+        return (phi, text("In the columns of ", *names, ":"), phi_q, nu, gamma, NotebookCode(code))

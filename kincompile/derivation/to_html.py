@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.mathml import MathMLPrinter
 from kincompile.derivation.renderer import Renderer
-from kincompile.targets.templates import fill
+from kincompile.targets.templates import fill, read
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from kincompile.derivation.document import (
+        Chapter,
+        CrossReference,
         Display,
-        Document,
-        Link,
+        Manuscript,
         Pattern,
-        Section,
         SourceLine,
         Table,
     )
@@ -33,10 +33,11 @@ CHARACTER = 6.8
 """Width of a character of a pattern's labels, in a monospaced font of 11 pixels."""
 
 
-def as_html(document: Document) -> str:
+def as_html(document: Manuscript) -> str:
     """Return a document as an HTML page."""
     renderer = _HtmlRenderer(document)
     data = {
+        "font": read("derivation/math.css"),
         "title": escape(f"Derivation of {document.name}"),
         "heading": f"Derivation of <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
@@ -49,10 +50,10 @@ def as_html(document: Document) -> str:
 class _HtmlRenderer(Renderer):
     """Prints elements of HTML."""
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Manuscript) -> None:
         self._printer = MathMLPrinter(document.abbreviations)
 
-    def contents(self, sections: tuple[Section, ...], depth: int = 1) -> Iterator[str]:
+    def contents(self, sections: tuple[Chapter, ...], depth: int = 1) -> Iterator[str]:
         yield "<ol>"
         for item in sections:
             yield f'<li><a href="#{escape(item.anchor)}">{self.runs(item.title)}</a>'
@@ -61,11 +62,11 @@ class _HtmlRenderer(Renderer):
             yield "</li>"
         yield "</ol>"
 
-    def section(self, section: Section, depth: int) -> Iterator[str]:
+    def section(self, section: Chapter, depth: int) -> Iterator[str]:
         yield from super().section(section, depth)
         yield "</section>"
 
-    def heading(self, section: Section, depth: int) -> Iterator[str]:
+    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
         level = f'<span class="level {section.level}">{section.level}</span>'
         title = self.runs(section.title) + (level if section.level else "")
         yield f'<section id="{escape(section.anchor)}">'
@@ -101,7 +102,7 @@ class _HtmlRenderer(Renderer):
     def _math(self, formula: Formula) -> str:
         return self._printer.math(formula)
 
-    def _link(self, link: Link) -> str:
+    def _link(self, link: CrossReference) -> str:
         return f'<a href="#{escape(link.anchor)}">{self.run(link.content)}</a>'
 
     def _prose(self, text: str) -> str:

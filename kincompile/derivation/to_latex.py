@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.derivation.document import Link, Verbatim
+from kincompile.derivation.document import CrossReference, Verbatim
 from kincompile.derivation.renderer import Renderer
 from kincompile.derivation.tex import TexPrinter, escape
 from kincompile.targets.templates import fill
@@ -12,7 +12,7 @@ from kincompile.targets.templates import fill
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.derivation.document import Display, Document, Pattern, Run, Section, Table
+    from kincompile.derivation.document import Chapter, Display, Manuscript, Pattern, Run, Table
     from kincompile.derivation.formulas import Formula
 
 HEADINGS = ("section", "subsection", "subsubsection")
@@ -27,7 +27,7 @@ MOST_PARAGRAPHS = 5
 """Columns up to which lines in cells are broken; a wider table is shrunk instead."""
 
 
-def as_tex(document: Document) -> str:
+def as_tex(document: Manuscript) -> str:
     """Return a document as LaTeX."""
     renderer = _LatexRenderer(document)
     data = {
@@ -41,10 +41,10 @@ def as_tex(document: Document) -> str:
 class _LatexRenderer(Renderer):
     """Prints LaTeX."""
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Manuscript) -> None:
         self._printer = TexPrinter(document.abbreviations, is_breakable=True)
 
-    def heading(self, section: Section, depth: int) -> Iterator[str]:
+    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
         level = rf" \level{{{section.level}}}" if section.level else ""
         plain = "".join(escape(_plain(run)) for run in section.title)
         heading = HEADINGS[min(depth, len(HEADINGS) - 1)]
@@ -88,7 +88,7 @@ class _LatexRenderer(Renderer):
     def _math(self, formula: Formula) -> str:
         return f"${self._printer.math(formula)}$"
 
-    def _link(self, link: Link) -> str:
+    def _link(self, link: CrossReference) -> str:
         return _hyperlink(link.anchor, self.run(link.content))
 
     def _prose(self, text: str) -> str:
@@ -100,7 +100,7 @@ def _plain(run: Run) -> str:
     match run:
         case Verbatim(text):
             return text
-        case Link(_, content):
+        case CrossReference(_, content):
             return _plain(content)
         case str():
             return run

@@ -16,14 +16,21 @@ from kincompile.derivation.tex import TexPrinter
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.derivation.document import Display, Document, Link, Pattern, Section, Table
+    from kincompile.derivation.document import (
+        Chapter,
+        CrossReference,
+        Display,
+        Manuscript,
+        Pattern,
+        Table,
+    )
     from kincompile.derivation.formulas import Formula
 
 SPECIAL = str.maketrans({character: f"\\{character}" for character in "\\`*_{}[]<>#|$~"})
 
 
 @dataclass(frozen=True, slots=True)
-class Dialect:
+class FormulaMarks:
     """The marks of formulas: around those on lines of their own, and within a line."""
 
     before: str
@@ -31,11 +38,11 @@ class Dialect:
     inline: str
 
 
-GITHUB = Dialect("```math", "```", "$`{}`$")
-NOTEBOOK = Dialect("$$", "$$", "${}$")
+GITHUB = FormulaMarks("```math", "```", "$`{}`$")
+NOTEBOOK = FormulaMarks("$$", "$$", "${}$")
 
 
-def as_markdown(document: Document) -> str:
+def as_markdown(document: Manuscript) -> str:
     """Return a document as Markdown for GitHub."""
     renderer = MarkdownRenderer(document, GITHUB)
     lines = [f"# Derivation of `{document.name}`", "", escape(document.summary), ""]
@@ -52,11 +59,11 @@ def escape(text: str) -> str:
 class MarkdownRenderer(Renderer):
     """Prints Markdown in a dialect."""
 
-    def __init__(self, document: Document, dialect: Dialect) -> None:
+    def __init__(self, document: Manuscript, dialect: FormulaMarks) -> None:
         self._printer = TexPrinter(document.abbreviations)
         self._dialect = dialect
 
-    def heading(self, section: Section, depth: int) -> Iterator[str]:
+    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
         """Yield the title of a section, after its anchor."""
         level = f" *({section.level})*" if section.level else ""
         title = f"{'#' * (depth + 2)} {self.runs(section.title)}{level}"
@@ -97,7 +104,7 @@ class MarkdownRenderer(Renderer):
     def _math(self, formula: Formula) -> str:
         return self._dialect.inline.format(self._printer.math(formula))
 
-    def _link(self, link: Link) -> str:
+    def _link(self, link: CrossReference) -> str:
         content = self.run(link.content)
         if isinstance(link.content, Math):
             # A formula inside the brackets of a link is not understood everywhere.

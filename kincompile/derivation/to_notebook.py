@@ -8,14 +8,14 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from kincompile.derivation.document import Code
+from kincompile.derivation.document import NotebookCode
 from kincompile.derivation.to_markdown import NOTEBOOK, MarkdownRenderer, escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import TypeAlias
 
-    from kincompile.derivation.document import Document, Section
+    from kincompile.derivation.document import Chapter, Manuscript
 
     Cell: TypeAlias = dict[str, object]
 
@@ -23,7 +23,7 @@ FORMAT, MINOR_FORMAT = 4, 5
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 
-def as_notebook(document: Document) -> str:
+def as_notebook(document: Manuscript) -> str:
     """Return a document as a notebook, the text of an .ipynb file."""
     renderer = MarkdownRenderer(document, NOTEBOOK)
     found = [*_preface(document)]
@@ -40,7 +40,7 @@ def as_notebook(document: Document) -> str:
     return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
 
 
-def _preface(document: Document) -> Iterator[Cell]:
+def _preface(document: Manuscript) -> Iterator[Cell]:
     yield _markdown([f"# Derivation of `{document.name}`", "", escape(document.summary)])
     yield _markdown(["The module that kincompile emits. It is plain NumPy; run it first."])
     yield _code(document.source)
@@ -48,11 +48,11 @@ def _preface(document: Document) -> Iterator[Cell]:
     yield _code(document.state)
 
 
-def _section_cells(renderer: MarkdownRenderer, section: Section, depth: int = 0) -> Iterator[Cell]:
+def _section_cells(renderer: MarkdownRenderer, section: Chapter, depth: int = 0) -> Iterator[Cell]:
     """Yield the text of a section in cells, broken where code stands in it."""
     lines = list(renderer.heading(section, depth))
     for block in section.blocks:
-        if isinstance(block, Code):
+        if isinstance(block, NotebookCode):
             if lines:
                 yield _markdown(lines)
             yield _code(block.text)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Partial:
+class PartialDerivative:
     """The derivative of a row block by a coordinate.
 
     Attributes
@@ -61,7 +61,7 @@ class Partial:
 
 
 @cache
-def partials(template: Template) -> tuple[tuple[Partial, ...], ...]:
+def partials(template: Template) -> tuple[tuple[PartialDerivative, ...], ...]:
     """Return the derivatives of a constraint type: by row block, then by coordinate."""
     changes = tuple(zip(template.coordinates, template.rates, strict=True))
     return tuple(
@@ -70,14 +70,16 @@ def partials(template: Template) -> tuple[tuple[Partial, ...], ...]:
     )
 
 
-def _partial(Phi: Expression, coordinate: CoordinateSymbol, rate: CoordinateSymbol) -> Partial:
+def _partial(
+    Phi: Expression, coordinate: CoordinateSymbol, rate: CoordinateSymbol
+) -> PartialDerivative:
     if not isinstance(rate, VectorSymbol):
-        return Partial(coordinate, *recorded(Phi, {coordinate: ONE}))
+        return PartialDerivative(coordinate, *recorded(Phi, {coordinate: ONE}))
     entry, steps = recorded(Phi, {coordinate: rate})
     read_off = tuple(
         Step(step.rule, step.expression, coefficient(step.derivative, rate)) for step in steps
     )
-    return Partial(coordinate, coefficient(entry, rate), read_off)
+    return PartialDerivative(coordinate, coefficient(entry, rate), read_off)
 
 
 def _applied(entry: Expression, change: Expression) -> Expression:

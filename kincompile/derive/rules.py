@@ -19,7 +19,7 @@ from kincompile.calculus.expressions import (
     Perpendicular,
     Power,
     Product,
-    Profile,
+    ProfileFunction,
     Rotated,
     Scalar,
     Scaled,
@@ -112,9 +112,9 @@ def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[R
             return Rule.PRODUCT, dot(along(left, direction, record), right) + dot(
                 left, along(right, direction, record)
             )
-        case Profile(name, argument, order):
+        case ProfileFunction(name, argument, order):
             inner = along(argument, direction, record)
-            return Rule.PROFILE, Profile(name, argument, order + 1) * inner
+            return Rule.PROFILE, ProfileFunction(name, argument, order + 1) * inner
         case TimeFunction(name, order) if TIME in direction:
             return Rule.DRIVER, TimeFunction(name, order + 1)
     change = direction.get(expression)

@@ -26,7 +26,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class ConstraintRows:
     """The rows of one constraint.
 
     Attributes
@@ -61,7 +61,7 @@ class InlineProgram:
 
     program: Program
     nodes: tuple[Node, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[ConstraintRows, ...]
     hints: Mapping[int, str]
     frames: tuple[tuple[int, ...], ...] = ()
 
@@ -86,7 +86,7 @@ def inline(program: Program) -> InlineProgram:
         hints.update(zip(body.entries, body.labels, strict=True))
     for item in program.coordinates:
         hints[graph.square(graph.input(rate(item.name)))] = f"{rate(item.name)}_sq"
-    sections: list[Section] = []
+    sections: list[ConstraintRows] = []
     shared: dict[str, dict[tuple[int, int], int]] = {}
     for instance in program.instances:
         kernel = instance.kernel
@@ -103,7 +103,7 @@ def inline(program: Program) -> InlineProgram:
             if graph.nodes[node][0] not in ("neg", "const", "input", "call"):
                 hints.setdefault(node, name)
         entries = _entries(instance, new, graph, shared)
-        sections.append(Section(instance, instance.constraint.text, entries))
+        sections.append(ConstraintRows(instance, instance.constraint.text, entries))
     if shared:  # a sum is complete where the last constraint has contributed
         sums = _sums(program, graph, shared)
         sections[-1] = replace(sections[-1], entries={**sections[-1].entries, **sums})

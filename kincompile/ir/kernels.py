@@ -31,7 +31,7 @@ from kincompile.ir.program import (
     Hint,
     Input,
     Kernel,
-    Motion,
+    StateEntry,
 )
 from kincompile.names import rate
 
@@ -39,33 +39,39 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from kincompile.calculus.expressions import Components, Profile, Rotation, TimeFunction, Value
+    from kincompile.calculus.expressions import (
+        Components,
+        ProfileFunction,
+        Rotation,
+        TimeFunction,
+        Value,
+    )
     from kincompile.calculus.symbols import CoordinateSymbol, Frame
     from kincompile.model.bodies import BodyKind
     from kincompile.model.resolve import FreeEquation
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class Operand:
     """A node that adds and multiplies like a number."""
 
     graph: Graph
     node: int
 
-    def __add__(self, other: Code) -> Code:
-        return Code(self.graph, self.graph.add(self.node, other.node))
+    def __add__(self, other: Operand) -> Operand:
+        return Operand(self.graph, self.graph.add(self.node, other.node))
 
-    def __sub__(self, other: Code) -> Code:
-        return Code(self.graph, self.graph.sub(self.node, other.node))
+    def __sub__(self, other: Operand) -> Operand:
+        return Operand(self.graph, self.graph.sub(self.node, other.node))
 
-    def __mul__(self, other: Code) -> Code:
-        return Code(self.graph, self.graph.mul(self.node, other.node))
+    def __mul__(self, other: Operand) -> Operand:
+        return Operand(self.graph, self.graph.mul(self.node, other.node))
 
-    def __neg__(self) -> Code:
-        return Code(self.graph, self.graph.neg(self.node))
+    def __neg__(self) -> Operand:
+        return Operand(self.graph, self.graph.neg(self.node))
 
-    def __pow__(self, exponent: int) -> Code:
-        return Code(self.graph, self.graph.pow(self.node, exponent))
+    def __pow__(self, exponent: int) -> Operand:
+        return Operand(self.graph, self.graph.pow(self.node, exponent))
 
 
 class KernelEnvironment:
@@ -78,17 +84,17 @@ class KernelEnvironment:
         self._frames = {frame.rotation: frame for frame in template.frames}
         self._template = template
 
-    def _input(self, item: Input) -> Code:
+    def _input(self, item: Input) -> Operand:
         node = self.inputs[item] = self.graph.input(item)
-        return Code(self.graph, node)
+        return Operand(self.graph, node)
 
     def number(self, value: Fraction) -> Value:
         """Return an exact number."""
-        return Code(self.graph, self.graph.const(value))
+        return Operand(self.graph, self.graph.const(value))
 
     def pi(self) -> Value:
         """Return pi."""
-        return Code(self.graph, self.graph.pi())
+        return Operand(self.graph, self.graph.pi())
 
     def symbol(self, symbol: Symbol) -> Value:
         """Return a coordinate, a rate or a scalar attribute."""
@@ -104,7 +110,7 @@ class KernelEnvironment:
         """Return C(t) or one of its derivatives."""
         return self._input(Function(function.name, function.order))
 
-    def profile(self, profile: Profile) -> Value:
+    def profile(self, profile: ProfileFunction) -> Value:
         """Return rho(alpha) or one of its derivatives."""
         (contact,) = self._motion[profile.argument]
         indices = [owner.index for owner in self._template.owners]
@@ -120,7 +126,7 @@ class KernelEnvironment:
 
     def call(self, function: str, value: Value) -> Value:
         """Return an elementary function."""
-        return Code(self.graph, self.graph.call(function, value.node))
+        return Operand(self.graph, self.graph.call(function, value.node))
 
 
 AXES = "xyz"
@@ -138,16 +144,16 @@ def frame_entries(template: Template, frame: Frame) -> tuple[FrameEntry, ...]:
     return tuple(FrameEntry(owner, k, f"{name}_{frame.index}") for k, name in enumerate(names))
 
 
-def motion_of(template: Template, owner: int, order: int) -> tuple[Motion, ...]:
+def motion_of(template: Template, owner: int, order: int) -> tuple[StateEntry, ...]:
     """Return the coordinates of an owner, or their rates, as inputs."""
     item, ending = template.owners[owner], "_dot" * order
     return tuple(
-        Motion(owner, k, order, f"{letter}_{item.index}{ending}")
+        StateEntry(owner, k, order, f"{letter}_{item.index}{ending}")
         for k, letter in enumerate(item.letters)
     )
 
 
-def _motion(template: Template) -> dict[CoordinateSymbol, tuple[Motion, ...]]:
+def _motion(template: Template) -> dict[CoordinateSymbol, tuple[StateEntry, ...]]:
     """Return the inputs of each coordinate and rate of a template."""
     found = {}
     for owner, item in enumerate(template.owners):
@@ -166,7 +172,9 @@ def frame_kernel(kind: BodyKind) -> FrameKernel:
     found = Expansion(environment).entries(own.rotation)
     graph = Graph()
     numbers = {
-        item: graph.input(item.component) for item in environment.inputs if isinstance(item, Motion)
+        item: graph.input(item.component)
+        for item in environment.inputs
+        if isinstance(item, StateEntry)
     }
     new = graph.instantiate(environment.graph.nodes, numbers)
     entries = tuple(new[item.node] for item in found)

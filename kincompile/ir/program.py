@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class StateEntry:
     """A coordinate of an owner, a body or a contact of the type, or its rate (order 1)."""
 
     owner: int
@@ -58,7 +58,7 @@ class Function:
         return self.symbol + "_prime" * self.order
 
 
-Input = Motion | FrameEntry | Attribute | Function
+Input = StateEntry | FrameEntry | Attribute | Function
 """What a kernel of a constraint type reads; `name` is for people, in the type's own symbols."""
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from kincompile.calculus.expressions import (
         Components,
-        Profile,
+        ProfileFunction,
         Rotation,
         Symbol,
         TimeFunction,
@@ -112,7 +112,7 @@ def _column(entries: list[sympy.Expr]) -> sympy.ImmutableDenseMatrix:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class EquationRow:
     """One equation of the system: Phi, the entries of Phi_q by coordinate, nu and gamma."""
 
     Phi: sympy.Expr
@@ -121,9 +121,9 @@ class Row:
     gamma: sympy.Expr
 
 
-def assemble(system: CheckedSystem) -> list[Row]:
+def assemble(system: CheckedSystem) -> list[EquationRow]:
     """Return the rows of the system in order."""
-    rows: list[Row] = []
+    rows: list[EquationRow] = []
     for constraint in system.constraints:
         rows += (
             _free_rows(constraint)
@@ -133,16 +133,16 @@ def assemble(system: CheckedSystem) -> list[Row]:
     return rows
 
 
-def _free_rows(equation: FreeEquation) -> list[Row]:
+def _free_rows(equation: FreeEquation) -> list[EquationRow]:
     rows = []
     for expression in equation.expressions:
         found = derive_equation(expression, equation.columns)
         entries = dict(zip(equation.columns, found.Phi_q, strict=True))
-        rows.append(Row(found.Phi, entries, found.nu, found.gamma))
+        rows.append(EquationRow(found.Phi, entries, found.nu, found.gamma))
     return rows
 
 
-def _joint_rows(joint: Joint) -> list[Row]:
+def _joint_rows(joint: Joint) -> list[EquationRow]:
     expansion = Expansion(SymbolicEnvironment(joint))
     rows = []
     for block in derive(joint.template):
@@ -151,7 +151,7 @@ def _joint_rows(joint: Joint) -> list[Row]:
         for Phi, nu, gamma, *entries in zip(*parts, *columns, strict=True):
             by_name = zip(joint.columns, entries, strict=True)
             known = {name: entry for name, entry in by_name if name is not None}
-            rows.append(Row(Phi, known, nu, gamma))
+            rows.append(EquationRow(Phi, known, nu, gamma))
     return rows
 
 
@@ -191,7 +191,7 @@ class SymbolicEnvironment:
         """Return C(t) or one of its derivatives."""
         return as_sympy(self._joint.scalars[function.name]).diff(t, function.order)
 
-    def profile(self, profile: Profile) -> Value:
+    def profile(self, profile: ProfileFunction) -> Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
         rho = self._joint.profiles[profile.name].diff(alpha, profile.order)
         return rho.subs(alpha, self.symbol(profile.argument))

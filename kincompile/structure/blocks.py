@@ -1,7 +1,9 @@
-"""The block triangular form: a square system as blocks that are solved one after the other.
+"""The decomposition of Dulmage and Mendelsohn, by the pattern of Phi_q alone.
 
-A *block* is a strongly connected component of the equations, each matched with a coordinate that
-it determines (Dulmage and Mendelsohn): equations that can only be solved together.
+A maximum matching pairs equations with coordinates that they determine. It shows the part with too
+many equations, the part with too few, and the square part between them. That one has a block
+triangular form: a *block* is a strongly connected component, equations that can only be solved
+together, and the blocks are solved one after the other.
 """
 
 from __future__ import annotations
@@ -29,6 +31,70 @@ class Block:
 
     rows: tuple[int, ...]
     columns: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Rows and columns of Phi_q by what the pattern alone says of them.
+
+    Attributes
+    ----------
+    too_many_rows, too_many_columns
+        Equations of which there are more than coordinates in them, and those coordinates.
+    blocks
+        The square part, in the order of solution.
+    too_few_rows, too_few_columns
+        Coordinates of which there are more than equations for them, and those equations.
+    """
+
+    too_many_rows: tuple[int, ...]
+    too_many_columns: tuple[int, ...]
+    blocks: tuple[Block, ...]
+    too_few_rows: tuple[int, ...]
+    too_few_columns: tuple[int, ...]
+
+
+def parts_of(pattern: Sequence[tuple[int, int]], shape: tuple[int, int]) -> Parts:
+    """Split a system into the part with too many equations, the square one, that with too few.
+
+    Arguments are those of `matching`.
+    """
+    m, n = shape
+    of_row = matching(pattern, shape).tolist()
+    of_column = [-1] * n
+    for row, column in enumerate(of_row):
+        if column >= 0:
+            of_column[column] = row
+    columns_of: list[list[int]] = [[] for _ in range(m)]
+    rows_of: list[list[int]] = [[] for _ in range(n)]
+    for row, column in pattern:
+        columns_of[row].append(column)
+        rows_of[column].append(row)
+    many_rows, many_columns = _reached(of_row, columns_of, of_column)
+    few_columns, few_rows = _reached(of_column, rows_of, of_row)
+    rows = set(range(m)) - many_rows - few_rows
+    columns = set(range(n)) - many_columns - few_columns
+    inner = [(row, column) for row, column in pattern if row in rows and column in columns]
+    blocks = block_triangular(sorted(rows), sorted(columns), inner) or ()
+    many = tuple(sorted(many_rows)), tuple(sorted(many_columns))
+    return Parts(*many, blocks, tuple(sorted(few_rows)), tuple(sorted(few_columns)))
+
+
+def _reached(
+    matched: Sequence[int], others_of: Sequence[Sequence[int]], partner: Sequence[int]
+) -> tuple[set[int], set[int]]:
+    """Follow alternating paths from items without a partner; return items and others on them."""
+    waiting = [item for item, other in enumerate(matched) if other < 0]
+    items, others = set(waiting), set[int]()
+    while waiting:
+        for other in others_of[waiting.pop()]:
+            if other not in others:
+                others.add(other)
+                following = partner[other]
+                if following >= 0 and following not in items:
+                    items.add(following)
+                    waiting.append(following)
+    return items, others
 
 
 def matching(pattern: Sequence[tuple[int, int]] | Index, shape: tuple[int, int]) -> Index:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.model.resolve import Joint
+from kincompile.structure.blocks import parts_of
 from kincompile.structure.counting import counting_problem, unmatched
 from kincompile.structure.findings import ConstraintEntry, Findings, Mobility, NamedBlock
-from kincompile.structure.parts import parts_of
 from kincompile.structure.remedies import least_squares_will_do, missing_drivers, surpluses
 from kincompile.structure.report_text import report_text
 

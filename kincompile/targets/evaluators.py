@@ -13,13 +13,13 @@ from kincompile.targets.schedule import Assignment, Scheduler
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
     from kincompile.ir.program import Program
     from kincompile.targets.naming import NameTable
 
 
 @dataclass(frozen=True, slots=True)
-class BodyFrame:
+class UsedFrame:
     """What is used of a body's frame, and the angle where that is its cosine and sine."""
 
     angle: int | None
@@ -48,16 +48,16 @@ class Listing:
         Names of all named nodes, inputs included.
     """
 
-    frames: tuple[BodyFrame, ...]
-    steps: tuple[tuple[Section, tuple[Assignment, ...]], ...]
-    results: tuple[tuple[str, tuple[tuple[Section, tuple[Entry, ...]], ...]], ...]
+    frames: tuple[UsedFrame, ...]
+    steps: tuple[tuple[ConstraintRows, tuple[Assignment, ...]], ...]
+    results: tuple[tuple[str, tuple[tuple[ConstraintRows, tuple[Entry, ...]], ...]], ...]
     inputs: frozenset[str]
     input_names: Mapping[str, str]
     functions: tuple[str, ...]
     names: Mapping[int, str]
 
 
-def varying(inline: InlineProgram, section: Section, quantity: str) -> tuple[Entry, ...]:
+def varying(inline: InlineProgram, section: ConstraintRows, quantity: str) -> tuple[Entry, ...]:
     """Return the entries a function computes: of a matrix those that are not plain numbers."""
     entries = section.entries[quantity]
     if all(item.name != quantity or not item.is_matrix for item in quantities.QUANTITIES):
@@ -132,13 +132,13 @@ def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, 
                 yield vector, k, listing.input_names[member]
 
 
-def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[BodyFrame, ...]:
+def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[UsedFrame, ...]:
     """Return the frames of which something is used, and name that."""
     found = []
     for entries in inline.frames:
         values = tuple(scheduler.name(node) for node in entries if node in scheduler.uses)
         if values:
-            found.append(BodyFrame(_angle(inline, values), values))
+            found.append(UsedFrame(_angle(inline, values), values))
     return tuple(found)
 
 
@@ -151,7 +151,7 @@ def _angle(inline: InlineProgram, values: Sequence[Assignment]) -> int | None:
 
 
 def _functions(
-    inline: InlineProgram, uses: Iterable[int], frames: tuple[BodyFrame, ...]
+    inline: InlineProgram, uses: Iterable[int], frames: tuple[UsedFrame, ...]
 ) -> tuple[str, ...]:
     """Return the names of the functions called; cosine and sine of a frame are one call."""
     pairs = [frame for frame in frames if frame.angle is not None]

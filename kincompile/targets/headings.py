@@ -10,7 +10,7 @@ from kincompile.targets.lines import indented, labelled, quoted, table, wrapped
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
 
 
 def header(code: InlineProgram, first: int = 0) -> list[str]:
@@ -61,13 +61,13 @@ def constants(code: InlineProgram, level: int, pair: str) -> dict[str, object]:
     }
 
 
-def short_title(section: Section, first: int = 0) -> str:
+def short_title(section: ConstraintRows, first: int = 0) -> str:
     """Return rows, type and name of a constraint, for a comment above its code."""
     instance = section.instance
     return f'{_rows(section, first)}  {instance.kernel.name} "{instance.name}"'
 
 
-def title(section: Section, first: int = 0) -> str:
+def title(section: ConstraintRows, first: int = 0) -> str:
     """Return rows, type, name and points of a constraint, for a comment above its rows."""
     return f"{short_title(section, first)}: {section.text}"
 
@@ -85,7 +85,7 @@ def _unit(unit: str) -> str:
     return f" [{unit}]" if unit else ""
 
 
-def _rows(section: Section, first: int) -> str:
+def _rows(section: ConstraintRows, first: int) -> str:
     first += section.instance.first_row
     last = first + len(section.entries["Phi"]) - 1
     return str(first) if first == last else f"{first}-{last}"

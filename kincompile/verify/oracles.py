@@ -9,13 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 Array = NDArray[Any]
 
@@ -35,51 +32,54 @@ ROUGH = 1e-3
 SAME = 1e-9
 """Largest difference between Phi of complex and of real numbers, relative to its terms."""
 
-Derivative = Callable[["ModuleType", Array, float, Array, float], Array]
+Function = Callable[[Array, Any], Array]
+"""Phi of q (..., n) and t."""
+
+Derivative = Callable[[Function, Array, float, Array, float], Array]
 """Gives derivatives of Phi, (k, m), at q (n,) and t along the directions (k, n) and of time."""
 
 
-def value(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
+def value(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:
     """Return Phi itself, shape (1, m), whatever the direction."""
-    return np.asarray(module.Phi(q, t)[np.newaxis])
+    return np.asarray(Phi(q, t)[np.newaxis])
 
 
-def complex_step(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
+def complex_step(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:
     """Return the derivative of Phi along directions.
 
     It is NaN where Phi of complex numbers is not Phi: a compiled module takes the former from
     NumPy.
     """
-    moved = module.Phi(q + 1j * STEP * along, t + 1j * STEP * time if time else t)
-    here = module.Phi(q, t)
+    moved = Phi(q + 1j * STEP * along, t + 1j * STEP * time if time else t)
+    here = Phi(q, t)
     is_same = np.abs(np.real(moved) - here) <= SAME * np.maximum(1.0, np.abs(here))
     return np.where(is_same, np.imag(moved) / STEP, np.nan)
 
 
-def second_complex_step(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
+def second_complex_step(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:
     """Return the second derivative of Phi along one line, by differences of complex steps."""
 
     def slope(h: float) -> Array:
-        return complex_step(module, q + h * along[0], t + h * time, along, time)
+        return complex_step(Phi, q + h * along[0], t + h * time, along, time)
 
     return _slope(slope, SHORT)
 
 
-def differences(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
+def differences(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:
     """Return the derivative of Phi along directions, by real numbers alone; NaN beside a pole."""
 
     def at(s: float) -> Array:
-        return np.asarray(module.Phi(q + s * along, t + s * time))
+        return np.asarray(Phi(q + s * along, t + s * time))
 
-    return _smooth(module.Phi(q, t), lambda h: _slope(at, h))
+    return _smooth(Phi(q, t), lambda h: _slope(at, h))
 
 
-def second_differences(module: ModuleType, q: Array, t: float, along: Array, time: float) -> Array:
+def second_differences(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:
     """Return the second derivative of Phi along lines, by real numbers alone; NaN beside a pole."""
-    here = module.Phi(q, t)
+    here = Phi(q, t)
 
     def at(s: float) -> Array:
-        return np.asarray(module.Phi(q + s * along, t + s * time))
+        return np.asarray(Phi(q + s * along, t + s * time))
 
     def curvature(h: float) -> Array:
         near, far = (at(s) + at(-s) - 2 * here for s in (h, 2 * h))

@@ -2,13 +2,17 @@ r"""Verification of an emitted module by oracles that know nothing of derivative
 
 Phi_q is compared with a complex step of Phi, nu with one in time, and gamma with the line oracle:
 along :math:`q + s\,\dot q,\ t + s`, with zero acceleration, gamma is minus the second derivative
-of Phi by s. Only the Phi of the module itself is used: if Phi is right, so is the rest.
+of Phi by s. Only the Phi of the module itself is used: if Phi is right, so is the rest. Phi is
+compared with the interpreter's where the module was compiled in this process, and what the planned
+solve gives is multiplied by Phi_q.
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -16,16 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 import kincompile.compiler as compiler
-from kincompile.errors import InputError, RedundantConstraintWarning
-from kincompile.quantities import QUANTITIES, TOGETHER, functions, is_moving
+from kincompile.errors import RedundantConstraintWarning
+from kincompile.ir.interpret import interpret
+from kincompile.ir.lower import lower
+from kincompile.model.origins import model_of
+from kincompile.quantities import QUANTITIES
 from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import require_square
-from kincompile.runtime.newton import newton
-from kincompile.runtime.problem import problem
-from kincompile.runtime.status import Status
 from kincompile.tables import indented, table
 from kincompile.verify.oracles import ORACLES, Oracle
+from kincompile.verify.planned_solve import LIMIT, PlannedSolve
+from kincompile.verify.samples import Samples, samples_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,13 +41,8 @@ if TYPE_CHECKING:
     from kincompile.quantities import Quantity
 
 Array = NDArray[Any]
-
-STATES, SEED = 6, 1989
-"""States of each kind, generic ones and assembled ones."""
-
-FAR = 100.0
-"""How far from the guess, in radians and sizes of the mechanism, an assembled position may be: far
-away a coordinate has no digits left for a difference."""
+PhiOfParameters = Callable[[Array, Any, Array], Array]
+"""Phi of q (..., n), t and p (k,)."""
 
 ALL_SHOWN = 60
 """Equations up to which each has lines of its own; beyond, the largest errors stand for all."""
@@ -49,10 +50,17 @@ ALL_SHOWN = 60
 LEGEND = (
     "complex step: Phi_q = Im Phi(q + i h) / h, nu = -Im Phi(q, t + i h) / h",
     "line oracle: gamma = -d2/ds2 Phi(q + s q_dot, t + s) at s = 0",
+    "multiplied back: Phi_q x = b for random b; the determinants of its blocks make det Phi_q",
 )
 """The oracles, for readers of the table."""
 
-LARGEST = 10
+THE_MODEL = "the model"
+"""What Phi of a module that was compiled here is compared with."""
+
+SOLVE, DETERMINANTS, ALL_BLOCKS = "solve", "determinants", "all blocks"
+"""What else is compared: the planned solve, equation by equation, and the determinants it gives."""
+
+LARGEST = 8
 """How many of the largest errors of each quantity stand for all."""
 
 
@@ -63,9 +71,10 @@ class Check:
     Attributes
     ----------
     quantity
-        ``"Phi_q"``, ``"nu"`` or ``"gamma"``; ``"Phi"`` for the functions that give Phi with others.
+        ``"Phi_q"``, ``"nu"`` or ``"gamma"``; ``"Phi"`` for the functions that give Phi with others;
+        ``"solve"`` for the planned solve, and ``"determinants"``.
     equation
-        Name of the equation.
+        Name of the equation; of determinants ``"all blocks"``.
     coordinate
         Of Phi_q, the coordinate of the entry with the largest error; else "".
     oracle
@@ -101,7 +110,8 @@ class Verification:
     states
         Number of generic states, and of assembled ones.
     checks
-        One for each equation and quantity.
+        One for each equation and quantity; where the module has a planned solve, one more for each
+        equation, and one of the determinants.
     """
 
     name: str
@@ -144,7 +154,7 @@ class Verification:
         if len(self.checks) <= len(ORACLES) * ALL_SHOWN:
             return list(self.checks)
         shown: set[Check] = {check for check in self.checks if not check.passed}
-        for quantity in ORACLES:
+        for quantity in (*ORACLES, SOLVE):
             own = [check for check in self.checks if check.quantity == quantity]
             shown |= set(sorted(own, key=lambda check: -check.error)[:LARGEST])
         return [check for check in self.checks if check in shown]
@@ -167,6 +177,9 @@ class Verification:
 
 def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
     """Compare Phi_q, nu and gamma of an emitted module with derivatives of its Phi.
+
+    What its planned solve gives is multiplied by Phi_q. Phi itself is compared with the model where
+    that is known; of a module that was loaded from a file it is believed.
 
     Parameters
     ----------
@@ -196,14 +209,10 @@ def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
         module = _compiled(model)
     require_square(code_of(module))
     with np.errstate(all="ignore"):
-        states, assembled = _states(module)
-        if not states:
-            raise InputError(
-                f"the equations of {module.NAME} have no finite value near the guess: give a guess "
-                "near the assembled mechanism."
-            )
-        checks = tuple(_checks(module, states))
-    return Verification(module.NAME, (len(states) - assembled, assembled), checks)
+        samples = samples_of(module)
+        checks = (*_checks(samples), *_checks_of_solve(samples))
+    states = len(samples.q) - samples.assembled, samples.assembled
+    return Verification(module.NAME, states, checks)
 
 
 def _compiled(model: Mechanism | ConstraintSystem) -> ModuleType:
@@ -213,41 +222,12 @@ def _compiled(model: Mechanism | ConstraintSystem) -> ModuleType:
         return compiler.compile(model)
 
 
-State = tuple[Array, Array, float]
-
-
-def _states(module: ModuleType) -> tuple[list[State], int]:
-    """Return states q, q_dot, t, and how many of them, the last ones, are assembled."""
-    random = np.random.default_rng(SEED)
-    guess, p = module.GUESS, module.DEFAULTS
-    reference = problem(module, p, guess, 0.0).reference
-    generic: list[State] = []
-    assembled: list[State] = []
-    for _ in range(STATES):
-        t = float(random.uniform(0.1, 0.9))
-        away, rates = random.uniform(-0.4, 0.4, (2, guess.size)) * reference
-        if _is_finite(module, guess + away, t):
-            generic.append((guess + away, 3 * rates, t))
-        found = newton(module, t, guess)
-        is_near = np.max(np.abs(found.q - guess) / reference, initial=0.0) <= FAR
-        if found.status is Status.CONVERGED and is_near:
-            assembled.append((found.q, 3 * rates, t))
-    return generic + assembled, len(assembled)
-
-
-def _is_finite(module: ModuleType, q: Array, t: float) -> bool:
-    try:
-        return bool(np.isfinite(module.Phi(q, t)).all() and np.isfinite(module.Phi_q(q, t)).all())
-    except (ArithmeticError, ValueError):
-        return False
-
-
-def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
+def _checks(samples: Samples) -> Iterator[Check]:
     """Yield the checks of each equation by the oracles."""
-    reference = problem(module, module.DEFAULTS, module.GUESS, 0.0).reference
+    module, known = samples.module, _Phi_of_model(samples.module)
     for quantity in QUANTITIES:
-        size = _sizes(module, states, quantity, reference)
-        error, limit, judge = _judged(module, states, quantity, size)
+        Phi = known if quantity.name == "Phi" and known else module.Phi
+        error, limit, judge = _judged(samples, quantity, Phi)
         # The entry and the state with the largest error, compared with the allowed one.
         columns = np.argmax(error, axis=2)
         errors = np.max(error, axis=2)
@@ -258,80 +238,59 @@ def _checks(module: ModuleType, states: list[State]) -> Iterator[Check]:
                 quantity.name,
                 equation,
                 module.COORDINATES[columns[at]] if quantity.is_matrix else "",
-                ORACLES[quantity.name][judge[at]].name,
+                THE_MODEL if Phi is known else ORACLES[quantity.name][judge[at]].name,
                 float(errors[at]),
                 bool(errors[at] <= limit[at]),
             )
 
 
-def _sizes(module: ModuleType, states: list[State], quantity: Quantity, reference: Array) -> Array:
-    """Return the scale of errors: the size of an equation's terms.
+def _Phi_of_model(module: ModuleType) -> PhiOfParameters | None:
+    """Return Phi of the model that a module was compiled from, by the interpreter, if it is known.
 
-    Its shape is (states, m, n) for a matrix, (states, m, 1) for a vector.
+    Of a module from a file nothing else is known, and its own Phi is believed.
     """
-    Phi_q = np.array([module.Phi_q(q, t) for q, _, t in states])
-    terms = np.abs(Phi_q) @ reference
-    terms = np.where(terms > 0, terms, 1.0)[:, :, np.newaxis]
-    if quantity.is_moving:
-        fastest = np.array([np.max(np.abs(q_dot / reference)) for _, q_dot, _ in states])
-        terms = terms * np.maximum(1.0, fastest**2)[:, np.newaxis, np.newaxis]
-    return np.asarray(terms / reference if quantity.is_matrix else terms)
+    system = model_of(module)
+    if system is None:
+        return None
+    program = lower(system)
+    return lambda q, t, p: interpret(program, q, np.zeros_like(q), t, p)[0]
 
 
-def _forms(module: ModuleType, states: list[State], quantity: Quantity) -> Iterator[Array]:
-    """Yield a quantity as each function of the module gives it, (states, m, k).
-
-    They are written out one by one, and a batch runs on other numbers than a single state.
-    """
-    shape = len(states), len(module.EQUATIONS), -1
-    q, q_dot, t = (np.array(part) for part in zip(*states, strict=True))
-    for name, given in functions().items():
-        if quantity.name not in given or name == "Phi":  # all else is judged by Phi
-            continue
-
-        def value(
-            q: Array, q_dot: Array, t: Any, name: str = name, given: tuple[str, ...] = given
-        ) -> Array:
-            function = getattr(module, name)
-            found = function(q, q_dot, t) if is_moving(given) else function(q, t)
-            return np.asarray(found if len(given) == 1 else found[given.index(quantity.name)])
-
-        yield np.array([value(*state) for state in states]).reshape(shape)
-        yield value(q, q_dot, t).reshape(shape)
-    if quantity.name not in TOGETHER["kinematics"]:
+def _checks_of_solve(samples: Samples) -> Iterator[Check]:
+    """Yield the checks of the planned solve, if there is one, where Phi_q is regular."""
+    plan = PlannedSolve(samples) if hasattr(samples.module, "solve") else None
+    if plan is None or not plan.states:
         return
-    place = TOGETHER["kinematics"].index(quantity.name)
-    found = module.kinematics_batch_last(q.T, q_dot.T, t)[place].T
-    if not quantity.is_matrix:
-        yield found.reshape(shape)
-        return
-    matrix = np.zeros((len(states), len(module.EQUATIONS), len(module.COORDINATES)))
-    matrix[:, module.PATTERN[:, 0], module.PATTERN[:, 1]] = found
-    yield matrix
+    oracle = "multiplied back"
+    for equation, error in zip(samples.module.EQUATIONS, plan.errors().tolist(), strict=True):
+        yield Check(SOLVE, equation, "", oracle, error, error <= LIMIT)
+    if plan.has_blocks:
+        error = plan.error_of_determinants()
+        yield Check(DETERMINANTS, ALL_BLOCKS, "", oracle, error, error <= LIMIT)
 
 
 def _judged(
-    module: ModuleType, states: list[State], quantity: Quantity, size: Array
+    samples: Samples, quantity: Quantity, Phi: PhiOfParameters
 ) -> tuple[Array, Array, Array]:
-    """Return errors (states, m, k), the allowed ones and the number of the oracle (states, m).
+    """Return errors (S, m, k), the allowed ones and the number of the oracle (S, m).
 
     Where the module disagrees with the exact oracle, either may be wrong: Phi need not have a
     continuation to complex numbers. The exact oracle is believed where it agrees with the plain
     one.
     """
     exact, plain = ORACLES[quantity.name]
-    forms = list(_forms(module, states, quantity))
+    size, forms = samples.sizes(quantity), list(samples.forms(quantity))
 
     def deviation(estimate: Array) -> Array:
         """Return the largest deviation of the module from an oracle."""
         scale = size if quantity.is_matrix else np.maximum(size, np.abs(estimate))
         return np.asarray(np.max([_distance(form, estimate, scale) for form in forms], axis=0))
 
-    estimate = _estimates(module, states, quantity, exact)
+    estimate = _estimates(samples, quantity, exact, Phi)
     error = deviation(estimate)
     limit, judge = np.full(error.shape[:2], exact.limit), np.zeros(error.shape[:2], dtype=int)
     if (error > exact.limit).any():
-        other = _estimates(module, states, quantity, plain)
+        other = _estimates(samples, quantity, plain, Phi)
         doubted = np.max(_distance(estimate, other, size), axis=2) > plain.limit
         error[doubted] = deviation(other)[doubted]
         limit[doubted], judge[doubted] = plain.limit, 1
@@ -347,19 +306,22 @@ def _distance(found: Array, given: Array, size: Array) -> Array:
     return np.asarray(np.nan_to_num(np.abs(found - given) / size, nan=np.inf))
 
 
-def _estimates(
-    module: ModuleType, states: list[State], quantity: Quantity, oracle: Oracle
-) -> Array:
-    """Return the values of an oracle at all states, (states, m, k); NaN where it has none."""
+def _estimates(samples: Samples, quantity: Quantity, oracle: Oracle, Phi: PhiOfParameters) -> Array:
+    """Return the values of an oracle at all states, (S, m, k); NaN where it has none."""
     sign = -1.0 if quantity.name in ("nu", "gamma") else 1.0
     found = []
-    for q, q_dot, t in states:
+    for q, q_dot, t, p in samples.each():
         along, time = np.eye(q.size), 0.0
         if not quantity.is_matrix:
             along, time = (q_dot if quantity.is_moving else 0 * q)[np.newaxis], 1.0
+        function = partial(_with_parameters, Phi, p)
         try:
-            rates = oracle.derivative(module, q, t, along, time).T
+            rates = oracle.derivative(function, q, t, along, time).T
         except (ArithmeticError, TypeError, ValueError):
-            rates = np.full((len(module.EQUATIONS), len(along)), np.nan)
+            rates = np.full((samples.terms.shape[1], len(along)), np.nan)
         found.append(sign * rates)
     return np.array(found)
+
+
+def _with_parameters(Phi: PhiOfParameters, p: Array, q: Array, t: Any) -> Array:
+    return Phi(q, t, p)

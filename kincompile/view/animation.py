@@ -185,7 +185,8 @@ def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
 
 def _traced(drawn: Drawing, names: Iterable[str]) -> list[BodyPoint]:
     """Return the points to be traced."""
-    places = {body: BodyPoint(k, (0.0, 0.0)) for k, body in enumerate(drawn.bodies)}
+    frames = zip(drawn.bodies, drawn.frames, strict=True)
+    places = {body: BodyPoint(frame, (0.0, 0.0)) for body, frame in frames}
     places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
     for name in (chosen := list(names)):
         if name not in places:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.bodies import Body
     from kincompile.view.geometry import Geometry
-    from kincompile.view.marks import BodyPoint, Mark, Point
+    from kincompile.view.marks import BodyPoint, Mark, PlaneFrame, Point
 
 SAME_POINT = 1e-9
 """Distance, relative to the coordinates, up to which two points of a body are one."""
@@ -24,20 +24,22 @@ def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Outline]:
     From back to front: the first body hides what slides in it.
     """
     found = [
-        Outline(frame, tuple(geometry.pair(corner) for corner in body.outline))
-        for frame, body in enumerate(bodies)
+        Outline(geometry.frames[body.name], tuple(map(geometry.pair, body.outline)))
+        for body in bodies
         if len(body.outline)
     ]
     return found[::-1]
 
 
-def links(count: int, attached: Iterable[BodyPoint], marks: Sequence[Mark]) -> list[Link]:
+def links(
+    frames: Iterable[PlaneFrame], attached: Iterable[BodyPoint], marks: Sequence[Mark]
+) -> list[Link]:
     """Return the hulls of bodies without an outline; of one point only where no mark shows it.
 
     Parameters
     ----------
-    count
-        Number of bodies.
+    frames
+        The frames of the bodies.
     attached
         Points that joints hold.
     marks
@@ -46,7 +48,7 @@ def links(count: int, attached: Iterable[BodyPoint], marks: Sequence[Mark]) -> l
     outlined = {mark.frame for mark in marks if isinstance(mark, Outline)}
     shown = {frame for mark in marks for frame in moves_with(mark)}
     found = []
-    for frame in sorted(set(range(count)) - outlined):
+    for frame in sorted(set(frames) - outlined):
         points = _distinct(place.point for place in attached if place.frame == frame)
         if len(points) < 2:
             points = _distinct([*points, (0.0, 0.0)])

@@ -15,12 +15,13 @@ from kincompile.view.geometry import Geometry, JointGeometry
 from kincompile.view.joint_shapes import marks_of
 from kincompile.view.marks import (
     GROUND_FRAME,
-    Block,
     BodyPoint,
     Drive,
     Mark,
     Pin,
+    PlaneFrame,
     Rail,
+    Slider,
     Span,
     moves_with,
     reach,
@@ -67,15 +68,14 @@ class JointLabel:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """The shapes of a mechanism.
+    """A mechanism as shapes that move with q: what matplotlib and the page draw.
 
     Attributes
     ----------
     name
         Name of the mechanism.
-    bodies
-        Names of the bodies; their index is their frame, and body k has the coordinates
-        q[3k : 3k + 3].
+    bodies, frames
+        Name and frame of each body, in the order of the mechanism.
     marks
         All shapes, from back to front.
     joints
@@ -86,6 +86,7 @@ class Drawing:
 
     name: str
     bodies: tuple[str, ...]
+    frames: tuple[PlaneFrame, ...]
     marks: tuple[Mark, ...]
     joints: tuple[JointLabel, ...]
     size: float
@@ -138,10 +139,12 @@ def drawing(
     if not len(positions):
         positions = _finite(guess)
     joints = [item for item in system.constraints if isinstance(item, Joint)]
+    frames = tuple(PlaneFrame(k, tuple(own)) for k, own in enumerate(system.body_columns))
+    names = tuple(body.name for body in system.bodies)
     geometry = Geometry(
         joints,
         {item.name: item.default or 0.0 for item in system.parameters} | dict(p or {}),
-        {body.name: k for k, body in enumerate(system.bodies)},
+        dict(zip(names, frames, strict=True)),
         positions,
     )
     by_joint = {
@@ -150,14 +153,13 @@ def drawing(
     bodies: list[Mark] = [*outlines(system.bodies, geometry)]
     marks = _uncovered(itertools.chain(*by_joint.values()), set().union(*map(moves_with, bodies)))
     marks = [*bodies, *marks]
-    marks += links(len(system.bodies), geometry.points(joints), marks)
+    marks += links(frames, geometry.points(joints), marks)
     size = _size(marks, positions)
     places = {
         joint.name: _pointed_at(by_joint[joint.name], geometry.points([joint])) for joint in joints
     }
     ordered = sorted((_lengthened(mark, OVERHANG * size) for mark in marks), key=_depth)
-    names = tuple(body.name for body in system.bodies)
-    return Drawing(system.name, names, tuple(ordered), _labels(system, places), size)
+    return Drawing(system.name, names, frames, tuple(ordered), _labels(system, places), size)
 
 
 def _labels(
@@ -220,7 +222,7 @@ def _lengthened(mark: Mark, overhang: float) -> Mark:
     return replace(mark, start=tuple((start - along).tolist()), end=tuple((end + along).tolist()))
 
 
-def _uncovered(marks: Iterable[Mark], outlined: set[int]) -> list[Mark]:
+def _uncovered(marks: Iterable[Mark], outlined: set[PlaneFrame]) -> list[Mark]:
     """Return the marks without slides and sleeves that other marks already show.
 
     A cylinder takes the place of its slide; two outlined bodies show by themselves how they slide.
@@ -235,11 +237,11 @@ def _uncovered(marks: Iterable[Mark], outlined: set[int]) -> list[Mark]:
         or {mark.first.frame, mark.second.frame} <= outlined
     }
     return [
-        mark for mark in found if not (isinstance(mark, Span | Block) and mark.joint in covered)
+        mark for mark in found if not (isinstance(mark, Span | Slider) and mark.joint in covered)
     ]
 
 
-_DEPTHS = ("rail", "wheel", "profile", "outline", "link", "span", "block", "pin", "drive")
+_DEPTHS = ("rail", "wheel", "contour", "outline", "link", "span", "slider", "pin", "drive")
 
 
 def _depth(mark: Mark) -> int:

@@ -13,14 +13,14 @@ from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND
 from kincompile.model.expressions import alpha, as_expression, depends_on, evaluate
 from kincompile.model.joints import Revolute
-from kincompile.view.marks import GROUND_FRAME, BodyPoint, Pin, Point, Profile, Rail, Span, Wheel
+from kincompile.view.marks import GROUND_FRAME, BodyPoint, Contour, Pin, Rail, Span, Wheel
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from kincompile.model.expressions import Scalar, Scalars
     from kincompile.model.resolve import Joint
-    from kincompile.view.marks import Array
+    from kincompile.view.marks import Array, PlaneFrame, Point
 
 PROFILE_POINTS = 180
 """Points of a cam profile: its chords are within 1.5e-4 of its radius."""
@@ -40,14 +40,14 @@ class Geometry:
     values
         Parameters by name.
     frames
-        Index of each body by name.
+        The frame of each body by name.
     q : ndarray, shape (N, n)
         Positions that rails must fit; all finite.
     """
 
     joints: Sequence[Joint]
     values: Mapping[str, float]
-    frames: Mapping[str, int]
+    frames: Mapping[str, PlaneFrame]
     q: Array
 
     def number(self, value: Scalar) -> float:
@@ -58,7 +58,7 @@ class Geometry:
         """Return the numbers of a point or a direction."""
         return self.number(pair[0]), self.number(pair[1])
 
-    def frame_of(self, joint: Joint, symbol: str) -> int:
+    def frame_of(self, joint: Joint, symbol: str) -> PlaneFrame:
         """Return the frame in which a point of a joint is fixed."""
         owner = joint.written.owners()[symbol]
         if owner == GROUND.name:
@@ -81,19 +81,19 @@ class Geometry:
         ]
 
     @cached_property
-    def bearings(self) -> dict[int, BodyPoint]:
+    def bearings(self) -> dict[PlaneFrame, BodyPoint]:
         """The point of each frame's first revolute joint, one with the ground first."""
         revolutes = [joint for joint in self.joints if isinstance(joint.written, Revolute)]
         revolutes.sort(key=lambda joint: not _is_on_ground(joint))
-        found: dict[int, BodyPoint] = {}
+        found: dict[PlaneFrame, BodyPoint] = {}
         for point in self.points(revolutes):
             found.setdefault(point.frame, point)
         return found
 
     @cached_property
-    def blocks(self) -> frozenset[int]:
+    def blocks(self) -> frozenset[PlaneFrame]:
         """The frames with one point for all joints, in a revolute joint of moving bodies."""
-        points: dict[int, set[Point]] = {}
+        points: dict[PlaneFrame, set[Point]] = {}
         for item in self.points(self.joints):
             points.setdefault(item.frame, set()).add(item.point)
         pinned = self.points(
@@ -168,7 +168,7 @@ class JointGeometry:
         size = self.number(radius)
         return Wheel(self.name, self.point(centre), abs(size), self.number(theta), size < 0)
 
-    def profile(self, centre: str, rho: str, style: str) -> Profile:
+    def profile(self, centre: str, rho: str, style: str) -> Contour:
         """Return the curve of radius rho(alpha) about a centre."""
         place = self.point(centre)
         x, y = place.point
@@ -177,7 +177,7 @@ class JointGeometry:
             known = {**self.mechanism.values, alpha.name: angle}
             length = evaluate(self.joint.profiles[rho], known) or 0.0
             points.append((x + length * math.cos(angle), y + length * math.sin(angle)))
-        return Profile(self.name, place.frame, tuple(points), style)
+        return Contour(self.name, place.frame, tuple(points), style)
 
     def rail(
         self,

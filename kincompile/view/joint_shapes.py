@@ -24,12 +24,12 @@ from kincompile.model.relative import Distance, RelativeAngle, RelativeX, Relati
 from kincompile.view.geometry import JointGeometry
 from kincompile.view.marks import (
     GROUND_FRAME,
-    Block,
     BodyPoint,
     Drive,
     Mark,
     Pin,
     Point,
+    Slider,
     Span,
 )
 
@@ -53,12 +53,12 @@ def _translational(joint: JointGeometry) -> list[Mark]:
     i, j = joint.point("s_i"), joint.point("s_j")
     v_i, v_j = joint.unit("v_i"), joint.unit("v_j")
     if i.frame == GROUND_FRAME:
-        return [joint.rail(i, v_i, j), Block(joint.name, j, v_j)]
+        return [joint.rail(i, v_i, j), Slider(joint.name, j, v_j)]
     if j.frame == GROUND_FRAME:
-        return [joint.rail(j, v_j, i), Block(joint.name, i, v_i)]
+        return [joint.rail(j, v_j, i), Slider(joint.name, i, v_i)]
     if j.frame in joint.mechanism.blocks:
         i, j, v_i = j, i, v_j
-    return [Span(joint.name, i, j, "slide"), Block(joint.name, i, v_i)]
+    return [Span(joint.name, i, j, "slide"), Slider(joint.name, i, v_i)]
 
 
 def _revolute_translational(joint: JointGeometry) -> list[Mark]:

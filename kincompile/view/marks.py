@@ -1,7 +1,6 @@
 """The marks that a drawing consists of: plain data, given to matplotlib and to the page alike.
 
-A frame is the index of a body, in the order of the mechanism, or `GROUND_FRAME`. Lengths are those
-of the model. Each renderer chooses line widths and colours.
+Lengths are those of the model. Each renderer chooses line widths and colours.
 """
 
 from __future__ import annotations
@@ -14,14 +13,31 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 
-GROUND_FRAME = -1
-"""The frame of the ground."""
-
 Point: TypeAlias = tuple[float, float]
 """Components (xi, eta) in a frame."""
 
 
-def in_ground(q: Array, frame: int, points: Array | Point) -> Array:
+@dataclass(frozen=True, slots=True, order=True)
+class PlaneFrame:
+    """The axes of a body, or of the ground.
+
+    Attributes
+    ----------
+    index
+        Index of the body in the mechanism; -1 for the ground.
+    columns
+        Columns of q with its x, y and phi; none for the ground.
+    """
+
+    index: int
+    columns: tuple[int, ...]
+
+
+GROUND_FRAME = PlaneFrame(-1, ())
+"""The frame of the ground."""
+
+
+def in_ground(q: Array, frame: PlaneFrame, points: Array | Point) -> Array:
     """Return where points of a frame are, in the axes of the ground.
 
     Parameters
@@ -29,7 +45,7 @@ def in_ground(q: Array, frame: int, points: Array | Point) -> Array:
     q : ndarray, shape (..., n)
         Positions.
     frame
-        Index of the body, or `GROUND_FRAME`.
+        The frame of a body, or of the ground.
     points : array_like, shape (..., 2)
         Components in the frame; the leading axes broadcast against those of `q`.
 
@@ -42,7 +58,7 @@ def in_ground(q: Array, frame: int, points: Array | Point) -> Array:
         x, y = np.zeros((2, *q.shape[:-1]))
         c, s = np.ones_like(x), np.zeros_like(x)
     else:
-        x, y, phi = np.moveaxis(q[..., 3 * frame : 3 * frame + 3], -1, 0)
+        x, y, phi = (q[..., column] for column in frame.columns)
         c, s = np.cos(phi), np.sin(phi)
     return np.stack((x + c * xi - s * eta, y + s * xi + c * eta), axis=-1)
 
@@ -51,7 +67,7 @@ def in_ground(q: Array, frame: int, points: Array | Point) -> Array:
 class BodyPoint:
     """A point fixed in a frame."""
 
-    frame: int
+    frame: PlaneFrame
     point: Point
 
     def at(self, q: Array) -> Array:
@@ -63,7 +79,7 @@ class BodyPoint:
 class Link:
     """A body as the convex hull of its joint points; two points are a bar, one is a dot."""
 
-    frame: int
+    frame: PlaneFrame
     points: tuple[Point, ...]
 
 
@@ -71,7 +87,7 @@ class Link:
 class Outline:
     """A body as the closed polygon that its author gave."""
 
-    frame: int
+    frame: PlaneFrame
     points: tuple[Point, ...]
 
 
@@ -93,7 +109,7 @@ class Rail:
     """
 
     joint: str
-    frame: int
+    frame: PlaneFrame
     start: Point
     end: Point
     axis: Point
@@ -101,7 +117,7 @@ class Rail:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class Slider:
     """A slider: a block at a point, along an axis of unit length in the same frame."""
 
     joint: str
@@ -135,11 +151,11 @@ class Wheel:
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class Contour:
     """A closed curve in a frame; `style` is "cam" (its edge is touched) or "slot" (a pin in it)."""
 
     joint: str
-    frame: int
+    frame: PlaneFrame
     points: tuple[Point, ...]
     style: str
 
@@ -153,10 +169,10 @@ class Drive:
     axis: Point | None
 
 
-Mark: TypeAlias = Link | Outline | Pin | Rail | Block | Span | Wheel | Profile | Drive
+Mark: TypeAlias = Link | Outline | Pin | Rail | Slider | Span | Wheel | Contour | Drive
 
 
-def moves_with(mark: Mark) -> set[int]:
+def moves_with(mark: Mark) -> set[PlaneFrame]:
     """Return the frames in which a mark is fixed."""
     return {place.frame for place, _ in reach(mark)}
 
@@ -166,12 +182,12 @@ def reach(mark: Mark) -> list[tuple[BodyPoint, float]]:
     match mark:
         case Wheel():
             return [(mark.place, mark.radius)]
-        case Link() | Outline() | Profile():
+        case Link() | Outline() | Contour():
             points = mark.points
         case Rail():
             points = (mark.start, mark.end)
         case Pin() | Span():
             return [(mark.first, 0.0), (mark.second, 0.0)]
-        case Block() | Drive():
+        case Slider() | Drive():
             return [(mark.place, 0.0)]
     return [(BodyPoint(mark.frame, point), 0.0) for point in points]

@@ -11,6 +11,7 @@ from kincompile.model.mechanism import system_of
 from kincompile.names import listed, suggestion
 from kincompile.runtime.results.columns import titled
 from kincompile.view.drawing import drawing
+from kincompile.view.marks import GROUND_FRAME
 from kincompile.view.polylines import polylines
 
 if TYPE_CHECKING:
@@ -216,7 +217,8 @@ def move(artists: list[tuple[Polyline, Any]], q: NDArray[np.float64]) -> None:
 
 def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
     """Return the artist of a polyline."""
-    colour = f"C{polyline.frame % 10}" if polyline.frame >= 0 else GROUND_COLOUR
+    is_ground = polyline.frame == GROUND_FRAME
+    colour = GROUND_COLOUR if is_ground else f"C{polyline.frame.index % 10}"
     look, points, zorder = LOOKS[polyline.look], polyline.at(q), 2 + order * 1e-3
     if not polyline.is_area:
         (line,) = ax.plot(*points.T, **{"color": colour, "zorder": zorder, **look})

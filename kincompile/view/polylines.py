@@ -13,15 +13,16 @@ import numpy as np
 
 from kincompile.view.marks import (
     GROUND_FRAME,
-    Block,
     BodyPoint,
+    Contour,
     Drive,
     Link,
     Mark,
     Outline,
     Pin,
-    Profile,
+    PlaneFrame,
     Rail,
+    Slider,
     Span,
     Wheel,
     in_ground,
@@ -69,7 +70,7 @@ class Polyline:
     """
 
     look: str
-    frame: int
+    frame: PlaneFrame
     points: Array
     start: BodyPoint | None = None
     end: BodyPoint | None = None
@@ -104,13 +105,13 @@ def _of(mark: Mark, size: float) -> Iterable[Polyline]:
             return _pin(mark, size)
         case Rail():
             return _rail(mark, size)
-        case Block():
+        case Slider():
             return [_block(mark, size)]
         case Span():
             return _span(mark, size)
         case Wheel():
             return _wheel(mark, size)
-        case Profile():
+        case Contour():
             return _profile(mark)
         case Drive():
             return _drive(mark, size)
@@ -184,7 +185,7 @@ def _rail(mark: Rail, size: float) -> list[Polyline]:
     return [Polyline("ground", GROUND_FRAME, along(line)) for line in (*sides, hatch)]
 
 
-def _block(mark: Block, size: float) -> Polyline:
+def _block(mark: Slider, size: float) -> Polyline:
     """Draw a rectangle along the axis."""
     axis = _array(mark.axis)
     half_sides = size * _array((BLOCK_LENGTH, BLOCK_HEIGHT))
@@ -218,12 +219,12 @@ def _wheel(mark: Wheel, size: float) -> list[Polyline]:
     return [_curve(frame, rim, is_area=not mark.is_internal), Polyline("tick", frame, tick)]
 
 
-def _profile(mark: Profile) -> list[Polyline]:
+def _profile(mark: Contour) -> list[Polyline]:
     """Draw a cam as an area, a slot as the closed line in which a pin runs."""
     return [_curve(mark.frame, _array(mark.points), is_area=mark.style == "cam")]
 
 
-def _curve(frame: int, points: Array, *, is_area: bool) -> Polyline:
+def _curve(frame: PlaneFrame, points: Array, *, is_area: bool) -> Polyline:
     """Draw a closed curve, as an area or as a line."""
     if is_area:
         return Polyline("wheel", frame, points, is_area=True)

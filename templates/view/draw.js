@@ -5,7 +5,16 @@
    style: { view, palette } and, where wanted, alpha, ghost (one colour for everything), violated (a
    set of joint names that are drawn as broken), drawing (of another mechanism than the player's). */
 
-const GROUND = -1;
+const GROUND = { index: -1, columns: [] };  // a frame: a body's index, and its columns of q
+
+function isGround(frame) {
+  return frame.index === GROUND.index;
+}
+
+/* The angle of a frame. */
+function angleOf(q, { columns: [, , phi] }) {
+  return phi === undefined ? 0 : q[phi];
+}
 
 /* World to screen: the whole extent fits, and lengths are true. */
 class View {
@@ -27,22 +36,22 @@ class View {
 
 /* Where a point of a frame is. */
 function inWorld(q, frame, [xi, eta]) {
-  if (frame === GROUND) return [xi, eta];
-  const [x, y, phi] = q.subarray(3 * frame, 3 * frame + 3);
-  const c = Math.cos(phi), s = Math.sin(phi);
-  return [x + c * xi - s * eta, y + s * xi + c * eta];
+  if (isGround(frame)) return [xi, eta];
+  const [x, y, phi] = frame.columns;
+  const c = Math.cos(q[phi]), s = Math.sin(q[phi]);
+  return [q[x] + c * xi - s * eta, q[y] + s * xi + c * eta];
 }
 
 /* Velocity and acceleration of a point of a frame. */
 function ratesInWorld(state, frame, [xi, eta]) {
-  if (frame === GROUND) return { velocity: [0, 0], acceleration: [0, 0] };
-  const k = 3 * frame, phi = state.q[k + 2], w = state.q_dot[k + 2], a = state.q_ddot[k + 2];
-  const c = Math.cos(phi), s = Math.sin(phi);
+  if (isGround(frame)) return { velocity: [0, 0], acceleration: [0, 0] };
+  const { q, q_dot, q_ddot } = state, [x, y, phi] = frame.columns;
+  const c = Math.cos(q[phi]), s = Math.sin(q[phi]), w = q_dot[phi], a = q_ddot[phi];
   const arm = [c * xi - s * eta, s * xi + c * eta];
   return {
-    velocity: [state.q_dot[k] - w * arm[1], state.q_dot[k + 1] + w * arm[0]],
+    velocity: [q_dot[x] - w * arm[1], q_dot[y] + w * arm[0]],
     acceleration: [
-      state.q_ddot[k] - a * arm[1] - w * w * arm[0], state.q_ddot[k + 1] + a * arm[0] - w * w * arm[1],
+      q_ddot[x] - a * arm[1] - w * w * arm[0], q_ddot[y] + a * arm[0] - w * w * arm[1],
     ],
   };
 }
@@ -72,9 +81,9 @@ class Pen {
     const { ghost, violated } = this.style;
     if (violated && violated.has(joint)) return [this.palette.bad, this.palette.badTint];
     if (ghost) return [ghost, this.palette.paper];
-    if (frame === GROUND) return [this.palette.quiet, this.palette.tint];
+    if (isGround(frame)) return [this.palette.quiet, this.palette.tint];
     const bodies = this.palette.bodies;
-    return bodies[frame % bodies.length];
+    return bodies[frame.index % bodies.length];
   }
 
   path(points, isClosed) {
@@ -159,7 +168,7 @@ function drawGroundSupport(pen, [x, y], colour) {
 
 function drawGuide(pen, mark, from, to) {
   const [strong] = pen.colours(mark.frame, mark.joint);
-  if (mark.frame !== GROUND) {
+  if (!isGround(mark.frame)) {
     pen.plate([from, to], 2.2 * pen.unit, [strong, pen.palette.paper], false);
     return;
   }
@@ -226,7 +235,7 @@ const DRAW = {
     const [first, second] = [pen.place(mark.first), pen.place(mark.second)];
     const isViolated = pen.style.violated && pen.style.violated.has(mark.joint);
     const [quiet] = pen.colours(GROUND, mark.joint);
-    if (mark.first.frame === GROUND) drawGroundSupport(pen, first, quiet);
+    if (isGround(mark.first.frame)) drawGroundSupport(pen, first, quiet);
     const isApart = towards(first, second)[2] > 2;
     if (isApart) {
       pen.path([first, second]);
@@ -249,7 +258,7 @@ const DRAW = {
     }
   },
 
-  block(pen, mark) {
+  slider(pen, mark) {
     const { frame, point } = mark.place, axis = mark.axis;
     const centre = pen.place(mark.place);
     const [x, y] = towards(centre, pen.at(frame, [point[0] + axis[0], point[1] + axis[1]]));
@@ -278,7 +287,7 @@ const DRAW = {
   wheel(pen, mark) {
     const { frame, point } = mark.place, centre = pen.place(mark.place);
     const radius = mark.radius * pen.view.scale;
-    const angle = mark.theta + (frame === GROUND ? 0 : pen.q[3 * frame + 2]);
+    const angle = mark.theta + angleOf(pen.q, frame);
     const [strong, tint] = pen.colours(frame, mark.joint);
     pen.circle(centre, radius);
     if (mark.is_internal) {
@@ -297,7 +306,7 @@ const DRAW = {
     pen.stroke(strong, 1.3);
   },
 
-  profile(pen, mark) {
+  contour(pen, mark) {
     const [strong, tint] = pen.colours(mark.frame, mark.joint);
     const points = mark.points.map(point => pen.at(mark.frame, point));
     pen.path(points, true);

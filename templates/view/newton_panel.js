@@ -120,10 +120,13 @@ class NewtonPanel {
     const [left, right, low, high] = player.data.extent;
     const between = (a, b) => a + (b - a) * Math.random();
     const scale = newton.scales(this.model, player.data.guess);
-    return player.data.guess.map((value, k) => {
-      if (k >= 3 * player.data.drawing.bodies.length) return value + between(-scale[k], scale[k]);
-      return [between(left, right), between(low, high), between(-Math.PI, Math.PI)][k % 3];
-    });
+    const guess = player.data.guess.map((value, k) => value + between(-scale[k], scale[k]));
+    for (const { columns: [x, y, phi] } of player.data.drawing.frames) {
+      guess[x] = between(left, right);
+      guess[y] = between(low, high);
+      guess[phi] = between(-Math.PI, Math.PI);
+    }
+    return guess;
   }
 
   render() {

@@ -29,7 +29,8 @@ class NewtonStage {
     this.scene = null;  // { guess, iterates }: those of newton.iterate that are shown
     this.drag = null;
     this.layer = svgElement('svg', { class: 'newton-handles', 'aria-label': 'Handles of the guess' });
-    this.handles = player.data.drawing.bodies.map((name, body) => this.handle(name, body));
+    this.handles = player.data.drawing.bodies.map(
+      (name, body) => this.handle(name, player.data.drawing.frames[body]));
     this.layer.append(...this.handles.map(handle => handle.group));
     stage.canvas.parentElement.append(this.layer);
     stage.extent = () => this.extent();
@@ -62,11 +63,12 @@ class NewtonStage {
     const reach = FARTHEST * Math.max(right - left, high - low);
     const around = MARGIN * player.data.drawing.size;
     for (const q of [this.scene.guess, ...this.scene.iterates.map(iterate => iterate.q)]) {
-      for (let k = 0; k < 3 * this.handles.length; k += 3) {
-        bounds[0] = Math.min(bounds[0], Math.max(q[k] - around, left - reach));
-        bounds[1] = Math.max(bounds[1], Math.min(q[k] + around, right + reach));
-        bounds[2] = Math.min(bounds[2], Math.max(q[k + 1] - around, low - reach));
-        bounds[3] = Math.max(bounds[3], Math.min(q[k + 1] + around, high + reach));
+      for (const { frame } of this.handles) {
+        const [x, y] = inWorld(q, frame, [0, 0]);
+        bounds[0] = Math.min(bounds[0], Math.max(x - around, left - reach));
+        bounds[1] = Math.max(bounds[1], Math.min(x + around, right + reach));
+        bounds[2] = Math.min(bounds[2], Math.max(y - around, low - reach));
+        bounds[3] = Math.max(bounds[3], Math.min(y + around, high + reach));
       }
     }
     return bounds;
@@ -78,7 +80,7 @@ class NewtonStage {
     // The style sheet gives them to the layer, where they are resolved for the theme.
     const { color: guessColour, fill: iterateColour } = getComputedStyle(this.layer);
     const drawGhost = (q, ghost, alpha) =>
-      drawShapes(ctx, Float64Array.from(q), { view, palette, alpha, ghost });
+      drawShapes(ctx, q, { view, palette, alpha, ghost });
     const last = iterates.length - 1;
     drawGhost(guess, guessColour, last ? 0.5 : 1);
     for (let k = 1; k < last; k++) drawGhost(iterates[k].q, iterateColour, 0.15 + 0.35 * k / last);
@@ -89,16 +91,16 @@ class NewtonStage {
   /* The number of each iterate at the body that moves farthest, where there is room for it. */
   drawNumbers(ctx, view, palette) {
     const { iterates } = this.scene;
-    const origin = ({ q }, body) => view.toScreen([q[3 * body], q[3 * body + 1]]);
-    const way = body => iterates.reduce((sum, iterate, k) =>
-      (k ? sum + towards(origin(iterates[k - 1], body), origin(iterate, body))[2] : 0), 0);
-    const ways = this.handles.map((_, body) => way(body));
-    const body = ways.indexOf(Math.max(...ways));
+    const origin = ({ q }, frame) => view.toScreen(inWorld(q, frame, [0, 0]));
+    const way = ({ frame }) => iterates.reduce((sum, iterate, k) =>
+      (k ? sum + towards(origin(iterates[k - 1], frame), origin(iterate, frame))[2] : 0), 0);
+    const ways = this.handles.map(way);
+    const { frame } = this.handles[ways.indexOf(Math.max(...ways))];
     Object.assign(ctx, { font: 'bold 12px system-ui, sans-serif', lineWidth: 3,
       textAlign: 'center', textBaseline: 'middle', strokeStyle: palette.paper, fillStyle: palette.ink });
     const taken = [];
     iterates.forEach((iterate, k) => {
-      const at = origin(iterate, body);
+      const at = origin(iterate, frame);
       if (k === 0 || taken.some(other => towards(at, other)[2] < 14)) return;
       taken.push(at);
       ctx.strokeText(k, ...at);
@@ -108,7 +110,7 @@ class NewtonStage {
   }
 
   /* What a body is dragged by: its link, its origin and the knob. */
-  handle(name, body) {
+  handle(name, frame) {
     const group = svgElement('g', {
       tabindex: 0, role: 'group', 'aria-label': `${name}: arrow keys move it, plus and minus turn it`,
     });
@@ -119,22 +121,22 @@ class NewtonStage {
       kinds.map(([kind, r]) => svgElement('circle', { class: kind, r }));
     const atOrigin = circles(['dot', 5], ['grip', 16]), atKnob = circles(['dot', 6], ['grip turn', 16]);
     group.append(svgElement('title', {}, name), link, arm, ...atOrigin, ...atKnob);
-    group.addEventListener('pointerdown', event => this.startDrag(event, group, body));
+    group.addEventListener('pointerdown', event => this.startDrag(event, group, frame));
     group.addEventListener('pointermove', event => this.moveDrag(event));
     for (const kind of ['pointerup', 'pointercancel']) {
       group.addEventListener(kind, () => this.endDrag());
     }
-    group.addEventListener('keydown', event => this.key(event, body));
-    return { body, group, link, arm, atOrigin, atKnob };
+    group.addEventListener('keydown', event => this.key(event, frame));
+    return { frame, group, link, arm, atOrigin, atKnob };
   }
 
-  placeHandle({ body, link, arm, atOrigin, atKnob }, view) {
-    const q = Float64Array.from(this.scene.guess);
-    const phi = q[3 * body + 2];
-    const [x, y] = view.toScreen(inWorld(q, body, [0, 0]));
+  placeHandle({ frame, link, arm, atOrigin, atKnob }, view) {
+    const q = this.scene.guess, phi = angleOf(q, frame);
+    const [x, y] = view.toScreen(inWorld(q, frame, [0, 0]));
     const [knobX, knobY] = [x + KNOB * Math.cos(phi), y - KNOB * Math.sin(phi)];
-    const hull = player.data.drawing.marks.find(mark => mark.kind === 'link' && mark.frame === body);
-    const corners = hull ? hull.points.map(point => view.toScreen(inWorld(q, body, point))) : [];
+    const hull = player.data.drawing.marks.find(
+      mark => mark.kind === 'link' && mark.frame.index === frame.index);
+    const corners = hull ? hull.points.map(point => view.toScreen(inWorld(q, frame, point))) : [];
     link.setAttribute('points', corners.join(' '));
     for (const circle of atOrigin) setAttributes(circle, { cx: x, cy: y });
     for (const circle of atKnob) setAttributes(circle, { cx: knobX, cy: knobY });
@@ -146,27 +148,27 @@ class NewtonStage {
     return [event.clientX - box.left, event.clientY - box.top];
   }
 
-  startDrag(event, group, body) {
+  startDrag(event, group, frame) {
     group.setPointerCapture(event.pointerId);
     group.focus({ preventScroll: true });
     const isTurn = event.target.classList.contains('turn');
-    this.drag = { body, isTurn, from: this.pointer(event), extent: this.extent() };
+    this.drag = { frame, isTurn, from: this.pointer(event), extent: this.extent() };
     event.preventDefault();
   }
 
   moveDrag(event) {
     if (!this.drag) return;
-    const { body, isTurn, from } = this.drag;
+    const { frame, isTurn, from } = this.drag;
     const to = this.pointer(event);
     this.drag.from = to;
     if (isTurn) {
-      const [x, y] = stage.view.toScreen(this.scene.guess.slice(3 * body, 3 * body + 2));
+      const [x, y] = stage.view.toScreen(inWorld(this.scene.guess, frame, [0, 0]));
       const turn = Math.atan2(y - to[1], to[0] - x) - Math.atan2(y - from[1], from[0] - x);
       // The short way, so that whole turns add up.
-      this.change(body, 0, 0, Math.atan2(Math.sin(turn), Math.cos(turn)));
+      this.change(frame, 0, 0, Math.atan2(Math.sin(turn), Math.cos(turn)));
     } else {
       const [[x0, y0], [x1, y1]] = [from, to].map(point => stage.view.toWorld(point));
-      this.change(body, x1 - x0, y1 - y0, 0);
+      this.change(frame, x1 - x0, y1 - y0, 0);
     }
   }
 
@@ -175,7 +177,7 @@ class NewtonStage {
     stage.draw(player.state);
   }
 
-  key(event, body) {
+  key(event, frame) {
     const part = event.shiftKey ? 0.1 : 1;
     const step = part * STEP * stage.width / stage.view.scale, turn = part * TURN;
     const change = {
@@ -183,14 +185,14 @@ class NewtonStage {
       ArrowDown: [0, -step, 0], '+': [0, 0, turn], '=': [0, 0, turn], '-': [0, 0, -turn],
     }[event.key];
     if (!change) return;
-    this.change(body, ...change);
+    this.change(frame, ...change);
     event.preventDefault();
     event.stopPropagation();
   }
 
-  change(body, x, y, phi) {
+  change({ columns }, ...moves) {
     const guess = this.scene.guess.slice();
-    [x, y, phi].forEach((value, k) => { guess[3 * body + k] += value; });
+    moves.forEach((value, k) => { guess[columns[k]] += value; });
     this.onGuess(guess);
   }
 }

@@ -62,7 +62,7 @@ class Plot {
     this.choice.value = label;
     this.choice.addEventListener('change', () => this.redraw());
     const close = document.createElement('button');
-    Object.assign(close, { type: 'button', textContent: '×', title: 'Take this plot away' });
+    Object.assign(close, { type: 'button', textContent: '×', title: 'Remove this plot' });
     close.addEventListener('click', () => plots.remove(this));
     bar.append(this.choice, close);
     this.holder = document.createElement('div');
@@ -263,14 +263,14 @@ const plots = {
    it is not one that a motor turns steadily; where all angles are steady, as of a cam and its follower,
    any coordinate of the largest acceleration; where nothing accelerates, the one that goes farthest. */
 function liveliest() {
-  const { data, n } = player, bodies = data.drawing.bodies.length;
+  const { data, n } = player, { frames } = data.drawing;
   const all = data.coordinates.map((_, k) => k);
   const sizes = (name, candidates) => candidates.map(k => {
     const values = data.arrays[name].filter((value, place) => place % n === k && Number.isFinite(value));
     return values.reduce((most, value) => Math.max(most, Math.abs(value - values[0])), 0);
   });
-  const ofBodies = all.filter(k => bodies === 0 || k < 3 * bodies);
-  const angles = ofBodies.filter(k => bodies > 0 && k % 3 === 2);
+  const ofBodies = frames.length ? frames.flatMap(({ columns }) => columns) : all;
+  const angles = frames.map(({ columns: [, , phi] }) => phi);
   for (const [name, candidates] of [['q_ddot', angles], ['q_ddot', ofBodies], ['q', all]]) {
     const found = sizes(name, candidates), largest = Math.max(0, ...found);
     if (largest > 1e-9) return data.coordinates[candidates[found.indexOf(largest)]].name;

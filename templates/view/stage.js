@@ -125,7 +125,7 @@ class Stage {
   /* A point with all others of its body that are at the same place. */
   together(point, state) {
     const at = this.where(point, state), least = player.data.drawing.size / 100;
-    const isHere = other => other.frame === point.frame && towards(at, this.where(other, state))[2] < least;
+    const isHere = other => other.frame.index === point.frame.index && towards(at, this.where(other, state))[2] < least;
     return [point, ...this.points.filter(other => other !== point && isHere(other))];
   }
 
@@ -184,8 +184,8 @@ function pointsOf(drawing) {
     frame: joint.place.frame, point: joint.place.point,
   }));
   const isBearing = joint => !joint.kind.endsWith('driver');
-  const origins = drawing.bodies.map((name, frame) => ({
-    name, kind: 'origin of the body', frame, point: [0, 0],
+  const origins = drawing.bodies.map((name, body) => ({
+    name, kind: 'origin of the body', frame: drawing.frames[body], point: [0, 0],
   }));
   // Of several at one place a joint comes first: it is the one that is met by the pointer.
   return [...joints.filter(isBearing), ...joints.filter(joint => !isBearing(joint)), ...origins];

@@ -159,8 +159,8 @@ function placeOfTip(tip, [x, y], state) {
    are such, since the others go in circles. */
 function traceLongest() {
   const pins = player.data.drawing.marks.filter(mark => mark.kind === 'pin');
-  const hung = new Set(pins.filter(pin => pin.first.frame === GROUND).map(pin => pin.second.frame));
-  const free = stage.points.filter(point => !hung.has(point.frame));
+  const hung = new Set(pins.filter(pin => isGround(pin.first.frame)).map(pin => pin.second.frame.index));
+  const free = stage.points.filter(point => !hung.has(point.frame.index));
   const candidates = free.length ? free : stage.points;
   const length = point => {
     const path = pathOf(point).filter(place => place !== null);

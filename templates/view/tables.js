@@ -140,7 +140,7 @@ const points = {
     const form = document.createElement('form');
     const body = document.createElement('select');
     body.setAttribute('aria-label', 'Body');
-    body.append(...player.data.drawing.bodies.map((name, frame) => new Option(name, frame)));
+    body.append(...player.data.drawing.bodies.map((name, index) => new Option(name, index)));
     const [xi, eta] = ['xi', 'eta'].map(name => {
       const input = document.createElement('input');
       Object.assign(input, { type: 'number', step: 'any', value: '0', ariaLabel: name });
@@ -152,8 +152,9 @@ const points = {
     form.addEventListener('submit', event => {
       event.preventDefault();
       const at = [Number(xi.value), Number(eta.value)];
-      const name = `${player.data.drawing.bodies[body.value]} (${at.join(', ')})`;
-      const point = { name, kind: 'chosen', frame: Number(body.value), point: at };
+      const { bodies, frames } = player.data.drawing;
+      const name = `${bodies[body.value]} (${at.join(', ')})`;
+      const point = { name, kind: 'chosen', frame: frames[body.value], point: at };
       stage.points.push(point);
       this.addRow(point);
       stage.toggleTrace(point);

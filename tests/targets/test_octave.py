@@ -38,7 +38,8 @@ def test_that_a_guess_at_which_phi_q_is_singular_gives_no_motion(octave, tmp_pat
     assert found == {"refused": [[8.0]]}
 
 
-@pytest.mark.parametrize("name", ["undriven", "driven_twice"])
+@pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
+@pytest.mark.parametrize("name", ["undriven", "driven_twice", "repeated"])
 def test_that_the_script_of_what_is_not_square_says_why(octave, case_named, tmp_path, name):
     emitted = kc.emit(case_named(name).model, "octave")
     emitted.write(tmp_path)
@@ -46,6 +47,7 @@ def test_that_the_script_of_what_is_not_square_says_why(octave, case_named, tmp_
     said = f"show('said', strcmp(problem.message, '{text}'));"
     found = octave(["try", name, "show('found', 1);", "catch problem", said, "end"])
     assert found == {"said": [[1.0]]}
+    assert name != "repeated" or "again.x, again.y" in text
 
 
 def test_that_a_name_beyond_matlab_is_refused():

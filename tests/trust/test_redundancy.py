@@ -275,6 +275,28 @@ def test_that_what_is_written_twice_does_no_harm(compiled, extra):
     )
 
 
+@pytest.mark.parametrize(("target", "language"), [("c", "C"), ("javascript", "JavaScript")])
+def test_that_code_without_least_squares_says_that_it_has_no_solve(target, language):
+    with pytest.warns(kc.RedundantConstraintWarning, match=r"again\.x, again\.y repeat"):
+        emitted = kc.emit(pendulum(PIN), target)
+    assert emitted.unsolvable == (
+        "'pendulum' has equations that repeat others, again.x, again.y, and the "
+        f"{language} target has no solve by least squares: use the target 'numpy', or replace "
+        "their constraint by one with fewer equations"
+    )
+    comment = " ".join(line.lstrip("/ ") for line in emitted.source.splitlines()[:9])
+    assert f"There is no solve: {emitted.unsolvable}." in comment
+    assert "pendulum_solve" not in emitted.source
+
+
+@pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
+def test_that_compiled_functions_of_a_redundant_mechanism_are_solved_too(build, quick_compiler):
+    t = np.linspace(0, 1, 21)
+    module = kc.compile(build["double_parallelogram"](), target="c")
+    assert module.REDUNDANT == ("head2.y",)
+    check_motion(kc.solve(module, t), double_parallelogram_at, t + 0.8, 1.0)
+
+
 def test_the_warning_names_what_repeats_and_what_to_do(build):
     with pytest.warns(kc.RedundantConstraintWarning, match=r"head2\.y repeats .* RelativeX"):
         module = kc.compile(build["double_parallelogram"]())

@@ -1,4 +1,4 @@
-"""The functions of a program as C text: each works on one point of a block of points."""
+"""The functions of a program as C text: each works on one point of a strip of points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kincompile.targets.lines import wrapped
 from kincompile.targets.planned_solve import explained
 from kincompile.targets.printer import Printer
 from kincompile.targets.schedule import Assignment, count_uses
-from kincompile.targets.statements import Layout
+from kincompile.targets.statements import Statements
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.planned_solve import BlockCall, SolveListing
 
-LAYOUT = Layout("//", "const double {}", "at->{}[{}][lane]", "")
+WRITE = Statements("//", "const double {}", "at->{}[{}][lane]", "")
 
 ABOUT = {
     "position": "Phi and Phi_q in one go: a step of Newton's method.",
@@ -33,12 +33,12 @@ ANGLE_FUNCTIONS = frozenset({"cos", "sin", "cos_sin"})
 
 
 def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return a function that evaluates quantities at a point, and the one for a block."""
+    """Return a function that evaluates quantities at a point, and the one for a strip."""
     has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
     body = ["int64_t far = 0;"] if has_angles else []
-    body += LAYOUT.inputs(code.program, listing)
+    body += WRITE.inputs(code.program, listing)
     body += ["const double t = at->t[lane];"] if "t" in listing.inputs else []
-    body += _frames(listing, printer) + LAYOUT.steps(listing, printer)
+    body += _frames(listing, printer) + WRITE.steps(listing, printer)
     numbers = {
         quantity: {place: k for k, place in enumerate(code.pattern(quantity))}
         for quantity, _ in listing.results
@@ -51,8 +51,8 @@ def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer
                 index = entry.row
                 if quantity_named(quantity).is_matrix:
                     index = numbers[quantity][entry.row, entry.column]
-                left, text = LAYOUT.element.format(quantity, index), printer.text(entry.node)
-                body += LAYOUT.assigned(left, text, entry_title(quantity, entry, code))
+                left, text = WRITE.element.format(quantity, index), printer.text(entry.node)
+                body += WRITE.assigned(left, text, entry_title(quantity, entry, code))
     write = _with_angles if has_angles else _plain
     return [f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
 
@@ -61,23 +61,23 @@ def _plain(name: str, body: list[str]) -> list[str]:
     # A function of a whole point that is constant, or has no entry that varies, is possible.
     used = any("[lane]" in line for line in body)
     return [
-        f"INLINE void {name}_at(block *at, size_t lane)",
+        f"INLINE void {name}_at(strip *at, size_t lane)",
         "{",
         *(f"    {line}" for line in (body if used else ["(void)at, (void)lane;"])),
         "}",
         "",
-        *_block_function(name),
+        *_strip_function(name),
     ]
 
 
 def _with_angles(name: str, body: list[str]) -> list[str]:
     return [
-        f"INLINE int64_t {name}_at(block *at, size_t lane, int exact)",
+        f"INLINE int64_t {name}_at(strip *at, size_t lane, int exact)",
         "{",
         *(f"    {line}" for line in (*body, "return far;")),
         "}",
         "",
-        f"static void {name}_of_block(block *at, size_t count)",
+        f"static void {name}_of_strip(strip *at, size_t count)",
         "{",
         "    int64_t far = 0;",
         "    for (size_t lane = 0; lane < count; lane++)",
@@ -88,9 +88,9 @@ def _with_angles(name: str, body: list[str]) -> list[str]:
     ]
 
 
-def _block_function(name: str) -> list[str]:
+def _strip_function(name: str) -> list[str]:
     return [
-        f"static void {name}_of_block(block *at, size_t count)",
+        f"static void {name}_of_strip(strip *at, size_t count)",
         "{",
         "    for (size_t lane = 0; lane < count; lane++)",
         f"        {name}_at(at, lane);",
@@ -169,8 +169,8 @@ def _steps(steps: Iterable[Assignment | BlockCall], printer: Printer) -> list[st
     lines: list[str] = []
     for step in steps:
         if isinstance(step, Assignment):
-            left = LAYOUT.value.format(step.name)
-            lines += LAYOUT.assigned(left, printer.definition(step.node))
+            left = WRITE.value.format(step.name)
+            lines += WRITE.assigned(left, printer.definition(step.node))
         else:
             lines += _block_call(step, printer)
     return lines
@@ -180,7 +180,7 @@ def _block_call(step: BlockCall, printer: Printer) -> list[str]:
     """Return the call that solves a block, with the names of the unknowns, or its determinant."""
     matrix = _indented(step.matrix, printer)
     if not step.right:
-        left = LAYOUT.value.format(step.names[0])
+        left = WRITE.value.format(step.names[0])
         return [f"{left} = block_determinant({step.size}, (const double[]){{", *matrix, "});"]
     vector = f"block_of_{step.names[0]}"
     return [

@@ -8,7 +8,7 @@ from kincompile import criteria, quantities
 from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
 from kincompile.quantities import nonzeros_of
 from kincompile.targets.c.dialect import C
-from kincompile.targets.c.functions import LAYOUT, evaluator, solve_functions
+from kincompile.targets.c.functions import WRITE, evaluator, solve_functions
 from kincompile.targets.lines import WIDTH, indented, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.planned_solve import schedule_solve
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 DIALECT = C
 
 LANES = 32
-"""Points in a block: enough for the widest registers, few enough for the nearest cache."""
+"""Points in a strip: enough for the widest registers, few enough for the nearest cache."""
 
 CRITERIA = (
     "KINK", "MAX_CORRECTIONS", "MAX_SUBSTEPS", "NEARLY_SINGULAR", "NO_SIZE", "RESIDUAL_FACTOR",
@@ -60,7 +60,7 @@ def evaluators() -> dict[str, tuple[str, ...]]:
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return the lines of a function of a point, and of the one for a block of points."""
+    """Return the lines of a function of a point, and of the one for a strip of points."""
     return ["", *evaluator(name, code, listing, printer)]
 
 
@@ -75,7 +75,7 @@ def files(
         listing = schedule_solve(code, plan, NameTable(RESERVED))
     about = _about(code, listing)
     lines = [line for own in functions.values() for line in own]
-    body = [_block(code, lines, called, listing)]
+    body = [_strip(code, lines, called, listing)]
     body.append(fill("c/batch.c.jinja", {**_only(about, "name", "is_planned"), **_batch(code)}))
     if listing is not None:
         body.append(fill("c/march.c.jinja", {**_only(about, "name", "NAME"), **_scales(program)}))
@@ -92,7 +92,7 @@ def _about(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
     return {
         "name": program.name,
         "NAME": program.name.upper(),
-        "header": LAYOUT.heading(code),
+        "header": WRITE.heading(code),
         "n": len(program.coordinates),
         "m": len(program.equations),
         "k": len(program.parameters),
@@ -166,7 +166,7 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
         constants = sum(code.number(entry.node) is not None for entry in entries)
         nonzeros = f"offsetof({program.name}_batch, {nonzeros_of(quantity)})"
         rows += [
-            f"{{offsetof(block, {name}), offsetof({program.name}_batch, {name}),",
+            f"{{offsetof(strip, {name}), offsetof({program.name}_batch, {name}),",
             f"    {nonzeros if quantity.is_matrix else 0}, {height}, {width}, {matrices},",
             f"    {len(entries)}, {constants}, {len(entries) - constants},",
             f"    {_pattern_name(code, quantity) if quantity.is_matrix else 'NULL'},",
@@ -189,7 +189,7 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
         ),
         "matrices": max(matrices, 1),
         "kernels": indented(
-            f"{{{sum(bits[item] for item in given)}, {name}_of_block}},"
+            f"{{{sum(bits[item] for item in given)}, {name}_of_strip}},"
             for name, given in kernels.items()
         ),
         "n_kernels": len(kernels),
@@ -215,10 +215,10 @@ def _array_lines(items: Sequence[str], placeholder: str = "0") -> str:
     return "\n".join(f"    {line}" for line in wrapped(items or [placeholder]))
 
 
-def _block(
+def _strip(
     code: InlineProgram, lines: list[str], called: Collection[str], listing: SolveListing | None
 ) -> str:
-    """Return the functions that work on a block of points, and what they need."""
+    """Return the functions that work on a strip of points, and what they need."""
     largest = 0
     if listing is not None:
         lines = [*lines, "", *solve_functions(code, listing)]
@@ -232,7 +232,7 @@ def _block(
             for item in quantities.QUANTITIES
         ),
     }
-    return fill("c/block.c.jinja", data)
+    return fill("c/strip.c.jinja", data)
 
 
 def _elementary(program: Program, called: Collection[str], largest: int) -> str:

@@ -12,7 +12,7 @@ from kincompile.targets.headings import constants
 from kincompile.targets.javascript.dialect import JAVASCRIPT
 from kincompile.targets.lines import indented, wrapped
 from kincompile.targets.naming import NameTable
-from kincompile.targets.statements import Layout
+from kincompile.targets.statements import Statements
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 DIALECT = JAVASCRIPT
 
-LAYOUT = Layout("//", "const {}", "{}[{}]", "{}[{}][{}]")
+WRITE = Statements("//", "const {}", "{}[{}]", "{}[{}][{}]")
 
 KEYWORDS = (
     "arguments", "await", "break", "case", "catch", "class", "const", "continue", "debugger",
@@ -60,10 +60,10 @@ def function(name: str, code: InlineProgram, listing: Listing, printer: Printer)
     vectors = ["q", "q_dot"] if quantity.is_moving else ["q"]
     body = [f'require_length("{vector}", {vector}, N_COORDINATES);' for vector in vectors]
     body.append('require_length("p", p, DEFAULTS.length);')
-    body += LAYOUT.inputs(code.program, listing)
-    body += LAYOUT.frames(listing, printer) + LAYOUT.steps(listing, printer)
+    body += WRITE.inputs(code.program, listing)
+    body += WRITE.frames(listing, printer) + WRITE.steps(listing, printer)
     body.append(f"const {name} = {_zeros(name, code.program)};")
-    body += LAYOUT.results(name, code, printer)
+    body += WRITE.results(name, code, printer)
     return [
         "",
         f"// {quantity.about}",
@@ -85,7 +85,7 @@ def files(
     data = {
         **constants(code, 2, "[{}, {}]"),
         "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),
-        "header": LAYOUT.heading(code),
+        "header": WRITE.heading(code),
         "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
         "tables": indented(_tables(program)),
         "has_square": "square(" in text,

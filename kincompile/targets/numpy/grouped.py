@@ -12,7 +12,7 @@ import numpy as np
 
 from kincompile import quantities
 from kincompile.errors import UnsupportedError
-from kincompile.ir.inline import Entry, InlineProgram, Section
+from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
 from kincompile.quantities import FORMAT, kernels
 from kincompile.targets.evaluators import input_names, inputs_read, schedule
 from kincompile.targets.lines import indented, wrapped
@@ -123,7 +123,7 @@ def _group_code(
     """Write the functions of a group; return the lines of its entry in the module's table."""
     table = NameTable((*RESERVED, *grouped.program.tables))
     names = {name: table.take(name) for name in item.inputs}
-    sections = (Section(item.sample, "", _local_entries(item)),)
+    sections = (ConstraintRows(item.sample, "", _local_entries(item)),)
     inline = InlineProgram(grouped.program, item.nodes, sections, item.hints)
     arrays[f"{item.name}.rows"] = item.rows
     lines = [f'Group("{item.name}", {len(item.outputs["Phi"])}, {{']
@@ -181,7 +181,9 @@ def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
     names = input_names(program, table)
     sample = program.instances[0]
     entries = tuple(Entry(k, 0, node) for k, node in enumerate(grouped.values))
-    inline = InlineProgram(program, program.values, (Section(sample, "", {"values": entries}),), {})
+    inline = InlineProgram(
+        program, program.values, (ConstraintRows(sample, "", {"values": entries}),), {}
+    )
     listing = schedule(inline, ("values",), names, table)
     called |= set(listing.functions)
     unpack = [f"{name} = {vector}[{k}]" for vector, k, name in inputs_read(program, listing)]

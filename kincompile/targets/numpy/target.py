@@ -21,7 +21,7 @@ from kincompile.targets.templates import fill
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from kincompile.ir.inline import Entry, InlineProgram, Section
+    from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
     from kincompile.ir.program import Program
     from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
@@ -274,7 +274,7 @@ def function_body(
 
 def _section(
     name: str,
-    section: Section,
+    section: ConstraintRows,
     entries: Sequence[Entry],
     code: InlineProgram,
     printer: Printer,

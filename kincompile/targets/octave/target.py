@@ -13,7 +13,7 @@ from kincompile import quantities
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.targets.lines import indented, pieces
 from kincompile.targets.octave.dialect import NAMES, OCTAVE
-from kincompile.targets.statements import Layout
+from kincompile.targets.statements import Statements
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 DIALECT = OCTAVE
 
-LAYOUT = Layout("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, continued=" ...")
+WRITE = Statements("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, continued=" ...")
 
 LONGEST_NAME = 63
 """Longest name; MATLAB truncates longer ones."""
@@ -61,10 +61,10 @@ def function(name: str, code: InlineProgram, listing: Listing, printer: Printer)
     """
     _require_short(listing.names.values())
     rows, columns = (*code.program.shape_of(quantities.quantity_named(name)), 1)[:2]
-    lines = LAYOUT.inputs(code.program, listing)
-    values = LAYOUT.frames(listing, printer) + LAYOUT.steps(listing, printer)
+    lines = WRITE.inputs(code.program, listing)
+    values = WRITE.frames(listing, printer) + WRITE.steps(listing, printer)
     zeros = f"{name} = zeros({rows}, {columns});"
-    results = LAYOUT.results(name, code, printer)
+    results = WRITE.results(name, code, printer)
     return [*lines, *values, *([""] if values else []), zeros, *results]
 
 
@@ -111,7 +111,7 @@ def _function_file(name: str, code: InlineProgram, body: str) -> str:
         "arguments": ", ".join(quantity.arguments),
         "n_arguments": len(quantity.arguments),
         "about": f"{quantity.about[:-1]}{shape}.",
-        "header": LAYOUT.header(code),
+        "header": WRITE.header(code),
         "fingerprint": program.fingerprint,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 2),
         "body": body,
@@ -157,7 +157,7 @@ def _script(code: InlineProgram) -> str:
         )
     data = {
         "name": program.name,
-        "header": LAYOUT.header(code),
+        "header": WRITE.header(code),
         "n": len(program.coordinates),
         "unsolvable": indented(_literal(piece) for piece in pieces(program.unsolvable)),
         "end": repr(end),

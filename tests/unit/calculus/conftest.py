@@ -17,7 +17,7 @@ from kincompile.calculus.expressions import (
     Basis,
     Expression,
     Number,
-    Profile,
+    ProfileFunction,
     Rotation,
     Symbol,
     TimeFunction,
@@ -136,7 +136,7 @@ class ExactEnvironment:
     def time_function(self, function: TimeFunction) -> Fraction:
         raise AssertionError(f"{function} is not in these recipes")
 
-    def profile(self, profile: Profile) -> Fraction:
+    def profile(self, profile: ProfileFunction) -> Fraction:
         raise AssertionError(f"{profile} is not in these recipes")
 
     def entries(self, rotation: Rotation, expand: Expansion) -> tuple[Fraction, Fraction]:

@@ -3,7 +3,7 @@
 import pytest
 
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.expressions import Basis, Profile, Symbol, VectorSymbol
+from kincompile.calculus.expressions import Basis, ProfileFunction, Symbol, VectorSymbol
 from kincompile.calculus.rotations import turned
 from kincompile.calculus.symbols import Contact, Frame, contact_i, i, j, s_i, unit
 from kincompile.calculus.template import Template
@@ -21,7 +21,7 @@ def test_that_a_point_is_position_plus_turned_vector() -> None:
 
 def test_that_the_tangent_of_a_profile_is_its_derivative() -> None:
     contact = Contact("k")
-    rho, rho_prime = (Profile("rho_k", contact.alpha, order) for order in (0, 1))
+    rho, rho_prime = (ProfileFunction("rho_k", contact.alpha, order) for order in (0, 1))
     u, u_prime = turned(contact.alpha, Basis()), turned(contact.alpha, Basis(), 1)
     assert contact.a == rho * u
     assert contact.g == rho_prime * u + rho * u_prime

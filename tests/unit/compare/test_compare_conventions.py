@@ -122,7 +122,10 @@ def test_columns_of_the_ground(place: int) -> None:
 @pytest.mark.parametrize("name", ["nu", "gamma"])
 def test_the_sign_of_a_whole_vector(name: str) -> None:
     given = {"Phi_q": PHI_Q, "nu": NU, "gamma": GAMMA}
-    report = kc.compare(REFERENCE, **{**given, name: -given[name]})
+    flipped = {**given, name: -given[name]}
+    assert not kc.compare(REFERENCE, **flipped).equal
+    stated = {name: {"nu": "Phi_t", "gamma": "left side"}[name]}
+    report = kc.compare(REFERENCE, **flipped, conventions=stated)
     assert (report.verdict, kinds(report)) == ("equal up to convention", [f"sign of {name}"])
 
 
@@ -151,13 +154,15 @@ def test_exchanged_roles_of_the_bodies() -> None:
     assert set(report.conventions[0].rows) == {"T.normal", "T.parallel"}
 
 
-def test_that_an_angle_counted_from_the_other_body_has_its_own_nu() -> None:
-    m = kc.Mechanism("exchanged")
+@pytest.mark.parametrize("angle", [sympy.cos(kc.t), 0])
+def test_that_an_angle_counted_from_the_other_body_turns_the_other_way(angle: Any) -> None:
+    m, other = kc.Mechanism("exchanged"), kc.Mechanism("exchanged")
     i, j = m.body("i"), m.body("j")
-    m.add(kc.RelativeAngle("A", j, i, sympy.cos(kc.t)))
-    report = kc.compare(REFERENCE, m.Phi, m.Phi_q, m.nu, m.gamma, constraint="A")
-    assert kinds(report)[0] == "roles of i and j"
-    assert report.verdict == "equal up to convention"
+    m.add(kc.RelativeAngle("A", i, j, angle))
+    other.body("i"), other.body("j")
+    other.add(kc.RelativeAngle("A", j, i, angle))
+    report = kc.compare(m, other.Phi, other.Phi_q, other.nu, other.gamma)
+    assert report.equal == (angle == 0)
 
 
 def test_degrees() -> None:

@@ -68,7 +68,9 @@ def faulty(quantity: str, entries: dict[tuple[str, str] | str, str]) -> Report:
         rows[ROW[row]][COLUMN.get(column, 0)] = text
     # With gamma at hand a reversed nu is not a convention that both would follow.
     given = {"gamma": RIGHT["gamma"], quantity: rows}
-    report: Report = compare(REFERENCE, **given, aliases={"w_i": "phi_id", "w_j": "phi_jd"})
+    report: Report = compare(
+        REFERENCE, **given, aliases={"w_i": "phi_id", "w_j": "phi_jd"}, strict=True
+    )
     return report
 
 
@@ -166,7 +168,7 @@ def judged(quantity: str, entries: dict[tuple[int, int], Any]) -> Report:
     matrix = RIGHT[quantity].as_mutable()
     for place, item in entries.items():
         matrix[place] = item
-    report: Report = compare(REFERENCE, **{quantity: matrix})
+    report: Report = compare(REFERENCE, **{quantity: matrix}, strict=True)
     return report
 
 

@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.derivation.document import Section
+from kincompile.derivation.document import Chapter
 
 V, W = (0.6, 0.9), (-0.4, 0.7)
 S, P, Q = (0.25, -0.15), (-0.35, 0.45), (1.05, 0.2)
@@ -59,7 +59,7 @@ def gallery() -> kc.Mechanism:
     return make_gallery()
 
 
-def all_sections(sections: tuple[Section, ...]) -> Iterator[Section]:
+def all_sections(sections: tuple[Chapter, ...]) -> Iterator[Chapter]:
     """Yield sections and their parts."""
     for section in sections:
         yield section
@@ -67,6 +67,6 @@ def all_sections(sections: tuple[Section, ...]) -> Iterator[Section]:
 
 
 @pytest.fixture(scope="session")
-def sections_of() -> Callable[[Any], list[Section]]:
+def sections_of() -> Callable[[Any], list[Chapter]]:
     """Return the function that gives all sections of a derivation, by depth first."""
     return lambda derivation: list(all_sections(derivation.sections))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.derivation.document import Link, Math, Table, Verbatim
+from kincompile.derivation.document import CrossReference, Math, Table, Verbatim
 from kincompile.derivation.evaluation import evaluation
 from kincompile.derivation.formulas import Decimal
 from kincompile.errors import InputError
@@ -96,7 +96,7 @@ def test_that_row_offsets_are_those_of_the_lecture(sections_of: Any) -> None:
     derivation = kc.derivation(m)  # case R0: three equations are missing, the page says so
     rows = table(derivation, "offsets", sections_of).rows
     assert [row[4][0] for row in rows] == ["1", "3", "4", "6"]
-    expected = [Link(f"constraint-{name}", Verbatim(name)) for name in "ABCD"]
+    expected = [CrossReference(f"constraint-{name}", Verbatim(name)) for name in "ABCD"]
     assert [row[0][0] for row in rows] == expected
     mobility = next(item for item in sections_of(derivation) if item.anchor == "mobility")
     assert "3 more equations are needed" in mobility.blocks[-1].runs[0]

@@ -6,7 +6,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.calculus.expressions import ONE, VectorSymbol
-from kincompile.derivation.document import Display, Link, Table
+from kincompile.derivation.document import CrossReference, Display, Table
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import coefficient, partials
 from kincompile.derive.rules import Rule, along
@@ -125,7 +125,7 @@ def test_that_every_link_has_a_target(gallery: Any, sections_of: Any) -> None:
         for row in block.rows
         for cell in row
         for run in cell
-        if isinstance(run, Link)
+        if isinstance(run, CrossReference)
     ]
     assert links
     assert set(links) <= set(anchors)

@@ -20,7 +20,7 @@ from kincompile.calculus.expressions import (
     Basis,
     Expression,
     Number,
-    Profile,
+    ProfileFunction,
     Rotation,
     Scalar,
     Symbol,
@@ -77,7 +77,7 @@ class Line:
     def time_function(self, function: TimeFunction) -> complex:
         return GROWTH**function.order * cmath.exp(GROWTH * (T + self.s))
 
-    def profile(self, profile: Profile) -> complex:
+    def profile(self, profile: ProfileFunction) -> complex:
         return BEND**profile.order * cmath.exp(BEND * self.symbol(profile.argument))
 
     def entries(self, rotation: Rotation, expand: Expansion) -> Any:
@@ -98,7 +98,7 @@ scalar_leaves = st.one_of(
     st.sampled_from(
         [
             Symbol("phi_i"), Symbol("k"), TimeFunction("C"), TimeFunction("C", 1),
-            Profile("rho", Symbol("alpha")), Profile("rho", Symbol("alpha"), 1),
+            ProfileFunction("rho", Symbol("alpha")), ProfileFunction("rho", Symbol("alpha"), 1),
         ]
     ),
 )  # fmt: skip
@@ -231,7 +231,7 @@ def test_that_what_does_not_depend_on_an_angle_is_constant(
 
 
 def test_that_time_differentiates_drivers_alone() -> None:
-    driver, rho = TimeFunction("C"), Profile("rho", phi)
+    driver, rho = TimeFunction("C"), ProfileFunction("rho", phi)
     assert along(driver**2 + rho, {TIME: ONE}) == 2 * driver * TimeFunction("C", 1)
     assert along(TimeFunction("C", 1), {TIME: ONE}) == TimeFunction("C", 2)
 

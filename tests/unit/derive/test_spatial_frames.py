@@ -12,7 +12,7 @@ import pytest
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import (
     Expression,
-    Profile,
+    ProfileFunction,
     Rotated,
     Scalar,
     Symbol,
@@ -113,7 +113,7 @@ class Numbers:
     def time_function(self, function: TimeFunction) -> Any:
         raise AssertionError(function)
 
-    def profile(self, profile: Profile) -> Any:
+    def profile(self, profile: ProfileFunction) -> Any:
         raise AssertionError(profile)
 
     def call(self, function: str, value: Any) -> Any:

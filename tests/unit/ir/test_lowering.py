@@ -9,7 +9,7 @@ from kincompile.ir.inline import inline
 from kincompile.ir.interpret import interpret
 from kincompile.ir.kernels import constraint_kernel
 from kincompile.ir.lower import lower
-from kincompile.ir.program import Attribute, FrameEntry, Function, Motion
+from kincompile.ir.program import Attribute, FrameEntry, Function, StateEntry
 from kincompile.model.cams import PointFollower
 from kincompile.model.joints import Revolute
 
@@ -105,11 +105,11 @@ def test_that_the_interpreter_takes_batches_and_parameters(chain: kc.Mechanism) 
 def test_that_inputs_say_what_they_are_and_not_only_how_they_are_called() -> None:
     kernel = constraint_kernel(PointFollower.template())
     found = {item.name: item for item in kernel.inputs if not isinstance(item, str)}
-    assert found["phi_j_dot"] == Motion(1, 2, 1, "phi_j_dot")
+    assert found["phi_j_dot"] == StateEntry(1, 2, 1, "phi_j_dot")
     assert found["cos_i"] == FrameEntry(0, 0, "cos_i")
     assert found["s_i_x"] == Attribute("s_i", 0, "s_i_x")
     assert found["rho_j_prime"] == Function("rho_j", 1, owner=2, body=1)
-    assert found["alpha_j"] == Motion(2, 0, 0, "alpha_j")
+    assert found["alpha_j"] == StateEntry(2, 0, 0, "alpha_j")
 
 
 def test_that_a_frame_is_a_kernel_bound_to_each_body(chain: kc.Mechanism) -> None:

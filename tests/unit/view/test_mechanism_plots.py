@@ -103,8 +103,9 @@ def test_that_parameters_change_the_shapes(slider_crank):
 
 
 MECHANISMS = (
-    "cam_flat_follower", "double_pendulum", "four_bar", "gear_train", "inverted_slider_crank",
-    "rack_and_pinion", "simple_pendulum", "slider_crank", "slot_follower", "wrecker_boom",
+    "cam_by_table", "cam_flat_follower", "double_pendulum", "four_bar", "gear_train",
+    "inverted_slider_crank", "rack_and_pinion", "simple_pendulum", "slider_crank", "slot_follower",
+    "wrecker_boom",
 )  # fmt: skip
 
 

@@ -16,19 +16,29 @@ from kincompile.model.joints import Revolute
 from kincompile.view.drawing import drawing
 from kincompile.view.joint_shapes import DRAWINGS
 from kincompile.view.marks import (
-    Block,
+    GROUND_FRAME,
     BodyPoint,
+    Contour,
     Drive,
     Link,
     Outline,
     Pin,
-    Profile,
+    PlaneFrame,
     Rail,
+    Slider,
     Span,
     Wheel,
 )
 
 GROUND = -1
+FRAMES = {GROUND: GROUND_FRAME} | {
+    k: PlaneFrame(k, (3 * k, 3 * k + 1, 3 * k + 2)) for k in range(4)
+}
+
+
+def at(body, point):
+    """Return a point of a body, or of the ground."""
+    return BodyPoint(FRAMES[body], point)
 
 
 def two_bodies(joint, *more, i_guess=(0, 0, 0), j_guess=(2, 1, 0.5)):
@@ -69,15 +79,15 @@ def test_that_a_type_of_ones_own_is_drawn_as_the_type_it_is_made_from():
         pass
 
     (pin,) = marks(two_bodies(lambda m, i, j, a: Bearing("A", i, (1, 2), j, (3, 4))), Pin)
-    assert pin == Pin("A", BodyPoint(0, (1, 2)), BodyPoint(1, (3, 4)))
+    assert pin == Pin("A", at(0, (1, 2)), at(1, (3, 4)))
 
 
 def test_that_a_pin_names_the_ground_first_and_parameters_have_their_values():
     m = two_bodies(lambda m, i, j, a: kc.Revolute("A", i, (2 * a, a**2), m.ground, (3, 0)))
     (pin,) = marks(m, Pin)
-    assert pin == Pin("A", BodyPoint(GROUND, (3, 0)), BodyPoint(0, (1, 0.25)))
+    assert pin == Pin("A", at(GROUND, (3, 0)), at(0, (1, 0.25)))
     (pin,) = marks(m, Pin, p={"a": 2.0})
-    assert pin.second == BodyPoint(0, (4, 4))
+    assert pin.second == at(0, (4, 4))
 
 
 def test_that_a_slider_has_a_rail_on_the_ground_as_long_as_its_motion():
@@ -86,19 +96,19 @@ def test_that_a_slider_has_a_rail_on_the_ground_as_long_as_its_motion():
     )
     q = np.zeros((3, 6))
     q[:, 3:] = [(0, 1, np.pi / 2), (0, 4, np.pi / 2), (0, 9, np.pi / 2)]
-    (rail,), (block,) = marks(m, Rail, q=q), marks(m, Block, q=q)
-    assert block == Block("C", BodyPoint(1, (0.5, 0)), (1, 0))
+    (rail,), (block,) = marks(m, Rail, q=q), marks(m, Slider, q=q)
+    assert block == Slider("C", at(1, (0.5, 0)), (1, 0))
     # The point (0.5, 0) is at y = 1.5, 4.5, 9.5; the rail goes on a little at both ends.
     over = rail.end[1] - 9.5
     assert over > 0
     np.testing.assert_allclose((rail.start, rail.end), ((0, 1.5 - over), (0, 9.5 + over)))
-    assert (rail.frame, rail.axis, rail.style) == (GROUND, (0, 1), "guide")
+    assert (rail.frame, rail.axis, rail.style) == (GROUND_FRAME, (0, 1), "guide")
 
 
 def test_that_between_moving_bodies_there_are_a_sleeve_and_a_slide():
     m = two_bodies(lambda m, i, j, a: kc.Translational("C", i, (1, 0), (1, 0), j, (2, 0), (1, 0)))
-    (slide,), (block,) = marks(m, Span), marks(m, Block)
-    assert slide == Span("C", BodyPoint(0, (1, 0)), BodyPoint(1, (2, 0)), "slide")
+    (slide,), (block,) = marks(m, Span), marks(m, Slider)
+    assert slide == Span("C", at(0, (1, 0)), at(1, (2, 0)), "slide")
     assert block.place == slide.first
 
 
@@ -113,9 +123,9 @@ def test_that_the_block_of_a_slotted_lever_is_the_body_at_the_crank_pin(is_lever
     i, j = sides if is_lever_first else sides[::-1]
     m.add(kc.Translational("slot", *i, *j))
     m.add(kc.AbsoluteAngle("motor", crank, kc.t))
-    (slide,), (sleeve,) = marks(m, Span), marks(m, Block)
-    assert (sleeve.place, sleeve.axis) == (BodyPoint(2, (0, 0)), (0, 1))
-    assert slide == Span("slot", BodyPoint(2, (0, 0)), BodyPoint(1, (0, 0)), "slide")
+    (slide,), (sleeve,) = marks(m, Span), marks(m, Slider)
+    assert (sleeve.place, sleeve.axis) == (at(2, (0, 0)), (0, 1))
+    assert slide == Span("slot", at(2, (0, 0)), at(1, (0, 0)), "slide")
 
 
 def test_that_a_cylinder_takes_the_place_of_its_slide():
@@ -124,17 +134,17 @@ def test_that_a_cylinder_takes_the_place_of_its_slide():
         lambda m, i, j, a: kc.TranslationalDistance("D", i, (1, 0), (1, 0), j, (2, 0), 1 + kc.t),
     )
     assert [(span.joint, span.style) for span in marks(m, Span)] == [("D", "cylinder")]
-    assert marks(m, Block) == []
+    assert marks(m, Slider) == []
 
 
 @pytest.mark.parametrize(("length", "style"), [(3, "rod"), (3 + kc.t, "cylinder")])
 def test_that_a_distance_is_a_rod_or_a_cylinder(length, style):
     m = two_bodies(lambda m, i, j, a: kc.Distance("D", i, (0, 0), j, (1, 0), length))
     (span,) = marks(m, Span)
-    assert span == Span("D", BodyPoint(0, (0, 0)), BodyPoint(1, (1, 0)), style)
+    assert span == Span("D", at(0, (0, 0)), at(1, (1, 0)), style)
     m = two_bodies(lambda m, i, j, a: kc.AbsoluteDistance("D", i, (1, 0), (5, 5), length))
     (span,) = marks(m, Span)
-    assert span == Span("D", BodyPoint(GROUND, (5, 5)), BodyPoint(0, (1, 0)), style)
+    assert span == Span("D", at(GROUND, (5, 5)), at(0, (1, 0)), style)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +156,7 @@ def test_that_a_held_coordinate_is_a_rail_and_a_driven_one_an_arrow(joint, acros
     assert rail.axis == across
     assert rail.start[held] == rail.end[held] == 4
     (drive,) = marks(two_bodies(lambda m, i, j, a: joint("X", j, (1, 0), kc.t)), Drive)
-    assert drive == Drive("X", BodyPoint(1, (1, 0)), (1, 0) if held == 0 else (0, 1))
+    assert drive == Drive("X", at(1, (1, 0)), (1, 0) if held == 0 else (0, 1))
 
 
 def test_that_a_turning_drive_is_at_the_bearing():
@@ -158,15 +168,15 @@ def test_that_a_turning_drive_is_at_the_bearing():
         lambda m, i, j, a: kc.AbsoluteAngle("held", j, 1),
     )
     assert marks(m, Drive) == [
-        Drive("motor", BodyPoint(0, (-1, 0)), None), Drive("gear", BodyPoint(1, (2, 0)), None),
+        Drive("motor", at(0, (-1, 0)), None), Drive("gear", at(1, (2, 0)), None),
     ]  # fmt: skip
 
 
 def test_that_gears_are_wheels_and_a_negative_radius_is_an_internal_one():
     m = two_bodies(lambda m, i, j, a: kc.Gear("G", i, (0, 0), -4 * a, 0.1, j, (1, 0), a, kc.pi))
     ring, planet = marks(m, Wheel)
-    assert ring == Wheel("G", BodyPoint(0, (0, 0)), 2, 0.1, is_internal=True)
-    assert planet == Wheel("G", BodyPoint(1, (1, 0)), 0.5, np.pi, is_internal=False)
+    assert ring == Wheel("G", at(0, (0, 0)), 2, 0.1, is_internal=True)
+    assert planet == Wheel("G", at(1, (1, 0)), 0.5, np.pi, is_internal=False)
 
 
 def test_that_a_rack_goes_from_p_to_q_and_as_far_as_the_pinion_rolls():
@@ -184,7 +194,7 @@ def test_that_a_cam_has_the_radius_of_its_profile():
     m = two_bodies(
         lambda m, i, j, a: kc.CamFlatFollower("F", i, (1, 0), profile, j, (0, 0), (0, 2))
     )
-    (cam,), (face,) = marks(m, Profile), marks(m, Rail)
+    (cam,), (face,) = marks(m, Contour), marks(m, Rail)
     angles = 2 * np.pi * np.arange(len(cam.points)) / len(cam.points)
     radii = np.hypot(*(np.array(cam.points) - (1, 0)).T)
     np.testing.assert_allclose(radii, 2 + np.cos(angles), rtol=1e-12)
@@ -197,8 +207,8 @@ def test_that_a_table_of_radii_is_a_profile():
     angles = np.linspace(0, 2 * np.pi, 13)[:-1]
     table = (angles.tolist(), (1 + 0.1 * np.cos(angles)).tolist())
     m = two_bodies(lambda m, i, j, a: kc.PointFollower("P", i, (0, 0), j, (0, 0), table))
-    (slot,), (pin,) = marks(m, Profile), marks(m, Pin)
-    assert (slot.frame, slot.style, pin.second) == (1, "slot", BodyPoint(0, (0, 0)))
+    (slot,), (pin,) = marks(m, Contour), marks(m, Pin)
+    assert (slot.frame, slot.style, pin.second) == (FRAMES[1], "slot", at(0, (0, 0)))
     radii = np.hypot(*np.array(slot.points).T)
     assert 0.899 < radii.min() < radii.max() < 1.101
 
@@ -210,22 +220,28 @@ def test_that_a_body_is_the_hull_of_its_joint_points():
         for k, at in enumerate(corners[1:])
     ]
     m = two_bodies(lambda m, i, j, a: kc.AbsoluteX("x", i, corners[0], kc.t), *more)
-    hull = next(link for link in marks(m, Link) if link.frame == 0)
+    hull = next(link for link in marks(m, Link) if link.frame == FRAMES[0])
     assert set(hull.points) == {(0, 0), (2, 0), (0, 2)}
 
 
 def test_that_a_body_of_one_joint_goes_to_its_origin():
     m = two_bodies(lambda m, i, j, a: kc.Revolute("A", m.ground, (0, 0), i, (-1, 0)))
     first, second = marks(m, Link)
-    assert (first.frame, first.points) == (0, ((-1, 0), (0, 0)))
-    assert (second.frame, second.points) == (1, ((0, 0),))  # no joint at all: a dot
+    assert (first.frame, first.points) == (FRAMES[0], ((-1, 0), (0, 0)))
+    assert (second.frame, second.points) == (FRAMES[1], ((0, 0),))  # no joint at all: a dot
+
+
+def test_that_a_frame_is_wherever_in_q_its_columns_are():
+    q = np.array([9.0, np.pi / 2, 2.0, 9.0, 1.0])
+    place = BodyPoint(PlaneFrame(0, (4, 2, 1)), (3, 4)).at(q)
+    np.testing.assert_allclose(place, (1 - 4, 2 + 3), atol=1e-12)
 
 
 def test_that_points_are_where_rotation_and_translation_put_them():
     q = np.array([[1.0, 2.0, np.pi / 2, 5.0, 6.0, np.pi]])
-    np.testing.assert_allclose(BodyPoint(0, (3, 4)).at(q), [(1 - 4, 2 + 3)], atol=1e-12)
-    np.testing.assert_allclose(BodyPoint(1, (3, 4)).at(q), [(5 - 3, 6 - 4)], atol=1e-12)
-    np.testing.assert_array_equal(BodyPoint(GROUND, (3, 4)).at(q), [(3, 4)])
+    np.testing.assert_allclose(at(0, (3, 4)).at(q), [(1 - 4, 2 + 3)], atol=1e-12)
+    np.testing.assert_allclose(at(1, (3, 4)).at(q), [(5 - 3, 6 - 4)], atol=1e-12)
+    np.testing.assert_array_equal(at(GROUND, (3, 4)).at(q), [(3, 4)])
 
 
 def test_that_the_extent_holds_every_mark_and_leaves_out_what_is_not_finite(example):
@@ -264,7 +280,7 @@ def test_that_a_drawing_is_plain_data(example):
     data = json.loads(json.dumps(drawing(example.model).to_json(), allow_nan=False))
     kinds = {mark["kind"] for mark in data["marks"]}
     assert kinds <= {
-        "link", "outline", "pin", "rail", "block", "span", "wheel", "profile", "drive",
+        "link", "outline", "pin", "rail", "slider", "span", "wheel", "contour", "drive",
     }  # fmt: skip
     assert data["bodies"] == [body.name for body in example.model.system().bodies]
 
@@ -278,6 +294,6 @@ def test_that_an_outline_takes_the_place_of_the_link_and_hides_what_slides_in_it
     m.add(kc.TranslationalDistance("reach", outer, (0, 0), (1, 0), inner, (1, 0), kc.t))
     drawn = drawing(m, {"a": 3.0})
     assert drawn.marks == (
-        Outline(1, ((0, 0), (1, 0), (0, 1))),
-        Outline(0, ((0, 0), (3, 0), (3, 1), (0, 1))),
+        Outline(FRAMES[1], ((0, 0), (1, 0), (0, 1))),
+        Outline(FRAMES[0], ((0, 0), (3, 0), (3, 1), (0, 1))),
     )

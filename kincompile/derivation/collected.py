@@ -1,0 +1,375 @@
+"""Gamma as the book prints it: products multiplied out, like terms joined, rates factored.
+
+What is derived is right, but in the order in which the rules fired. Here it is multiplied out to
+terms `number * scalars * rates * core`, where a core is a vector or a scalar product of two vectors
+that are no sums; the turned vectors in it have one form (R A = B, R B = -A, u^T R v = -(R u)^T v);
+and the rates that stand with the same scalars and core are put together, as a square where they are
+one. Abbreviations such as d stay whole.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from fractions import Fraction
+from functools import reduce
+from itertools import product
+from typing import TYPE_CHECKING, Any, TypeAlias
+from zlib import crc32
+
+from kincompile.calculus.expand import Expansion
+from kincompile.calculus.expressions import (
+    ONE,
+    Basis,
+    Dot,
+    Expression,
+    Number,
+    Perpendicular,
+    Power,
+    Product,
+    Rotated,
+    Scalar,
+    Scaled,
+    Sum,
+    Symbol,
+    Vector,
+    VectorSum,
+    product_of,
+    scaled,
+    split_coefficient,
+    split_factor,
+    vector_sum,
+)
+from kincompile.calculus.rotations import PlaneRotation
+from kincompile.derivation.notation import is_rate
+from kincompile.errors import InternalError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from kincompile.calculus.expressions import Profile, Rotation, TimeFunction, VectorSymbol
+    from kincompile.derivation.formulas import Glyph
+
+Monomial: TypeAlias = tuple[tuple[Scalar, int], ...]
+"""Scalars with their exponents."""
+
+Core: TypeAlias = Vector | Dot | None
+"""What cannot be multiplied out: a vector, a scalar product, or nothing."""
+
+Term: TypeAlias = tuple[Fraction, Monomial, Core]
+
+AGREEMENT = 1e-9
+"""Difference, relative to the terms, up to which two forms are equal at random numbers."""
+
+
+def collected(expression: Expression, names: Mapping[Expression, Glyph]) -> Expression:
+    """Return gamma with like terms joined, equal to it at random numbers.
+
+    Parameters
+    ----------
+    expression
+        What was derived.
+    names
+        What is printed as one symbol, and so not multiplied out.
+
+    Raises
+    ------
+    InternalError
+        If the two differ in numbers: the line is never printed.
+    """
+    found: dict[tuple[Monomial, Core], dict[Monomial, Fraction]] = {}
+    for number, monomial, core in _terms(expression, _Atoms(names)):
+        rates = tuple(item for item in monomial if is_rate(item[0]))
+        others = tuple(item for item in monomial if not is_rate(item[0]))
+        polynomial = found.setdefault((others, core), {})
+        polynomial[rates] = polynomial.get(rates, Fraction(0)) + number
+    kept = [(key, {k: v for k, v in item.items() if v}) for key, item in found.items()]
+    parts = [(others, core, item) for (others, core), item in kept if item]
+    result: Expression
+    if isinstance(expression, Vector):
+        result = vector_sum(tuple(_vector(_part(*part)) for part in parts))
+    else:
+        result = _over_divisors(parts)
+    _require_equal(expression, result)
+    return result
+
+
+def _over_divisors(parts: list[tuple[Monomial, Core, dict[Monomial, Fraction]]]) -> Scalar:
+    """Return a sum of scalars; those with the same divisor are over it together."""
+    found: dict[Monomial, list[Scalar]] = {}
+    for others, core, rates in parts:
+        below = tuple(factor for factor in others if factor[1] < 0)
+        above = tuple(factor for factor in others if factor[1] > 0)
+        found.setdefault(below, []).append(_scalar(_part(above, core, rates)))
+    terms: list[Scalar] = []
+    for below, items in found.items():
+        divisors = tuple(Power(base, exponent) for base, exponent in below)
+        terms += [product_of((*divisors, _sum(items)))] if below else items
+    return _sum(terms)
+
+
+class _Atoms:
+    """What is not multiplied out: the abbreviations, and products of scalars that are one."""
+
+    def __init__(self, names: Mapping[Expression, Glyph]) -> None:
+        self.whole = frozenset(names)
+        self.products = [item for item in names if isinstance(item, Product)]
+
+    def folded(self, factors: tuple[Scalar, ...]) -> list[Scalar]:
+        """Return factors with those that make an abbreviation as that abbreviation."""
+        rest = Counter(dict(self._powers(factors)))
+        found: list[Scalar] = []
+        for item in self.products:
+            wanted = Counter(dict(self._powers(item.factors)))
+            while all(
+                abs(rest[base]) >= abs(n) and rest[base] * n > 0 for base, n in wanted.items()
+            ):
+                rest.subtract(wanted)
+                found.append(item)
+        return [*found, *(_power(base, n) for base, n in rest.items() if n)]
+
+    @staticmethod
+    def _powers(factors: Iterable[Scalar]) -> Iterable[tuple[Scalar, int]]:
+        for item in factors:
+            yield (item.base, item.exponent) if isinstance(item, Power) else (item, 1)
+
+
+def _terms(expression: Expression, atoms: _Atoms) -> list[Term]:
+    """Return the terms of an expression, multiplied out."""
+    if expression in atoms.whole:
+        return [_atom(expression)]
+    match expression:
+        case Number(value):
+            return [(value, (), None)]
+        case VectorSum(items) if (term := _difference(items)) is not None:
+            return [term]
+        case Sum(items) | VectorSum(items):
+            return [term for item in items for term in _terms(item, atoms)]
+        case Product():
+            number, rest = split_coefficient(expression)
+            parts = [_terms(item, atoms) for item in atoms.folded(rest)]
+            return _multiplied([[(number, (), None)], *parts])
+        case Power(base, exponent) if exponent > 1 and isinstance(base, Sum):
+            return _multiplied([_terms(base, atoms)] * exponent)
+        case Scaled(factor, vector):
+            return _multiplied([_terms(factor, atoms), _terms(vector, atoms)])
+        case Dot(left, right):
+            return [_dotted(a, b) for a, b in product(_terms(left, atoms), _terms(right, atoms))]
+        case Rotated() | Perpendicular():
+            return [_turned(expression)]
+    return [_atom(expression)]
+
+
+def _difference(items: tuple[Vector, ...]) -> Term | None:
+    """Return the difference of two points of a body as one turned vector: A (s_Q - s_P)."""
+    if len(items) != 2:
+        return None
+    (factor, first), (other, second) = map(split_factor, items)
+    if not (isinstance(first, Rotated) and isinstance(second, Rotated) and factor == -other):
+        return None
+    if (first.rotation, first.along) != (second.rotation, second.along):
+        return None
+    number, factors = split_coefficient(factor)
+    if repr(first.vector) < repr(second.vector):  # s_Q - s_P wherever it stands
+        number, first, second = -number, second, first
+    (sign, _, core) = _turned(Rotated(first.rotation, first.vector - second.vector, first.along))
+    monomial: Monomial = ()
+    for item in factors:
+        monomial = _joined(monomial, _atom(item)[1])
+    return sign * number, monomial, core
+
+
+def _atom(expression: Expression) -> Term:
+    if isinstance(expression, Vector | Dot):
+        return Fraction(1), (), expression
+    base, exponent = (
+        (expression.base, expression.exponent) if isinstance(expression, Power) else (expression, 1)
+    )
+    return Fraction(1), ((base, exponent),), None
+
+
+def _multiplied(parts: list[list[Term]]) -> list[Term]:
+    return [reduce(_times, choice) for choice in product(*parts)]
+
+
+def _times(first: Term, second: Term) -> Term:
+    core = first[2] if second[2] is None else second[2]
+    monomial = _joined(first[1], second[1])
+    if first[2] is not None and second[2] is not None:  # two scalar products
+        return first[0] * second[0], _joined(monomial, ((_scalar(first[2]), 1),)), second[2]
+    return first[0] * second[0], monomial, core
+
+
+def _scalar(item: Core | Expression) -> Scalar:
+    assert isinstance(item, Scalar)
+    return item
+
+
+def _joined(first: Monomial, second: Monomial) -> Monomial:
+    """Return the product of two monomials, in an order that does not depend on theirs."""
+    exponents: dict[Scalar, int] = {}
+    for base, exponent in (*first, *second):
+        exponents[base] = exponents.get(base, 0) + exponent
+    kept = ((base, exponent) for base, exponent in exponents.items() if exponent)
+    return tuple(sorted(kept, key=lambda item: repr(item[0])))
+
+
+def _quarter_turns(vector: Vector) -> tuple[Vector, int]:
+    """Return a turned vector without its quarter turns, and how many there were.
+
+    In the plane all turns commute: R A = A R = B.
+    """
+    match vector:
+        case Rotated(PlaneRotation() as rotation, inner, along) if all(x == ONE for x in along):
+            core, turns = _quarter_turns(inner)
+            return Rotated(rotation, core), turns + len(along)
+        case Perpendicular(inner) if not isinstance(inner, Basis):
+            core, turns = _quarter_turns(inner)
+            return core, turns + 1
+    return vector, 0
+
+
+def _with_turns(vector: Vector, turns: int) -> tuple[int, Vector]:
+    """Return a sign and a vector with at most one quarter turn, which its outer rotation has."""
+    sign = -1 if turns % 4 > 1 else 1
+    if turns % 2 == 0:
+        return sign, vector
+    if isinstance(vector, Rotated):
+        return sign, Rotated(vector.rotation, vector.vector, (ONE,))
+    return sign, Perpendicular(vector)
+
+
+def _turned(vector: Vector) -> Term:
+    sign, core = _with_turns(*_quarter_turns(vector))
+    return Fraction(sign), (), core
+
+
+def _dotted(first: Term, second: Term) -> Term:
+    """Return the scalar product of two terms; of two turned vectors the left has the turn."""
+    (left, turns), (right, more) = (_quarter_turns(_vector(term[2])) for term in (first, second))
+    number, monomial = first[0] * second[0], _joined(first[1], second[1])
+    if isinstance(left, Rotated) and isinstance(right, Rotated):
+        sign, left = _with_turns(left, (turns - more) % 4)
+        return sign * number, monomial, Dot(left, right)
+    (sign, left), (other, right) = _with_turns(left, turns), _with_turns(right, more)
+    return sign * other * number, monomial, Dot(left, right)
+
+
+def _vector(item: Core | Expression) -> Vector:
+    assert isinstance(item, Vector)
+    return item
+
+
+def _power(base: Scalar, exponent: int) -> Scalar:
+    return base if exponent == 1 else Power(base, exponent)
+
+
+def _part(others: Monomial, core: Core, rates: dict[Monomial, Fraction]) -> Expression:
+    """Return number, scalars and core with their polynomial in the rates."""
+    number, factors = _factored(rates)
+    scalars = [_power(base, exponent) for base, exponent in others]
+    if isinstance(core, Vector):
+        return scaled(_product(number, (*scalars, *factors)), core)
+    dots = () if core is None else (core,)
+    return _product(number, (*scalars, *dots, *factors))
+
+
+def _product(number: Fraction, factors: tuple[Scalar, ...]) -> Scalar:
+    if not factors:
+        return Number(number)
+    if number == 1:
+        return factors[0] if len(factors) == 1 else Product(factors)
+    return Product((Number(number), *factors))
+
+
+def _factored(polynomial: dict[Monomial, Fraction]) -> tuple[Fraction, tuple[Scalar, ...]]:
+    """Return a polynomial in the rates as a number and factors: what all terms share, the rest."""
+    first = next(iter(polynomial))
+    common = tuple(
+        (base, least)
+        for base, _ in first
+        if (least := min(dict(monomial).get(base, 0) for monomial in polynomial)) > 0
+    )
+    divisor = tuple((base, -exponent) for base, exponent in common)
+    rest = {_joined(monomial, divisor): number for monomial, number in polynomial.items()}
+    number = _content(list(rest.values()))
+    rest = {monomial: value / number for monomial, value in rest.items()}
+    shared = tuple(_power(base, exponent) for base, exponent in common)
+    if len(rest) == 1:
+        return number, shared
+    square = _square(rest)
+    if square is not None:
+        return number, (*shared, square)
+    return number, (*shared, Sum(tuple(_monomial(item, value) for item, value in rest.items())))
+
+
+def _content(numbers: list[Fraction]) -> Fraction:
+    """Return the largest number that leaves integers, with the sign of the first."""
+    below = math.lcm(*(item.denominator for item in numbers))
+    above = math.gcd(*(int(item * below) for item in numbers))
+    return Fraction(above if numbers[0] > 0 else -above, below)
+
+
+def _monomial(monomial: Monomial, number: Fraction) -> Scalar:
+    return _product(number, tuple(_power(base, exponent) for base, exponent in monomial))
+
+
+def _square(polynomial: dict[Monomial, Fraction]) -> Scalar | None:
+    """Return (a + b - c)^2 where a polynomial is the square of such a sum."""
+    bases = list(dict.fromkeys(base for monomial in polynomial for base, _ in monomial))
+    first = bases[0]
+    signs = {first: Fraction(1)} | {
+        base: polynomial.get(_joined(((first, 1),), ((base, 1),)), Fraction(0)) / 2
+        for base in bases[1:]
+    }
+    square: dict[Monomial, Fraction] = {}
+    for a, b in product(bases, bases):
+        monomial = _joined(((a, 1),), ((b, 1),))
+        square[monomial] = square.get(monomial, Fraction(0)) + signs[a] * signs[b]
+    if square != polynomial:
+        return None
+    if signs[bases[-1]] < 0:  # phi_j - phi_i, as in the book
+        signs = {base: -signs[base] for base in reversed(bases)}
+    return Power(Sum(tuple(_product(sign, (base,)) for base, sign in signs.items())), 2)
+
+
+def _sum(terms: list[Scalar]) -> Scalar:
+    """Return a sum, flat; unlike `sum_of` it leaves numbers before brackets."""
+    flat = tuple(part for item in terms for part in getattr(item, "terms", (item,)))
+    return Sum(flat) if len(flat) != 1 else flat[0]
+
+
+class _AtRandom:
+    """Every leaf of an expression as a number that follows from its name."""
+
+    def number(self, value: Fraction) -> Any:
+        return float(value)
+
+    def pi(self) -> Any:
+        return math.pi
+
+    def symbol(self, symbol: Symbol) -> Any:
+        return 0.5 + crc32(symbol.name.encode()) / 2**32
+
+    def vector(self, symbol: VectorSymbol) -> Any:
+        return tuple(self.symbol(Symbol(f"{symbol.name} {k}")) for k in range(symbol.size))
+
+    def time_function(self, function: TimeFunction) -> Any:
+        return self.symbol(Symbol(f"{function.name} {function.order}"))
+
+    def profile(self, profile: Profile) -> Any:
+        return self.symbol(Symbol(f"{profile.name} {profile.order}"))
+
+    def entries(self, rotation: Rotation, expand: Expansion) -> Any:
+        return expand.entries(rotation)
+
+    def call(self, function: str, value: Any) -> Any:
+        return getattr(math, function)(value)
+
+
+def _require_equal(first: Expression, second: Expression) -> None:
+    """Check that two forms of an expression have the same numbers."""
+    values = [Expansion(_AtRandom()).components(item) for item in (first, second)]
+    for a, b in zip(*values, strict=True):
+        if not math.isclose(a, b, rel_tol=AGREEMENT, abs_tol=AGREEMENT):
+            raise InternalError(f"gamma collected is not gamma: {b} is not {a}.")
