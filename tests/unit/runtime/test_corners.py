@@ -27,7 +27,7 @@ def press(**options) -> kc.Mechanism:
     return m
 
 
-def length(t: np.ndarray) -> np.ndarray:
+def length(t: np.ndarray) -> Any:
     return np.interp(t, TIMES, (0.1, 0.15, 0.15, 0.1))
 
 
