@@ -22,7 +22,6 @@ _HOME = {
     name: module for module, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.MULTILINE)
 }
 _CATALOGUE = "kincompile.model.catalogue"
-_MODULES = ("motion",)
 _WITHOUT_SYMPY = ("kincompile.runtime", "kincompile.errors")
 
 __version__ = "0.1.0"
@@ -43,8 +42,8 @@ def __getattr__(name: str) -> Any:
         import_module("kincompile.files.write_model")
         if "IPython" in sys.modules:
             import_module("kincompile.view.notebook")
-    found = import_module(f"{module}.{name}" if name in _MODULES else module)
-    value = globals()[name] = found if name in _MODULES else getattr(found, name)
+    home = import_module(module)
+    value = globals()[name] = getattr(home, name, None) or import_module(f"{module}.{name}")
     return value
 
 

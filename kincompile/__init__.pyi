@@ -28,6 +28,7 @@ from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis
 from kincompile.files.files import read_model as read_model
 from kincompile.model import motion as motion
+from kincompile.model import outputs as outputs
 from kincompile.model.catalogue import *
 from kincompile.model.equation import Equation as Equation
 from kincompile.model.expressions import alpha as alpha
@@ -35,6 +36,7 @@ from kincompile.model.expressions import deg as deg
 from kincompile.model.expressions import pi as pi
 from kincompile.model.expressions import t as t
 from kincompile.model.mechanism import Mechanism as Mechanism
+from kincompile.model.sketch import Sketch as Sketch
 from kincompile.model.system import ConstraintSystem as ConstraintSystem
 from kincompile.runtime.load import load as load
 from kincompile.runtime.newton import newton as newton

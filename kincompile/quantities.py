@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
-FORMAT = 2
+FORMAT = 3
 """The format of emitted modules, as docs/architecture.md has it."""
 
 Rows = Literal["equations", "coordinates", "outputs"]
@@ -33,7 +33,7 @@ class Quantity:
     columns
         What its columns belong to; ``"none"`` for a vector.
     reads
-        What it depends on: ``q``, ``q_dot``, ``t`` and ``p``.
+        What it depends on: ``q``, ``q_dot``, ``q_ddot``, ``t`` and ``p``.
     adds
         Whether several constraints contribute to one entry, so that contributions are added;
         otherwise an entry belongs to one constraint.
@@ -54,17 +54,14 @@ class Quantity:
         return self.columns != "none"
 
     @property
-    def is_moving(self) -> bool:
-        """Whether it depends on the rates q_dot."""
-        return "q_dot" in self.reads
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """The arguments of its function: the rates only where it depends on them."""
-        return ("q", "q_dot", "t", "p") if self.is_moving else ("q", "t", "p")
+    def states(self) -> tuple[str, ...]:
+        """What it reads of q, q_dot and q_ddot."""
+        return self.reads[:-2]
 
 
 AT_POSITION = ("q", "t", "p")
+MOVING = ("q", "q_dot", "t", "p")
+ACCELERATED = ("q", "q_dot", "q_ddot", "t", "p")
 
 QUANTITIES: tuple[Quantity, ...] = (
     Quantity("Phi", "equations", "none", AT_POSITION, False, "Constraint vector Phi(q, t)."),
@@ -74,8 +71,20 @@ QUANTITIES: tuple[Quantity, ...] = (
         "Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.",
     ),
     Quantity(
-        "gamma", "equations", "none", ("q", "q_dot", "t", "p"), False,
+        "gamma", "equations", "none", MOVING, False,
         "Right side of the acceleration equation Phi_q q_ddot = gamma.",
+    ),
+    Quantity("outputs", "outputs", "none", ACCELERATED, False, "Outputs y."),
+    Quantity(
+        "outputs_dot", "outputs", "none", ACCELERATED, False,
+        "Time derivatives of the outputs, y_dot = y_q q_dot + y_t.",
+    ),
+    Quantity(
+        "outputs_ddot", "outputs", "none", ACCELERATED, False,
+        "Second time derivatives of the outputs; NaN of those that depend on rates.",
+    ),
+    Quantity(
+        "outputs_q", "outputs", "coordinates", ACCELERATED, False, "Jacobian of the outputs by q."
     ),
 )  # fmt: skip
 """All quantities, in the order in which they are computed."""
@@ -85,8 +94,21 @@ TOGETHER: Mapping[str, tuple[str, ...]] = {
     "velocity": ("Phi_q", "nu"),
     "acceleration": ("Phi_q", "gamma"),
     "kinematics": ("Phi", "Phi_q", "nu", "gamma"),
+    "observe": ("outputs", "outputs_dot", "outputs_ddot"),
 }
 """Functions that give several quantities at once: the steps of an analysis."""
+
+WHOLE = ("position", "observe")
+"""Those of them that are code of their own, in place of code for each of their quantities."""
+
+
+def over(rows: Collection[str]) -> tuple[Quantity, ...]:
+    """Return the quantities of a mechanism that has these kinds of rows, in order."""
+    return tuple(item for item in QUANTITIES if item.rows in rows)
+
+
+OF_EQUATIONS = over({"equations"})
+"""Those whose rows are the equations, which a hand-derived formula is compared with."""
 
 
 def quantity_named(name: str) -> Quantity:
@@ -94,30 +116,33 @@ def quantity_named(name: str) -> Quantity:
     return next(item for item in QUANTITIES if item.name == name)
 
 
-def singles() -> dict[str, tuple[str, ...]]:
+def singles(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return a function for each quantity."""
-    return {item.name: (item.name,) for item in QUANTITIES}
+    return {item.name: (item.name,) for item in given}
 
 
-def functions() -> dict[str, tuple[str, ...]]:
+def functions(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the functions of an emitted module, and the quantities that each gives."""
-    return {**singles(), **TOGETHER}
+    single = singles(given)
+    return single | {name: own for name, own in TOGETHER.items() if set(own) <= single.keys()}
 
 
-def kernels() -> dict[str, tuple[str, ...]]:
+def kernels(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the pieces of code that are emitted, and the quantities that each computes.
 
-    They are ``position``, one for each quantity that is not in it, and ``kinematics``, since most
-    of the work of a batch is shared.
+    They are ``position``, one for each quantity that is in none of the others, ``kinematics``,
+    since most of the work of a batch is shared, and ``observe`` where there are outputs.
     """
-    position = TOGETHER["position"]
-    single = {name: given for name, given in singles().items() if name not in position}
-    return {"position": position, **single, "kinematics": TOGETHER["kinematics"]}
+    whole = {name: TOGETHER[name] for name in WHOLE if name in functions(given)}
+    covered = {name for own in whole.values() for name in own}
+    single = {name: own for name, own in singles(given).items() if name not in covered}
+    position = {"position": whole.pop("position")}
+    return {**position, **single, "kinematics": TOGETHER["kinematics"], **whole}
 
 
-def kernel_of(names: tuple[str, ...]) -> str:
+def kernel_of(names: tuple[str, ...], given: Sequence[Quantity]) -> str:
     """Return the first kernel that computes all these quantities."""
-    return next(kernel for kernel, given in kernels().items() if set(names) <= set(given))
+    return next(kernel for kernel, own in kernels(given).items() if set(names) <= set(own))
 
 
 def nonzeros_of(quantity: Quantity) -> str:
@@ -125,6 +150,6 @@ def nonzeros_of(quantity: Quantity) -> str:
     return "nonzeros" if quantity.name == "Phi_q" else f"{quantity.name}_nonzeros"
 
 
-def is_moving(names: tuple[str, ...]) -> bool:
-    """Return whether any of the quantities depends on the rates q_dot."""
-    return any(quantity_named(name).is_moving for name in names)
+def states_of(names: Iterable[str]) -> tuple[str, ...]:
+    """Return what quantities read of q, q_dot and q_ddot together."""
+    return max((quantity_named(name).states for name in names), key=len)

@@ -634,7 +634,7 @@ static const struct {
     {8, gamma_of_strip},
     {15, kinematics_of_strip},
 };
-enum { KERNELS = 4, MOVING = 8 };
+enum { KERNELS = 4, READS_RATES = 8 };
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
 static void run_kernels(unsigned wanted, strip *b, size_t count)
@@ -719,7 +719,7 @@ int four_bar_evaluate(const four_bar_batch *batch)
             wanted |= 1u << k;
     if (wanted == 0)
         return 0;
-    const int is_far = batch->count > FAR, wants_rates = wanted & MOVING && batch->q_dot.first;
+    const int is_far = batch->count > FAR, wants_rates = wanted & READS_RATES && batch->q_dot.first;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
     if (!batch->varying_only)
         place_constants(&b, matrices, widest);

@@ -20,7 +20,7 @@ const cam_by_table = (() => {
     "use strict";
 
     const NAME = "cam_by_table";
-    const FORMAT = 2;
+    const FORMAT = 3;
     const FINGERPRINT = "fc5b7a69973968d964191eadf6c68e9b";
     const N_COORDINATES = 7;
     const N_EQUATIONS = 7;

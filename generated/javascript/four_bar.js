@@ -21,7 +21,7 @@ const four_bar = (() => {
     "use strict";
 
     const NAME = "four_bar";
-    const FORMAT = 2;
+    const FORMAT = 3;
     const FINGERPRINT = "026fefbfb06f3b341fb7723f8ec67fcb";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;

@@ -17,7 +17,7 @@ const problem_3_5_6 = (() => {
     "use strict";
 
     const NAME = "problem_3_5_6";
-    const FORMAT = 2;
+    const FORMAT = 3;
     const FINGERPRINT = "fa7adf382924fd70db26c5bd35276fee";
     const N_COORDINATES = 3;
     const N_EQUATIONS = 3;

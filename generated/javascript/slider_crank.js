@@ -21,7 +21,7 @@ const slider_crank = (() => {
     "use strict";
 
     const NAME = "slider_crank";
-    const FORMAT = 2;
+    const FORMAT = 3;
     const FINGERPRINT = "367a7ab757cf5203ac73fe4edd6c86ae";
     const N_COORDINATES = 9;
     const N_EQUATIONS = 9;

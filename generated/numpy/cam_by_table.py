@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 NAME = "cam_by_table"
-FORMAT = 2
+FORMAT = 3
 FINGERPRINT = "fc5b7a69973968d964191eadf6c68e9b"
 N_COORDINATES, N_EQUATIONS = 7, 7
 COORDINATES = (
@@ -368,7 +368,7 @@ class _Quantity:
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
 _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
 _PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
-_STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
+_STATES, _SHAPE = ("q", "q_dot", "q_ddot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
 _PARAMETER_LIST, _STRIP = DEFAULTS.tolist(), 4000  # points at a time: they stay in the cache
 _empty = np.empty  # the loader's function in its place uses the memory of earlier results again

@@ -28,7 +28,7 @@ import math
 import numpy as np
 
 NAME = "four_bar"
-FORMAT = 2
+FORMAT = 3
 FINGERPRINT = "026fefbfb06f3b341fb7723f8ec67fcb"
 N_COORDINATES, N_EQUATIONS = 9, 9
 COORDINATES = (
@@ -373,7 +373,7 @@ class _Quantity:
 _PHI = _NU = _GAMMA = _Quantity((N_EQUATIONS,), range(N_EQUATIONS))
 _PHI_Q = _Quantity((N_EQUATIONS, N_COORDINATES), PATTERN @ (N_COORDINATES, 1), _CONSTANTS)
 _PHI_Q_NONZEROS = _Quantity((len(PATTERN),), range(len(PATTERN)), _CONSTANTS)
-_STATES, _SHAPE = ("q", "q_dot"), (N_COORDINATES,)
+_STATES, _SHAPE = ("q", "q_dot", "q_ddot"), (N_COORDINATES,)
 _REAL, _ndarray, _fromiter = np.dtype(float), np.ndarray, np.fromiter
 _PARAMETER_LIST, _STRIP = DEFAULTS.tolist(), 4000  # points at a time: they stay in the cache
 _empty = np.empty  # the loader's function in its place uses the memory of earlier results again

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.system import ConstraintSystem
 
-QUANTITIES = tuple(item.name for item in quantities.QUANTITIES)
+QUANTITIES = tuple(item.name for item in quantities.OF_EQUATIONS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,7 @@ class Reference:
         if self._latest is None or self._latest[0] is not states:
             with np.errstate(all="ignore"):
                 found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
-            self._latest = states, Values(dict(zip(QUANTITIES, found, strict=True)))
+            self._latest = states, Values(dict(zip(QUANTITIES, found, strict=False)))
         return self._latest[1]
 
     @cached_property

@@ -27,7 +27,7 @@ from kincompile.calculus.expressions import (
 from kincompile.compare.reference import Values
 from kincompile.derive.derivation import derive
 from kincompile.model.matrices import SymbolicEnvironment
-from kincompile.quantities import QUANTITIES
+from kincompile.quantities import OF_EQUATIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -150,7 +150,7 @@ def joint_values(joint: Joint, reference: Reference, states: States) -> Values:
     """Evaluate a joint by itself."""
     expansion = NumericExpansion(joint, reference, states)
     arrays = {}
-    for quantity in QUANTITIES:
+    for quantity in OF_EQUATIONS:
         formulas = [getattr(block, quantity.name) for block in derive(joint.template)]
         values = column_values if quantity.is_matrix else component_values
         arrays[quantity.name] = np.concatenate([values(item, expansion) for item in formulas], 1)

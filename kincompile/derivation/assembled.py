@@ -10,6 +10,7 @@ from kincompile.derivation.document import (
     Chapter,
     CrossReference,
     Display,
+    Figure,
     Math,
     NotebookCode,
     Pattern,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 
     from kincompile.derivation.document import Block, Run, Runs
     from kincompile.derivation.evaluation import Evaluation
+    from kincompile.derivation.figures import Figures
     from kincompile.ir.inline import Entry
     from kincompile.model.bodies import Body
     from kincompile.runtime.newton import NewtonResult
@@ -74,14 +76,18 @@ def assembled_section(evaluation: Evaluation) -> Chapter:
     return Chapter("assembled", ("The assembled system",), (), parts)
 
 
-def unknowns_section(evaluation: Evaluation) -> Chapter:
-    """Return the coordinates and parameters, with the chosen state."""
+def unknowns_section(figures: Figures) -> Chapter:
+    """Return the mechanism drawn, its coordinates and parameters, with the chosen state."""
+    evaluation = figures.evaluation
     values, q = evaluation.values, evaluation.shown["q"]
     rows: Rows = [
         (str(k), Verbatim(item.name), item.unit, _math(item.guess), _math(q[k]))
         for k, item in enumerate(evaluation.system.coordinates)
     ]
-    blocks: list[Block] = [table(("column", "coordinate", "unit", "guess", "chosen state"), rows)]
+    blocks: list[Block] = []
+    if (shown := figures.mechanism()) is not None:
+        blocks.append(Figure(shown))
+    blocks.append(table(("column", "coordinate", "unit", "guess", "chosen state"), rows))
     if evaluation.system.parameters:
         known: Rows = [
             (Verbatim(item.name), item.unit, _math(values[item.name]))

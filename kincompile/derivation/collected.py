@@ -47,7 +47,12 @@ from kincompile.errors import InternalError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from kincompile.calculus.expressions import Profile, Rotation, TimeFunction, VectorSymbol
+    from kincompile.calculus.expressions import (
+        ProfileFunction,
+        Rotation,
+        TimeFunction,
+        VectorSymbol,
+    )
     from kincompile.derivation.formulas import Glyph
 
 Monomial: TypeAlias = tuple[tuple[Scalar, int], ...]
@@ -357,7 +362,7 @@ class _AtRandom:
     def time_function(self, function: TimeFunction) -> Any:
         return self.symbol(Symbol(f"{function.name} {function.order}"))
 
-    def profile(self, profile: Profile) -> Any:
+    def profile(self, profile: ProfileFunction) -> Any:
         return self.symbol(Symbol(f"{profile.name} {profile.order}"))
 
     def entries(self, rotation: Rotation, expand: Expansion) -> Any:

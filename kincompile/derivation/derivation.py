@@ -17,6 +17,7 @@ from kincompile.derivation.assembled import assembled_section, unknowns_section
 from kincompile.derivation.document import Chapter, Manuscript
 from kincompile.derivation.equation_section import equation_section
 from kincompile.derivation.evaluation import Evaluation, evaluation
+from kincompile.derivation.figures import Figures
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
 from kincompile.derivation.to_html import as_html
@@ -142,8 +143,9 @@ def derivation(
     """
     system = system_of(model)
     chosen = evaluation(system, state)
+    figures = Figures(chosen)
     sections = tuple(
-        joint_section(chosen, item, rows)
+        joint_section(figures, item, rows)
         if isinstance(item, Joint)
         else equation_section(chosen, item, rows)
         for item, rows in zip(system.constraints, chosen.code.sections, strict=True)
@@ -156,7 +158,7 @@ def derivation(
     return Derivation(
         system.name,
         _summary(chosen),
-        (unknowns_section(chosen), constraints, assembled_section(chosen)),
+        (unknowns_section(figures), constraints, assembled_section(chosen)),
         names,
         chosen.source,
         _state_code(chosen),

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from kincompile.calculus.expressions import Expression
     from kincompile.derivation.formulas import Formula, Glyph
+    from kincompile.view.picture import Picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +126,13 @@ class Pattern:
     bands: tuple[tuple[int, int], ...]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Figure:
+    """A picture on the page."""
+
+    picture: Picture
+
+
 @dataclass(frozen=True, slots=True)
 class NotebookCode:
     """Code that a notebook runs; other media leave it out."""
@@ -132,7 +140,7 @@ class NotebookCode:
     text: str
 
 
-Block: TypeAlias = Text | Display | Table | Pattern | NotebookCode
+Block: TypeAlias = Text | Display | Table | Pattern | Figure | NotebookCode
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import ast
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.document import SourceLine
-from kincompile.quantities import kernels
+from kincompile.quantities import OF_EQUATIONS, kernels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,7 +26,7 @@ def emitted_lines(code: InlineProgram, source: str) -> dict[EntryKey, SourceLine
     lines = source.splitlines()
     functions = {item.name: item for item in tree.body if isinstance(item, ast.FunctionDef)}
     found: dict[EntryKey, SourceLine] = {}
-    for kernel, computed in kernels().items():
+    for kernel, computed in kernels(OF_EQUATIONS).items():
         if kernel == "kinematics":  # repeats the others
             continue
         entries = {name: code.entries(name) for name in computed}

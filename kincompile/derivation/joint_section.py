@@ -12,7 +12,7 @@ from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
 from kincompile.derivation.collected import collected
-from kincompile.derivation.document import Chapter, Display, Math, Verbatim, table, text
+from kincompile.derivation.document import Chapter, Display, Figure, Math, Verbatim, table, text
 from kincompile.derivation.formulas import (
     GAMMA_TERMS,
     PHI_Q,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
     from kincompile.calculus.expressions import Expression
     from kincompile.derivation.document import Block, Run, Runs
-    from kincompile.derivation.evaluation import Evaluation
+    from kincompile.derivation.figures import Figures
     from kincompile.derivation.formulas import Formula
     from kincompile.derive.rules import Step
     from kincompile.ir.inline import ConstraintRows as Rows
@@ -58,15 +58,16 @@ if TYPE_CHECKING:
     from kincompile.model.resolve import Joint
 
 
-def joint_section(evaluation: Evaluation, joint: Joint, rows: Rows) -> Chapter:
+def joint_section(figures: Figures, joint: Joint, rows: Rows) -> Chapter:
     """Return the derivation of a joint."""
     columns = [name for name in joint.columns if name is not None]
     blocks = derive(joint.template)
+    evaluation = figures.evaluation
     steps = _JointSteps(evaluation, rows, joint.name, columns, blocks, "vector", joint)
     return steps.section(
         joint.template.type_name,
         joint.is_driver,
-        steps.attributes(),
+        steps.attributes(Figure(figures.joint(joint))),
         steps.constraint(),
         steps.rules(),
         steps.jacobian(),
@@ -89,7 +90,7 @@ class _JointSteps(Steps[RowBlock]):
         index = str(k + 1) if len(self.derivatives) > 1 else ""
         return Glyph(letter, index, exponent=self.name)
 
-    def attributes(self) -> Chapter:
+    def attributes(self, figure: Figure) -> Chapter:
         written = type(self.joint.written)
         meaning = (written.__doc__ or "").strip().splitlines()[0]
         rows: list[tuple[Run | Runs, ...]] = []
@@ -103,7 +104,8 @@ class _JointSteps(Steps[RowBlock]):
             rows.append((Verbatim(name), Math(symbol), *shown))
         source = text(f"{meaning} Source: {self.joint.source}.")
         header = ("attribute", "symbol", "as written", "number")
-        return self.step(1, "The joint and its attributes", source, table(header, rows), level="")
+        attributes = table(header, rows)
+        return self.step(1, "The joint and its attributes", source, figure, attributes, level="")
 
     def _number(self, symbol: str) -> Run:
         """Return an attribute in numbers; a profile has none."""

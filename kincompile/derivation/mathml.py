@@ -43,6 +43,19 @@ SLANTED = _alphabet("\U0001d434", "\U0001d6fc", "") | {
 """Bold and slanted letters of Unicode; the page brings a font that has them."""
 
 
+def letter_text(name: str, *, bold: bool) -> str:
+    """Return a letter, a Greek one by its name, bold or slanted; a word is upright."""
+    text = VARTHETA if name == "vartheta" else greek_unicode.get(name, name)
+    if bold:
+        return text.translate(BOLD)
+    return text.translate(SLANTED) if len(text) == 1 else text
+
+
+def index_text(index: str) -> str:
+    """Return an index: one or two letters are slanted, a word is upright."""
+    return index.translate(SLANTED) if len(index) <= 2 else index
+
+
 class MathMLPrinter(Notation, MathMLPresentationPrinter):
     """Prints formulas as the children of a `math` element.
 
@@ -76,13 +89,7 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
         return parts[0] if len(parts) == 1 else self._element("mrow", *parts)
 
     def _letter(self, name: str, *, bold: bool = False) -> Element:
-        text = VARTHETA if name == "vartheta" else greek_unicode.get(name, name)
-        if bold:
-            return self._element("mi", text.translate(BOLD), mathvariant="normal")
-        return self._slanted(text) if len(text) == 1 else self._upright(text)
-
-    def _slanted(self, text: str) -> Element:
-        return self._element("mi", text.translate(SLANTED), mathvariant="normal")
+        return self._upright(letter_text(name, bold=bold))
 
     def _upright(self, text: str) -> Element:
         return self._element("mi", text, mathvariant="normal")
@@ -90,7 +97,7 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
     def _index_text(self, index: str) -> Element:
         if index.isdigit():
             return self._numeral(index)
-        return self._slanted(index) if len(index) <= 2 else self._upright(index)
+        return self._upright(index_text(index))
 
     def _operator(self, text: str) -> Element:
         text = OPERATORS.get(text, text)

@@ -66,7 +66,8 @@ CONNECTIVES = {"&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}"}
 LONGEST_NUMERATOR = 24
 """Most nodes above a fraction bar, since no line can be broken within a fraction."""
 
-_BODY_FIXED = ("s", "v")
+BODY_FIXED = ("s", "v")
+"""Letters of vectors given in the frame of a body, which have a prime."""
 
 
 def split_name(name: str) -> tuple[str, str, int]:
@@ -143,7 +144,7 @@ class Notation:
 
     def _named(self, name: str, *, is_vector: bool) -> Printed:
         letter, index, dots = split_name(name)
-        prime = self._operator("\N{PRIME}") if is_vector and letter in _BODY_FIXED else None
+        prime = self._operator("\N{PRIME}") if is_vector and letter in BODY_FIXED else None
         base = self._letter(letter, bold=is_vector)
         base = self._dotted(base, dots) if dots else base
         return self._scripts(base, self._index_text(index) if index else None, prime)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from kincompile.derivation.document import (
     CrossReference,
     Display,
+    Figure,
     Math,
     NotebookCode,
     Pattern,
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from kincompile.derivation.document import Block, Chapter, Run, Runs
     from kincompile.derivation.formulas import Formula
+    from kincompile.view.picture import Picture
 
 
 class Renderer(ABC):
@@ -45,6 +47,8 @@ class Renderer(ABC):
                 return self._table(block)
             case Pattern():
                 return self._pattern(block)
+            case Figure(picture):
+                return self._figure(picture)
             case NotebookCode():
                 return ()
         raise TypeError(f"cannot print {block!r}")
@@ -79,6 +83,9 @@ class Renderer(ABC):
 
     @abstractmethod
     def _pattern(self, pattern: Pattern) -> Iterator[str]: ...
+
+    @abstractmethod
+    def _figure(self, picture: Picture) -> Iterable[str]: ...
 
     @abstractmethod
     def _verbatim(self, text: str) -> str: ...

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.mathml import MathMLPrinter
 from kincompile.derivation.renderer import Renderer
+from kincompile.derivation.svg import as_svg
 from kincompile.targets.templates import fill, read
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
         Table,
     )
     from kincompile.derivation.formulas import Formula
+    from kincompile.view.picture import Picture
 
 DEEPEST_IN_CONTENTS = 2
 """Depth of the list of contents, which leaves out the nine steps."""
@@ -95,6 +97,9 @@ class _HtmlRenderer(Renderer):
 
     def _pattern(self, pattern: Pattern) -> Iterator[str]:
         yield from ('<div class="wide">', _pattern_svg(pattern), "</div>")
+
+    def _figure(self, picture: Picture) -> Iterator[str]:
+        yield f"<figure>{as_svg(picture)}</figure>"
 
     def _verbatim(self, text: str) -> str:
         return f"<code>{escape(text)}</code>"

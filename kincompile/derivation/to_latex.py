@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from kincompile.calculus.expressions import Symbol, VectorSymbol
 from kincompile.derivation.document import CrossReference, Verbatim
 from kincompile.derivation.renderer import Renderer
 from kincompile.derivation.tex import TexPrinter, escape
 from kincompile.targets.templates import fill
+from kincompile.view.polylines import FILL
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from kincompile.derivation.document import Chapter, Display, Manuscript, Pattern, Run, Table
     from kincompile.derivation.formulas import Formula
+    from kincompile.view.picture import Picture, PicturePath
 
 HEADINGS = ("section", "subsection", "subsubsection")
 
@@ -82,6 +87,18 @@ class _LatexRenderer(Renderer):
             rows.append([self._verbatim(name), *marks])
         yield from _tabular(["", *header], rows)
 
+    def _figure(self, picture: Picture) -> Iterator[str]:
+        yield rf"\fitted{{\begin{{picture}}({picture.width:.0f},{picture.height:.0f})%"
+        yield r"\put(0,0){\pdfliteral{q 1 J 1 j"
+        yield from (_drawn(path) for path in picture.paths)
+        yield "Q}}%"
+        for label in picture.labels:
+            node = VectorSymbol(label.name) if label.is_vector else Symbol(label.name)
+            symbol = self._printer.math(node)
+            at = f"({label.x:.1f},{label.y:.1f})"
+            yield rf"\put{at}{{\makebox(0,0){{\small ${symbol}$}}}}%"
+        yield r"\end{picture}}"
+
     def _verbatim(self, text: str) -> str:
         return rf"\texttt{{{escape(text)}}}"
 
@@ -93,6 +110,25 @@ class _LatexRenderer(Renderer):
 
     def _prose(self, text: str) -> str:
         return escape(text)
+
+
+def _drawn(path: PicturePath) -> str:
+    """Return a path in the operators of PDF; what is faint or pale is mixed with white."""
+    points = np.asarray(path.points).tolist()
+    corners = " l ".join(f"{x:.1f} {y:.1f}" for x, y in points[1:])
+    way = f"{points[0][0]:.1f} {points[0][1]:.1f} m {corners} l"
+    strength = path.opacity * (FILL if path.is_pale else 1)
+    fill = f"{_mixed(path.fill, strength)} rg" if path.fill else ""
+    line = f"{_mixed(path.stroke, path.opacity)} RG {path.width} w" if path.stroke else ""
+    paint = {(True, True): "b", (True, False): "h f", (False, True): "S"}
+    dash = {"--": "[5 4] 0 d", ":": "[1 3] 0 d", "": "[] 0 d"}[path.dash]
+    return f"{fill} {line} {dash} {way} {paint[bool(path.fill), bool(path.stroke)]}"
+
+
+def _mixed(colour: str, strength: float) -> str:
+    """Return a colour on white as three numbers from 0 to 1."""
+    parts = (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return " ".join(f"{1 - strength * (1 - part):.3f}" for part in parts)
 
 
 def _plain(run: Run) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.document import Math
 from kincompile.derivation.renderer import Renderer
+from kincompile.derivation.svg import svg_address
 from kincompile.derivation.tex import TexPrinter
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
         Table,
     )
     from kincompile.derivation.formulas import Formula
+    from kincompile.view.picture import Picture
 
 SPECIAL = str.maketrans({character: f"\\{character}" for character in "\\`*_{}[]<>#|$~"})
 
@@ -97,6 +99,11 @@ class MarkdownRenderer(Renderer):
             marks = ("" if item is None else f"[\N{BLACK SQUARE}](#{item})" for item in anchors)
             yield _line([f"`{name}`", *marks])
         yield ""
+
+    def _figure(self, picture: Picture) -> Iterator[str]:
+        """Yield nothing on GitHub, which shows no picture that is part of a text."""
+        if self._dialect is NOTEBOOK:
+            yield from (f"![{escape(picture.title)}]({svg_address(picture)})", "")
 
     def _verbatim(self, text: str) -> str:
         return f"`{text}`"

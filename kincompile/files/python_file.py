@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import InternalError, KincompileError, ModelError
 from kincompile.model.mechanism import Mechanism
+from kincompile.model.sketch import Sketch
 from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed
 
@@ -119,10 +120,11 @@ def _only_model(path: Path, names: Mapping[str, Any]) -> Mechanism | ConstraintS
     }
     if not models:
         others = [name for name in names if not name.startswith("_")]
+        drawn = next((name for name, value in names.items() if isinstance(value, Sketch)), "s")
         raise ModelError(
             f"{path} has no Mechanism and no ConstraintSystem at module level; assign one to a "
-            f'name there, for instance mechanism = kc.Mechanism("name"). Its names are: '
-            f"{listed(others)}"
+            f'name there, for instance mechanism = kc.Mechanism("name"), or, of a kc.Sketch, '
+            f"mechanism = {drawn}.mechanism(). Its names are: {listed(others)}"
         )
     for name in PREFERRED:
         if name in models:

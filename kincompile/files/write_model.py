@@ -13,7 +13,7 @@ from kincompile.files.file_format import SMOOTHNESS, VERSION
 from kincompile.model.arguments import Kind
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.expressions import as_expression, deg, t
-from kincompile.model.laws import MotionTable
+from kincompile.model.laws import TableLaw
 from kincompile.model.resolve import Joint
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
@@ -100,7 +100,7 @@ def _corners(item: Joint | FreeEquation) -> dict[str, Any]:
 
 def _scalar(given: Scalar) -> Any:
     """Return a value: a table over time as its columns, anything else as a number or formula."""
-    if isinstance(given, MotionTable) and given.args == (t,) and not given.order:
+    if isinstance(given, TableLaw) and given.args == (t,) and not given.order:
         return dict(zip(("times", "values", "velocities"), map(list, given.given), strict=True))
     return value(given)
 
@@ -163,7 +163,7 @@ class _Printer(StrPrinter):
             return str(self._print(expr.in_pieces()))
         return str(self._print_Function(expr))  # type: ignore[no-untyped-call]
 
-    def _print_MotionTable(self, expr: sympy.Expr) -> str:
+    def _print_TableLaw(self, expr: sympy.Expr) -> str:
         return self._print_PeriodicSpline(expr)
 
     def _print_PeriodicSpline(self, expr: sympy.Expr) -> str:

@@ -67,6 +67,10 @@ class Graph:
         """Return pi."""
         return self._intern(("pi",))
 
+    def nan(self) -> int:
+        """Return the number that is none, for what has no value."""
+        return self._intern(("nan",))
+
     def input(self, name: Hashable) -> int:
         """Return a named input."""
         return self._intern(("input", name))
@@ -274,6 +278,8 @@ class Graph:
         match operation, operands:
             case "pi", _:
                 return self.pi()
+            case "nan", _:
+                return self.nan()
             case "logic", [name, *arguments]:
                 return self.logic(name, *(new[k] for k in arguments))
             case "compare", [relation, a, b]:

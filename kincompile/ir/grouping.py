@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile import quantities
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.ir.graph import Graph, Node, number_of, operands_of
 from kincompile.ir.program import FrameEntry
 from kincompile.names import rate
+from kincompile.quantities import over
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -297,7 +297,7 @@ class _Builder:
                     if sample.place(quantity, row, column) is not None
                     and not (quantity.is_matrix and graph.value_of(new[node]) == 0)
                 )
-                for quantity in quantities.QUANTITIES
+                for quantity in over({"equations", "coordinates"})
             },
             rows,
             columns,

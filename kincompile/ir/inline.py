@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from kincompile import quantities
 from kincompile.ir.graph import Constant, Graph, Node, number_of
 from kincompile.ir.program import Function
 from kincompile.names import rate
+from kincompile.quantities import TOGETHER, quantity_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +27,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class ConstraintRows:
-    """The rows of one constraint.
+    """The rows of one constraint, or of one output.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class InlineProgram:
     nodes
         The code.
     sections
-        One a constraint, in order of rows.
+        One a constraint, in order of rows, then one an output.
     hints
         Speaking names of nodes.
     frames
@@ -64,6 +64,11 @@ class InlineProgram:
     sections: tuple[ConstraintRows, ...]
     hints: Mapping[int, str]
     frames: tuple[tuple[int, ...], ...] = ()
+
+    @property
+    def constraints(self) -> tuple[ConstraintRows, ...]:
+        """The sections of constraints alone."""
+        return self.sections[: len(self.program.instances)]
 
     def entries(self, quantity: str) -> list[Entry]:
         """Return the entries of a quantity, row by row."""
@@ -88,7 +93,7 @@ def inline(program: Program) -> InlineProgram:
         hints[graph.square(graph.input(rate(item.name)))] = f"{rate(item.name)}_sq"
     sections: list[ConstraintRows] = []
     shared: dict[str, dict[tuple[int, int], int]] = {}
-    for instance in program.instances:
+    for instance in (*program.instances, *program.observers):
         kernel = instance.kernel
         inputs = dict(zip(kernel.inputs, instance.bindings, strict=True))
         new = graph.instantiate(kernel.nodes, inputs)
@@ -98,11 +103,16 @@ def inline(program: Program) -> InlineProgram:
             if isinstance(item, Function)
         ]
         named += [(new[hint.node], _vector_name(hint, instance)) for hint in kernel.hints]
+        named += [
+            (new[node], rate(instance.name, order))
+            for order, quantity in enumerate(TOGETHER["observe"])
+            for _, _, node in kernel.outputs.get(quantity, ())
+        ]
         for node, name in named:
             # A call is named by its function and argument.
             if graph.nodes[node][0] not in ("neg", "const", "input", "call"):
                 hints.setdefault(node, name)
-        entries = _entries(instance, new, graph, shared)
+        entries = _entries(program, instance, new, graph, shared)
         sections.append(ConstraintRows(instance, instance.constraint.text, entries))
     if shared:  # a sum is complete where the last constraint has contributed
         sums = _sums(program, graph, shared)
@@ -112,6 +122,7 @@ def inline(program: Program) -> InlineProgram:
 
 
 def _entries(
+    program: Program,
     instance: Instance,
     new: list[int],
     graph: Graph,
@@ -119,8 +130,8 @@ def _entries(
 ) -> dict[str, tuple[Entry, ...]]:
     """Return the entries of a constraint's own rows; what it adds to others goes into `shared`."""
     entries = {}
-    for quantity in quantities.QUANTITIES:
-        is_own = quantity.rows == "equations" and not quantity.adds
+    for quantity in program.quantities:
+        is_own = quantity.rows != "coordinates" and not quantity.adds
         found = {} if is_own else shared.setdefault(quantity.name, {})
         for row, column, node in instance.kernel.outputs.get(quantity.name, ()):
             place = instance.place(quantity, row, column)
@@ -142,7 +153,7 @@ def _sums(
     """Return the entries to which several constraints may contribute; a vector has all its rows."""
     sums = {}
     for name, found in shared.items():
-        quantity = quantities.quantity_named(name)
+        quantity = quantity_named(name)
         if not quantity.is_matrix:
             for row in range(len(program.names_of(quantity.rows))):
                 found.setdefault((row, 0), graph.const(0))

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kincompile import quantities
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -34,7 +33,12 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
 
 
 def interpret(
-    program: Program, q: Array, q_dot: Array, t: Any, p: Array | None = None
+    program: Program,
+    q: Array,
+    q_dot: Array,
+    t: Any,
+    p: Array | None = None,
+    q_ddot: Array | None = None,
 ) -> tuple[Array, ...]:
     """Evaluate the quantities.
 
@@ -46,13 +50,17 @@ def interpret(
         Time, a scalar or of shape (...).
     p
         Parameters, shape (k,); the defaults where None.
+    q_ddot
+        Second rates, for outputs, shape (..., n); zero where None.
 
     Returns
     -------
     tuple of arrays
-        In the order of the table: Phi (..., m), Phi_q (..., m, n), nu (..., m), gamma (..., m).
+        In the order of the table: Phi (..., m), Phi_q (..., m, n), nu (..., m), gamma (..., m), and
+        the outputs where there are any.
     """
     q, q_dot = np.asarray(q), np.asarray(q_dot)
+    q_ddot = 0 * q if q_ddot is None else np.asarray(q_ddot)
     defaults = [item.default for item in program.parameters]
     inputs: dict[str, Any] = {"t": t}
     inputs.update(
@@ -61,20 +69,21 @@ def interpret(
     for column, item in enumerate(program.coordinates):
         inputs[item.name] = q[..., column]
         inputs[rate(item.name)] = q_dot[..., column]
+        inputs[rate(item.name, 2)] = q_ddot[..., column]
     values = run(program.values, inputs, program.tables)
 
     shape = q.shape[:-1]
-    dtype = np.result_type(q, q_dot, t, float)
+    dtype = np.result_type(q, q_dot, q_ddot, t, float)
     every = np.empty((*shape, len(values)), dtype)
     for node, value in enumerate(values):
         every[..., node] = value
-    found = [np.zeros((*shape, *program.shape_of(item)), dtype) for item in quantities.QUANTITIES]
+    found = [np.zeros((*shape, *program.shape_of(item)), dtype) for item in program.quantities]
     for kernel, instances in _by_kernel(program):
         bindings = np.array([instance.bindings for instance in instances], dtype=np.intp)
         bound = {name: every[..., bindings[:, k]] for k, name in enumerate(kernel.inputs)}
         results = run(kernel.nodes, bound, program.tables)
         placed = _Placed.of(instances)
-        for quantity, array in zip(quantities.QUANTITIES, found, strict=True):
+        for quantity, array in zip(program.quantities, found, strict=True):
             for row, column, node in kernel.outputs.get(quantity.name, ()):
                 moving, index = placed.index(quantity, row, column)
                 entries = np.broadcast_to(results[node], (*shape, len(instances)))[..., moving]
@@ -118,7 +127,7 @@ class _Placed:
 def _by_kernel(program: Program) -> list[tuple[Kernel, list[Instance]]]:
     """Return the instances of each kernel, which run together as arrays."""
     found: dict[int, tuple[Kernel, list[Instance]]] = {}
-    for instance in program.instances:
+    for instance in (*program.instances, *program.observers):
         found.setdefault(id(instance.kernel), (instance.kernel, []))[1].append(instance)
     return list(found.values())
 
@@ -145,6 +154,8 @@ def _apply(
             return float(number)
         case "pi", _:
             return np.pi
+        case "nan", _:
+            return np.nan
         case "input", [name]:
             return inputs[name]
         case "neg", [a]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from kincompile.calculus.expand import Expansion
@@ -22,7 +23,7 @@ from kincompile.calculus.template import Template
 from kincompile.derive.derivation import derive
 from kincompile.ir.differentiate import negated_tangents, tangents
 from kincompile.ir.from_sympy import Converter
-from kincompile.ir.graph import Graph, pruned
+from kincompile.ir.graph import Graph, pruned, reachable
 from kincompile.ir.program import (
     Attribute,
     FrameEntry,
@@ -34,9 +35,10 @@ from kincompile.ir.program import (
     StateEntry,
 )
 from kincompile.names import rate
+from kincompile.quantities import TOGETHER
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from fractions import Fraction
 
     from kincompile.calculus.expressions import (
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
     )
     from kincompile.calculus.symbols import CoordinateSymbol, Frame
     from kincompile.model.bodies import BodyKind
+    from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.resolve import FreeEquation
 
 
@@ -265,6 +268,31 @@ def equation_kernel(equation: FreeEquation) -> Kernel:
     return differentiated(graph, [convert(item) for item in equation.expressions], equation.columns)
 
 
+def output_kernel(output: ResolvedOutput) -> Kernel:
+    r"""Return the kernel of an output y, with :math:`\dot y`, :math:`\ddot y` and :math:`y_q`.
+
+    A derivative that would need a third derivative of q is not a number.
+    """
+    graph = Graph()
+    names = output.columns
+    motion = {graph.input("t"): graph.const(1)}
+    for name in names:
+        orders = [graph.input(rate(name, order)) for order in range(3)]
+        motion |= dict(pairwise(orders))
+    last = {graph.input(rate(name, 2)) for name in names}
+    y = Converter(graph, graph.input).convert(output.expression)
+    found = [y]
+    for _ in range(2):
+        is_known = last.union([graph.nan()]).isdisjoint(reachable(graph.nodes, found[-1:]))
+        found += tangents(graph, found[-1:], motion) if is_known else [graph.nan()]
+    by_column = [tangents(graph, [y], {graph.input(name): graph.const(1)})[0] for name in names]
+    outputs = {name: [(0, 0, node)] for name, node in zip(TOGETHER["observe"], found, strict=True)}
+    outputs["outputs_q"] = [
+        (0, column, node) for column, node in enumerate(by_column) if graph.value_of(node) != 0
+    ]
+    return _pruned_kernel("Output", graph, outputs)
+
+
 def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> Kernel:
     r"""Return the kernel of equations given as nodes, in the coordinates that are named.
 
@@ -287,14 +315,21 @@ def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> 
         name: [(row, 0, node) for row, node in enumerate(found)] for name, found in vectors.items()
     }
     outputs["Phi_q"] = entries
+    return _pruned_kernel("Equation", graph, outputs)
+
+
+def _pruned_kernel(
+    name: str, graph: Graph, outputs: Mapping[str, Sequence[tuple[int, int, int]]]
+) -> Kernel:
+    """Return the kernel of what outputs need of a graph; its inputs are names."""
     nodes, new = pruned(graph.nodes, [node for found in outputs.values() for _, _, node in found])
     return Kernel(
-        "Equation",
+        name,
         tuple(node[1] for node in nodes if node[0] == "input"),
         tuple(nodes),
         {
-            name: tuple((row, column, new[node]) for row, column, node in found)
-            for name, found in outputs.items()
+            quantity: tuple((row, column, new[node]) for row, column, node in found)
+            for quantity, found in outputs.items()
         },
         (),
     )

@@ -20,10 +20,11 @@ from kincompile.ir.kernels import (
     frame_entries,
     frame_kernel,
     motion_of,
+    output_kernel,
 )
 from kincompile.ir.program import Attribute, BodyFrame, Function, Input, Instance, Kernel, Program
 from kincompile.model.expressions import alpha, t
-from kincompile.model.laws import MotionTable
+from kincompile.model.laws import TableLaw
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.spline import PeriodicSpline, SplineTable
 from kincompile.names import rate
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
     from kincompile.model.expressions import Scalar
+    from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.system import ConstraintSystem
 
 
@@ -47,18 +49,28 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
     graph = Graph()
     binder = _Binder(graph, EquationShapes(columns) if share_equations else None)
     instances = []
-    tables: dict[str, SplineTable] = {}
     for first_row, constraint in zip(system.row_offsets, system.constraints, strict=True):
         try:
             kernel, names, bindings = binder.bound(constraint)
         except RecursionError:
             raise ModelError(_too_deep(constraint)) from None
-        tables.update(_tables(constraint))
         own = tuple(None if name is None else columns[name] for name in names)
         instances.append(Instance(kernel, constraint, first_row, own, bindings))
+    tables = _tables((*system.constraints, *system.outputs))
     bodies = tuple(
         binder.frame_of(body, own)
         for body, own in zip(system.bodies, system.body_columns, strict=True)
+    )
+    observers = tuple(
+        Instance(
+            kernel := output_kernel(item),
+            item,
+            len(system.equations),
+            tuple(columns[name] for name in item.columns),
+            tuple(graph.input(name) for name in kernel.inputs),
+            row,
+        )
+        for row, item in enumerate(system.outputs)
     )
     return Program(
         system.name,
@@ -69,9 +81,10 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
         tuple(graph.nodes),
         tuple(instances),
         tables,
-        _fingerprint(system, graph, instances, tables),
+        _fingerprint(system, graph, [*instances, *observers], tables),
         system.end,
         system.points,
+        observers=observers,
     )
 
 
@@ -120,14 +133,20 @@ def _too_deep(constraint: Joint | FreeEquation) -> str:
     )
 
 
-def _tables(constraint: Joint | FreeEquation) -> dict[str, SplineTable]:
-    if isinstance(constraint, FreeEquation):
-        values: Iterable[Scalar] = constraint.expressions
-    else:
-        values = (*constraint.profiles.values(), *constraint.scalars.values())
-    written = (item for item in values if isinstance(item, sympy.Expr))
-    found = (table for item in written for table in item.atoms(PeriodicSpline, MotionTable))
-    return {item.table_name: item.table for item in sorted(found, key=str)}
+def _tables(items: Iterable[Joint | FreeEquation | ResolvedOutput]) -> dict[str, SplineTable]:
+    """Return the splines of profiles, and of motions over time, by name in order of occurrence."""
+    values: list[Scalar] = []
+    for item in items:
+        if isinstance(item, Joint):
+            values += (*item.profiles.values(), *item.scalars.values())
+        else:
+            values += item.expressions if isinstance(item, FreeEquation) else [item.expression]
+    found: dict[str, SplineTable] = {}
+    for value in values:
+        if isinstance(value, sympy.Expr):
+            tables = sorted(value.atoms(PeriodicSpline, TableLaw), key=str)
+            found |= {table.table_name: table.table for table in tables}
+    return found
 
 
 class _Binder:

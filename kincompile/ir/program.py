@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
+
+from kincompile.quantities import over
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from kincompile.ir.graph import Node
     from kincompile.model.bodies import Coordinate, Parameter
+    from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.spline import SplineTable
     from kincompile.quantities import Columns, Quantity, Rows
@@ -150,12 +153,12 @@ class Kernel:
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """One constraint: a kernel bound to rows, columns and attribute values.
+    """One constraint, or one output: a kernel bound to rows, columns and attribute values.
 
     Attributes
     ----------
     constraint
-        The constraint, for names and comments.
+        The constraint or output, for names and comments.
     first_row
         Row offset in the system.
     columns
@@ -167,7 +170,7 @@ class Instance:
     """
 
     kernel: Kernel
-    constraint: Joint | FreeEquation
+    constraint: Joint | FreeEquation | ResolvedOutput
     first_row: int
     columns: tuple[int | None, ...]
     bindings: tuple[int, ...]
@@ -211,8 +214,8 @@ class Program:
         Names of equations that repeat others at every assembled position, and agree with them.
     unsolvable
         Why the equations cannot determine the coordinates; "" where they can.
-    outputs
-        Names of the outputs.
+    observers
+        The outputs, an instance each.
     end, points
         The mechanism's own time grid, for a target that solves too.
     """
@@ -230,7 +233,18 @@ class Program:
     points: int
     redundant: tuple[str, ...] = ()
     unsolvable: str = ""
-    outputs: tuple[str, ...] = ()
+    observers: tuple[Instance, ...] = ()
+
+    @property
+    def outputs(self) -> tuple[ResolvedOutput, ...]:
+        """The outputs."""
+        return tuple(cast("ResolvedOutput", item.constraint) for item in self.observers)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The quantities that there are: those of outputs only where there are outputs."""
+        rows = {"equations", "coordinates"} | ({"outputs"} if self.observers else set())
+        return over(rows)
 
     @property
     def corners(self) -> bool:
@@ -242,7 +256,7 @@ class Program:
         names: dict[str, tuple[str, ...]] = {
             "equations": self.equations,
             "coordinates": tuple(item.name for item in self.coordinates),
-            "outputs": self.outputs,
+            "outputs": tuple(item.name for item in self.observers),
             "parameters": tuple(item.name for item in self.parameters),
             "none": (),
         }

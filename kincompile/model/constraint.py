@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import textwrap
 from dataclasses import dataclass, field, fields
-from functools import cache
+from functools import cache, wraps
 from typing import TYPE_CHECKING, ClassVar, TypeVar, dataclass_transform
 
 import sympy
@@ -15,6 +15,7 @@ from kincompile.calculus.template import Template
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
 from kincompile.model.bodies import GROUND, PLANAR, BodyKind
+from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -72,6 +73,13 @@ class Constraint:
             for item in fields(cls)
             if "argument" in item.metadata
         }
+
+    @classmethod
+    def point_on(cls, body: str) -> str:
+        """Return the argument that is the first point on the body that an argument names."""
+        given = cls.arguments()
+        points = (key for key, item in given.items() if item.kind is Kind.POINT)
+        return next((key for key in points if given[key].on == given[body].symbol), body)
 
     @classmethod
     @cache
@@ -140,7 +148,25 @@ def constraint_type(cls: type[Type]) -> type[Type]:
     """Make a class a constraint type: a frozen dataclass whose docstring has its arguments."""
     made = dataclass(frozen=True)(cls)
     made.__doc__ = _documentation(made)
+    _take_points(made)
     return made
+
+
+def _take_points(cls: type[Constraint]) -> None:
+    """Let a named point stand where a type wants a body and a point on it."""
+    init = cls.__init__
+
+    @wraps(init)
+    def taking_points(self: Constraint, *given: object, **named: object) -> None:
+        flat: list[object] = []
+        for item in given:
+            flat += (item.body, item.local) if isinstance(item, BodyPoint) else (item,)
+        for key, item in list(named.items()):
+            if isinstance(item, BodyPoint):
+                named |= {key: item.body, cls.point_on(key): item.local}
+        init(self, *flat, **named)  # type: ignore[arg-type]
+
+    cls.__init__ = taking_points  # type: ignore[method-assign]
 
 
 def _documentation(cls: type[Constraint]) -> str:

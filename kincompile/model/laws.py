@@ -235,7 +235,7 @@ RISES: dict[str, type[Rise]] = {
 """The normalised laws by their titles."""
 
 
-class MotionTable(MotionLaw):
+class TableLaw(MotionLaw):
     """A spline through values over time, which goes on at constant velocity on both sides.
 
     Attributes
@@ -257,16 +257,16 @@ class MotionTable(MotionLaw):
     @lru_cache
     def of(
         cls, given: tuple[tuple[float, ...], ...], table: SplineTable, table_name: str
-    ) -> type[MotionTable]:
+    ) -> type[TableLaw]:
         """Return the function of a table; the same one for the same table."""
         contents = {"given": given, "table": table, "table_name": table_name}
-        function: type[MotionTable] = type(table_name, (cls,), contents)
+        function: type[TableLaw] = type(table_name, (cls,), contents)
         return function
 
     @classmethod
-    def called(cls, table_name: str) -> type[MotionTable]:
+    def called(cls, table_name: str) -> type[TableLaw]:
         """Return the same function under another name, or the same derivative of it."""
-        function: type[Any] = MotionTable.of(cls.given, cls.table, table_name)
+        function: type[Any] = TableLaw.of(cls.given, cls.table, table_name)
         for _ in range(cls.order):
             function = function.derivative()
         return function

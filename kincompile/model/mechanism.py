@@ -11,12 +11,15 @@ from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
 from kincompile.model.matrices import MatrixViews
+from kincompile.model.outputs import Output
+from kincompile.model.points import BodyPoint
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import TextViews
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from kincompile.model.arguments import BodyLike, PointLike
     from kincompile.model.expressions import Scalar, Scalars
 
 Item = TypeVar("Item", bound=Constraint | Equation)
@@ -54,6 +57,7 @@ class Mechanism(MatrixViews, TextViews):
         self.bodies: list[Body] = []
         self.parameters: list[Parameter] = []
         self.constraints: list[Constraint | Equation] = []
+        self.outputs: list[BodyPoint | Output] = []
 
     def parameter(self, name: str, default: Scalar | None = None, unit: str = "") -> sympy.Symbol:
         """Declare a parameter and return its symbol, to be used in attributes and drivers.
@@ -90,6 +94,49 @@ class Mechanism(MatrixViews, TextViews):
         self.bodies.append(body)
         return body
 
+    def point(self, name: str, body: BodyLike, local: PointLike) -> BodyPoint:
+        """Name a point of a body and return it: a coupler point, a foot, the end of an arm.
+
+        Parameters
+        ----------
+        name
+            Name of the point; the columns of a solution are ``x_<name>`` and ``y_<name>`` [length],
+            and their rates.
+        body
+            The body, or its name.
+        local
+            (xi, eta) in the body's frame [length], numbers or expressions of parameters.
+
+        Returns
+        -------
+        BodyPoint
+            Its coordinates ``.x`` and ``.y`` are expressions for equations and outputs, and it may
+            stand where a joint wants a body and a point.
+        """
+        known = {item.name: item for item in (GROUND, *self.bodies)}
+        named = body if isinstance(body, Body) else known.get(body, Body(body))
+        point = BodyPoint(name, named, local)
+        self.outputs.append(point)
+        return point
+
+    def output(self, name: str, expression: Scalar, unit: str = "") -> Scalar:
+        """Ask for an expression over the motion, with its time derivatives, and return it.
+
+        Parameters
+        ----------
+        name
+            Its name; the columns of a solution are ``<name>``, ``<name>_dot`` and ``<name>_ddot``.
+        expression
+            An expression of coordinates, parameters and `t`, and of rates such as
+            ``crank.phi_dot`` or ``kc.outputs.rate(foot.x)``. `kincompile.outputs` has angles,
+            distances, speeds, transmission angles and velocity ratios. The derivatives of one with
+            rates go as far as second rates; what would need a third is NaN.
+        unit
+            Its unit.
+        """
+        self.outputs.append(Output(name, expression, unit))
+        return expression
+
     def add(self, constraint: Item) -> Item:
         """Add a joint, a driver or a free equation, and return it.
 
@@ -111,6 +158,7 @@ class Mechanism(MatrixViews, TextViews):
             equations=self.constraints,
             parameters=self.parameters,
             bodies=self.bodies,
+            outputs=self.outputs,
             length_unit=self.length_unit,
             end=self.end,
             points=self.points,

@@ -19,7 +19,7 @@ from kincompile.model.expressions import (
     in_radians,
     t,
 )
-from kincompile.model.laws import RISES, MotionTable, Rise, constant_velocity
+from kincompile.model.laws import RISES, Rise, TableLaw, constant_velocity
 from kincompile.model.spline import fit_between
 from kincompile.names import listed, suggestion
 
@@ -143,7 +143,7 @@ def table(
     if problems:
         raise ModelError([f"motion table: {problem}" for problem in problems])
     spline = fit_between(*columns)
-    motion: sympy.Expr = MotionTable.of(tuple(columns), spline, "motion_table")(t)
+    motion: sympy.Expr = TableLaw.of(tuple(columns), spline, "motion_table")(t)
     return motion
 
 

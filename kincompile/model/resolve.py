@@ -30,9 +30,9 @@ from kincompile.model.expressions import (
     t,
     unknown_problem,
 )
-from kincompile.model.laws import MotionLaw, MotionTable
+from kincompile.model.laws import MotionLaw, TableLaw
 from kincompile.model.spline import PeriodicSpline, fit
-from kincompile.names import listed, suggestion
+from kincompile.names import listed, rate, suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -150,6 +150,12 @@ class Scope:
         return {name: place for place, name in enumerate(self.coordinates)}
 
     @cached_property
+    def motion(self) -> dict[str, tuple[str, int]]:
+        """The coordinate, and the order of the derivative, by names of coordinates and rates."""
+        orders = range(3)
+        return {rate(name, k): (name, k) for name in self.coordinates for k in orders}
+
+    @cached_property
     def columns(self) -> dict[str, tuple[str | None, ...]]:
         """The names of the columns of each body, by its name; the ground has none."""
         found: dict[str, tuple[str | None, ...]] = {
@@ -178,13 +184,13 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
     expressions = []
     for name, given in zip(equation.equation_names, equation.expressions, strict=True):
         where = f"equation {name!r}"
-        value = _expression(given, where, scope.declared, scope, corners=corners)
+        value = checked_expression(given, where, scope.declared, scope, corners=corners)
         if value is not None and not depends_on(value, scope.coordinate_names):
             scope.problems.append(
                 f"{where} contains no coordinate, so it cannot constrain anything; coordinates "
                 f"are: {listed(scope.coordinates)}"
             )
-        expressions.append(_named_tables(as_sympy(0 if value is None else value), name))
+        expressions.append(named_tables(as_sympy(0 if value is None else value), name))
     if len(scope.problems) > before:
         return None
     occurring = set().union(*(symbol_names(expression) for expression in expressions))
@@ -210,15 +216,15 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     for name, item in constraint.arguments().items():
         given, where = getattr(constraint, name), f"{title}, {name}"
         if item.kind is Kind.BODY:
-            bodies.append(_body(given, where, scope))
+            bodies.append(body_named(given, where, scope))
         elif item.kind in (Kind.POINT, Kind.AXIS):
-            points[item.symbol] = _point(given, item, where, scope)
+            points[item.symbol] = checked_point(given, item.kind, where, scope)
         elif item.kind is Kind.PROFILE:
             table_name = f"{item.symbol}_{constraint.name}"
             profiles[item.symbol] = _profile(given, table_name, where, scope)
         else:
             value = _scalar(given, item, where, scope, corners=corners)
-            scalars[item.symbol] = _named_tables(value, constraint.name)
+            scalars[item.symbol] = named_tables(value, constraint.name)
     if "C" not in scalars and corners:
         scope.problems.append(
             f"{title}: it drives nothing, so it has no corners; leave corners out"
@@ -251,7 +257,7 @@ def _corners(given: Any, title: str, scope: Scope) -> bool:
     return given is True
 
 
-def _body(given: Any, where: str, scope: Scope) -> Body | None:
+def body_named(given: Any, where: str, scope: Scope) -> Body | None:
     """Return the body with the given name, None where there is none."""
     name = given.name if isinstance(given, Body) else given
     if isinstance(name, str) and name == GROUND.name:
@@ -280,7 +286,7 @@ def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> N
         )
 
 
-def _expression(
+def checked_expression(
     given: Any,
     where: str,
     declared: Collection[str],
@@ -321,11 +327,11 @@ def _falling_problem(value: sympy.Expr, scope: Scope) -> str | None:
     return None
 
 
-def _named_tables(value: Any, name: str) -> Any:
+def named_tables(value: Any, name: str) -> Any:
     """Return an expression whose tables over time are called after a constraint."""
-    if not isinstance(value, sympy.Expr) or not value.has(MotionTable):
+    if not isinstance(value, sympy.Expr) or not value.has(TableLaw):
         return value
-    tables = sorted(value.atoms(MotionTable), key=lambda item: item.given)
+    tables = sorted(value.atoms(TableLaw), key=lambda item: item.given)
     numbers = {given: k for k, given in enumerate(dict.fromkeys(item.given for item in tables))}
     stem = f"C_{name}".replace(".", "_")
     named = {
@@ -339,7 +345,7 @@ def _named_tables(value: Any, name: str) -> Any:
 
 def _attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar:
     """Return an attribute: a number or an expression of parameters."""
-    value = _expression(given, where, scope.declared, scope, unit=unit)
+    value = checked_expression(given, where, scope.declared, scope, unit=unit)
     if value is None:
         return 1
     if not isinstance(value, sympy.Expr):
@@ -365,7 +371,7 @@ def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bo
             )
         return value
     declared = scope.declared
-    value_or_none = _expression(given, where, declared, scope, unit=unit, corners=corners)
+    value_or_none = checked_expression(given, where, declared, scope, unit=unit, corners=corners)
     if value_or_none is None:
         return 1
     coordinates = sorted(symbol_names(value_or_none) & scope.coordinate_names)
@@ -386,7 +392,8 @@ def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bo
     return value_or_none
 
 
-def _point(given: Any, item: Argument, where: str, scope: Scope) -> Point:
+def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
+    """Return a pair (xi, eta) of numbers or expressions of parameters."""
     # A generator would be used up here, a set has no order.
     is_list = type(given) is tuple or (
         isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
@@ -398,9 +405,9 @@ def _point(given: Any, item: Argument, where: str, scope: Scope) -> Point:
             f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame"
         )
         return 1, 1
-    point = _attribute(xi, where, scope, item.unit), _attribute(eta, where, scope, item.unit)
-    is_axis = item.kind is Kind.AXIS
-    if is_axis and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
+    unit = "" if kind is Kind.AXIS else "length"
+    point = _attribute(xi, where, scope, unit), _attribute(eta, where, scope, unit)
+    if kind is Kind.AXIS and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
         scope.problems.append(f"{where}: the axis has length zero; give a direction such as (1, 0)")
     return point
 
@@ -429,7 +436,7 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
             f"{where}: {given!r} is neither a radius rho(alpha) nor a table (angles, radii)"
         )
         return sympy.S.One
-    value = _expression(given, where, {*scope.parameters, alpha.name}, scope, unit="length")
+    value = checked_expression(given, where, {*scope.parameters, alpha.name}, scope, unit="length")
     rho: sympy.Expr = as_sympy(1 if value is None else value)
     return rho
 

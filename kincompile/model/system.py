@@ -20,6 +20,14 @@ from kincompile.model.expressions import (
     evaluate,
 )
 from kincompile.model.matrices import MatrixViews
+from kincompile.model.outputs import (
+    Output,
+    ResolvedOutput,
+    outputs_of_points,
+    resolve_output,
+    resolve_point,
+)
+from kincompile.model.points import BodyPoint
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
 from kincompile.model.text_views import TextViews
 from kincompile.names import listed, name_problem, rate, unit_problem
@@ -43,6 +51,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         Start values of the free coordinates for Newton's method, shape (n,), or by name.
     bodies
         Bodies, whose coordinates come first.
+    outputs
+        `Output` and `BodyPoint`, as `Mechanism.output` and `Mechanism.point` make them.
     length_unit, end, points
         As for `Mechanism`.
 
@@ -57,6 +67,10 @@ class ConstraintSystem(MatrixViews, TextViews):
         As written, with their arguments resolved: the rows of Phi_q.
     equations : tuple of str
         Names of the equations, in order.
+    body_points : tuple of BodyPoint
+        The named points.
+    outputs : tuple of ResolvedOutput
+        The coordinates x and y of each point, then the other outputs, in order.
 
     Raises
     ------
@@ -65,8 +79,8 @@ class ConstraintSystem(MatrixViews, TextViews):
     """
 
     __slots__ = (
-        "bodies", "constraints", "coordinates", "end", "equations", "length_unit", "name",
-        "parameters", "points",
+        "bodies", "body_points", "constraints", "coordinates", "end", "equations", "length_unit",
+        "name", "outputs", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -75,6 +89,8 @@ class ConstraintSystem(MatrixViews, TextViews):
     parameters: tuple[Parameter, ...]
     constraints: tuple[Joint | FreeEquation, ...]
     equations: tuple[str, ...]
+    body_points: tuple[BodyPoint, ...]
+    outputs: tuple[ResolvedOutput, ...]
     length_unit: str
     end: float
     points: int
@@ -88,6 +104,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         parameters: Mapping[Any, float] | Iterable[Parameter] = (),
         guess: Sequence[float] | Mapping[Any, float] | None = None,
         bodies: Iterable[Body] = (),
+        outputs: Iterable[BodyPoint | Output] = (),
         length_unit: str = "m",
         end: float = 1.0,
         points: int = 101,
@@ -103,7 +120,10 @@ class ConstraintSystem(MatrixViews, TextViews):
             *_contact_coordinates(written, defaults, problems),
         ]
         _check_outlines(bodies, defaults, problems)
-        _check_names(name, bodies, found, declared, written, problems)
+        wanted = _items(outputs, "outputs", problems)
+        body_points = tuple(item for item in wanted if isinstance(item, BodyPoint))
+        named = (*outputs_of_points(body_points), *(x for x in wanted if isinstance(x, Output)))
+        _check_names(name, bodies, found, declared, written, named, problems)
         scope = Scope(
             {body.name: body for body in bodies},
             [item.name for item in found],
@@ -116,6 +136,9 @@ class ConstraintSystem(MatrixViews, TextViews):
             else resolve_joint(item, scope)
             for item in written
         ]
+        for point in body_points:
+            resolve_point(point, scope)
+        found_outputs = [resolve_output(item, scope, length_unit) for item in named]
         if not written:
             problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
         if not found and not bodies:
@@ -126,8 +149,9 @@ class ConstraintSystem(MatrixViews, TextViews):
         names = tuple(name for item in constraints for name in item.equation_names)
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
-            "constraints": constraints, "equations": names, "length_unit": length_unit,
-            "end": end, "points": points,
+            "constraints": constraints, "equations": names, "body_points": body_points,
+            "outputs": tuple(item for item in found_outputs if item is not None),
+            "length_unit": length_unit, "end": end, "points": points,
         }  # fmt: skip
         for key, value in values.items():
             object.__setattr__(self, key, value)
@@ -348,6 +372,7 @@ def _check_names(
     coordinates: list[Coordinate],
     parameters: tuple[Parameter, ...],
     constraints: list[Constraint | Equation],
+    outputs: Sequence[Output],
     problems: list[str],
 ) -> None:
     """Check that names and units are well formed, and that each name means one thing."""
@@ -356,6 +381,7 @@ def _check_names(
     named += [("a parameter", item.name) for item in parameters]
     named += [("a coordinate", item.name) for item in coordinates]
     named += [("a constraint", item.name) for item in constraints]
+    named += [("an output", item.name) for item in outputs]
     problems += [problem for what, text in named if (problem := name_problem(text, what))]
     if not all(isinstance(text, str) for _, text in named):
         raise ModelError(problems)  # further checks need names
@@ -373,8 +399,11 @@ def _check_names(
     if len({body.name for body in bodies}) == len(bodies):
         symbols += [item.name for item in coordinates]
         known = dict.fromkeys(item.name for item in coordinates)
+        known |= dict.fromkeys(item.name for item in outputs)
         symbols += [rate(name, order) for name in known for order in (1, 2)]
-    _check_unique("coordinates, rates and parameters", symbols, problems)
+    symbols += [item.name for item in outputs]
+    kinds = "coordinates, outputs, rates" if outputs else "coordinates, rates"
+    _check_unique(f"{kinds} and parameters", symbols, problems)
 
 
 def _check_unique(what: str, names: list[Any], problems: list[str]) -> None:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import ModuleType
 
-FORMATS = (1, quantities.FORMAT)
+    from kincompile.quantities import Quantity
+
+FORMATS = (1, 2, quantities.FORMAT)
 """The formats of emitted modules that this version reads."""
 
 REMEDY = "Emit it again with `kincompile compile MODEL -o FILE` of this version."
@@ -36,9 +38,15 @@ _CONSTANTS: dict[str, type] = {
 }
 
 
-def functions() -> tuple[str, ...]:
+def present_in(module: ModuleType) -> tuple[Quantity, ...]:
+    """Return the quantities of a module: those of outputs where it has any."""
+    rows = {"equations", "coordinates"} | ({"outputs"} if hasattr(module, "OUTPUTS") else set())
+    return quantities.over(rows)
+
+
+def functions(module: ModuleType) -> tuple[str, ...]:
     """Return the functions of an emitted module."""
-    return (*quantities.functions(), "Phi_q_nonzeros")
+    return (*quantities.functions(present_in(module)), "Phi_q_nonzeros")
 
 
 def check(module: ModuleType) -> None:
@@ -95,7 +103,7 @@ def _missing(module: ModuleType) -> Iterator[str]:
         elif not isinstance(getattr(module, name), kind):
             given = type(getattr(module, name)).__name__
             yield f"{name} is of type {given}, not {kind.__name__}"
-    for name in functions():
+    for name in functions(module):
         if not callable(getattr(module, name, None)):
             yield f"the function {name} is missing"
 

@@ -38,7 +38,7 @@ def emit_program(name: str, code: InlineProgram | GroupedProgram) -> Emitted:
     names = input_names(program, table)
     functions: dict[str, list[str]] = {}
     called: set[str] = set()
-    for function, quantities in target.evaluators().items():
+    for function, quantities in target.evaluators(program.quantities).items():
         listing = schedule(code, quantities, names, table)
         printer = Printer(target.DIALECT, code.nodes, listing.names, program.name)
         functions[function] = target.function(function, code, listing, printer)

@@ -115,7 +115,9 @@ def vectors(program: Program) -> dict[str, list[str]]:
     """Return the names of the elements of each vector that functions read."""
     coordinates = [item.name for item in program.coordinates]
     parameters = [item.name for item in program.parameters]
-    return {"q": coordinates, "q_dot": [rate(name) for name in coordinates], "p": parameters}
+    orders = range(3 if program.observers else 2)
+    states = {rate("q", k): [rate(name, k) for name in coordinates] for k in orders}
+    return {**states, "p": parameters}
 
 
 def input_names(program: Program, table: NameTable) -> dict[str, str]:

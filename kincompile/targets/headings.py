@@ -17,7 +17,7 @@ def header(code: InlineProgram, first: int = 0) -> list[str]:
     """Return the docstring's tables: coordinates, parameters, rows, which count from `first`."""
     program = code.program
     rows = [("row", "constraint", "", "source")]
-    for section in code.sections:
+    for section in code.constraints:
         instance, constraint = section.instance, section.instance.constraint
         driver = " (driver)" if constraint.is_driver else ""
         name = f'{instance.kernel.name} "{instance.name}"{driver}'
@@ -25,6 +25,8 @@ def header(code: InlineProgram, first: int = 0) -> list[str]:
     lines = labelled("q", [f"{item.name}{_unit(item.unit)}" for item in program.coordinates])
     if program.parameters:
         lines += labelled("p", [f"{item.name}{_unit(item.unit)}" for item in program.parameters])
+    if program.observers:
+        lines += labelled("y", [f"{item.name}{_unit(item.unit)}" for item in program.outputs])
     return [*lines, "", *table(rows)]
 
 
@@ -62,7 +64,7 @@ def constants(code: InlineProgram, level: int, pair: str) -> dict[str, object]:
 
 
 def short_title(section: ConstraintRows, first: int = 0) -> str:
-    """Return rows, type and name of a constraint, for a comment above its code."""
+    """Return rows, type and name of a constraint or output, for a comment above its code."""
     instance = section.instance
     return f'{_rows(section, first)}  {instance.kernel.name} "{instance.name}"'
 
@@ -86,6 +88,9 @@ def _unit(unit: str) -> str:
 
 
 def _rows(section: ConstraintRows, first: int) -> str:
+    count = len(section.entries["Phi"])
+    if count == 0:  # an output
+        return str(first + section.instance.first_output)
     first += section.instance.first_row
-    last = first + len(section.entries["Phi"]) - 1
+    last = first + count - 1
     return str(first) if first == last else f"{first}-{last}"

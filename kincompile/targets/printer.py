@@ -46,8 +46,8 @@ class Dialect:
         Its name, for messages.
     functions
         Text of each elementary function, with ``{}`` for the arguments.
-    pi, square
-        The number pi; a square, which is a power or a function.
+    pi, nan, square
+        The number pi; the number that is none; a square, which is a power or a function.
     select
         Text of a choice: condition, value where it holds, value elsewhere.
     table
@@ -62,6 +62,7 @@ class Dialect:
     language: str
     functions: Mapping[str, str]
     pi: str = "pi"
+    nan: str = "NaN"
     square: Operation = ("square({})", (SUM,), ATOM)
     select: str = "({} ? {} : {})"
     table: str = "spline({}, {}, {})"
@@ -95,6 +96,7 @@ class Printer:
             **ARITHMETIC,
             "square": dialect.square,
             "pi": (dialect.pi, (), ATOM),
+            "nan": (dialect.nan, (), ATOM),
             "select": (dialect.select, (SUM, SUM, SUM), ATOM),
         }
 

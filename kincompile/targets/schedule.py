@@ -107,7 +107,7 @@ class Scheduler:
         An input, a number, a number times pi and a changed sign do not.
         """
         kind = self._nodes[node][0]
-        if kind in ("input", "const", "pi", "neg"):
+        if kind in ("input", "const", "pi", "nan", "neg"):
             return False
         return any(self._nodes[k][0] not in ("const", "pi") for k in operands_of(self._nodes[node]))
 

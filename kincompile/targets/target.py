@@ -13,11 +13,12 @@ import numpy as np
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from kincompile.ir.inline import InlineProgram
+    from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.printer import Dialect, Printer
 
@@ -104,8 +105,8 @@ class Target(Protocol):
     RESERVED: tuple[str, ...]
     """Words of the language, and names that its functions use."""
 
-    def evaluators(self) -> Mapping[str, tuple[str, ...]]:
-        """Return its functions, and the quantities that each gives."""
+    def evaluators(self, given: Sequence[Quantity]) -> Mapping[str, tuple[str, ...]]:
+        """Return its functions for these quantities, and those that each gives."""
 
     def function(
         self, name: str, code: InlineProgram, listing: Listing, printer: Printer

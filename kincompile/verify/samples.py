@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kincompile.errors import InputError
-from kincompile.quantities import TOGETHER, functions, is_moving
+from kincompile.quantities import OF_EQUATIONS, TOGETHER, functions, states_of
 from kincompile.runtime.newton import newton
 from kincompile.runtime.problem import problem
 from kincompile.runtime.status import Status
@@ -82,7 +82,7 @@ class Samples:
     def sizes(self, quantity: Quantity) -> Array:
         """Return the scale of errors, (S, m, n) for a matrix and (S, m, 1) for a vector."""
         terms = self.terms[..., np.newaxis]
-        if quantity.is_moving:
+        if len(quantity.states) > 1:
             fastest = np.max(np.abs(self.q_dot / self.reference), axis=1)
             terms = terms * np.maximum(1.0, fastest**2)[:, np.newaxis, np.newaxis]
         return np.asarray(terms / self.reference if quantity.is_matrix else terms)
@@ -94,7 +94,7 @@ class Samples:
         """
         module, q, t, p = self.module, self.q, self.t, self.p
         shape = len(q), len(module.EQUATIONS), -1
-        for name, given in functions().items():
+        for name, given in functions(OF_EQUATIONS).items():
             if quantity.name in given:
                 yield np.array([self._value(quantity, name, *state) for state in self.each()])
                 yield self._value(quantity, name, q, self.q_dot, t, p).reshape(shape)
@@ -113,8 +113,8 @@ class Samples:
         self, quantity: Quantity, name: str, q: Array, q_dot: Array, t: Any, p: Array
     ) -> Array:
         """Return a quantity as a function of the module gives it; a vector as a column."""
-        given, function = functions()[name], getattr(self.module, name)
-        found = function(q, q_dot, t, p) if is_moving(given) else function(q, t, p)
+        given, function = functions(OF_EQUATIONS)[name], getattr(self.module, name)
+        found = function(*(q, q_dot)[: len(states_of(given))], t, p)
         value = np.asarray(found if len(given) == 1 else found[given.index(quantity.name)])
         return value if quantity.is_matrix else value[..., np.newaxis]
 

@@ -24,7 +24,7 @@ from kincompile.errors import RedundantConstraintWarning
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.origins import model_of
-from kincompile.quantities import QUANTITIES
+from kincompile.quantities import OF_EQUATIONS
 from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import require_square
@@ -225,7 +225,7 @@ def _compiled(model: Mechanism | ConstraintSystem) -> ModuleType:
 def _checks(samples: Samples) -> Iterator[Check]:
     """Yield the checks of each equation by the oracles."""
     module, known = samples.module, _Phi_of_model(samples.module)
-    for quantity in QUANTITIES:
+    for quantity in OF_EQUATIONS:
         Phi = known if quantity.name == "Phi" and known else module.Phi
         error, limit, judge = _judged(samples, quantity, Phi)
         # The entry and the state with the largest error, compared with the allowed one.
@@ -313,7 +313,7 @@ def _estimates(samples: Samples, quantity: Quantity, oracle: Oracle, Phi: PhiOfP
     for q, q_dot, t, p in samples.each():
         along, time = np.eye(q.size), 0.0
         if not quantity.is_matrix:
-            along, time = (q_dot if quantity.is_moving else 0 * q)[np.newaxis], 1.0
+            along, time = (q_dot if len(quantity.states) > 1 else 0 * q)[np.newaxis], 1.0
         function = partial(_with_parameters, Phi, p)
         try:
             rates = oracle.derivative(function, q, t, along, time).T

@@ -23,6 +23,7 @@ from kincompile.view.marks import (
     Rail,
     Slider,
     Span,
+    in_ground,
     moves_with,
     reach,
 )
@@ -195,16 +196,19 @@ def _pointed_at(marks: Iterable[Mark], attached: Iterable[BodyPoint]) -> BodyPoi
 
 def _box(marks: Iterable[Mark], q: Array) -> tuple[Array, Array]:
     """Return the lower left and the upper right corner of the marks at positions q."""
-    corners = [
-        place.at(q) + offset
-        for mark in marks
-        for place, radius in reach(mark)
-        for offset in (-radius, radius)
-    ]
-    if not corners or not len(q):
+    fixed: dict[PlaneFrame, list[tuple[float, float, float]]] = {}
+    for mark in marks:
+        for place, radius in reach(mark):
+            fixed.setdefault(place.frame, []).append((*place.point, radius))
+    if not fixed or not len(q):
         return np.array((-1.0, -1.0)), np.array((1.0, 1.0))
-    points = np.concatenate(corners)
-    return points.min(axis=0), points.max(axis=0)
+    low, high = [], []
+    for frame, circles in fixed.items():
+        numbers = np.array(circles)
+        points, radii = in_ground(q[:, None], frame, numbers[:, :2]), numbers[:, 2:]
+        low.append((points - radii).min(axis=(0, 1)))
+        high.append((points + radii).max(axis=(0, 1)))
+    return np.min(low, axis=0), np.max(high, axis=0)
 
 
 def _size(marks: Iterable[Mark], q: Array) -> float:

@@ -12,7 +12,7 @@ from kincompile.names import listed, suggestion
 from kincompile.runtime.results.columns import titled
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME
-from kincompile.view.polylines import polylines
+from kincompile.view.polylines import FILL, GROUND_COLOUR, LOOKS, polylines
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,35 +24,6 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
     from kincompile.view.drawing import Drawing
     from kincompile.view.polylines import Polyline
-
-GROUND_COLOUR, DRIVER_COLOUR, GAP_COLOUR = "0.35", "0.1", "red"
-"""Colours of the ground, of drivers, and of joints that are not assembled."""
-
-FILL = 0.22
-"""Opacity of the areas of bodies."""
-
-LOOKS: dict[str, dict[str, Any]] = {
-    "bar": {"linewidth": 5, "alpha": 0.75, "solid_capstyle": "round"},
-    "body": {"linewidth": 2.0},
-    "wheel": {"linewidth": 1.5},
-    "rim": {"linewidth": 1.5},
-    "tick": {"linewidth": 1.5},
-    "rack": {"linewidth": 1.5},
-    "groove": {"linewidth": 1.2},
-    "block": {"linewidth": 1.5},
-    "rod": {"linewidth": 3.0, "color": "0.3", "solid_capstyle": "round"},
-    "piston": {"linewidth": 2.5, "color": "0.3"},
-    "barrel": {"linewidth": 1.5, "edgecolor": "0.3", "facecolor": "0.8"},
-    "slide": {"linewidth": 3.0, "alpha": 0.5},
-    "dimension": {"linewidth": 1.0, "color": "0.4", "linestyle": "--"},
-    "pin": {"linewidth": 1.2, "edgecolor": "0.1", "facecolor": "white"},
-    "stand": {"linewidth": 1.2, "edgecolor": GROUND_COLOUR, "facecolor": "0.92"},
-    "ground": {"linewidth": 1.0},
-    "arrow": {"linewidth": 1.3, "color": DRIVER_COLOUR},
-    "head": {"linewidth": 0, "edgecolor": DRIVER_COLOUR, "facecolor": DRIVER_COLOUR},
-    "gap": {"linewidth": 2.0, "color": GAP_COLOUR, "linestyle": ":"},
-}
-"""Style of each kind of polyline; without a colour, it has that of its body."""
 
 NAME: dict[str, Any] = {
     "xytext": (9, 9),
@@ -217,15 +188,17 @@ def move(artists: list[tuple[Polyline, Any]], q: NDArray[np.float64]) -> None:
 
 def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
     """Return the artist of a polyline."""
+    look, points = LOOKS[polyline.look], polyline.at(q)
     is_ground = polyline.frame == GROUND_FRAME
-    colour = GROUND_COLOUR if is_ground else f"C{polyline.frame.index % 10}"
-    look, points, zorder = LOOKS[polyline.look], polyline.at(q), 2 + order * 1e-3
-    if not polyline.is_area:
-        (line,) = ax.plot(*points.T, **{"color": colour, "zorder": zorder, **look})
-        return line
-    style = {"edgecolor": colour, "facecolor": (colour, FILL), **look}
-    (area,) = ax.fill(*points.T, zorder=zorder, **style)
-    return area
+    colour = look.colour or (GROUND_COLOUR if is_ground else f"C{polyline.frame.index % 10}")
+    style: dict[str, Any] = {"linewidth": look.width, "zorder": 2 + order * 1e-3}
+    if polyline.is_area:
+        face = look.face or (colour, FILL)
+        (area,) = ax.fill(*points.T, edgecolor=colour, facecolor=face, **style)
+        return area
+    style |= {"linestyle": look.dash or "-", "alpha": look.opacity, "solid_capstyle": "round"}
+    (line,) = ax.plot(*points.T, color=colour, **style)
+    return line
 
 
 def _write_names(ax: Axes, drawn: Drawing, q: NDArray[np.float64]) -> None:

@@ -1,7 +1,7 @@
-"""The marks of a drawing as lines and areas that move with q, for matplotlib.
+"""The marks of a drawing as lines and areas that move with q, for matplotlib and for figures.
 
 A polyline is a chain of points that moves with a frame, is carried by a point without turning, or
-is stretched between two points. Colours and line widths are in `LOOKS` of `mechanism_plot`.
+is stretched between two points. Colours and line widths are in `LOOKS`.
 """
 
 from __future__ import annotations
@@ -29,12 +29,65 @@ from kincompile.view.marks import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import ArrayLike
 
     from kincompile.view.drawing import Drawing
     from kincompile.view.marks import Array
+GROUND_COLOUR, DRIVER_COLOUR = "#595959", "#1a1a1a"
+"""Colours of the ground and of drivers."""
+
+FILL = 0.22
+"""Opacity of the areas of bodies."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What a line or an area is drawn like.
+
+    Attributes
+    ----------
+    width
+        Of the line [points].
+    colour, face
+        Of the line, and of the area; that of the body without, areas pale.
+    opacity
+        Of a line.
+    dash
+        "--", ":" or "" for an unbroken line.
+    """
+
+    width: float
+    colour: str = ""
+    face: str = ""
+    opacity: float = 1.0
+    dash: str = ""
+
+
+LOOKS: Mapping[str, Look] = {
+    "bar": Look(5, opacity=0.75),
+    "body": Look(2),
+    "wheel": Look(1.5),
+    "rim": Look(1.5),
+    "tick": Look(1.5),
+    "rack": Look(1.5),
+    "groove": Look(1.2),
+    "block": Look(1.5),
+    "rod": Look(3, "#4d4d4d"),
+    "piston": Look(2.5, "#4d4d4d"),
+    "barrel": Look(1.5, "#4d4d4d", "#cccccc"),
+    "slide": Look(3, opacity=0.5),
+    "dimension": Look(1, "#666666", dash="--"),
+    "pin": Look(1.2, "#1a1a1a", "#ffffff"),
+    "stand": Look(1.2, GROUND_COLOUR, "#ebebeb"),
+    "ground": Look(1),
+    "arrow": Look(1.3, DRIVER_COLOUR),
+    "head": Look(0, DRIVER_COLOUR, DRIVER_COLOUR),
+    "gap": Look(2, "#ff0000", dash=":"),
+}
+"""Look of each kind of polyline."""
+
 PIN, BLOCK_LENGTH, BLOCK_HEIGHT, HATCH, TURN = 0.45, 1.6, 0.9, 0.8, 1.9
 """Radius of a pin, half sides of a slider, length of a hatch line, radius of a turning arrow, in
 sizes of the drawing."""
@@ -91,11 +144,11 @@ class Polyline:
 
 def polylines(drawn: Drawing) -> list[Polyline]:
     """Return the lines and areas of a drawing, from back to front."""
-    return [polyline for mark in drawn.marks for polyline in _of(mark, drawn.size)]
+    return [polyline for mark in drawn.marks for polyline in of_mark(mark, drawn.size)]
 
 
-def _of(mark: Mark, size: float) -> Iterable[Polyline]:
-    """Return the polylines of a mark."""
+def of_mark(mark: Mark, size: float) -> Iterable[Polyline]:
+    """Return the lines and areas of a mark, in a drawing with marks of a size."""
     match mark:
         case Link():
             return _link(mark, size)

@@ -15,7 +15,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.model.origins import remember_model
-from kincompile.quantities import functions, is_moving
+from kincompile.quantities import OF_EQUATIONS, functions, states_of
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.lanes import LaneCode
 from kincompile.runtime.engine.stages import StagedSolver
@@ -115,10 +115,10 @@ def numbers(module):
     nonzeros = module.Phi_q_nonzeros(q, t, p)
     found = [nonzeros, module.solve(nonzeros, b), module.solve(nonzeros[3], b[3])]
     found += module.kinematics_batch_last(q.T, q_dot.T, t, p.T)
-    for name, given in functions().items():
+    for name, given in functions(OF_EQUATIONS).items():
         function = getattr(module, name)
         for at in (np.arange(40), 3):
-            states = (q[at], q_dot[at]) if is_moving(given) else (q[at],)
+            states = (q[at], q_dot[at])[: len(states_of(given))]
             values = function(*states, t[at] if np.ndim(at) else float(t[at]), p[at])
             found += [values] if len(given) == 1 else values
     return [np.asarray(value) for value in (*found, *numbers_of_plan(module, q, t, p, nonzeros, b))]

@@ -18,6 +18,10 @@ FIGURES = {
     "gear_train": "turns of the arm: 1.000000",
     "rack_and_pinion": "pinion +2.000 rad, rack +0.1000 m",
     "cam_flat_follower": "highest: 60.000 mm at a cam angle of 270 degrees",
+    "jansen": "the leg swings from 146.683 to 211.231 degrees",
+    "klann": "the leg swings from -144.324 to -108.832 degrees",
+    "shaper": "the ram's stroke is 0.311110 m",
+    "double_wishbone": "camber from -0.012 to +0.549 degrees",
     "cam_by_table": "highest: 60.000 mm at a cam angle of 270 degrees",
     "slot_follower": "back at 152.95, where it was: 152.95",
 }
@@ -40,7 +44,11 @@ def test_that_it_solves_over_its_whole_grid(example):
 def test_that_it_is_named_as_its_file_and_says_its_source(example):
     docstring = runpy.run_path(str(example.path))["__doc__"]
     assert example.model.name == example.path.stem
-    assert re.search(r"^Source: .*(R\d+|reference cases|catalogue)", docstring, re.MULTILINE)
+    assert re.search(
+        r"^Source: .*(R\d+|reference cases|catalogue|linkage of|dimensions ours)",
+        docstring,
+        re.MULTILINE,
+    )
 
 
 @pytest.mark.parametrize("word", ["lock", "4.5"])

@@ -1,13 +1,13 @@
 """A new target is a folder and a line in the table: here plain Python, which needs no NumPy."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
 import kincompile as kc
-from kincompile.quantities import singles
+from kincompile.quantities import OF_EQUATIONS, Quantity, singles
 from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
 from kincompile.targets.registry import TARGETS, Listed
 from kincompile.targets.statements import Statements
@@ -59,9 +59,9 @@ class Plain:
     RESERVED: tuple[str, ...] = ("q", "q_dot", "t", "p", "pi", "spline", *ELEMENTARY)
     function, files = staticmethod(function), staticmethod(files)
 
-    def evaluators(self) -> Mapping[str, tuple[str, ...]]:
+    def evaluators(self, given: Sequence[Quantity]) -> Mapping[str, tuple[str, ...]]:
         """Return a function for each quantity."""
-        return singles()
+        return singles(given)
 
 
 PLAIN: Target = Plain()
@@ -75,7 +75,7 @@ def test_that_a_new_target_is_a_line_in_the_table(example, monkeypatch):
     module, found = example.module, SimpleNamespace(**names)
     q, q_dot = np.random.default_rng(1).uniform(0.1, 1, (2, module.N_COORDINATES))
     rest = 0.3, module.DEFAULTS.tolist()
-    for name, expected in zip(singles(), module.kinematics(q, q_dot, 0.3), strict=True):
+    for name, expected in zip(singles(OF_EQUATIONS), module.kinematics(q, q_dot, 0.3), strict=True):
         rates = [q_dot.tolist()] if name == "gamma" else []
         values = getattr(found, name)(q.tolist(), *rates, *rest)
         np.testing.assert_allclose(values, expected, rtol=1e-12, atol=1e-13)

@@ -82,7 +82,7 @@ def assert_toys(module, program, names=NAMES):
 def test_that_the_interpreter_adds_where_a_quantity_adds(program):
     q, t = points(program)
     found = interpret(program, q, 0 * q, t)
-    names = [item.name for item in quantities.QUANTITIES]
+    names = [item.name for item in program.quantities]
     for name, known in expected(program, q, t).items():
         np.testing.assert_allclose(found[names.index(name)], known, rtol=1e-13, atol=1e-13)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from kincompile import quantities
 from kincompile.errors import InputError
+from kincompile.runtime.contract import present_in
 from kincompile.runtime.engine.code import attach
 from kincompile.runtime.memory import LINE, empty
 from kincompile.runtime.native.library import library
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from kincompile.quantities import Quantity
     from kincompile.runtime.inputs import Inputs
 
     Array = NDArray[np.float64]
@@ -76,7 +78,8 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     loaded = library(module.NAME, files, module.FINGERPRINT)
     functions = _Functions(module, loaded)
     names = vars(module)
-    given = {**quantities.functions(), **_nonzeros()}
+    present = present_in(module)
+    given = {**quantities.functions(present), **_nonzeros(present)}
     compiled = {name: functions.evaluator(name, results) for name, results in given.items()}
     compiled["kinematics_batch_last"] = functions.batch_last()
     if "solve" in names:
@@ -91,9 +94,15 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     return module
 
 
-def _nonzeros() -> dict[str, tuple[str, ...]]:
+def _states(name: str) -> tuple[str, ...]:
+    """Return what a function reads of q, q_dot and q_ddot."""
+    given = quantities.TOGETHER.get(name, (name.removesuffix("_nonzeros"),))
+    return quantities.states_of(given)
+
+
+def _nonzeros(present: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the functions that give the entries of a matrix, and what C calls their result."""
-    matrices = [item for item in quantities.QUANTITIES if item.is_matrix]
+    matrices = [item for item in present if item.is_matrix]
     return {f"{item.name}_nonzeros": (quantities.nonzeros_of(item),) for item in matrices}
 
 
@@ -109,10 +118,22 @@ class _Functions:
 
     def evaluator(self, name: str, results: tuple[str, ...]) -> Function:
         """Return a function of points (..., n) that gives some results."""
+        original, states = getattr(self._module, name), _states(name)
+        if len(states) == len(STATES):
+            return self._of_second_rates(results, original)
         places = Places(self._module, self._library, results, self._shapes, self._batch_type)
-        moving = {item.name for item in quantities.QUANTITIES if item.is_moving}
-        make = function_of_positions if moving.isdisjoint(results) else function_of_states
-        return make(places, self._batch, getattr(self._module, name))
+        make = function_of_positions if len(states) == 1 else function_of_states
+        return make(places, self._batch, original)
+
+    def _of_second_rates(self, results: tuple[str, ...], original: Function) -> Function:
+        """Return a function of q, q_dot, q_ddot, t and p: outputs, asked for in batches."""
+        defaults, batch = self._module.DEFAULTS, self._batch
+
+        def of_second_rates(q: Any, q_dot: Any, q_ddot: Any, t: Any, p: Any = defaults) -> Any:
+            found = batch(results, (q, q_dot, q_ddot), t, p)
+            return original(q, q_dot, q_ddot, t, p) if found is None else found
+
+        return of_second_rates
 
     def _batch(self, wanted: Sequence[str], states: tuple[Any, ...], t: Any, p: Any) -> Any:
         """Evaluate a batch whose axes are the first ones; None where numbers are complex."""
@@ -308,7 +329,7 @@ def _shapes(module: ModuleType) -> dict[str, tuple[int, ...]]:
         "parameters": len(module.PARAMETERS),
     }
     shapes: dict[str, tuple[int, ...]] = {}
-    for item in quantities.QUANTITIES:
+    for item in present_in(module):
         shapes[item.name] = (sizes[item.rows],)
         if item.is_matrix:
             shapes[item.name] += (sizes[item.columns],)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 REAL = np.dtype(np.float64)
 NUMBER = REAL.itemsize
 
-STATES = ("q", "q_dot")
+STATES = ("q", "q_dot", "q_ddot")
 
 
 class Numbers(Structure):
@@ -30,7 +30,8 @@ def batch_type(results: tuple[str, ...]) -> type[Any]:
     """Return the structure of what is to be evaluated, as the emitted header has it."""
     fields = (
         ("count", c_size_t),
-        *((name, Numbers) for name in (*STATES, "t", "p", *results)),
+        *((name, Numbers) for name in ("q", "q_dot", "t", "p")),
+        *((name, Numbers) for name in (*(("q_ddot",) if "outputs" in results else ()), *results)),
         ("varying_only", c_int),
     )
     return type("Batch", (Structure,), {"_fields_": fields})

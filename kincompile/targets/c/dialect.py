@@ -8,6 +8,7 @@ C = Dialect(
     # These two say by `far` that an angle is out of their reach.
     | {"cos": "cosine({}, exact, &far)", "sin": "sine({}, exact, &far)"},
     pi="PI",
+    nan="NAN",
     table="spline(&{}, {}, {})",
     signs={"&": "&&", "|": "||"},
     # C divides integers to integers.

@@ -54,9 +54,9 @@ RESERVED: tuple[str, ...] = (
 """Names that the functions of a mechanism use."""
 
 
-def evaluators() -> dict[str, tuple[str, ...]]:
+def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the kernels."""
-    return quantities.kernels()
+    return quantities.kernels(given)
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
@@ -113,7 +113,7 @@ def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]
     """Return the constants of the source file: names, numbers and the patterns of matrices."""
     program = code.program
     patterns, entries = [], []
-    for quantity in quantities.QUANTITIES:
+    for quantity in program.quantities:
         values = [code.number(entry.node) for entry in code.entries(quantity.name)]
         numbers = [f"{{{k}, {float(x)!r}}}" for k, x in enumerate(values) if x is not None]
         computed = [str(k) for k, value in enumerate(values) if value is None]
@@ -133,7 +133,7 @@ def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]
     return {
         "patterns": "\n".join(patterns),
         "entries": "\n".join(entries),
-        "numbers": sum(len(code.entries(item.name)) for item in quantities.QUANTITIES),
+        "numbers": sum(len(code.entries(item.name)) for item in program.quantities),
         "lanes": LANES,
         "n_factors": 0 if listing is None else len(listing.factors),
         "n_blocks": 0 if listing is None else len(listing.plan.determinants),
@@ -160,7 +160,7 @@ def _array(declaration: str, items: Sequence[str], placeholder: str = "0") -> st
 def _batch(code: InlineProgram) -> dict[str, Any]:
     """Return the tables of quantities and kernels by which a batch is evaluated."""
     program, rows, matrices = code.program, [], 0
-    for quantity in quantities.QUANTITIES:
+    for quantity in program.quantities:
         height, width = (*program.shape_of(quantity), 0)[:2]
         entries, name = code.entries(quantity.name), quantity.name
         constants = sum(code.number(entry.node) is not None for entry in entries)
@@ -173,8 +173,8 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
             f"    {name}_constant, {name}_computed, {f'{name}_place' if width else 'NULL'}}},",
         ]
         matrices += height * width
-    bits = {item.name: 1 << k for k, item in enumerate(quantities.QUANTITIES)}
-    kernels = quantities.kernels()
+    bits = {item.name: 1 << k for k, item in enumerate(program.quantities)}
+    kernels = quantities.kernels(program.quantities)
     return {
         "quantities": indented(rows),
         "n_quantities": len(bits),
@@ -193,14 +193,21 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
             for name, given in kernels.items()
         ),
         "n_kernels": len(kernels),
-        "moving": sum(bits[item.name] for item in quantities.QUANTITIES if item.is_moving),
+        **{
+            f"reads_{state}": sum(
+                bits[item.name] for item in program.quantities if state in item.reads
+            )
+            for state in ("q_dot", "q_ddot")
+        },
     }
 
 
 def _outputs(code: InlineProgram) -> list[str]:
     """Return the results of a batch as the header declares them."""
     program, lines = code.program, []
-    for quantity in quantities.QUANTITIES:
+    if program.observers:
+        lines.append(f"{program.name}_input q_ddot;  // second rates, of which outputs may depend")
+    for quantity in program.quantities:
         size = " x ".join(map(str, program.shape_of(quantity)))
         lines.append(f"{program.name}_output {quantity.name};  // {size}: {quantity.about}")
         if quantity.is_matrix:
@@ -229,7 +236,7 @@ def _strip(
         "functions": "\n".join(lines),
         "results": indented(
             f"double {item.name}[{max(len(code.entries(item.name)), 1)}][LANES];"
-            for item in quantities.QUANTITIES
+            for item in code.program.quantities
         ),
     }
     return fill("c/strip.c.jinja", data)

@@ -16,10 +16,11 @@ from kincompile.targets.statements import Statements
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Mapping, Sequence
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
+    from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.printer import Printer
 
@@ -38,8 +39,8 @@ KEYWORDS = (
 """Words of the language, and names that it does not let be declared."""
 
 RESERVED: tuple[str, ...] = (
-    *KEYWORDS, *quantities.singles(), "q", "q_dot", "t", "p", "Array", "Math", "require_length",
-    "square", "spline", "DEFAULTS", "N_COORDINATES",
+    *KEYWORDS, *quantities.singles(quantities.QUANTITIES), "q", "q_dot", "q_ddot", "t", "p",
+    "Array", "Math", "require_length", "square", "spline", "DEFAULTS", "N_COORDINATES",
 )  # fmt: skip
 """Names that the functions use."""
 
@@ -49,15 +50,15 @@ TAKEN_BY_ENVIRONMENT = (
 """Names that a page or node does not let a script declare."""
 
 
-def evaluators() -> dict[str, tuple[str, ...]]:
+def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the functions: one a quantity."""
-    return quantities.singles()
+    return quantities.singles(given)
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return the lines of a function of one point."""
     quantity = quantities.quantity_named(name)
-    vectors = ["q", "q_dot"] if quantity.is_moving else ["q"]
+    vectors = quantity.states
     body = [f'require_length("{vector}", {vector}, N_COORDINATES);' for vector in vectors]
     body.append('require_length("p", p, DEFAULTS.length);')
     body += WRITE.inputs(code.program, listing)

@@ -5,6 +5,7 @@ from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
 NUMPY = Dialect(
     "NumPy",
     {name: f"{name}({{}})" for name in ELEMENTARY},
+    nan="nan",
     square=("{}**2", (ATOM,), POWER),
     select="where({}, {}, {})",
 )

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile import quantities
 from kincompile.errors import UnsupportedError
 from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
 from kincompile.quantities import FORMAT, kernels
@@ -131,12 +130,12 @@ def _group_code(
     lines.append("}, {")
     for name, source in item.inputs.items():
         arrays[f"{item.name}.{names[name]}"] = source.index
-    for quantity in quantities.QUANTITIES:
+    for quantity in grouped.program.quantities:
         if quantity.rows == "coordinates":
             places = [item.columns[:, row] for row, _, _ in item.outputs[quantity.name]]
             shape = len(places), item.rows.size
             arrays[f"{item.name}.{quantity.name}"] = np.array(places, dtype=np.intp).reshape(shape)
-    for function, computed in _kernels().items():
+    for function, computed in _kernels(grouped.program).items():
         listing = schedule(inline, computed, names, table)
         called |= set(listing.functions)
         read = [names[name] for name in item.inputs if name in listing.inputs]
@@ -150,10 +149,11 @@ def _group_code(
     return [*lines, "}),"]
 
 
-def _kernels() -> dict[str, tuple[str, ...]]:
+def _kernels(program: Program) -> dict[str, tuple[str, ...]]:
     """Return what is computed together; right sides alone, because Phi_q is then at hand."""
-    found = {name: computed for name, computed in kernels().items() if name != "kinematics"}
-    for quantity in quantities.QUANTITIES:
+    found = kernels(program.quantities)
+    del found["kinematics"]
+    for quantity in program.quantities:
         if quantity.rows == "outputs" or (quantity.is_matrix and quantity.name != "Phi_q"):
             raise UnsupportedError(f"the grouped form has no {quantity.name}; use form='inline'")
     return found
@@ -163,7 +163,7 @@ def _public(program: Program, nonzeros: int) -> Iterator[str]:
     """Yield the public functions of the quantities."""
     for quantity, name, lines in public_functions(program, nonzeros):
         wanted = name.removeprefix("Phi_q_")
-        states = "q, q_dot" if quantity.is_moving else "q"
+        states = ", ".join(quantity.states)
         yield from lines
         yield f'    return _evaluate(("{wanted}",), t, p, {states})[0]\n\n'
 
@@ -223,17 +223,17 @@ def _data(
         "defaults": tuple_text((repr(item.default) for item in program.parameters), 62),
         "kernels": "\n".join(code),
         "functions": "\n".join(_public(program, nonzeros)),
-        "sizes": indented(_sizes()),
+        "sizes": indented(_sizes(program)),
         "groups": indented(line for lines in tables for line in lines),
         "stages": indented(solving),
         **support(called, has_frames=True, has_large_blocks=True),
     }
 
 
-def _sizes() -> list[str]:
+def _sizes(program: Program) -> list[str]:
     """Return the numbers of rows of the vectors; those whose rows are shared are sums."""
     rows = {"equations": "N_EQUATIONS", "coordinates": "N_COORDINATES"}
-    vectors = [item for item in quantities.QUANTITIES if not item.is_matrix]
+    vectors = [item for item in program.quantities if not item.is_matrix]
     sizes = [f'"{item.name}": {rows[item.rows]},' for item in vectors]
     return [*sizes, '"nonzeros": len(PATTERN),']
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, Literal
 
-from kincompile import quantities
 from kincompile.ir.elimination import plan_solve
-from kincompile.quantities import FORMAT, is_moving, kernel_of, kernels, quantity_named
+from kincompile.quantities import FORMAT, kernel_of, kernels, quantity_named, states_of
 from kincompile.targets.evaluators import varying, vectors
 from kincompile.targets.headings import entry_title, header, short_title, title
 from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
@@ -45,7 +44,7 @@ SCALAR_FUNCTIONS = {
 """Functions that `math` does not have."""
 
 RESERVED: tuple[str, ...] = (
-    "f", "q", "q_dot", "t", "p", "np", "math", "pi", "spline", *FUNCTIONS,
+    "f", "q", "q_dot", "q_ddot", "t", "p", "np", "math", "nan", "pi", "spline", *FUNCTIONS,
     "sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt",
 )  # fmt: skip
 """Names that the code of the functions uses."""
@@ -53,14 +52,14 @@ RESERVED: tuple[str, ...] = (
 RESERVED_IN_SOLVE = ("f", "J", "F", "b")
 
 
-def evaluators() -> dict[str, tuple[str, ...]]:
+def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the kernels."""
-    return kernels()
+    return kernels(given)
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return the lines of a kernel: code for a point, or for arrays of points."""
-    states = "q, q_dot" if is_moving(kernels()[name]) else "q"
+    states = ", ".join(states_of(computed for computed, _ in listing.results))
     body = [*_unpack(code.program, listing)]
     body += function_body(code, listing, printer, "packed" if name == "kinematics" else "titled")
     matrix = _matrix(code, printer) if name == "position" else []
@@ -81,9 +80,10 @@ def files(
     data = {
         **_constants(code),
         "kernels": "\n".join(lines),
-        "has_pi": any(re.search(r"\bpi\b", line) for line in lines),
+        "has_pi": _has("pi", lines),
+        "has_nan": _has("nan", lines),
         "functions": "\n".join(_functions(code)),
-        "results": "\n".join(_results()),
+        "results": "\n".join(_results(code.program)),
         "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
         "is_planned": plan is not None,
         **support(
@@ -95,12 +95,18 @@ def files(
     return {f"{code.program.name}.py": fill("numpy/module.py.jinja", data)}
 
 
+def _has(name: str, lines: Iterable[str]) -> bool:
+    """Return whether a constant is used."""
+    return any(re.search(rf"\b{name}\b", line) for line in lines)
+
+
 def _constants(code: InlineProgram) -> dict[str, Any]:
     """Return what the head of the module says."""
     program = code.program
     names = [item.name for item in program.coordinates]
     units = [item.unit for item in program.coordinates]
     units += [item.unit for item in program.parameters]
+    units += [item.unit for item in program.outputs]
     return {
         "title": program.name,
         "header": "\n".join(header(code)),
@@ -114,6 +120,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "coordinates": tuple_text(f'"{name}"' for name in names),
         "equations": tuple_text(f'"{name}"' for name in program.equations),
         "solvability": solvability_text(program),
+        "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
         "units": tuple_text((f'"{unit}"' for unit in units), WIDTH - 44),
@@ -137,7 +144,7 @@ def _pattern_name(quantity: Quantity) -> str:
 
 def _patterns(code: InlineProgram) -> Iterator[str]:
     """Yield the places of the entries of each matrix, and its entries that never change."""
-    for quantity in quantities.QUANTITIES:
+    for quantity in code.program.quantities:
         if not quantity.is_matrix:
             continue
         entries, name = code.entries(quantity.name), _pattern_name(quantity)
@@ -151,16 +158,16 @@ def _patterns(code: InlineProgram) -> Iterator[str]:
         yield f"_CONSTANTS{suffix} = {{\n{indented(wrapped(constants))}\n}}"
 
 
-def _results() -> Iterator[str]:
+def _results(program: Program) -> Iterator[str]:
     """Yield the lines that say what the functions return."""
     sizes = {
         "equations": "N_EQUATIONS",
         "coordinates": "N_COORDINATES",
-        "outputs": "N_OUTPUTS",
+        "outputs": "len(OUTPUTS)",
         "parameters": "len(PARAMETERS)",
     }
     results: dict[str, list[str]] = {}
-    for quantity in quantities.QUANTITIES:
+    for quantity in program.quantities:
         rows, name = sizes[quantity.rows], f"_{quantity.name.upper()}"
         if not quantity.is_matrix:
             results.setdefault(f"({rows},), range({rows})", []).append(name)
@@ -178,12 +185,13 @@ def _results() -> Iterator[str]:
 def _functions(code: InlineProgram) -> Iterator[str]:
     """Yield the public functions of the quantities."""
     for quantity, name, lines in public_functions(code.program, len(code.pattern())):
-        kernel, states = kernel_of((quantity.name,)), "q, q_dot" if quantity.is_moving else "q"
-        computed = kernels()[kernel]
+        kernel = kernel_of((quantity.name,), code.program.quantities)
+        computed = kernels(code.program.quantities)[kernel]
         before = computed[: computed.index(quantity.name)]
         skip = sum(len(varying(code, part, item)) for item in before for part in code.sections)
         result = f"_{name.upper()}"
         yield from lines
+        states = ", ".join(quantity.states)
         yield f"    return _evaluate(_{kernel}, {skip}, {result}, t, p, {states})\n\n"
 
 
@@ -191,14 +199,14 @@ def public_functions(
     program: Program, nonzeros: int
 ) -> Iterator[tuple[Quantity, str, tuple[str, ...]]]:
     """Yield name and first lines of the functions of quantities, of a matrix also its nonzeros."""
-    for quantity in quantities.QUANTITIES:
+    for quantity in program.quantities:
         shape = ", ".join(map(str, program.shape_of(quantity)))
         texts = {quantity.name: f"{quantity.about.rstrip('.')}, shape (..., {shape})."}
         if quantity.is_matrix:
             size = nonzeros if quantity.name == "Phi_q" else "nonzeros"
             order = f"Entries of {quantity.name} in the order of {_pattern_name(quantity)}"
             texts[f"{quantity.name}_nonzeros"] = f"{order}, shape (..., {size})."
-        states = "q, q_dot" if quantity.is_moving else "q"
+        states = ", ".join(quantity.states)
         for name, text in texts.items():
             yield quantity, name, (f"def {name}({states}, t, p=DEFAULTS):", f'    """{text}"""')
 

@@ -17,10 +17,11 @@ from kincompile.targets.statements import Statements
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.model.spline import SplineTable
+    from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.printer import Printer
 
@@ -40,15 +41,15 @@ KEYWORDS = (
 """Words of MATLAB and of Octave."""
 
 RESERVED: tuple[str, ...] = (
-    *KEYWORDS, *quantities.singles(), *NAMES.values(), "q", "q_dot", "t", "p", "pi", "zeros",
-    "nargin", "either", "in_reals", "NaN", "isreal",
+    *KEYWORDS, *quantities.singles(quantities.QUANTITIES), *NAMES.values(), "q",
+    "q_dot", "q_ddot", "t", "p", "pi", "zeros", "nargin", "either", "in_reals", "NaN", "isreal",
 )  # fmt: skip
 """Names that the functions use."""
 
 
-def evaluators() -> dict[str, tuple[str, ...]]:
+def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the functions: one a quantity."""
-    return quantities.singles()
+    return quantities.singles(given)
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
@@ -108,8 +109,8 @@ def _function_file(name: str, code: InlineProgram, body: str) -> str:
     data = {
         "quantity": name,
         "name": program.name,
-        "arguments": ", ".join(quantity.arguments),
-        "n_arguments": len(quantity.arguments),
+        "arguments": ", ".join(quantity.reads),
+        "n_arguments": len(quantity.reads),
         "about": f"{quantity.about[:-1]}{shape}.",
         "header": WRITE.header(code),
         "fingerprint": program.fingerprint,

@@ -7,7 +7,7 @@ import pytest
 
 
 def test_that_a_module_says_what_it_is(rich: Any) -> None:
-    assert (rich.NAME, rich.FORMAT) == ("rich", 2)
+    assert (rich.NAME, rich.FORMAT) == ("rich", 3)
     assert len(rich.FINGERPRINT) == 32
     assert int(rich.FINGERPRINT, 16) > 0
     assert (rich.N_COORDINATES, rich.N_EQUATIONS) == (7, 7)

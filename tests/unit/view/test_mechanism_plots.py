@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
+from kincompile.view.polylines import DRIVER_COLOUR, GROUND_COLOUR
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 from matplotlib import pyplot as plt
@@ -122,7 +123,7 @@ def test_that_the_arrow_of_a_driver_lies_within_the_limits(kind):
     m.add(kind("pull", block, (0, 0), 1 + kc.t))
     ax = kc.plot_mechanism(m)
     require_all_within(ax)
-    (arrow,) = lines(ax, "0.1")
+    (arrow,) = lines(ax, DRIVER_COLOUR)
     along = np.ptp(arrow, axis=0) > 0
     assert along.tolist() == [kind is kc.AbsoluteX, kind is kc.AbsoluteY]
 
@@ -149,7 +150,7 @@ def test_that_gears_have_their_radius_and_turn(example_named):
     np.testing.assert_allclose((x, y), (0.05 * np.cos(angle), 0.05 * np.sin(angle)), atol=1e-12)
     turned = 2 * np.pi * solution.t[k]
     assert has_line(ax, "C0", [(0, 0), (0.02 * np.cos(turned), 0.02 * np.sin(turned))])
-    (ring,) = [line for line in lines(ax, "0.35") if len(line) > 60]
+    (ring,) = [line for line in lines(ax, GROUND_COLOUR) if len(line) > 60]
     np.testing.assert_allclose(np.hypot(*ring.T), 0.08, rtol=1e-12)
 
 

@@ -1,0 +1,143 @@
+"""The figures of a derivation: the mechanism, and each joint with the vectors of its equation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.calculus.expand import Expansion
+from kincompile.calculus.expressions import (
+    VectorSum,
+    split_coefficient,
+    split_factor,
+    vector_sum,
+)
+from kincompile.derivation.joint_terms import abbreviations
+from kincompile.model.arguments import Kind
+from kincompile.model.expressions import evaluate
+from kincompile.model.matrices import SymbolicEnvironment
+from kincompile.model.resolve import Joint
+from kincompile.view.drawing import drawing
+from kincompile.view.geometry import Geometry
+from kincompile.view.marks import GROUND_FRAME, BodyPoint
+from kincompile.view.picture import Arrow, Picture, picture
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from kincompile.calculus.expressions import Vector
+    from kincompile.derivation.evaluation import Evaluation
+    from kincompile.view.drawing import Drawing
+    from kincompile.view.marks import Array, PlaneFrame
+
+SHORTEST = 0.4
+"""Length of the shortest vector that is drawn, in sizes of marks."""
+
+AXIS, DIRECTION = 5.0, 7.0
+"""Lengths of the axes of a frame and of directions, in sizes of marks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """Pictures of a mechanism at the state of its numbers."""
+
+    evaluation: Evaluation
+
+    @cached_property
+    def _drawn(self) -> Drawing:
+        return drawing(self.evaluation.system, self._parameters, self.evaluation.q)
+
+    @property
+    def _parameters(self) -> dict[str, float]:
+        names = (item.name for item in self.evaluation.system.parameters)
+        return dict(zip(names, self.evaluation.p.tolist(), strict=True))
+
+    @cached_property
+    def _geometry(self) -> Geometry:
+        system, drawn = self.evaluation.system, self._drawn
+        joints = [item for item in system.constraints if isinstance(item, Joint)]
+        frames = dict(zip(drawn.bodies, drawn.frames, strict=True))
+        return Geometry(joints, self._parameters, frames, self.evaluation.q[None])
+
+    def mechanism(self) -> Picture | None:
+        """Return the whole mechanism with the axes of its bodies; None without bodies."""
+        drawn = self._drawn
+        if not drawn.bodies:
+            return None
+        named = zip(drawn.frames, drawn.bodies, strict=True)
+        arrows = [arrow for frame, name in named for arrow in self._axes(frame, name)]
+        title = f"{drawn.name} at {self.evaluation.origin}"
+        return picture(drawn, self.evaluation.q, title, [*self._axes(GROUND_FRAME, ""), *arrows])
+
+    def joint(self, joint: Joint) -> Picture:
+        """Return a joint with the vectors and axes that occur in its equation."""
+        arrows = [*self.vectors(joint)]
+        indices = dict(zip(self._frames(joint), "ij", strict=False))
+        for frame, index in indices.items():
+            arrows += self._axes(frame, index if frame != GROUND_FRAME else "")
+        if GROUND_FRAME not in indices:
+            arrows += self._axes(GROUND_FRAME, "")
+        title = f"{joint.name}: the vectors of its equation, at {self.evaluation.origin}"
+        return picture(self._drawn, self.evaluation.q, title, arrows, self._frames(joint))
+
+    def _frames(self, joint: Joint) -> list[PlaneFrame]:
+        frames = self._geometry.frames
+        return [frames.get(body.name, GROUND_FRAME) for body in joint.bodies]
+
+    def _place(self, frame: PlaneFrame, x: float = 0.0, y: float = 0.0) -> Array:
+        return BodyPoint(frame, (x, y)).at(self.evaluation.q)
+
+    def _axes(self, frame: PlaneFrame, index: str) -> Iterator[Arrow]:
+        """Yield the axes of a frame at its origin."""
+        origin, length = self._place(frame), AXIS * self._drawn.size
+        for letter, x, y in (("x", length, 0.0), ("y", 0.0, length)):
+            name = f"{letter}_{index}" if index else letter
+            yield Arrow(name, origin, self._place(frame, x, y), frame, is_vector=False)
+
+    def vectors(self, joint: Joint) -> Iterator[Arrow]:
+        """Yield r of each body, s and v of the joint, and d; those of no length are left out."""
+        for arrow in (*self._positions(joint), *self._fixed(joint), *self._separations(joint)):
+            if np.hypot(*(arrow.end - arrow.start)) > SHORTEST * self._drawn.size:
+                yield arrow
+
+    def _positions(self, joint: Joint) -> Iterator[Arrow]:
+        for index, frame in zip("ij", self._frames(joint), strict=False):
+            yield Arrow(f"r_{index}", self._place(GROUND_FRAME), self._place(frame), frame)
+
+    def _fixed(self, joint: Joint) -> Iterator[Arrow]:
+        """Yield the points of a joint from their origins, and its directions from their points."""
+        last: dict[PlaneFrame, Array] = {}
+        for item in joint.written.arguments().values():
+            if item.kind is Kind.POINT:
+                place = self._geometry.point(joint, item.symbol)
+                end = place.at(self.evaluation.q)
+                last.setdefault(place.frame, end)
+                yield Arrow(item.symbol, self._place(place.frame), end, place.frame)
+            elif item.kind is Kind.AXIS:
+                frame = self._geometry.frame_of(joint, item.symbol)
+                x, y = self._geometry.pair(joint.points[item.symbol])
+                length = DIRECTION * self._drawn.size / np.hypot(x, y)
+                start = last.get(frame, self._place(frame))
+                way = self._place(frame, length * x, length * y) - self._place(frame)
+                yield Arrow(item.symbol, start, start + way, frame)
+
+    def _separations(self, joint: Joint) -> Iterator[Arrow]:
+        """Yield d from where its negative terms end to where its positive ones do."""
+        expansion = Expansion(SymbolicEnvironment(joint))
+        values = self.evaluation.values
+
+        def where(terms: list[Vector]) -> Array:
+            components = expansion.vector(vector_sum(tuple(terms)))
+            return np.array([evaluate(value, dict(values)) or 0.0 for value in components])
+
+        for vector, glyph in abbreviations(joint.template).items():
+            if isinstance(vector, VectorSum) and not glyph.dots:
+                signs = [split_coefficient(split_factor(term)[0])[0] for term in vector.terms]
+                pairs = list(zip(vector.terms, signs, strict=True))
+                positive = [term for term, sign in pairs if sign > 0]
+                negative = [-term for term, sign in pairs if sign < 0]
+                name = f"d_{glyph.index}" if glyph.index else "d"
+                yield Arrow(name, where(negative), where(positive), GROUND_FRAME)

@@ -1,0 +1,328 @@
+"""`Sketch`: a mechanism from a drawing, joints named once and the links that join them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, TypeVar
+
+from kincompile.errors import ModelError
+from kincompile.model.absolute import AbsoluteAngle, AbsoluteX, AbsoluteY
+from kincompile.model.bodies import GROUND, Body
+from kincompile.model.constraint import Constraint
+from kincompile.model.equation import Equation
+from kincompile.model.gears import Gear
+from kincompile.model.joints import (
+    Revolute,
+    RevoluteTranslational,
+    Translational,
+    TranslationalDistance,
+)
+from kincompile.model.link_shape import ShapeError, drawn_angle, shape
+from kincompile.model.mechanism import Mechanism
+from kincompile.model.relative import Distance, RelativeAngle
+from kincompile.model.sketch_parts import Drawn, Line, Link, minus
+from kincompile.names import listed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import sympy
+
+    from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+    from kincompile.model.resolve import Point
+
+Item = TypeVar("Item", bound=Constraint | Equation)
+
+
+class Sketch:
+    """A mechanism as one draws it: where the joints are, and which of them each link joins.
+
+    Frames, local points, revolute joints and guesses follow. What is on the ground is where it is
+    drawn. A moving link has its shape from its lengths where they are given, and then the drawing
+    is the guess and says on which side a joint is; without lengths it is as drawn. The frame of a
+    link has its origin at its first joint and its xi axis through the second.
+
+    Nothing is refused while drawing; `mechanism` tells all mistakes together.
+
+    Parameters
+    ----------
+    name, length_unit, end, points
+        As for `Mechanism`.
+    """
+
+    def __init__(
+        self, name: str, *, length_unit: str = "m", end: float = 1.0, points: int = 101
+    ) -> None:
+        self._mechanism = Mechanism(name, length_unit=length_unit, end=end, points=points)
+        self._drawn = Drawn(self._mechanism)
+
+    def parameter(self, name: str, default: float | None = None, unit: str = "") -> sympy.Symbol:
+        """Declare a parameter and return its symbol, as `Mechanism.parameter` does."""
+        return self._mechanism.parameter(name, default, unit)
+
+    def length(self, name: str, default: float) -> sympy.Symbol:
+        """Declare a parameter in the unit of length and return its symbol."""
+        return self.parameter(name, default, self._mechanism.length_unit)
+
+    def joints(self, **places: PointLike) -> None:
+        """Draw joints: a place (x, y) by name [length], numbers or expressions of parameters.
+
+        A joint that several links have is a pin. Where lengths are given, a rough place will do.
+        """
+        for name, place in places.items():
+            if name in self._drawn.joints:
+                self._drawn.problems.append(f"joint {name!r} is drawn twice; draw it once")
+            where = self._drawn.pair(place, f"joint {name!r}", "a place (x, y)")
+            self._drawn.joints[name] = where
+
+    def ground(self, **places: PointLike) -> None:
+        """Draw joints of the ground, as `joints` does: these are exactly where they are drawn."""
+        self.joints(**places)
+        ground = self._drawn.links[GROUND.name]
+        own = {name: self._drawn.joints[name] for name in places}
+        self._drawn.links[GROUND.name] = Link(GROUND, {**ground.places, **own})
+
+    def link(
+        self,
+        name: str,
+        joints: str | Sequence[str],
+        length: ValueLike | None = None,
+        /,
+        **lengths: ValueLike | PointLike,
+    ) -> Body:
+        """Join joints by a rigid link and return its body.
+
+        Parameters
+        ----------
+        name
+            Name of the link and of its body.
+        joints
+            Two joints or more, as ``"A B C"``.
+        length
+            Length of a link of two joints.
+        **lengths
+            Distances of joints by their names: ``AB=0.3``, or ``hip_knee=0.3``. A joint's own name
+            gives its place in the frame of the link: ``P=(0.1, 0.05)``.
+        """
+        drawn, what = self._drawn, f"link {name!r}"
+        named = drawn.named(joints, what, 2)
+        if named is None:
+            return self._added(name)
+        outline = drawn.outline(named, *drawn.lengths(what, named, length, lengths))
+        places: Mapping[str, Point] = dict.fromkeys(named, (0, 0))
+        try:
+            places = shape(outline)
+        except ShapeError as error:
+            drawn.problems.append(f"{what}: {error}")
+        angle = drawn_angle(outline, named[0], named[1])
+        return self._added(name, places, drawn.joints[named[0]], angle)
+
+    def wheel(self, name: str, joint: str) -> Body:
+        """Add a body that turns about one joint, a gear wheel, and return it; drawn at angle 0."""
+        named = self._drawn.named(joint, f"wheel {name!r}", 1, most=1)
+        if named is None:
+            return self._added(name)
+        return self._added(name, {named[0]: (0, 0)}, self._drawn.joints[named[0]])
+
+    def slider(
+        self,
+        name: str,
+        joints: str | Sequence[str],
+        along: str | PointLike,
+        on: BodyLike = GROUND,
+    ) -> Body:
+        """Add a body that slides along a straight guide without turning, and return it.
+
+        Parameters
+        ----------
+        name
+            Name of the slider; its guide is the constraint ``<name>_guide``.
+        joints
+            Joints that it carries, as drawn; the first is on the guide.
+        along
+            The guide: through two joints of one link, as ``"C D"``; or a direction (x, y) in the
+            drawing, through the place where the first joint is drawn.
+        on
+            The link that has a guide given by a direction; the ground if none is named.
+        """
+        drawn, what = self._drawn, f"slider {name!r}"
+        named = drawn.named(joints, what, 1)
+        guide = None if named is None else drawn.line(named[0], along, on, what)
+        if named is None or guide is None:
+            return self._added(name)
+        origin = drawn.joints[named[0]]
+        base = guide.link
+        places = {joint: base.turned(minus(drawn.joints[joint], origin)) for joint in named}
+        body = self._added(name, places, origin, base.angle, guide)
+        own = (body, (0, 0), guide.axis)
+        self.add(Translational(f"{name}_guide", base.body, guide.point, guide.axis, *own))
+        return body
+
+    def slot(self, joint: str, along: str | PointLike, on: BodyLike = GROUND) -> None:
+        """Let a joint of a link run along a straight line of another, as a pin in a slot.
+
+        Parameters
+        ----------
+        joint
+            The joint; a link has it already. The constraint is ``<joint>_slot``.
+        along, on
+            The line, as for `slider`.
+        """
+        what = f"slot of {joint!r}"
+        line = self._drawn.line(joint, along, on, what)
+        pin = None if line is None else self._drawn.holder(joint, what)
+        if line is not None and pin is not None:
+            pinned = (pin.body, pin.places[joint], 0)
+            slot = (line.link.body, line.point, line.axis)
+            self.add(RevoluteTranslational(f"{joint}_slot", *slot, *pinned))
+
+    def gear(
+        self,
+        name: str,
+        i: BodyLike,
+        centre_i: str,
+        radius_i: ValueLike,
+        j: BodyLike,
+        centre_j: str,
+        radius_j: ValueLike,
+    ) -> None:
+        """Let two links roll on each other as gears, whose teeth mesh as drawn.
+
+        Parameters
+        ----------
+        name
+            Name of the gear.
+        i, j
+            The links or wheels.
+        centre_i, centre_j
+            The joint at the centre of each; what keeps them apart is a link.
+        radius_i, radius_j
+            Pitch radii [length], negative for an internal gear.
+        """
+        drawn, what = self._drawn, f"gear {name!r}"
+        first, second = drawn.link_of(i, what), drawn.link_of(j, what)
+        named = drawn.named((centre_i, centre_j), what, 2, most=2)
+        if named is None or first is None or second is None:
+            return
+        towards = drawn_angle(drawn.outline(named), *named)
+        wheel_i = (first.body, self.place(i, centre_i), radius_i, towards - first.angle)
+        wheel_j = (second.body, self.place(j, centre_j), radius_j, towards + math.pi - second.angle)
+        self.add(Gear(name, *wheel_i, *wheel_j))
+
+    def drive(self, what: str, value: ValueLike, against: BodyLike | None = None) -> None:
+        """Prescribe a motion by a function of `kc.t`; the constraint is ``drive_<what>``.
+
+        Parameters
+        ----------
+        what
+            A link: the angle of its xi axis [rad]; a slider: its way along the guide, from the
+            first joint of the guide, or from where it is drawn; two joints ``"A B"``: their
+            distance; ``"A.x"`` or ``"A.y"``: a coordinate of a joint.
+        value
+            What it is.
+        against
+            The link from which the angle of a link is counted; the x axis if none is named.
+        """
+        name = "drive_" + "_".join(what.replace(".", " ").split())
+        link = self._drawn.links.get(what)
+        if link is not None:
+            constraint = self._turning_or_sliding(name, link, value, against)
+        else:
+            constraint = self._moving_joints(name, what, value)
+        if constraint is not None:
+            self.add(constraint)
+
+    def add(self, constraint: Item) -> Item:
+        """Add any constraint, as `Mechanism.add` does; `place` gives its points."""
+        return self._mechanism.add(constraint)
+
+    def place(self, link: BodyLike, joint: str) -> Point:
+        """Return where a joint is in the frame of a link that has it, (xi, eta)."""
+        found = self._drawn.link_of(link, f"joint {joint!r}")
+        if found is not None and joint not in found.places:
+            self._drawn.problems.append(
+                f"the link {found.body.name!r} has no joint {joint!r}; it has "
+                f"{listed(found.places)}"
+            )
+        return (0, 0) if found is None else found.places.get(joint, (0, 0))
+
+    def mechanism(self) -> Mechanism:
+        """Return the mechanism, to which more may be added.
+
+        Raises
+        ------
+        ModelError
+            With everything that is wrong with the drawing.
+        """
+        drawn = self._drawn
+        held = {joint for link in drawn.links.values() for joint in link.places}
+        loose = [joint for joint in drawn.joints if joint not in held]
+        problems = [*drawn.problems]
+        if loose:
+            problems.append(
+                f"no link has the joints {listed(loose)}; name them in a link, or do not draw them"
+            )
+        if problems:
+            raise ModelError(list(dict.fromkeys(problems)))
+        return self._mechanism
+
+    def __repr__(self) -> str:
+        """Return name and sizes."""
+        sizes = f"{len(self._drawn.joints)} joints, {len(self._drawn.links) - 1} links"
+        return f"<Sketch {self._mechanism.name!r}: {sizes}; .mechanism() makes the model>"
+
+    def _added(
+        self,
+        name: str,
+        places: Mapping[str, Point] | None = None,
+        origin: Point = (0, 0),
+        angle: float = 0.0,
+        guide: Line | None = None,
+    ) -> Body:
+        """Add a body, and a pin for each of its joints that another link has already."""
+        drawn, places = self._drawn, places or {}
+        if name in drawn.links:
+            remedy = "draw its joints with s.ground(A=(x, y))" if name == GROUND.name else "rename"
+            drawn.problems.append(f"there is a link {name!r} already; {remedy}")
+        body = self._mechanism.body(name, guess=(*origin, angle))
+        taken = {item.name for item in self._mechanism.constraints}
+        for joint, place in places.items():
+            other = drawn.first(joint)
+            if other is not None:
+                pin = joint if joint not in taken else f"{joint}_{name}"
+                self.add(Revolute(pin, other.body, other.places[joint], body, place))
+        drawn.links[name] = Link(body, places, angle, guide)
+        return body
+
+    def _turning_or_sliding(
+        self, name: str, link: Link, value: ValueLike, against: BodyLike | None
+    ) -> Constraint | None:
+        """Return the driver of a link's angle, or of a slider's way."""
+        if link.guide is not None:
+            guide = (link.guide.link.body, link.guide.point, link.guide.axis)
+            return TranslationalDistance(name, *guide, link.body, (0, 0), value)
+        if against is None:
+            return AbsoluteAngle(name, link.body, value)
+        base = self._drawn.link_of(against, f"drive of {link.body.name!r}")
+        return None if base is None else RelativeAngle(name, base.body, link.body, value)
+
+    def _moving_joints(self, name: str, what: str, value: ValueLike) -> Constraint | None:
+        """Return the driver of a joint's coordinate, or of the distance of two joints."""
+        drawn, title = self._drawn, f"drive of {what!r}"
+        joint, _, letter = what.partition(".")
+        kind = {"x": AbsoluteX, "y": AbsoluteY}.get(letter)
+        ends = (joint,) if kind is not None else tuple(what.split())
+        if kind is None and len(ends) < 2:
+            drawn.problems.append(
+                f"{title}: drive a link, a slider, the distance of two joints 'A B', or a "
+                f"coordinate of a joint 'A.x'; links so far are: {listed(drawn.links)}"
+            )
+            return None
+        named = drawn.named(ends, title, len(ends), most=1 if kind else 2)
+        held = [(drawn.holder(end, title), end) for end in named or ()]
+        points = [(link.body, link.places[end]) for link, end in held if link is not None]
+        if len(points) < len(ends):
+            return None
+        if kind is not None:
+            return kind(name, *points[0], value)
+        return Distance(name, *points[0], *points[1], value)

@@ -1,0 +1,238 @@
+"""A mechanism at one position as a still picture: paths and labels, for HTML and LaTeX.
+
+The paths are the polylines that matplotlib draws. Vectors with their names may be drawn over them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.view.marks import GROUND_FRAME, moves_with
+from kincompile.view.polylines import GROUND_COLOUR, LOOKS, Polyline, of_mark
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from kincompile.view.drawing import Drawing
+    from kincompile.view.marks import Array, Mark, PlaneFrame
+
+WIDTH, TALLEST = 480.0, 340.0
+"""Largest sides of a picture [points]."""
+
+MARGIN = 24.0
+"""Room around it for labels [points]."""
+
+FAINT = 0.25
+"""Opacity of what a picture is not about."""
+
+MOST_FAINT = 12
+"""Bodies up to which those that a picture is not about are shown."""
+
+HUES = ("#2563eb", "#b45309", "#047857", "#7c3aed", "#0e7490", "#be185d", "#4d7c0f", "#475569")
+"""Colours of bodies, those of the page."""
+
+HEAD, THICK = 7.0, 1.4
+"""Length of the head of a vector, and width of its line [points]."""
+
+ASIDE = 9.0
+"""Distance of a label from its vector [points]."""
+
+ROOM = 17.0
+"""Distance that labels keep from each other where they can [points]."""
+
+ALONG = (0.5, 0.65, 0.35, 0.8, 0.2)
+"""Where a label may stand beside its vector, in parts of it, the best place first."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PicturePath:
+    """A line or an area on the picture.
+
+    Attributes
+    ----------
+    points
+        Corners [points], y upwards.
+    stroke, fill
+        Colours; "" for none.
+    width
+        Of the line.
+    opacity
+        Of the whole; the area of a body is paler by `FILL`.
+    is_pale
+        Whether the area has the pale colour of its line.
+    dash
+        "--", ":" or "" for an unbroken line.
+    """
+
+    points: Array
+    stroke: str
+    fill: str
+    width: float
+    opacity: float = 1.0
+    is_pale: bool = False
+    dash: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PictureLabel:
+    """A symbol by its name, such as `s_i`, centred at a point."""
+
+    x: float
+    y: float
+    name: str
+    colour: str
+    is_vector: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """A vector to be drawn, in the axes of the ground.
+
+    Attributes
+    ----------
+    name
+        Name of its symbol, such as ``"s_i"``.
+    start, end
+        Where it begins and ends.
+    frame
+        The frame whose colour it has.
+    is_vector
+        Whether its symbol is bold; an axis of a frame is not.
+    """
+
+    name: str
+    start: Array
+    end: Array
+    frame: PlaneFrame
+    is_vector: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """Paths and labels, from back to front, in a frame of some width and height [points]."""
+
+    title: str
+    width: float
+    height: float
+    paths: tuple[PicturePath, ...]
+    labels: tuple[PictureLabel, ...]
+
+
+def picture(
+    drawn: Drawing,
+    q: Array,
+    title: str,
+    arrows: Sequence[Arrow] = (),
+    focus: Iterable[PlaneFrame] | None = None,
+) -> Picture:
+    """Draw a mechanism.
+
+    Parameters
+    ----------
+    drawn
+        Its shapes.
+    q : ndarray, shape (n,)
+        The position.
+    title
+        What is shown, for those who cannot see it.
+    arrows
+        Vectors over it.
+    focus
+        Frames that the picture is about; what moves with others is faint. All by default.
+    """
+    scale = _Scale(drawn, q, arrows)
+    shown = None if focus is None else {*focus, GROUND_FRAME}
+    paths = [
+        path
+        for mark in drawn.marks
+        if shown is None or len(drawn.bodies) <= MOST_FAINT or moves_with(mark) <= shown
+        for polyline in of_mark(mark, drawn.size)
+        for path in _paths(polyline, q, scale, _opacity(mark, shown))
+    ]
+    labels: list[PictureLabel] = []
+    for arrow in arrows:
+        start, end = scale.at(arrow.start), scale.at(arrow.end)
+        paths += _arrow(arrow, start, end)
+        x, y = _free(_places(arrow, start, end), labels)
+        colour = colour_of(arrow.frame)
+        labels.append(PictureLabel(x, y, arrow.name, colour, arrow.is_vector))
+    return Picture(title, scale.width, scale.height, tuple(paths), tuple(labels))
+
+
+class _Scale:
+    """From the lengths of a model to points of a picture that shows marks and arrows."""
+
+    def __init__(self, drawn: Drawing, q: Array, arrows: Sequence[Arrow]) -> None:
+        left, right, low, high = drawn.extent(q)
+        corners = [np.array(((left, low), (right, high)))]
+        corners += [np.stack((arrow.start, arrow.end)) for arrow in arrows]
+        points = np.concatenate(corners)
+        self._low = points.min(axis=0)
+        wide, tall = points.max(axis=0) - self._low
+        self._factor = min((WIDTH - 2 * MARGIN) / wide, (TALLEST - 2 * MARGIN) / tall)
+        self.width = self._factor * float(wide) + 2 * MARGIN
+        self.height = self._factor * float(tall) + 2 * MARGIN
+
+    def at(self, points: Array) -> Array:
+        """Return where points of the ground are on the picture."""
+        return np.asarray(MARGIN + self._factor * (points - self._low), dtype=np.float64)
+
+
+def _opacity(mark: Mark, shown: set[PlaneFrame] | None) -> float:
+    return 1.0 if shown is None or moves_with(mark) <= shown else FAINT
+
+
+def colour_of(frame: PlaneFrame) -> str:
+    """Return the colour of a body, or of the ground."""
+    return GROUND_COLOUR if frame == GROUND_FRAME else HUES[frame.index % len(HUES)]
+
+
+def _paths(polyline: Polyline, q: Array, scale: _Scale, opacity: float) -> Iterable[PicturePath]:
+    """Yield a polyline in pieces, which NaN separates."""
+    look, points = LOOKS[polyline.look], scale.at(polyline.at(q))
+    colour = look.colour or colour_of(polyline.frame)
+    if polyline.is_area:
+        fill = look.face or colour
+        yield PicturePath(points, colour, fill, look.width, opacity, is_pale=not look.face)
+        return
+    gaps = np.flatnonzero(np.isnan(points).any(axis=1))
+    for piece in np.split(points, gaps):
+        kept = piece[~np.isnan(piece).any(axis=1)]
+        if len(kept) > 1:
+            strength = opacity * look.opacity
+            yield PicturePath(kept, colour, "", look.width, strength, dash=look.dash)
+
+
+def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, PicturePath]:
+    """Return line and head of a vector between two points of the picture."""
+    colour, length = colour_of(arrow.frame), float(np.hypot(*(end - start)))
+    along = (end - start) / length
+    left = np.array((-along[1], along[0]))
+    head = min(HEAD, 0.6 * length)
+    neck = end - head * along
+    corners = np.stack((end, neck + 0.38 * head * left, neck - 0.38 * head * left))
+    line = PicturePath(np.stack((start, neck)), colour, "", THICK)
+    return line, PicturePath(corners, "", colour, 0.0)
+
+
+def _places(arrow: Arrow, start: Array, end: Array) -> list[Array]:
+    """Return where the label of a vector may stand; that of an axis is at its end."""
+    along = (end - start) / float(np.hypot(*(end - start)))
+    aside = ASIDE * np.array((-along[1], along[0]))
+    if not arrow.is_vector:
+        return [end + ASIDE * along, end + aside, end - aside]
+    return [start + part * (end - start) + side for part in ALONG for side in (aside, -aside)]
+
+
+def _free(places: list[Array], labels: list[PictureLabel]) -> tuple[float, float]:
+    """Return the first place that is far enough from all labels, or the farthest."""
+
+    def distance(place: Array) -> float:
+        near = (float(np.hypot(place[0] - item.x, place[1] - item.y)) for item in labels)
+        return min(min(near, default=ROOM), ROOM)
+
+    x, y = max(places, key=distance)
+    return float(x), float(y)

@@ -1,0 +1,105 @@
+"""Figures of a derivation: vectors begin and end where the equation says."""
+
+import xml.etree.ElementTree as ET
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+from kincompile.derivation.document import Figure
+from kincompile.derivation.evaluation import evaluation
+from kincompile.derivation.figures import Figures
+from kincompile.derivation.svg import as_svg
+from kincompile.view.picture import Arrow
+
+
+def offset_slider() -> kc.Mechanism:
+    """Return one body on a slanted guide, with a driven distance to a point of the ground."""
+    m = kc.Mechanism("offset")
+    body = m.body("block", guess=(3.0, 1.0, 0.5))
+    m.add(kc.Translational("guide", m.ground, (0.5, 1.0), (3, 1), body, (0.2, -0.1), (3, 1)))
+    m.add(kc.Distance("rod", m.ground, (-1, 2), body, (0.4, 0.3), 3 + kc.t))
+    return m
+
+
+STATE = {"x_block": 2.0, "y_block": 1.5, "phi_block": 0.4}
+
+
+def arrows_of(name: str) -> dict[str, Arrow]:
+    """Return the vectors of a constraint at the state, by name."""
+    figures = Figures(evaluation(offset_slider().system(), STATE))
+    joint = next(item for item in figures.evaluation.system.constraints if item.name == name)
+    return {arrow.name: arrow for arrow in figures.vectors(joint)}  # type: ignore[arg-type]
+
+
+def turned(x: float, y: float) -> Any:
+    c, s = np.cos(0.4), np.sin(0.4)
+    return np.array((c * x - s * y, s * x + c * y))
+
+
+def test_that_vectors_begin_and_end_where_the_equation_says() -> None:
+    arrows = arrows_of("guide")
+    origin = np.array((2.0, 1.5))
+    assert set(arrows) == {"r_j", "s_i", "s_j", "v_i", "v_j", "d"}
+    for name, start, end in (
+        ("r_j", (0, 0), origin),
+        ("s_i", (0, 0), (0.5, 1.0)),
+        ("s_j", origin, origin + turned(0.2, -0.1)),
+        ("d", (0.5, 1.0), origin + turned(0.2, -0.1)),
+    ):
+        np.testing.assert_allclose(arrows[name].start, start, atol=1e-12)
+        np.testing.assert_allclose(arrows[name].end, end, atol=1e-12)
+    way = arrows["v_j"].end - arrows["v_j"].start
+    np.testing.assert_allclose(way / np.hypot(*way), turned(3, 1) / np.sqrt(10), atol=1e-12)
+    np.testing.assert_allclose(arrows["v_j"].start, origin + turned(0.2, -0.1), atol=1e-12)
+
+
+def test_that_a_vector_of_no_length_is_not_drawn() -> None:
+    m = kc.Mechanism("pinned")
+    body = m.body("arm", guess=(0, 0, 0.3))
+    m.add(kc.Revolute("A", m.ground, (0, 0), body, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", body, kc.t))
+    figures = Figures(evaluation(m.system(), 0.3))
+    joint = figures.evaluation.system.constraints[0]
+    assert list(figures.vectors(joint)) == []  # type: ignore[arg-type]
+
+
+def test_that_a_figure_is_an_image_with_its_symbols() -> None:
+    figures = Figures(evaluation(offset_slider().system(), STATE))
+    joint = figures.evaluation.system.constraints[0]
+    element = ET.fromstring(as_svg(figures.joint(joint)))  # type: ignore[arg-type]
+    labels = {"".join(item.itertext()) for item in element.iter("text")}
+    bold_d, bold_s = "\N{MATHEMATICAL BOLD SMALL D}", "\N{MATHEMATICAL BOLD SMALL S}"
+    assert {bold_d, f"{bold_s}\N{MATHEMATICAL ITALIC SMALL I}\N{PRIME}"} <= labels
+    width, height = float(element.get("width", 0)), float(element.get("height", 0))
+    for item in element.iter("text"):
+        assert 0 < float(item.get("x", -1)) < width
+        assert 0 < float(item.get("y", -1)) < height
+
+
+def test_that_each_joint_has_a_figure_and_the_mechanism_one(gallery: Any, sections_of: Any) -> None:
+    derivation = kc.derivation(gallery)
+    count = sum(
+        isinstance(block, Figure) for section in sections_of(derivation) for block in section.blocks
+    )
+    joints = [item for item in gallery.system().constraints if item.name not in ("free", "pieces")]
+    assert count == len(joints) + 1
+    assert derivation.to_html().count('<svg class="figure"') == count
+    assert derivation.to_latex().count(r"\begin{picture}") == count
+    assert derivation.to_notebook().count("data:image/svg+xml") == count
+
+
+def test_that_equations_without_bodies_have_no_figure(example_named: Any) -> None:
+    assert "<figure>" not in kc.derivation(example_named("problem_3_5_6").model).to_html()
+
+
+@pytest.mark.parametrize("name", ["wrecker_boom", "gear_train", "cam_flat_follower"])
+def test_that_nothing_of_a_picture_is_outside_it(name: str, example_named: Any) -> None:
+    figures = Figures(evaluation(example_named(name).model.system(), 0.2))
+    shown = figures.mechanism()
+    assert shown is not None
+    for path in shown.paths:
+        x, y = np.asarray(path.points).T
+        assert -1 < x.min() <= x.max() < shown.width + 1
+        assert -1 < y.min() <= y.max() < shown.height + 1
