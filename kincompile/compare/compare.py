@@ -182,8 +182,12 @@ def _read(
     for name in QUANTITIES:
         if name in given:
             try:
-                written[name] = read_written(name, given[name], words, reference, at_states)
-                problems += _shape_problems(name, written[name], reference, block)
+
+                def check(rows: int, columns: int, name: str = name) -> list[str]:
+                    return _shape_problems(name, rows, columns, reference, block)
+
+                written[name] = read_written(name, given[name], words, reference, at_states, check)
+                problems += check(*written[name].shape)
             except InputError as error:
                 problems += error.problems
     if problems:
@@ -192,9 +196,8 @@ def _read(
 
 
 def _shape_problems(
-    name: str, written: Written, reference: Reference, block: ConstraintBlock | None
+    name: str, rows: int, columns: int, reference: Reference, block: ConstraintBlock | None
 ) -> list[str]:
-    rows, columns = written.shape
     names = reference.equations if block is None else block.constraint.equation_names
     found = []
     if rows != len(names):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,21 +12,28 @@ import sympy
 
 from kincompile.compare.matrix_text import Cell, split_matrix
 from kincompile.errors import InputError
+from kincompile.files.data_text import MAX_PROBLEMS
 from kincompile.files.safe_expressions import (
     CONSTANTS,
     FUNCTIONS,
     ExpressionError,
     Place,
+    extent,
     parse_expression,
 )
 from kincompile.model.expressions import NotAnExpressionError, as_expression, symbol_names, t
-from kincompile.names import listed, name_problem, rate, suggestion
+from kincompile.names import listed, name_problem, rate, shown, suggestion
 
 if TYPE_CHECKING:
     from kincompile.compare.reference import Reference
     from kincompile.compare.states import Array, States
 
 Texts = tuple[tuple[str, ...], ...]
+
+MAX_ALIASES = 1000
+"""Names of the author's own."""
+MAX_SIZE = 1_000_000
+"""Characters of all formulas and parts with aliases written out; as many take about 10 s."""
 
 _NO_ACCELERATIONS = "accelerations are the unknowns of Phi_q q_ddot = gamma; no formula holds them"
 
@@ -58,12 +65,37 @@ class Written:
         return len(self.texts), len(self.texts[0])
 
 
+class _Formulas:
+    """Formulas that were read, by their text: most entries of a large matrix are alike."""
+
+    def __init__(self) -> None:
+        self._read: dict[str, sympy.Expr] = {}
+        self._size = 0
+
+    def read(self, text: str, place: Place | None, words: Vocabulary) -> sympy.Expr:
+        """Return a text as an expression; the names in it must mean what they meant before."""
+        if text not in self._read:
+            if self._size > MAX_SIZE:
+                raise NotAnExpressionError(
+                    f"all formulas together have more than {MAX_SIZE:,} characters and parts, "
+                    "aliases written out; write them shorter"
+                )
+            self._size += len(text)
+            self._read[text] = parse_expression(text, words.names, place, words.refused)
+            self._size += extent(self._read[text])[0]
+        return self._read[text]
+
+
 @dataclass(frozen=True, slots=True)
 class Vocabulary:
-    """Names that a formula may use, and names that exist but may not stand in one."""
+    """Names that a formula may use, and names that exist but may not stand in one.
+
+    Names may be added while formulas are read, but not change what they mean.
+    """
 
     names: Mapping[str, sympy.Expr]
     refused: Mapping[str, str]
+    formulas: _Formulas = field(default_factory=_Formulas)
 
     def read(self, value: object) -> sympy.Expr:
         """Return a text, a `Cell`, a number or a SymPy expression in plain symbols.
@@ -74,9 +106,9 @@ class Vocabulary:
             If it is none of these, or holds an unknown name.
         """
         if isinstance(value, Cell):
-            return parse_expression(value.text, self.names, value.place, self.refused)
+            return self.formulas.read(value.text, value.place, self)
         if isinstance(value, str):
-            return parse_expression(value, self.names, None, self.refused)
+            return self.formulas.read(value, None, self)
         expression: sympy.Expr = sympy.sympify(as_expression(_without_derivatives(value)))
         unknown = sorted(symbol_names(expression) - set(self.names))
         if unknown:
@@ -119,6 +151,8 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
     InputError
         If an alias is not a name, hides a name of the system, or is not an expression.
     """
+    if len(aliases) > MAX_ALIASES:
+        raise InputError(f"there are {len(aliases)} aliases; at most {MAX_ALIASES} are read")
     symbols = [*reference.coordinates, *(item.name for item in reference.system.parameters)]
     names: dict[str, sympy.Expr] = {name: sympy.Symbol(name) for name in symbols}
     names["t"] = t
@@ -127,19 +161,23 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
         names[rate(name)] = sympy.Symbol(rate(name))
         names.setdefault(f"{name}d", names[rate(name)])
         refused[rate(name, 2)] = refused[f"{name}dd"] = _NO_ACCELERATIONS
+    words = Vocabulary(names, refused)
     problems = []
     for name, value in aliases.items():
         problem = _alias_problem(name, names)
         try:
             if problem is None:
-                names[name] = Vocabulary(names, refused).read(value)
+                names[name] = words.read(value)
         except NotAnExpressionError as error:
             problem = str(error)
         if problem is not None:
-            problems.append(f"alias {name!r}: {problem}")
+            problems.append(f"alias {shown(name)}: {problem}")
+        if len(problems) == MAX_PROBLEMS:
+            break
     if problems:
         raise InputError(problems)
-    return Vocabulary(names, {name: why for name, why in refused.items() if name not in names})
+    still_refused = {name: why for name, why in refused.items() if name not in names}
+    return Vocabulary(names, still_refused, words.formulas)
 
 
 def _alias_problem(name: str, names: Mapping[str, sympy.Expr]) -> str | None:
@@ -149,7 +187,12 @@ def _alias_problem(name: str, names: Mapping[str, sympy.Expr]) -> str | None:
 
 
 def read_written(
-    quantity: str, given: object, words: Vocabulary, reference: Reference, at_states: bool
+    quantity: str,
+    given: object,
+    words: Vocabulary,
+    reference: Reference,
+    at_states: bool,
+    shape_problems: Callable[[int, int], list[str]],
 ) -> Written:
     """Read one quantity in any of the forms a user may give it.
 
@@ -167,6 +210,9 @@ def read_written(
         The system that the quantity belongs to.
     at_states
         Whether an array holds values at given states.
+    shape_problems
+        Says what is wrong with a number of rows and columns. It is asked before any formula is
+        read: a file can hold more of them than anyone could wait for.
 
     Raises
     ------
@@ -179,8 +225,17 @@ def read_written(
         return _from_function(quantity, given, reference)
     rows = _rows(quantity, given)
     _check_rectangular(quantity, rows)
-    problems: list[str] = []
+    if quantity != "Phi_q" and len(rows) == 1:
+        rows = [[cell] for cell in rows[0]]
+    if problems := shape_problems(len(rows), len(rows[0])):
+        raise InputError(problems)
+    return _from_expressions(rows, _expressions(quantity, rows, words), reference)
+
+
+def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> list[sympy.Expr]:
+    """Return the entries as expressions, row by row."""
     expressions: list[sympy.Expr] = []
+    problems: list[str] = []
     for r, row in enumerate(rows, 1):
         for c, cell in enumerate(row, 1):
             try:
@@ -189,11 +244,11 @@ def read_written(
                 # A cell knows its own place in the file.
                 place = "" if isinstance(cell, Cell) else f"row {r}, column {c}: "
                 problems.append(f"{quantity}, {place}{error}")
+        if len(problems) >= MAX_PROBLEMS:
+            break
     if problems:
         raise InputError(problems)
-    if quantity != "Phi_q" and len(rows) == 1:
-        rows = [[cell] for cell in rows[0]]
-    return _from_expressions(rows, expressions, reference)
+    return expressions
 
 
 def _rows(quantity: str, given: object) -> list[list[object]]:

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from kincompile.errors import ModelError
-from kincompile.files.data_text import decoded, listed_problems, read_json
-from kincompile.files.file_fields import FieldReader, shown
+from kincompile.files.content import decoded
+from kincompile.files.data_text import listed_problems, read_json
+from kincompile.files.file_fields import FieldReader
 from kincompile.files.file_format import MOST_POINTS
 from kincompile.model.absolute import AbsoluteAngle, AbsoluteDistance, AbsoluteX, AbsoluteY
 from kincompile.model.expressions import evaluate, t
@@ -27,7 +28,7 @@ from kincompile.model.gears import RackAndPinion
 from kincompile.model.joints import Revolute, Translational
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.relative import Distance, RelativeX, RelativeY
-from kincompile.names import listed, name_problem, suggestion
+from kincompile.names import listed, name_problem, shown, suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -245,7 +246,7 @@ class _AdmReader(FieldReader):
     def _constraint(self, address: Address, row: Row) -> Constraint | None:
         kind = row.get("type")
         if not isinstance(kind, str) or kind not in _CONSTRAINTS:
-            hint = suggestion(kind[:40], _CONSTRAINTS) if isinstance(kind, str) else ""
+            hint = suggestion(kind, _CONSTRAINTS) if isinstance(kind, str) else ""
             given = f"no constraint type {shown(kind)}" if "type" in row else "no type"
             text = f"there is {given}{hint}; types are: {listed(_CONSTRAINTS)}"
             self.problem((*address, "type"), text)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.model.arguments import Kind
 from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.model.laws import RISES
+from kincompile.names import MOST_CHARACTERS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,7 +40,9 @@ class Field:
 
 
 _TEXT: dict[str, Any] = {"type": "string"}
-_NAME: dict[str, Any] = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$"}
+_NAME: dict[str, Any] = {
+    "type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": MOST_CHARACTERS,
+}  # fmt: skip
 _NUMBER: dict[str, Any] = {"type": "number"}
 _EXPRESSION: dict[str, Any] = {"$ref": "#/$defs/expression"}
 _POINT: dict[str, Any] = {

@@ -24,7 +24,7 @@ import sympy
 
 from kincompile.errors import ModelError
 from kincompile.files.data_text import listed_problems, read_json, read_toml
-from kincompile.files.file_fields import FieldReader, shown
+from kincompile.files.file_fields import FieldReader
 from kincompile.files.file_format import (
     FIELDS,
     MOST_POINTS,
@@ -40,7 +40,7 @@ from kincompile.model.equation import Equation
 from kincompile.model.expressions import alpha, t
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.system import ConstraintSystem
-from kincompile.names import listed, suggestion
+from kincompile.names import listed, shown, suggestion
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -247,7 +247,7 @@ class _ModelReader(FieldReader):
         kind = row.get("type")
         known = (*CONSTRAINTS, "Equation")
         if not isinstance(kind, str) or kind not in known:
-            hint = suggestion(kind[:40], known) if isinstance(kind, str) else ""
+            hint = suggestion(kind, known) if isinstance(kind, str) else ""
             given = f"no type {shown(kind)}" if "type" in row else "no type"
             self.problem((*address, "type"), f"there is {given}{hint}; types: {listed(known, 20)}")
             return None
@@ -316,7 +316,7 @@ class _ModelReader(FieldReader):
         if not isinstance(given, str):
             self.problem(address, f"expected the name of a body, not {shown(given)}")
         elif given not in self._bodies and given != GROUND.name:
-            near = suggestion(given[:40], list(self._bodies)[:1000])
+            near = suggestion(given, self._bodies)
             known = listed((GROUND.name, *self._bodies))
             self.problem(address, f"there is no body {shown(given)}{near}; bodies are: {known}")
         return str(given)

@@ -3,73 +3,172 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from kincompile.criteria import RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
-from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.engine import Point
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
-from kincompile.runtime.march import March, Outcome, State, give_up, leaves_branch, start
-from kincompile.runtime.problem import problem
+from kincompile.runtime.march import March, Outcome, State
+from kincompile.runtime.newton import give_up, start
+from kincompile.runtime.problem import Dense, problem
 from kincompile.runtime.singular.events import branch_switch, locate, singular_start
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.code import Array
     from kincompile.runtime.engine.engine import Engine
     from kincompile.runtime.inputs import Inputs
-    from kincompile.runtime.motion import Motion, Progress
-    from kincompile.runtime.singular.events import Passage
+    from kincompile.runtime.singular.events import Event, Passage
+
+    Progress: TypeAlias = Callable[[int, int], object]
 
 LARGEST_CAREFUL = 1000
 """Coordinates up to which a large mechanism is left to dense matrices where the stages fail: there
 a step takes a fraction of a second."""
 
 
-def follow(
-    inputs: Inputs, motion: Motion, on_grid: bool, smooth: bool, progress: Progress | None
-) -> Outcome:
+@dataclass(slots=True, eq=False)
+class Motion:
+    """The arrays of a solution while they are being filled, N points and n coordinates.
+
+    Attributes
+    ----------
+    q, q_dot, q_ddot : ndarray, shape (N, n)
+        The motion; NaN where nothing was found.
+    status, residual, iterations : ndarray, shape (N,)
+        What became of each point.
+    statistics : dict
+        How many points were found in which way.
+    events, passed : list of Event
+        What happened on the way, and those of it that the motion went through.
+    near : list of int
+        Points so near to a singular configuration that their rates are uncertain.
+    note : str
+        A remark for the message of the solution.
+    """
+
+    q: Array
+    q_dot: Array
+    q_ddot: Array
+    status: NDArray[np.int64]
+    residual: Array
+    iterations: NDArray[np.int64]
+    statistics: dict[str, int]
+    events: list[Event] = field(default_factory=list)
+    passed: list[Event] = field(default_factory=list)
+    near: list[int] = field(default_factory=list)
+    note: str = ""
+
+    @classmethod
+    def over(cls, inputs: Inputs) -> Motion:
+        """Make the arrays for a time grid, with nothing reached."""
+        points = inputs.t.size
+        if inputs.code.stages:
+            q, q_dot, q_ddot = np.full((3, points, inputs.guess.size), np.nan)
+        else:  # each coordinate contiguous in memory, as the code of a grid wants it
+            q, q_dot, q_ddot = np.full((3, inputs.guess.size, points), np.nan).transpose(0, 2, 1)
+        return cls(
+            q,
+            q_dot,
+            q_ddot,
+            np.full(points, int(Status.NOT_REACHED)),
+            np.full(points, np.nan),
+            np.zeros(points, dtype=np.int64),
+            {"coarse": 0, "marched": 0},
+        )
+
+    def forget(self, index: int) -> None:
+        """Clear the results of a grid after the last point reached."""
+        for values in (self.q, self.q_dot, self.q_ddot, self.residual):
+            values[index:] = np.nan
+        self.iterations[index:] = 0
+
+    def put(self, index: int, outcome: Outcome) -> None:
+        """Write down what became of a point."""
+        self.status[index] = outcome.status
+        self.iterations[index] = outcome.iterations
+        self.q[index] = self.q_dot[index] = self.q_ddot[index] = np.nan
+        self.residual[index] = np.nan
+        if outcome.position is not None:
+            self.q[index] = outcome.position.q
+        if (point := outcome.position or (None if outcome.jumps else outcome.nearest)) is not None:
+            self.residual[index] = np.max(np.abs(point.Phi))
+        if outcome.status is Status.CONVERGED and outcome.state is not None:
+            self.q_dot[index] = outcome.state.q_dot
+            self.q_ddot[index] = outcome.state.q_ddot
+            if outcome.state.sensitivity > TOO_NEAR:
+                self.near.append(index)
+
+
+def follow(inputs: Inputs, progress: Progress | None = None) -> tuple[Motion, Outcome]:
     """Go through the grid up to its end, or to the first point that fails.
 
-    What ends a motion is found and noted; with `smooth` it goes on past a bifurcation.
+    What ends a motion is found and noted; with `inputs.smooth` it goes on past a bifurcation.
     """
-    way = _Way(inputs, motion, on_grid, progress)
+    motion = Motion.over(inputs)
+    if inputs.method is None and _march_compiled(inputs, motion):
+        return motion, Outcome(Status.CONVERGED, 0, None)
+    way = _Way(inputs, motion, progress)
     outcome = way.run(way.start())
     while outcome.status is not Status.CONVERGED:
         passage = way.explain(outcome)
-        if passage is None or not smooth:
+        if passage is None or not inputs.smooth:
             break
         outcome = way.run(way.go_through(passage))
     way.end()
-    return outcome
+    return motion, outcome
+
+
+def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
+    """Let a compiled module follow the motion; say whether all went well.
+
+    Where anything did not, the careful march finds out what it is, from the first time on.
+    """
+    march = inputs.code.march
+    if march is None:
+        return False
+    states = motion.q.T, motion.q_dot.T, motion.q_ddot.T
+    status, iterations = np.empty((2, inputs.t.size), dtype=np.intc)
+    if march(inputs, states, motion.residual, status, iterations) < inputs.t.size:
+        return False
+    # A large step of Newton's from the guess may have ended on another branch.
+    time = float(inputs.t[0])
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
+    guess, found = (equations.at(q, time) for q in (inputs.guess, motion.q[0].copy()))
+    if guess is None or found is None or equations.leaves_branch(guess, found):
+        return False
+    motion.status[:], motion.iterations[:] = status, iterations
+    motion.statistics["compiled"] = inputs.t.size
+    return True
 
 
 class _Way:
     """How far a motion was followed: `index` is the next point, found by `march`."""
 
-    def __init__(
-        self, inputs: Inputs, motion: Motion, on_grid: bool, progress: Progress | None
-    ) -> None:
-        self._inputs, self._motion, self._on_grid = inputs, motion, on_grid
+    _march: March
+
+    def __init__(self, inputs: Inputs, motion: Motion, progress: Progress | None) -> None:
+        self._inputs, self._motion, self._times, self._index = inputs, motion, inputs.t, 0
         self._progress = progress or (lambda done, total: None)
-        self._times = inputs.t
-        self._index = 0
-        self._march = self._march_at(inputs.guess, None)
 
     def start(self) -> Outcome:
         """Assemble the mechanism at the first time."""
         inputs, time = self._inputs, float(self._times[0])
+        self._march = self._march_at(inputs.guess, None)
         outcome = start(self._march, time, inputs)
-        if self._is_staged and (outcome.state is None or self._is_on_other_branch(outcome)):
+        if self._is_staged and (outcome.state is None or outcome.strays):
             self._leave_stages(inputs.guess)
             outcome = start(self._march, time, inputs)
         self._put(outcome)
-        if self._may_be_dense and self._is_on_other_branch(outcome):
+        if self._may_be_dense and outcome.strays:
             self._motion.note = (
                 f" The position at t = {time:.10g} is on another branch than the guess: "
                 "kc.assemblies gives all of them, and each serves as a guess."
@@ -85,9 +184,9 @@ class _Way:
         while self._index < len(self._times) and outcome.status is Status.CONVERGED:
             state = outcome.state
             assert state is not None
-            stop = _end_of_run(trusted, self._index)
-            if stop > self._index and self._continues(state):
-                outcome = self._take_up(stop)
+            rest = trusted[self._index :]
+            if rest[0] and self._continues(state):
+                outcome = self._take_up(rest.size if rest.all() else int(np.argmin(rest)))
             else:
                 outcome = self._advance(state)
             self._progress(self._index, len(self._times))
@@ -107,8 +206,8 @@ class _Way:
         if found is not None:
             motion.events.append(found[0])
             return found[1]
-        if outcome.attempt is not None and outcome.attempt.status is Status.CONVERGED:
-            q = outcome.attempt.last.q
+        if outcome.jumps and outcome.nearest is not None:
+            q = outcome.nearest.q
             motion.events.append(branch_switch(equations.code, state, t, q, equations.spread(q)))
         return None
 
@@ -159,7 +258,7 @@ class _Way:
         """Return the march of the mechanism, whose size comes from the guess and a position."""
         inputs, time = self._inputs, float(self._times[0])
         equations = problem(
-            inputs.module, inputs.p, q, time, inputs.guess, staged=True, engine=engine
+            inputs.code.module, inputs.p, q, time, inputs.guess, staged=True, engine=engine
         )
         return March(equations, equations.engine, inputs.tolerance)
 
@@ -167,13 +266,6 @@ class _Way:
         """Solve dense matrices from here on: they have the last word."""
         self._count_pivoted()
         self._march = self._march_at(q, Dense(self._inputs.code, self._inputs.p))
-
-    def _is_on_other_branch(self, outcome: Outcome) -> bool:
-        """Say whether a first position lies on another branch than the guess."""
-        guess = self._march.equations.at(self._inputs.guess, float(self._times[0]))
-        if guess is None or outcome.position is None:
-            return False
-        return leaves_branch(self._march.equations, guess, outcome.position)
 
     def _put(self, outcome: Outcome) -> None:
         self._motion.put(self._index, outcome)
@@ -204,7 +296,7 @@ class _Way:
         """Solve all points from the last one on together; return which can be trusted."""
         motion, index, first = self._motion, self._index - 1, outcome.state
         trusted = np.zeros(len(self._times), dtype=bool)
-        if not self._on_grid or outcome.status is not Status.CONVERGED or first is None:
+        if not self._inputs.on_grid or outcome.status is not Status.CONVERGED or first is None:
             return trusted
         if first.t == self._times[index]:
             arrays = motion.q, motion.q_dot, motion.q_ddot, motion.residual
@@ -231,9 +323,10 @@ class _Way:
         spread = self._march.equations.spread(state.point.q)
         return bool(np.max(np.abs(motion.q[index] - state.point.q) / spread) <= SMALL_ERROR)
 
-    def _take_up(self, stop: int) -> Outcome:
-        """Take the points of the grid up to one; return the last as one to go on from."""
-        motion, last = self._motion, stop - 1
+    def _take_up(self, count: int) -> Outcome:
+        """Take so many points of the grid; return the last as one to go on from."""
+        motion, stop = self._motion, self._index + count
+        last = stop - 1
         motion.status[self._index : stop] = Status.CONVERGED
         self._index = stop
         if stop < len(self._times):
@@ -251,9 +344,3 @@ class _Way:
         if isinstance(following, Status):
             return Outcome(following, 0, None, point)
         return Outcome(Status.CONVERGED, 0, following, point)
-
-
-def _end_of_run(trusted: NDArray[np.bool_], index: int) -> int:
-    """Return where a run of trusted points that begins at an index ends."""
-    rest = trusted[index:]
-    return index + (rest.size if rest.all() else int(np.argmin(rest)))

@@ -1,35 +1,44 @@
 r"""A whole time grid at once: a coarse march, interpolation, and Newton on all points together.
 
-Between two points of the coarse march every coordinate is interpolated by the polynomial of fifth
-degree through :math:`q, \dot q, \ddot q` at both ends (Hermite). That is so near that the first
-correction already leaves rounding errors, and the second shows it. Nothing is taken on trust: a
-point counts only if its corrections became small, its equations hold, it stayed near the
-interpolation, and the determinant of every block of Phi_q kept its sign.
+The coarse march takes the same steps as `march.advance`, as far apart as the prediction is good, on
+plain floats and with the planned solve, so that one costs as much as a few calls of NumPy. It takes
+no decision of its own: where anything is out of the ordinary it stops, and the careful march goes
+on.
+
+Between two of its points every coordinate is interpolated by the polynomial of fifth degree through
+:math:`q, \dot q, \ddot q` at both ends (Hermite). That is so near that the first correction already
+leaves rounding errors, and the second shows it. Nothing is taken on trust: a point counts only if
+its corrections became small, its equations hold, it stayed near the interpolation, and the
+determinant of every block of Phi_q kept its sign.
 """
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import SMALLEST_DETERMINANT
-from kincompile.runtime.coarse import Node, coarse_march
-from kincompile.runtime.engine.lanes import LaneCode
+from kincompile.criteria import (
+    KINK_UNSEEN,
+    MAX_CORRECTIONS,
+    SMALLEST_DETERMINANT,
+    SMOOTH_UNSEEN,
+)
 from kincompile.runtime.engine.planned import Planned
-from kincompile.runtime.march import March
-from kincompile.runtime.problem import largest, within
+from kincompile.runtime.march import March, largest
+from kincompile.runtime.problem import within
 
 if TYPE_CHECKING:
-    from typing import TypeAlias
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.planned import Lanes
     from kincompile.runtime.march import State
-
-    Array: TypeAlias = NDArray[np.float64]
 
 BLOCK = 3000
 """Points at a time, so that intermediate arrays stay in the cache."""
@@ -39,6 +48,21 @@ LARGEST_DISPLACEMENT = 1e-3
 
 CORRECTIONS_ON_GRID = 2
 """Newton corrections of every point."""
+
+TARGET_ERROR = 0.0006
+"""Error of the coarse march's prediction aimed at, in radians or sizes of the mechanism. It falls
+with the third power of the step, the interpolation's with the sixth: this one leaves the points of
+the grid about 1e-6 from their place."""
+
+LARGEST_ERROR = 0.0015
+"""Error of the prediction above which a coarse step is not trusted."""
+
+LAST_COARSE_CORRECTION = 1e-7
+"""Correction, in scales, with which a coarse step ends: what it leaves is as its square, and nobody
+sees it in the interpolation."""
+
+SMALLEST_STEP_COUNT = 8
+"""No coarse step is longer than this part of the grid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,10 +106,9 @@ def solve_grid(march: March, times: Array, first: State, result: GridResult) -> 
     equations, code = march.equations, march.equations.code
     assert code.lanes is not None
     spread = equations.spread(first.point.q)
-    floats = LaneCode(code, code.lanes.floats, equations.p.tolist())
-    q, q_dot, q_ddot = (x.tolist() for x in (first.point.q, first.q_dot, first.q_ddot))
-    node = Node(0, q, q_dot, q_ddot, first.determinants.tolist())
-    nodes = coarse_march(floats, node, times, spread.tolist(), march.tolerance)
+    floats = Planned(code, equations.p.tolist(), code.lanes.floats)
+    state = (x.tolist() for x in (first.point.q, first.q_dot, first.q_ddot, first.determinants))
+    nodes = _coarse_march(floats, _Node(0, *state), times, spread.tolist())
     reached = nodes[-1].index + 1
     _interpolate(nodes, times[:reached], result.q)
     signed = np.array([node.determinants for node in nodes])
@@ -98,7 +121,79 @@ def solve_grid(march: March, times: Array, first: State, result: GridResult) -> 
     return len(nodes)
 
 
-def _interpolate(nodes: list[Node], times: Array, q: Array) -> None:
+@dataclass(frozen=True, slots=True)
+class _Node:
+    """A point of the coarse march: its number in the time grid, and floats."""
+
+    index: int
+    q: Lanes
+    q_dot: Lanes
+    q_ddot: Lanes
+    determinants: Lanes
+
+
+def _coarse_march(
+    engine: Planned, first: _Node, times: Array, spread: Sequence[float]
+) -> list[_Node]:
+    """Follow the motion over a time grid in as few steps as the prediction allows.
+
+    Returns nodes from `first` to the last point of the grid, or to the last that could be trusted.
+    """
+    nodes, last = [first], len(times) - 1
+    longest = max(1, last // SMALLEST_STEP_COUNT)
+    stride = max(1, min(longest, last // 64))
+    while nodes[-1].index < last:
+        node = nodes[-1]
+        index = min(node.index + stride, last)
+        try:
+            step = _coarse_step(engine, node, index, times, spread)
+        except (ArithmeticError, ValueError):
+            step = None
+        error = LARGEST_ERROR * 8 if step is None else step[1]
+        if step is not None and error <= LARGEST_ERROR:
+            nodes.append(step[0])
+        elif stride == 1:
+            break
+        ratio = (TARGET_ERROR / max(error, 1e-12)) ** (1 / 3)
+        stride = max(1, min(longest, int((index - node.index) * min(2.0, max(0.25, ratio)))))
+    return nodes
+
+
+def _coarse_step(
+    engine: Planned, node: _Node, index: int, times: Array, spread: Sequence[float]
+) -> tuple[_Node, float] | None:
+    """Return the point at `index` and the error of its prediction; None without convergence."""
+    t = float(times[index])
+    h = t - float(times[node.index])
+    half = 0.5 * h
+    q: Any = [
+        x + h * (v + half * a) for x, v, a in zip(node.q, node.q_dot, node.q_ddot, strict=True)
+    ]
+    predicted = q
+    for _ in range(MAX_CORRECTIONS):
+        point = engine.evaluate(q, t)
+        correction = engine.solve(point, point.Phi)
+        q = [x - d for x, d in zip(q, correction, strict=True)]
+        size = max([abs(d) / s for d, s in zip(correction, spread, strict=True)])
+        if size <= LAST_COARSE_CORRECTION:
+            break
+    else:
+        return None
+    q_dot, q_ddot = engine.velocity_and_acceleration(replace(point, q=q))
+    determinants = point.factors[1]
+    if not math.isfinite(sum(q_ddot)):
+        return None
+    if any(x * y <= 0 for x, y in zip(determinants, node.determinants, strict=True)):
+        return None
+    error = max([abs(x - y) / s for x, y, s in zip(q, predicted, spread, strict=True)])
+    rates = zip(q_dot, node.q_dot, node.q_ddot, spread, strict=True)
+    kink = abs(h) * max([abs(w - v - h * a) / s for w, v, a, s in rates])
+    if kink > KINK_UNSEEN * (error + SMOOTH_UNSEEN):
+        return None
+    return _Node(index, q, q_dot, q_ddot, determinants), error
+
+
+def _interpolate(nodes: list[_Node], times: Array, q: Array) -> None:
     """Write the Hermite polynomials of fifth degree between the nodes into q, shape (n, N)."""
     index = np.array([node.index for node in nodes])
     at = times[index]
@@ -138,16 +233,16 @@ def _solve_block(
     march: March, t: Array, result: GridResult, block: slice, smallest: Array, spread: Array
 ) -> None:
     """Correct a block of interpolated positions twice, and solve for velocity and acceleration."""
-    interpolated, engine = result.q[:, block], march.engine
+    engine, rates = march.engine, (result.q_dot[:, block], result.q_ddot[:, block])
     assert isinstance(engine, Planned)
-    found = march.correct(interpolated, t, CORRECTIONS_ON_GRID)
+    found = march.correct_together(result.q[:, block], t, CORRECTIONS_ON_GRID)
     point = found.point
-    q_dot, q_ddot = result.q_dot[:, block], result.q_ddot[:, block]
-    engine.put_rates(point, q_dot, q_ddot)
-    interpolated -= point.q
-    good = found.good & within(interpolated, LARGEST_DISPLACEMENT * spread)
-    interpolated[:] = point.q
-    for values, least in zip(engine.determinants(point, point), smallest, strict=True):
+    good = found.good & within(found.first, LARGEST_DISPLACEMENT * spread)
+    for rows, lanes in zip(rates, engine.velocity_and_acceleration(point), strict=True):
+        for row, lane in zip(rows, lanes, strict=True):
+            row[:] = lane
+        good = good & np.isfinite(sum(rows))
+    for values, least in zip(point.factors[1], smallest, strict=True):
         good = good & (values / least > 1)
     result.residual[block] = largest(point.Phi, t.size)
-    result.good[block] = good & np.isfinite(sum(q_dot) + sum(q_ddot))
+    result.good[block] = good

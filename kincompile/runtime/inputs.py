@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from kincompile.errors import InputError, StructuralError
+from kincompile.errors import InputError
 from kincompile.names import listed, suggestion
-from kincompile.runtime.engine.code import Code, code_of
+from kincompile.runtime.engine.code import Code, code_of, require_square
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Values: TypeAlias = ArrayLike | Mapping[str, float] | None
+
+
+SMALLEST_GRID = 32
+"""Points from which on a grid is faster than a march."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +45,12 @@ class Inputs:
         Bound for the last correction, in scales of the coordinates.
     max_iterations : int
         Newton iterations after which an attempt is given up.
+    method : str or None
+        How a grid is solved: ``"grid"``, ``"march"``, or the faster.
+    on_grid : bool
+        Whether the points of a grid are solved together, rather than one after the other.
+    smooth : bool
+        Whether to go on past a bifurcation.
     """
 
     code: Code
@@ -49,15 +59,47 @@ class Inputs:
     guess: NDArray[np.float64]
     tolerance: float
     max_iterations: int
+    method: str | None = None
+    on_grid: bool = False
+    smooth: bool = False
 
-    @property
-    def module(self) -> ModuleType:
-        """The emitted module."""
-        return self.code.module
+
+def read_variants(module: ModuleType, p: object) -> NDArray[np.float64] | None:
+    """Return parameter sets of shape (B, k) where `p` has the shape (B, 1, k), else None.
+
+    Raises
+    ------
+    InputError
+        When a set has the wrong size or a value is not finite.
+    """
+    if not isinstance(p, np.ndarray) or p.ndim != 3:
+        return None
+    count, one, size = p.shape
+    if one != 1 or size != len(module.PARAMETERS) or count == 0 or p.dtype.kind not in "iuf":
+        raise InputError(
+            f"p has shape {p.shape} and type {p.dtype}: give real numbers of shape "
+            f"(B, 1, {len(module.PARAMETERS)}) for B variants of {listed(module.PARAMETERS)}."
+        )
+    sets = np.ascontiguousarray(p[:, 0], dtype=np.float64)
+    bad = np.argwhere(~np.isfinite(sets))
+    if bad.size:
+        variant, which = bad[0].tolist()
+        raise InputError(
+            f"parameter {module.PARAMETERS[which]!r} of variant {variant} is "
+            f"{sets[variant, which]}: give a finite number."
+        )
+    return sets
 
 
 def read_inputs(
-    module: ModuleType, t: ArrayLike, p: Values, guess: Values, tolerance: Any, max_iterations: Any
+    module: ModuleType,
+    t: ArrayLike,
+    p: Values,
+    guess: Values,
+    tolerance: Any,
+    max_iterations: Any,
+    method: str | None = None,
+    through: str | None = None,
 ) -> Inputs:
     """Check all inputs of the solver and bring them into the form in which it uses them.
 
@@ -69,20 +111,31 @@ def read_inputs(
         When the equations cannot determine the coordinates: what is wrong, and what to do.
     """
     _require_module(module)
-    code = code_of(module)
-    require_square(code)
     problems: list[str] = []
-    inputs = Inputs(
-        code,
+    values = (
         _times(t, problems),
         _values("parameter", module.PARAMETERS, module.DEFAULTS, p, problems),
         _values("coordinate", module.COORDINATES, module.GUESS, guess, problems),
         _tolerance(tolerance, problems),
         _count(max_iterations, problems),
     )
+    if method not in (None, "grid", "march"):
+        problems.append(f"method is {method!r}: give 'grid', 'march', or nothing.")
+    if through not in (None, "smooth"):
+        problems.append(f"through is {through!r}: give 'smooth', or nothing.")
+    code = code_of(module)
+    require_square(code)
+    if method == "grid" and code.lanes is None:
+        problems.append(
+            f"{code.name} goes from point to point, as all redundant mechanisms and those in the "
+            "grouped form do: use method='march', or compile it with form='inline'."
+        )
     if problems:
         raise InputError(problems)
-    return inputs
+    on_grid = method == "grid" or (
+        method is None and values[0].size >= SMALLEST_GRID and code.lanes is not None
+    )
+    return Inputs(code, *values, method, on_grid, through == "smooth")
 
 
 def _require_module(module: object) -> None:
@@ -94,31 +147,6 @@ def _require_module(module: object) -> None:
     else:
         remedy = "compile the mechanism first: module = kc.compile(m)"
     raise InputError(f"expected a compiled module, got a {type(module).__name__}: {remedy}.")
-
-
-def require_square(code: Code) -> None:
-    """Refuse a module whose equations cannot determine its coordinates.
-
-    What the compiler has written into the module says why; else they are counted.
-
-    Raises
-    ------
-    StructuralError
-        With what is wrong, and what to do.
-    """
-    if code.unsolvable:
-        raise StructuralError(code.unsolvable)
-    m, n = len(code.equations), len(code.coordinates)
-    if m == n or (m > n and code.redundant):
-        return
-    if m < n:
-        remedy = f"add {n - m} more (joints or drivers), or hold coordinates that are free"
-    else:
-        remedy = f"remove {m - n} of them: {listed(code.equations)}"
-    raise StructuralError(
-        f"{code.name} has {m} equations for {n} coordinates ({listed(code.coordinates)}), "
-        f"and the motion needs as many equations as coordinates: {remedy}."
-    )
 
 
 def _times(t: ArrayLike, problems: list[str]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ step is halved, and doubled again once it succeeds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,19 +31,18 @@ from kincompile.criteria import (
     SMOOTH,
     TOO_NEAR,
 )
-from kincompile.runtime.engine.dense import Dense
-from kincompile.runtime.newton import Attempt, assemble, iterate, safeguarded_step, unsolvable
-from kincompile.runtime.problem import column, within
+from kincompile.runtime.problem import Dense, column, unsolvable, within
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Iterable
 
+    from kincompile.runtime.engine.code import Array
     from kincompile.runtime.engine.engine import Engine, Point
-    from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.problem import Problem
 
-    Array = NDArray[np.float64]
+SAME_DETERMINANT = 0.5
+"""Part of a determinant down to which Phi_q counts as no nearer to singular."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +61,8 @@ class State:
         Those of the blocks of Phi_q.
     sensitivity : float or ndarray, shape (N,)
         Movement, in scales of the coordinates, for an error of one scale in the equations.
+    probed : ndarray, shape of determinants
+        Sizes of the determinants where that was found.
     """
 
     t: float
@@ -70,6 +71,7 @@ class State:
     q_ddot: Array
     determinants: Array
     sensitivity: Any = 0.0
+    probed: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,16 +88,21 @@ class Outcome:
         The point when converged; on failure the last good one on the way, if there is one.
     position : Point or None
         Where the mechanism is at that time, also when only velocity or acceleration failed.
-    attempt : Attempt or None
-        When the motion does not lead to that time: the try to assemble the mechanism there
-        nevertheless. If even that converges, the mechanism could only jump there.
+    nearest : Point or None
+        Where the motion does not lead to that time: where Newton's method ends there.
+    jumps : bool
+        Whether the mechanism is assembled there: it could only jump to it.
+    strays : bool
+        Whether it was assembled on another branch than its guess shows.
     """
 
     status: Status
     iterations: int
     state: State | None
     position: Point | None = None
-    attempt: Attempt | None = None
+    nearest: Point | None = None
+    jumps: bool = False
+    strays: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,11 +117,14 @@ class Corrected:
         Where it converged.
     iterations : int or ndarray of int, shape (N,)
         How many corrections were applied.
+    first
+        Of a batch the first correction, a row each.
     """
 
     point: Point
     good: Any
     iterations: Any
+    first: Any = None
 
 
 class March:
@@ -136,71 +146,83 @@ class March:
         # Factors of Phi_q a rounding error away serve the rates; a dense matrix has none to save.
         self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
 
-    def correct(self, q: Array, t: Any, most: int) -> Corrected:
-        """Run Newton's method from a prediction, on each of a batch until it has converged.
+    def correct(self, q: Array, t: float, most: int) -> Corrected:
+        """Run Newton's method from a prediction.
 
         The last correction may be so small that Phi_q before it serves what comes after it.
         """
-        equations, engine, single = self.equations, self.engine, q.ndim == 1
-        far = np.abs(q) if single else np.abs(q[:, [0, -1]]).max(axis=1)
-        rounding = ROUNDING * far
-        tight = self._tight * equations.reference + rounding
-        q = q.copy()
-        done, iterations = np.zeros(q.shape[1:], bool), np.zeros(q.shape[1:], int)
-        size: Any = np.inf
+        equations, engine = self.equations, self.engine
+        rounding, last = ROUNDING * np.abs(q), np.inf
+        for iteration in range(1, most + 1):
+            point = engine.evaluate(q, t)
+            change = engine.solve(point, point.Phi)
+            q = q - change
+            # Near a singular position rounding alone keeps the corrections above any bound.
+            size = ((np.abs(change) - rounding) / equations.reference).max()
+            if size <= self.tolerance or not size <= last / 4:
+                point = replace(point, q=q) if size <= self._tight else engine.evaluate(q, t)
+                done = size <= self.tolerance and equations.holds(point, self._residual)
+                done = done or equations.holds_to_rounding(point)
+                if done or not size < np.inf:
+                    return Corrected(point, bool(done), iteration)
+            last = size
+        return Corrected(engine.evaluate(q, t), False, most)
+
+    def correct_together(self, q: Array, t: Any, most: int) -> Corrected:
+        """Run Newton's method on a batch, in place; what has converged stays where it is."""
+        equations, engine = self.equations, self.engine
+        rounding = ROUNDING * np.abs(q[:, [0, -1]]).max(axis=1)
+        loose, tight = (x * equations.reference + rounding for x in (self.tolerance, self._tight))
+        done, iterations = np.zeros(q.shape[1], bool), np.zeros(q.shape[1], int)
+        first: Any = None
         for _ in range(most):
             point = engine.evaluate(q, t)
             change = engine.solve(point, point.Phi)
-            if done.any():
-                change[:, done] = 0.0
-            q -= change
-            iterations = iterations + ~done
-            if single:
-                # Near a singular position rounding alone keeps the corrections above any bound.
-                last, size = size, ((np.abs(change) - rounding) / equations.reference).max()
-                if size <= self.tolerance or size > last / 4:
-                    point = point if size <= self._tight else engine.evaluate(q, t)
-                    done = (size <= self.tolerance) & equations.holds(point, self._residual)
-                    if not done:
-                        done = equations.holds_to_rounding(point)
-                if done or not size < np.inf:
-                    return Corrected(point, done, iterations)
-            else:
-                done = done | within(change, self.tolerance * equations.reference + rounding)
-                if done.all() and within(change, tight).all():
-                    return Corrected(point, equations.holds(point, self._residual), iterations)
-                if done.all():
-                    break
-        point = engine.evaluate(q, t)
-        return Corrected(point, done & equations.holds(point, self._residual), iterations)
+            for row, lane in zip(q, change, strict=True):
+                row -= np.where(done, 0.0, lane) if done.any() else lane
+            iterations += ~done
+            # Hardly one of a batch is done at once, and a mask takes as long as a correction.
+            done = done | (all_within(change, loose) if first is None else within(change, loose))
+            first = change if first is None else first
+            if done.all():
+                break
+        if not (done.all() and all_within(change, tight)):
+            point = engine.evaluate(q, t)
+        return Corrected(point, done & equations.holds(point, self._residual), iterations, first)
 
-    def complete(self, point: Point) -> tuple[State, Checks]:
+    def complete(self, point: Point, before: State | None = None) -> tuple[State, Checks]:
         """Solve for velocity and acceleration; say where all is as it must be, and what it is else.
 
         A third right side, of the size of the equations' own terms, shows how near to singular
-        Phi_q is.
+        Phi_q is. Where no determinant has halved since that was last looked at, it is no nearer.
         """
-        equations = self.equations
-        scale = equations.scale(point.q)
-        besides = equations.terms(point, scale) * column(equations.probe, point.q)
-        rates = self.engine.rates(point, besides)
-        sensitivity = (np.abs(rates.movement) / scale).max(axis=0)
+        equations, engine = self.equations, self.engine
+        scale, sensitivity, probed = equations.scale(point.q), np.inf, None
+        determinants = engine.determinants(point, point)
+        if before is not None and not isinstance(engine, Dense):
+            sensitivity, probed = before.sensitivity, before.probed
+        if probed is None or not (np.abs(determinants) >= SAME_DETERMINANT * probed).all():
+            probed = np.abs(determinants)
+            rates = engine.rates(point, column(equations.magnitude * equations.probe, point.q))
+            sensitivity = (np.abs(rates.movement) / scale).max(axis=0)
+        else:
+            rates = engine.rates(point, None)
         finite = np.isfinite((rates.q_dot + rates.q_ddot).sum(axis=0))
         checks = (
             (sensitivity < SINGULAR_SENSITIVITY, Status.SINGULAR),
             (finite, Status.NOT_FINITE),
             (rates.agree, Status.SINGULAR),
         )
-        determinants = self.engine.determinants(point, point)
-        return State(point.t, point, rates.q_dot, rates.q_ddot, determinants, sensitivity), checks
+        numbers = rates.q_dot, rates.q_ddot, determinants, sensitivity, probed
+        return State(point.t, point, *numbers), checks
 
-    def state(self, point: Point) -> State | Status:
+    def state(self, point: Point, before: State | None = None) -> State | Status:
         """Return a position as a state of the motion, or say why it is none."""
-        state, checks = self.complete(point)
-        status = first_failed(checks)
+        state, checks = self.complete(point, before)
+        status = next((failed for good, failed in checks if not good), None)
         if status is Status.SINGULAR and unsolvable(point) is Status.NOT_FINITE:
             return Status.NOT_FINITE
-        return state if status is Status.CONVERGED else status
+        return status or state
 
     def predict(self, state: State, t: float) -> Array:
         """Return the position at a time that velocity and acceleration lead to."""
@@ -241,20 +263,20 @@ class March:
         error, is_near = self.error(state, point.q, predicted, spread)
         if not (found.good and is_near):
             return Outcome(Status.NOT_CONVERGED, iterations, None)
-        following = self.state(point)
+        following = self.state(point, state)
         if isinstance(following, Status):
             return Outcome(following, iterations, None, point)
-        status = first_failed(self.follows(state, following, error, spread))
-        if status is not Status.CONVERGED:
-            return Outcome(status, iterations, None)
-        return Outcome(status, iterations, following, point)
+        for good, status in self.follows(state, following, error, spread):
+            if not good:
+                return Outcome(status, iterations, None)
+        return Outcome(Status.CONVERGED, iterations, following, point)
 
     def step_together(self, state: State, t: float, most: int) -> tuple[State, Any, Any]:
         """Take a step with a batch; return the states, where they are good, and the iterations."""
         predicted = self.predict(state, t)
         spread = self.equations.spread(predicted)
-        found = self.correct(predicted, t, most)
-        following, checks = self.complete(found.point)
+        found = self.correct_together(predicted.copy(), t, most)
+        following, checks = self.complete(found.point, state)
         error, near = self.error(state, found.point.q, predicted, spread)
         checks += self.follows(state, following, error, spread)
         is_far = following.sensitivity <= TOO_NEAR
@@ -301,11 +323,6 @@ Checks = tuple[tuple[Any, Status], ...]
 """What must be true, of one point or of each of a batch, and the status where it is not."""
 
 
-def first_failed(checks: Checks) -> Status:
-    """Return the status of the first check that fails."""
-    return next((status for good, status in checks if not good), Status.CONVERGED)
-
-
 def all_hold(good: Any, checks: Checks) -> Any:
     """Say which of a batch were good, and pass all checks."""
     for check, _ in checks:
@@ -313,48 +330,18 @@ def all_hold(good: Any, checks: Checks) -> Any:
     return good
 
 
-def start(march: March, t: float, inputs: Inputs) -> Outcome:
-    """Assemble the mechanism at the first time, from the guess."""
-    equations = march.equations
-    attempt = assemble(equations, t, inputs.guess, inputs.tolerance, inputs.max_iterations)
-    iterations = len(attempt.corrections)
-    if attempt.status is not Status.CONVERGED:
-        return Outcome(attempt.status, iterations, None, attempt=attempt)
-    attempt = _on_branch_of_guess(equations, t, attempt, inputs)
-    state = march.state(attempt.last)
-    if isinstance(state, Status):
-        return Outcome(state, iterations, None, attempt.last)
-    return Outcome(Status.CONVERGED, iterations, state, attempt.last)
+def largest(rows: Iterable[Any], count: int) -> Array:
+    """Return the largest size in the rows of a batch, for each of it."""
+    result = np.zeros(count)
+    for row in rows:
+        np.maximum(result, np.abs(row), out=result)
+    return result
 
 
-def _on_branch_of_guess(equations: Problem, t: float, attempt: Attempt, inputs: Inputs) -> Attempt:
-    """Give what small steps from the guess lead to, where Newton's large ones left its branch."""
-    guess, found = attempt.points[0], attempt.last
-    if not leaves_branch(equations, guess, found):
-        return attempt
-    limits = inputs.tolerance, inputs.max_iterations
-    careful = iterate(equations, t, guess.q, *limits, safeguarded_step)
-    if careful.status is not Status.CONVERGED:
-        return attempt
-    spread = equations.spread(found.q)
-    near, far = (np.max(np.abs(x.last.q - guess.q) / spread) for x in (careful, attempt))
-    return attempt if near >= far or leaves_branch(equations, guess, careful.last) else careful
+def all_within(values: Iterable[Array], limits: Array) -> bool:
+    """Say whether the values of a batch are within limits as `within` says, all together.
 
-
-def leaves_branch(equations: Problem, guess: Point, found: Point) -> bool:
-    """Say whether a guess shows a branch, and a position found from it lies on another."""
-    wanted = equations.engine.signs(guess)
-    return all(wanted) and equations.engine.signs(found) != wanted
-
-
-def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome:
-    """Find out what is there at a time that the motion does not reach."""
-    state = outcome.state
-    assert state is not None
-    limits = inputs.tolerance, inputs.max_iterations
-    attempt = assemble(march.equations, t, state.point.q, *limits)
-    iterations = outcome.iterations + len(attempt.corrections)
-    # What is wrong there, rather than on the way.
-    found = attempt.status is Status.CONVERGED
-    status = outcome.status if found else attempt.status
-    return Outcome(status, iterations, state, attempt=attempt)
+    Nearly always all meet together what each must meet, and one number costs less than a mask.
+    """
+    rows = zip(values, limits.ravel().tolist(), strict=True)
+    return all(np.dot(row, row) <= limit * limit for row, limit in rows)

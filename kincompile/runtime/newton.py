@@ -14,16 +14,16 @@ shortened until the residual falls (Armijo).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, RESIDUAL_FACTOR, ROUNDING, TOLERANCE
 from kincompile.errors import InputError
-from kincompile.runtime.engine.engine import Point, norm
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.problem import Problem, problem
+from kincompile.runtime.march import March, Outcome
+from kincompile.runtime.problem import Problem, norm, problem, unsolvable
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.inputs import Values
+    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.inputs import Inputs, Values
 
     Vector: TypeAlias = NDArray[np.float64]
 
@@ -109,6 +110,11 @@ class Attempt:
         """The last position; there is one unless the guess itself could not be evaluated."""
         return self.points[-1]
 
+    @property
+    def nearest(self) -> Point | None:
+        """The last position, if there is one."""
+        return self.points[-1] if self.points else None
+
 
 if TYPE_CHECKING:
     Step: TypeAlias = Callable[[Problem, float, Point], tuple[Point, float] | Status]
@@ -163,6 +169,53 @@ def newton(
     return _result(attempt, inputs.guess)
 
 
+def start(march: March, t: float, inputs: Inputs) -> Outcome:
+    """Assemble the mechanism at the first time, from the guess."""
+    limits = inputs.tolerance, inputs.max_iterations
+    attempt = assemble(march.equations, t, inputs.guess, *limits)
+    iterations = len(attempt.corrections)
+    if attempt.status is not Status.CONVERGED:
+        return Outcome(attempt.status, iterations, None, nearest=attempt.nearest)
+    point, guess = attempt.last, attempt.points[0]
+    if strays := march.equations.leaves_branch(guess, point):
+        near = _near_guess(march.equations, t, guess, point, inputs)
+        point, strays = near or point, near is None
+    state = march.state(point)
+    if isinstance(state, Status):
+        return Outcome(state, iterations, None, point, strays=strays)
+    return Outcome(Status.CONVERGED, iterations, state, point, strays=strays)
+
+
+def _near_guess(
+    equations: Problem, t: float, guess: Point, found: Point, inputs: Inputs
+) -> Point | None:
+    """Give what small steps from the guess lead to, if it is nearer and on the guess's branch."""
+    limits = inputs.tolerance, inputs.max_iterations
+    careful = iterate(equations, t, guess.q, *limits, safeguarded_step)
+    if careful.status is not Status.CONVERGED:
+        return None
+    spread = equations.spread(found.q)
+    near, far = (np.max(np.abs(x.q - guess.q) / spread) for x in (careful.last, found))
+    is_better = near < far and not equations.leaves_branch(guess, careful.last)
+    return careful.last if is_better else None
+
+
+def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome:
+    """Find out what is there at a time that the motion does not reach."""
+    assert outcome.state is not None
+    limits = inputs.tolerance, inputs.max_iterations
+    attempt = assemble(march.equations, t, outcome.state.point.q, *limits)
+    # What is wrong there, rather than on the way.
+    jumps = attempt.status is Status.CONVERGED
+    return replace(
+        outcome,
+        status=outcome.status if jumps else attempt.status,
+        iterations=outcome.iterations + len(attempt.corrections),
+        nearest=attempt.nearest,
+        jumps=jumps,
+    )
+
+
 def assemble(
     equations: Problem, t: float, guess: Vector, tolerance: float, max_iterations: int
 ) -> Attempt:
@@ -212,6 +265,7 @@ def iterate(
         attempt.status = Status.NOT_FINITE
         return attempt
     attempt.points.append(point)
+    crawls = False
     for _ in range(max_iterations):
         outcome = step(equations, t, attempt.last)
         if isinstance(outcome, Status):
@@ -220,11 +274,12 @@ def iterate(
         point, correction = outcome
         attempt.points.append(point)
         attempt.corrections.append(correction)
-        if _converged(equations, attempt, tolerance):
+        crawls = len(attempt.corrections) > 1 and correction > attempt.corrections[-2] / 4
+        if equations.has_converged(attempt.points[-2], point, tolerance, crawls):
             attempt.status = Status.CONVERGED
             break
     else:
-        if _crawls(attempt) and equations.holds(attempt.last, RESIDUAL_FACTOR * tolerance):
+        if crawls and equations.holds(attempt.last, RESIDUAL_FACTOR * tolerance):
             attempt.status = Status.SINGULAR
     return attempt
 
@@ -237,11 +292,6 @@ def plain_step(equations: Problem, t: float, point: Point) -> tuple[Point, float
         return unsolvable(point)
     following = equations.at(point.q + correction, t)
     return Status.NOT_FINITE if following is None else (following, size)
-
-
-def unsolvable(point: Point) -> Status:
-    """Say why Phi_q x = b has no solution at a point."""
-    return Status.SINGULAR if np.isfinite(point.Phi_q).all() else Status.NOT_FINITE
 
 
 def safeguarded_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
@@ -292,22 +342,6 @@ def _clamp(equations: Problem, point: Point, correction: Vector) -> float:
     return min(1.0, 1.0 / float(np.max(np.abs(correction) / limits, initial=0.0) or 1.0))
 
 
-def _converged(equations: Problem, attempt: Attempt, tolerance: float) -> bool:
-    """Say whether the last correction was small, or rounding forbids better, and Phi is zero."""
-    before, point = attempt.points[-2:]
-    small = equations.is_small(point.q - before.q, point.q, tolerance)
-    if small and equations.holds(point, RESIDUAL_FACTOR * tolerance):
-        return True
-    # Near a singular configuration rounding alone keeps the corrections above any tolerance.
-    return (small or _crawls(attempt)) and equations.holds_to_rounding(point)
-
-
-def _crawls(attempt: Attempt) -> bool:
-    """Say whether the corrections shrink no faster than towards a double root, by halves."""
-    corrections = attempt.corrections
-    return len(corrections) > 1 and corrections[-1] > corrections[-2] / 4
-
-
 def _result(attempt: Attempt, guess: Vector) -> NewtonResult:
     """Turn the record into arrays."""
     points = attempt.points
@@ -316,7 +350,7 @@ def _result(attempt: Attempt, guess: Vector) -> NewtonResult:
         status=attempt.status,
         iterates=np.array([point.q for point in points] or [guess]),
         corrections=np.array(attempt.corrections),
-        residuals=np.array([point.residual for point in points] or [np.nan]),
+        residuals=np.array([norm(point.Phi) for point in points] or [np.nan]),
         residual=float(np.max(np.abs(points[-1].Phi))) if points else math.nan,
         iterations=len(attempt.corrections),
     )

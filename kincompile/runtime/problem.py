@@ -1,4 +1,4 @@
-"""The equations at given parameters, and the scales by which their numbers are judged.
+"""One position: its equations, their dense matrix, and the scales by which numbers are judged.
 
 Nothing here compares a length with an angle, or a residual with a fixed number: a coordinate is
 compared with its own scale (the size of the mechanism, or a radian), an equation with the sum of
@@ -14,16 +14,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import NO_SIZE, ROUNDING, STEEP, WILD, probe_of, size_of
+from kincompile.criteria import (
+    AGREEMENT,
+    NO_SIZE,
+    RESIDUAL_FACTOR,
+    ROUNDING,
+    STEEP,
+    WILD,
+    probe_of,
+    size_of,
+)
 from kincompile.runtime.engine.code import Array, Code, code_of
-from kincompile.runtime.engine.dense import Dense
+from kincompile.runtime.engine.engine import Point, Rates
+from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.staged import Staged
+from kincompile.runtime.engine.stages import StagedSolver
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from types import ModuleType
 
-    from kincompile.runtime.engine.engine import Engine, Point
+    from kincompile.runtime.engine.engine import Engine
+
+LARGEST_POWER = 700.0
+"""Power of e beyond which no determinant is given: floating point ends at 709."""
 
 
 @dataclass(slots=True, eq=False)
@@ -62,7 +77,7 @@ class Problem:
     def at(self, q: Array, t: float) -> Point | None:
         """Evaluate the equations, or give None where they have no finite value."""
         point = self.engine.evaluate(q, t)
-        return point if math.isfinite(point.residual) else None
+        return point if math.isfinite(point.Phi.sum()) else None
 
     def scale(self, q: Array) -> Array:
         """Give the scale of each coordinate at a position."""
@@ -84,6 +99,22 @@ class Problem:
         """Say whether a correction that led to q is small, or all that floating point can give."""
         allowed = tolerance * self.reference + ROUNDING * np.abs(q)
         return bool((np.abs(correction) <= allowed).all())
+
+    def leaves_branch(self, guess: Point, found: Point) -> bool:
+        """Say whether a guess shows a branch, and a position found from it lies on another."""
+        wanted = self.engine.signs(guess)
+        return all(wanted) and self.engine.signs(found) != wanted
+
+    def has_converged(self, before: Point, point: Point, tolerance: float, crawls: bool) -> bool:
+        """Say whether Newton's method is at its end: the last correction small, and Phi zero.
+
+        Near a singular configuration rounding alone keeps the corrections above any tolerance; then
+        they crawl, shrinking no faster than towards a double root, by halves.
+        """
+        small = self.is_small(point.q - before.q, point.q, tolerance)
+        if small and self.holds(point, RESIDUAL_FACTOR * tolerance):
+            return True
+        return (small or crawls) and bool(self.holds_to_rounding(point))
 
     def terms(self, point: Point, scale: Array) -> Array:
         """Give what the terms of each equation contribute at the scales of the coordinates.
@@ -151,28 +182,14 @@ def problem(
 
 
 def within(values: Array | Iterable[Array], limits: Array) -> Any:
-    """Say where no value, of a row of a batch, is beyond the limit of its row.
-
-    Nearly always all of a batch together meet what each must meet, and one number costs less than
-    a mask.
-    """
+    """Say where no value, of a row of a batch, is beyond the limit of its row."""
     if isinstance(values, np.ndarray) and values.ndim == 1:
         return (np.abs(values) <= limits).all()
     good: Any = np.True_
     for row, limit in zip(values, limits.ravel().tolist(), strict=True):
         if not np.dot(row, row) <= limit * limit:
             good = good & (np.abs(row) <= limit)
-            if not good.any():
-                break
     return good
-
-
-def largest(rows: Iterable[Any], count: int) -> Array:
-    """Return the largest size in the rows of a batch, for each of it."""
-    result = np.zeros(count)
-    for row in rows:
-        np.maximum(result, np.abs(row), out=result)
-    return result
 
 
 def column(values: Array, q: Array) -> Array:
@@ -192,3 +209,157 @@ def _size_in_equations(point: Point, angular: np.ndarray[tuple[int], np.dtype[np
     rows = along > 0
     size = float(np.max(shown[rows] / along[rows], initial=0.0))
     return size if math.isfinite(size) else 0.0
+
+
+class Dense:
+    """An engine of one point at a time, whose Phi_q is a matrix (m, n).
+
+    Signs and sizes of blocks come from the planned solve, in one piece or in stages, where the
+    module has one. Where redundant equations forbid a determinant, that of the equations'
+    independent combinations takes its place: these turn slowly along a motion, and are those of the
+    point before.
+
+    Parameters
+    ----------
+    code
+        A module.
+    p : ndarray, shape (k,)
+        Parameters.
+    """
+
+    def __init__(self, code: Code, p: Array) -> None:
+        self.code, self._p = code, p
+        self._stages = StagedSolver(code) if code.stages else None
+
+    def evaluate(self, q: Array, t: float) -> Point:
+        """Evaluate Phi and Phi_q at one point."""
+        try:
+            return Point(q, t, *self.code.position(q, t, self._p))
+        except (ArithmeticError, ValueError):  # of math.sqrt, log, or 1/0; NaN or infinity in q
+            m = len(self.code.equations)
+            return Point(q, t, np.full(m, np.nan), np.full((m, q.size), np.nan))
+
+    def factor(self, point: Point) -> None:
+        """Do nothing: LAPACK factors with each right side."""
+
+    def solve(self, point: Point, b: Array) -> Array:
+        """Return x of Phi_q x = b, b of shape (m,) or (m, k)."""
+        try:
+            return solve_linear(point.Phi_q, b)
+        except np.linalg.LinAlgError:
+            return np.full((point.q.size, *b.shape[1:]), np.nan)
+
+    def solve_transposed(self, point: Point, b: Array) -> Array:
+        """Return x of Phi_q^T x = b; of redundant equations the shortest."""
+        try:
+            if point.Phi_q.shape[0] == point.Phi_q.shape[1]:
+                return np.asarray(np.linalg.solve(point.Phi_q.T, b), dtype=np.float64)
+            return np.asarray(np.linalg.lstsq(point.Phi_q.T, b, rcond=None)[0], dtype=np.float64)
+        except np.linalg.LinAlgError:
+            return np.full((point.Phi.size, *b.shape[1:]), np.nan)
+
+    def rates(self, point: Point, besides: Array | None) -> Rates:
+        """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
+        nothing = np.full(point.q.size, np.nan)
+        sides = np.empty((point.Phi.size, 2))
+        sides[:, 1] = 0.0 if besides is None else besides  # a second right side costs nothing
+        try:
+            sides[:, 0] = self.code.nu(point.q, point.t, self._p)
+        except (ArithmeticError, ValueError):
+            sides[:, 0] = np.nan
+        q_dot, movement = self.solve(point, sides).T
+        try:
+            gamma = self.code.gamma(point.q, q_dot, point.t, self._p)
+        except (ArithmeticError, ValueError):
+            return Rates(q_dot, nothing, movement)
+        q_ddot = self.solve(point, gamma)
+        agree = _agree(point.Phi_q, q_dot, sides[:, 0]) and _agree(point.Phi_q, q_ddot, gamma)
+        return Rates(q_dot, q_ddot, movement, agree)
+
+    def determinants(self, point: Point, before: Point) -> Array:
+        """Return the determinants of the blocks; without any, one relative to the point before."""
+        found = self._blocks(point)
+        if found is not None or point is before:
+            return np.ones(1) if found is None else found
+        matrix, reference = point.Phi_q, before.Phi_q
+        if matrix.shape[0] != matrix.shape[1]:
+            basis = np.linalg.svd(reference, full_matrices=False)[0].T
+            matrix, reference = basis @ matrix, basis @ reference
+        sign, size = np.linalg.slogdet(matrix)
+        sign_there, size_there = np.linalg.slogdet(reference)
+        return np.array([sign * sign_there * math.exp(min(size - size_there, LARGEST_POWER))])
+
+    def signs(self, point: Point) -> tuple[float, ...]:
+        """Return the signs of the determinants; none where equations are redundant."""
+        found = self._blocks(point)
+        if found is not None:
+            return tuple(np.sign(found).tolist())
+        matrix = point.Phi_q
+        square = matrix.shape[0] == matrix.shape[1]
+        return (float(np.linalg.slogdet(matrix)[0]),) if square else ()
+
+    def _blocks(self, point: Point) -> Array | None:
+        """Return the determinants of the blocks that the module knows, if it knows any."""
+        if point.factors is None and self.code.lanes is not None:
+            point.factors = self._planned(point)
+        elif point.factors is None and self._stages is not None:
+            point.factors = self._stages.determinants_of(point.Phi_q[tuple(self.code.pattern.T)])
+        return None if point.factors is None else np.asarray(point.factors)
+
+    def _planned(self, point: Point) -> Array:
+        """Return the determinants by the planned solve."""
+        lanes, p = self.code.lanes, self._p.tolist()
+        assert lanes is not None
+        q, t = point.q, point.t
+        values = lanes.position(lanes.floats, q.tolist(), t, p)
+        try:
+            found = lanes.factor(lanes.floats, values[len(self.code.equations) :])[1]
+        except ArithmeticError:  # floats refuse 1/0 in the factors of a singular block
+            batch = Planned(self.code, self._p)
+            return batch.determinants(batch.evaluate(q[:, np.newaxis], t))[:, 0]
+        return np.array(found, dtype=np.float64)
+
+
+def _agree(matrix: Array, rates: Array, sides: Array) -> bool:
+    """Say whether redundant equations are all met by the rates that solve them best."""
+    if matrix.shape[0] == matrix.shape[1]:
+        return True
+    terms = np.abs(matrix) @ np.abs(rates) + np.abs(sides)
+    missing = np.abs(matrix @ rates - sides)
+    return bool(np.max(missing) <= AGREEMENT * np.max(terms))
+
+
+def solve_linear(matrix: Array, sides: Array) -> Array:
+    """Return x of matrix x = sides; of more equations than unknowns in the sense of least squares.
+
+    Redundant equations that agree change nothing. That they do agree is for the caller to check.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (m, n)
+        With m >= n.
+    sides : ndarray, shape (m,) or (m, k)
+        Right-hand sides.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When the rank is less than n.
+    """
+    m, n = matrix.shape
+    if m == n:
+        return np.asarray(np.linalg.solve(matrix, sides), dtype=np.float64)
+    solution, _, rank, _ = np.linalg.lstsq(matrix, sides, rcond=None)
+    if rank < n:
+        raise np.linalg.LinAlgError("dependent columns")
+    return np.asarray(solution, dtype=np.float64)
+
+
+def norm(vector: Array) -> float:
+    """Return the Euclidean norm; three times as fast as `numpy.linalg.norm`."""
+    return math.sqrt(vector @ vector)
+
+
+def unsolvable(point: Point) -> Status:
+    """Say why Phi_q x = b has no solution at a point."""
+    return Status.SINGULAR if np.isfinite(point.Phi_q).all() else Status.NOT_FINITE

@@ -1,13 +1,14 @@
 """The motion over a time grid: position, velocity and acceleration at every point.
 
 inputs    checked, in the solver's form            inputs.read_inputs
-  -> of a compiled module, its own march           native.make_native
   -> go through the times                          follow.follow
-       assemble the first point from the guess     march.start      (newton.assemble)
-       solve all points together                   grid.solve_grid  (coarse.coarse_march)
+       assemble the first point from the guess     newton.start
+       solve all points together                   grid.solve_grid
        point by point what cannot be trusted       march.March
        find what ends the motion, or go through it events.locate
-  -> say how it went                               verdict.verdict
+  -> say how it went                               here
+
+What all of them stand on is one position with its scales: problem.Problem.
 """
 
 from __future__ import annotations
@@ -18,35 +19,46 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.errors import (
-    BranchSwitchWarning,
-    InputError,
-    SingularConfigurationWarning,
-    SolveError,
-)
+from kincompile.errors import BranchSwitchWarning, SingularConfigurationWarning, SolveError
+from kincompile.names import listed
 from kincompile.runtime.corners import after_corners, corners_of, with_corners
 from kincompile.runtime.follow import follow
-from kincompile.runtime.inputs import Inputs, read_inputs
-from kincompile.runtime.march import Outcome, leaves_branch
-from kincompile.runtime.motion import Motion
-from kincompile.runtime.problem import problem
+from kincompile.runtime.inputs import read_inputs, read_variants
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
-from kincompile.runtime.variants import read_variants, solve_in_turn, solve_variants
-from kincompile.runtime.verdict import verdict
+from kincompile.runtime.variants import solve_in_turn, solve_variants
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
     from types import ModuleType
 
     from numpy.typing import ArrayLike
 
-    from kincompile.runtime.engine.code import Code
-    from kincompile.runtime.inputs import Values
-    from kincompile.runtime.motion import Progress
+    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.follow import Motion, Progress
+    from kincompile.runtime.inputs import Inputs, Values
+    from kincompile.runtime.march import Outcome
+    from kincompile.runtime.singular.events import Event
 
+NAMED_EQUATIONS = 3
+"""How many equations a message names."""
 
-SMALLEST_GRID = 32
-"""Points from which on a grid is faster than a march."""
+NAMED_BODIES = 6
+"""Of how many bodies a message gives the position."""
+
+LOCATED = 1e-6
+"""How exactly an event is located in time."""
+
+NOT_ASSEMBLED = (
+    "No position was found: the mechanism cannot be assembled at this time (change lengths, or "
+    "what the drivers demand), or the guess is too far away (give one nearer to the assembled "
+    "mechanism; kc.assemblies(module) looks for positions)."
+)
+"""What a first point that does not converge means, and what to do: there is no motion yet."""
+
+MET = 1e-9
+"""Residual, relative to the largest, up to which an equation counts as met."""
 
 
 def solve(
@@ -120,97 +132,32 @@ def solve(
         digits, with the time. A motion that ends at one has a status and an event instead.
     """
     sets = read_variants(module, p)
-    inputs = read_inputs(module, t, p if sets is None else None, guess, tolerance, max_iterations)
-    on_grid = _takes_grid(inputs.code, inputs.t.size, method)
-    if through not in (None, "smooth"):
-        raise InputError(f"through is {through!r}: give 'smooth', or nothing.")
-
-    def solve_one(inputs: Inputs, progress: Progress | None = None) -> Solution:
-        return _solve_one(inputs, on_grid, method is None, through == "smooth", progress)
-
-    t_given, corners = inputs.t, corners_of(inputs, sets)
+    p = p if sets is None else None
+    inputs = read_inputs(module, t, p, guess, tolerance, max_iterations, method, through)
+    times, corners = inputs.t, corners_of(inputs, sets)
     inputs = after_corners(inputs, corners)
-    if sets is None:
-        solution = solve_one(inputs, progress)
-    elif inputs.code.lanes is not None:
-        solution = solve_variants(inputs, sets, progress)
-    else:
-        solution = solve_in_turn(inputs, sets, solve_one, progress)
-    solution = with_corners(solution, t_given, corners)
+    with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
+        if sets is None:
+            solution = _solution(inputs, *follow(inputs, progress))
+        elif inputs.code.lanes is not None:
+            solution = solve_variants(inputs, sets, progress)
+        else:
+            solution = solve_in_turn(inputs, sets, progress)
+    solution = with_corners(solution, times, corners)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution
 
 
-def _solve_one(
-    inputs: Inputs, on_grid: bool, may_be_compiled: bool, smooth: bool, progress: Progress | None
-) -> Solution:
-    """Solve with one set of parameters."""
-    motion = Motion.over(inputs)
-    with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
-        if may_be_compiled and _march_compiled(inputs, motion):
-            outcome = Outcome(Status.CONVERGED, 0, None)
-        else:
-            outcome = follow(inputs, motion, on_grid, smooth, progress)
-    for event in motion.passed:
-        text = f"{inputs.module.NAME} goes through a bifurcation at t = {event.t:.10g}, and on"
-        warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=3)
-    if motion.near and outcome.status is Status.CONVERGED:
-        warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=3)
-    return _solution(inputs, motion, outcome)
-
-
-def _nearly(inputs: Inputs, near: list[int]) -> str:
-    """Say that points of a motion, given by their numbers, are nearly singular."""
-    more = f" and {len(near) - 1} more times" if len(near) > 1 else ""
-    return (
-        f"{inputs.module.NAME} is nearly singular at t = {inputs.t[near[0]]:.10g}{more}: its rates "
-        "have few good digits there (see .condition). Drive another coordinate near this time, or "
-        "change a length slightly."
-    )
-
-
-def _takes_grid(code: Code, points: int, method: str | None) -> bool:
-    """Say whether the points of a grid are solved together."""
-    if method not in (None, "grid", "march"):
-        raise InputError(f"method is {method!r}: give 'grid', 'march', or nothing.")
-    if method == "grid" and code.lanes is None:
-        raise InputError(
-            f"{code.name} goes from point to point, as all redundant mechanisms and those in the "
-            "grouped form do: use method='march', or compile it with form='inline'."
-        )
-    return method == "grid" or (
-        method is None and points >= SMALLEST_GRID and code.lanes is not None
-    )
-
-
-def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
-    """Let a compiled module follow the motion; say whether all went well.
-
-    Where anything did not, the careful march finds out what it is, from the first time on.
-    """
-    march = inputs.code.march
-    if march is None:
-        return False
-    states = motion.q.T, motion.q_dot.T, motion.q_ddot.T
-    status, iterations = np.empty((2, inputs.t.size), dtype=np.intc)
-    if march(inputs, states, motion.residual, status, iterations) < inputs.t.size:
-        return False
-    # A large step of Newton's from the guess may have ended on another branch.
-    time = float(inputs.t[0])
-    equations = problem(inputs.module, inputs.p, inputs.guess, time, inputs.guess)
-    guess, found = (equations.at(q, time) for q in (inputs.guess, motion.q[0].copy()))
-    if guess is None or found is None or leaves_branch(equations, guess, found):
-        return False
-    motion.status[:], motion.iterations[:] = status, iterations
-    motion.statistics["compiled"] = inputs.t.size
-    return True
-
-
 def _solution(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
-    """Put names, parameters and the verdict to the numbers."""
-    module = inputs.module
-    message = verdict(inputs, motion.status, motion.residual, outcome, motion.events)
+    """Put names, parameters and a verdict to the numbers, and warn of what was passed."""
+    code = inputs.code
+    success = outcome.status is Status.CONVERGED
+    for event in motion.passed:
+        text = f"{code.name} goes through a bifurcation at t = {event.t:.10g}, and on"
+        warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=3)
+    if motion.near and success:
+        warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=3)
     return Solution(
         t=inputs.t,
         q=motion.q,
@@ -219,14 +166,101 @@ def _solution(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
         status=motion.status,
         residual=motion.residual,
         iterations=motion.iterations,
-        success=outcome.status is Status.CONVERGED,
-        message=message + motion.note,
-        name=module.NAME,
-        coordinates=module.COORDINATES,
-        equations=module.EQUATIONS,
-        units=dict(module.UNITS),
-        parameters=dict(zip(module.PARAMETERS, inputs.p.tolist(), strict=True)),
+        success=success,
+        message=_verdict(inputs, motion, outcome) + motion.note,
+        name=code.name,
+        coordinates=code.coordinates,
+        equations=code.equations,
+        units=dict(code.units),
+        parameters=dict(zip(code.parameters, inputs.p.tolist(), strict=True)),
         statistics=motion.statistics,
         events=motion.events,
-        module=module,
+        module=code.module,
     )
+
+
+def _nearly(inputs: Inputs, near: list[int]) -> str:
+    """Say that points of a motion, given by their numbers, are nearly singular."""
+    more = f" and {len(near) - 1} more times" if len(near) > 1 else ""
+    return (
+        f"{inputs.code.name} is nearly singular at t = {inputs.t[near[0]]:.10g}{more}: its rates "
+        "have few good digits there (see .condition). Drive another coordinate near this time, or "
+        "change a length slightly."
+    )
+
+
+def _verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
+    """Say in words how a motion went; the outcome is that of the last point that was tried."""
+    name, times, events = inputs.code.name, inputs.t, motion.events
+    if outcome.status is Status.CONVERGED:
+        points = f"all {times.size} points" if times.size > 1 else "the point"
+        passed = "".join(f" Passed: {event.kind} at t = {event.t:.10g}." for event in events)
+        largest = motion.residual.max()
+        return f"{name}: {points} converged; the largest residual is {largest:.2g}.{passed}"
+    index = int(np.argmax(motion.status != Status.CONVERGED))
+    parts = [
+        f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
+        f" ({outcome.status.name}).",
+        _before(outcome, index),
+        _why(outcome, events, times[index]),
+        _there(inputs.code, outcome),
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def _before(outcome: Outcome, index: int) -> str:
+    """Say how far the motion was followed."""
+    if outcome.state is None:
+        return ""
+    good = f"The {index} points before it are good" if index > 1 else "The point before it is good"
+    reached = f"; the motion was followed to t = {outcome.state.t:.10g}"
+    return f"{good}{'' if outcome.position else reached}."
+
+
+def _why(outcome: Outcome, events: Sequence[Event], t: float) -> str:
+    """Say why the motion ended, and what to do: by the event between its end and the failed time.
+
+    Without one, what the status may mean is said in general, and the last event on the way.
+    """
+    if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
+        return NOT_ASSEMBLED
+    general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
+    if not events or outcome.state is None:
+        return general
+    event, end = events[-1], outcome.state.t
+    is_between = abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LOCATED
+    return event.message if is_between else general
+
+
+def _there(code: Code, outcome: Outcome) -> str:
+    """Name the equations that do not hold at the time of failure, or say what else is there."""
+    if outcome.position is not None:
+        return "The position there was found."
+    if outcome.jumps:
+        return "A position exists at that time, but the motion does not lead there continuously."
+    return "" if outcome.nearest is None else _unmet(code, outcome.nearest)
+
+
+def _unmet(code: Code, point: Point) -> str:
+    """Say by how much which equations are missed at the best position, and where its bodies are."""
+    sizes = np.abs(point.Phi)
+    order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
+    rows = [row for row in order.tolist() if sizes[row] > MET * sizes[order[0]]]
+    worst = ", ".join(f"{code.equations[row]} = {point.Phi[row]:.3g}" for row in rows)
+    places = listed(_places(code, point.q), most=NAMED_BODIES)
+    return (
+        f"The equations with the largest residuals at the nearest position: {worst}. "
+        f"There: {places}."
+    )
+
+
+def _places(code: Code, q: Array) -> Iterator[str]:
+    """Yield where each body is, and the values of coordinates that belong to none."""
+    values = dict(zip(code.coordinates, q.tolist(), strict=True))
+    firsts = {body: first for body, first, _ in code.bodies}
+    for owner in dict.fromkeys(code.owners().values()):
+        if owner in firsts:
+            x, y, phi = q[firsts[owner] : firsts[owner] + 3]
+            yield f"{owner} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+        else:
+            yield f"{owner} = {values[owner]:.4g}"

@@ -13,54 +13,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import MAX_CORRECTIONS, TOO_NEAR
-from kincompile.errors import InputError
-from kincompile.names import listed
 from kincompile.runtime.engine.planned import Planned
-from kincompile.runtime.march import March, Outcome, State, all_hold, give_up, start
-from kincompile.runtime.problem import largest, problem
+from kincompile.runtime.follow import follow
+from kincompile.runtime.march import March, Outcome, State, all_hold, largest
+from kincompile.runtime.newton import give_up, start
+from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from types import ModuleType
-
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.follow import Progress
     from kincompile.runtime.inputs import Inputs
 
-    Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]
 
 CHUNK = 2048
 """Variants at a time, so that intermediate arrays stay in the cache and memory is bounded."""
-
-
-def read_variants(module: ModuleType, p: object) -> Array | None:
-    """Return parameter sets of shape (B, k) where `p` has the shape (B, 1, k), else None.
-
-    Raises
-    ------
-    InputError
-        When a set has the wrong size or a value is not finite.
-    """
-    if not isinstance(p, np.ndarray) or p.ndim != 3:
-        return None
-    count, one, size = p.shape
-    if one != 1 or size != len(module.PARAMETERS) or count == 0 or p.dtype.kind not in "iuf":
-        raise InputError(
-            f"p has shape {p.shape} and type {p.dtype}: give real numbers of shape "
-            f"(B, 1, {len(module.PARAMETERS)}) for B variants of {listed(module.PARAMETERS)}."
-        )
-    sets = np.ascontiguousarray(p[:, 0], dtype=np.float64)
-    bad = np.argwhere(~np.isfinite(sets))
-    if bad.size:
-        variant, which = bad[0].tolist()
-        raise InputError(
-            f"parameter {module.PARAMETERS[which]!r} of variant {variant} is "
-            f"{sets[variant, which]}: give a finite number."
-        )
-    return sets
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,9 +58,7 @@ class _Arrays:
         )
 
 
-def solve_variants(
-    inputs: Inputs, sets: Array, progress: Callable[[int, int], object] | None
-) -> Solution:
+def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> Solution:
     """Solve all variants over the time grid.
 
     Parameters
@@ -108,29 +77,23 @@ def solve_variants(
     """
     count = len(sets)
     arrays = _Arrays.over(inputs, count)
-    with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
-        for first in range(0, count, CHUNK):
-            chunk = slice(first, min(first + CHUNK, count))
-            _solve_chunk(inputs, sets[chunk], arrays, chunk)
-            if progress:
-                progress(chunk.stop, count)
+    for first in range(0, count, CHUNK):
+        chunk = slice(first, min(first + CHUNK, count))
+        _solve_chunk(inputs, sets[chunk], arrays, chunk)
+        if progress:
+            progress(chunk.stop, count)
     return _solution(inputs, sets, arrays)
 
 
-def solve_in_turn(
-    inputs: Inputs,
-    sets: Array,
-    alone: Callable[[Inputs], Solution],
-    progress: Callable[[int, int], object] | None,
-) -> Solution:
-    """Solve variants of a module that has no lanes, one after the other, as `alone` does."""
+def solve_in_turn(inputs: Inputs, sets: Array, progress: Progress | None) -> Solution:
+    """Solve variants of a module that has no lanes, one after the other."""
     arrays = _Arrays.over(inputs, len(sets))
     for variant, p in enumerate(sets):
-        solution = alone(replace(inputs, p=p))
-        arrays.motion[..., variant] = solution.q, solution.q_dot, solution.q_ddot
-        arrays.status[:, variant] = solution.status
-        arrays.residual[:, variant] = solution.residual
-        arrays.iterations[:, variant] = solution.iterations
+        motion, _ = follow(replace(inputs, p=p))
+        arrays.motion[..., variant] = motion.q, motion.q_dot, motion.q_ddot
+        arrays.status[:, variant] = motion.status
+        arrays.residual[:, variant] = motion.residual
+        arrays.iterations[:, variant] = motion.iterations
         if progress:
             progress(variant + 1, len(sets))
     return _solution(inputs, sets, arrays)
@@ -165,14 +128,14 @@ class _Chunk:
         self._times: list[float] = inputs.t.tolist()
         self._alive = np.ones(len(sets), dtype=bool)
         engine = Planned(inputs.code, np.ascontiguousarray(sets.T))
-        nominal = problem(inputs.module, sets[0], inputs.guess, self._times[0], inputs.guess)
+        nominal = problem(inputs.code.module, sets[0], inputs.guess, self._times[0], inputs.guess)
         self._march = March(nominal, engine, inputs.tolerance)
 
     def run(self) -> None:
         """Go through the grid with all variants."""
         inputs, time = self._inputs, self._times[0]
         guess = np.repeat(inputs.guess[:, np.newaxis], len(self._sets), axis=1)
-        found = self._march.correct(guess, time, inputs.max_iterations)
+        found = self._march.correct_together(guess, time, inputs.max_iterations)
         state, checks = self._march.complete(found.point)
         good = all_hold(found.good, checks)
         self._record(0, state, good, found.iterations)
@@ -206,7 +169,7 @@ class _Chunk:
     def _alone(self, variant: int, q: Array) -> March:
         """Return the march of one variant."""
         inputs, time = self._inputs, self._times[0]
-        equations = problem(inputs.module, self._sets[variant], q, time, inputs.guess)
+        equations = problem(inputs.code.module, self._sets[variant], q, time, inputs.guess)
         return March(equations, equations.engine, inputs.tolerance)
 
     def _record(self, index: int, state: State, good: Mask, iterations: Any) -> None:
@@ -237,13 +200,16 @@ class _Chunk:
         state.point.q[:, variant] = found.point.q
         state.q_dot[:, variant], state.q_ddot[:, variant] = found.q_dot, found.q_ddot
         state.determinants[:, variant] = found.determinants
+        if state.probed is not None:
+            state.probed[:, variant] = np.abs(found.determinants)
+            state.sensitivity[variant] = found.sensitivity
         arrays.motion[:, index, :, place] = found.point.q, found.q_dot, found.q_ddot
         arrays.residual[index, place] = np.max(np.abs(found.point.Phi))
         arrays.iterations[index, place] = outcome.iterations
 
 
 def _solution(inputs: Inputs, sets: Array, arrays: _Arrays) -> Solution:
-    module = inputs.module
+    module = inputs.code.module
     q, q_dot, q_ddot = arrays.motion.transpose(0, 3, 1, 2)
     statuses = arrays.status.T
     failed = np.flatnonzero((statuses != Status.CONVERGED).any(axis=1))

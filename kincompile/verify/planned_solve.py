@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from kincompile.criteria import SINGULAR_SENSITIVITY
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.engine.lanes import LaneCode
-from kincompile.runtime.engine.planned import stacked
+from kincompile.runtime.engine.planned import Planned, stacked
 from kincompile.runtime.engine.stages import StagedSolver
 from kincompile.verify.samples import dense
 
@@ -82,25 +81,20 @@ class PlannedSolve:
         """Return x (n,) by the lanes of one state; NaN where floats refuse a division by zero."""
         (q, _, t, p), lanes = state, self._code.lanes
         assert lanes is not None
-        code = LaneCode(self._code, lanes.floats, p.tolist())
+        engine = Planned(self._code, p.tolist(), lanes.floats)
         try:
-            return code.solve(code.position(q.tolist(), t), b.tolist())
+            return engine.solve(engine.evaluate(q.tolist(), t), b.tolist())
         except ArithmeticError:
             return np.full(q.size, np.nan)
 
     def _of_complex_numbers(self) -> tuple[Array, Array, Array]:
         """Return Phi_q, x and b of complex numbers, a batch between each state and another one."""
-        lanes = self._lanes()
-        Phi, entries = lanes.evaluate(self._at.q.T, self._at.t)
-        varying = _between(stacked(entries, self.states).T)
+        engine = Planned(self._code, self._at.p.T)
+        point = engine.evaluate(self._at.q.T, self._at.t)
+        point.Phi_q = _between(stacked(point.Phi_q, self.states).T).T
         b = self._b + 1j * self._other
-        x = lanes.solve(lanes.factor(Phi, varying.T), b.T)
+        x = engine.solve(point, b.T)
         return _between(self._Phi_q), np.array(np.broadcast_arrays(*x)).T, b
-
-    def _lanes(self) -> LaneCode:
-        code = self._code
-        assert code.lanes is not None
-        return LaneCode(code, code.lanes.arrays, self._at.p.T)
 
     @property
     def has_blocks(self) -> bool:
@@ -111,8 +105,8 @@ class PlannedSolve:
         """Return by what part the product of the determinants changes relative to det Phi_q."""
         signs, sizes = np.linalg.slogdet(self._Phi_q)
         if self._code.lanes is not None:
-            lanes = self._lanes().position(self._at.q.T, self._at.t).determinants
-            found = stacked(lanes, self.states).T
+            engine = Planned(self._code, self._at.p.T)
+            found = engine.determinants(engine.evaluate(self._at.q.T, self._at.t)).T
         else:
             stages = StagedSolver(self._code)
             found = np.array([stages.determinants_of(J) for J in self._nonzeros])

@@ -26,8 +26,7 @@ from kincompile.ir.lower import lower
 from kincompile.model.origins import model_of
 from kincompile.quantities import OF_EQUATIONS
 from kincompile.runtime.contract import check as check_contract
-from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.inputs import require_square
+from kincompile.runtime.engine.code import code_of, require_square
 from kincompile.tables import indented, table
 from kincompile.verify.oracles import ORACLES, Oracle
 from kincompile.verify.planned_solve import LIMIT, PlannedSolve

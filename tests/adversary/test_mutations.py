@@ -17,7 +17,7 @@ import kincompile as kc
 from kincompile.model.origins import remember_model
 from kincompile.quantities import OF_EQUATIONS, functions, states_of
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.engine.lanes import LaneCode
+from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.stages import StagedSolver
 
 MACHINERY = {"inline": "class _Quantity", "grouped": "class Group"}
@@ -128,9 +128,9 @@ def numbers_of_plan(module, q, t, p, nonzeros, b):
     """Yield what the planned solve gives to the runtime: solutions and determinants."""
     code = code_of(module)
     if code.lanes is not None:
-        lanes = LaneCode(code, code.lanes.arrays, p.T)
-        at = lanes.position(q.T, t)
-        yield from np.broadcast_arrays(*lanes.solve(at, b.T), *at.determinants)
+        engine = Planned(code, p.T)
+        point = engine.evaluate(q.T, t)
+        yield from np.broadcast_arrays(*engine.solve(point, b.T), *engine.determinants(point))
     if code.stages:
         stages = StagedSolver(code)
         for entries, right in zip(nonzeros[:5], b, strict=False):

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.errors import StructuralError
+from kincompile.names import listed
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from types import ModuleType
@@ -16,6 +19,9 @@ Array = NDArray[np.float64]
 
 PLACE = "_code"
 """Where a module keeps its `Code`."""
+
+JOINT_POINTS = "_joint_points"
+"""Where a module keeps the function that compiles the points of its joints, on request."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,3 +170,28 @@ def attach(module: ModuleType) -> Code:
     )
     names[PLACE] = code
     return code
+
+
+def require_square(code: Code) -> None:
+    """Refuse a module whose equations cannot determine its coordinates.
+
+    What the compiler has written into the module says why; else they are counted.
+
+    Raises
+    ------
+    StructuralError
+        With what is wrong, and what to do.
+    """
+    if code.unsolvable:
+        raise StructuralError(code.unsolvable)
+    m, n = len(code.equations), len(code.coordinates)
+    if m == n or (m > n and code.redundant):
+        return
+    if m < n:
+        remedy = f"add {n - m} more (joints or drivers), or hold coordinates that are free"
+    else:
+        remedy = f"remove {m - n} of them: {listed(code.equations)}"
+    raise StructuralError(
+        f"{code.name} has {m} equations for {n} coordinates ({listed(code.coordinates)}), "
+        f"and the motion needs as many equations as coordinates: {remedy}."
+    )

@@ -3,7 +3,7 @@
 | engine | linear systems | for |
 | --- | --- | --- |
 | `planned.Planned` | the elimination planned at compile time | batches of points or variants |
-| `dense.Dense` | LAPACK with pivoting; least squares for redundant equations | single points |
+| `problem.Dense` | LAPACK with pivoting; least squares for redundant equations | single points |
 | `staged.Staged` | block after block of a large sparse matrix | mechanisms in the grouped form |
 
 A compiled module needs none of its own: its functions take the place of the NumPy ones.
@@ -11,7 +11,6 @@ A compiled module needs none of its own: its functions take the place of the Num
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -48,11 +47,6 @@ class Point:
     Phi: Any
     Phi_q: Any
     factors: Any = None
-
-    @property
-    def residual(self) -> float:
-        """Euclidean norm of Phi at one position."""
-        return norm(self.Phi)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,8 +86,8 @@ class Engine(Protocol):
     def factor(self, point: Point) -> None:
         """Factor Phi_q of a point, once."""
 
-    def solve(self, point: Point, b: Array) -> Array:
-        """Return x of Phi_q x = b, b of shape (m,) or (m, N)."""
+    def solve(self, point: Point, b: Array) -> Any:
+        """Return x of Phi_q x = b, b of shape (m,) or (m, N); of a batch also as a row each."""
 
     def solve_transposed(self, point: Point, b: Array) -> Array:
         """Return x of Phi_q^T x = b, b of shape (n,) or (n, N)."""
@@ -109,8 +103,3 @@ class Engine(Protocol):
 
     def signs(self, point: Point) -> tuple[float, ...]:
         """Return their signs at one point; none where redundant equations forbid a determinant."""
-
-
-def norm(vector: Array) -> float:
-    """Return the Euclidean norm; three times as fast as `numpy.linalg.norm`."""
-    return math.sqrt(vector @ vector)

@@ -1,75 +1,93 @@
-"""The engine of the planned elimination: batches of points, or of parameter sets."""
+"""The engine of the planned elimination: batches of points or parameter sets, or plain floats."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kincompile.runtime.engine.engine import Point, Rates
-from kincompile.runtime.engine.lanes import LaneCode, Lanes
 
 if TYPE_CHECKING:
-    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.code import Array, Code, LaneFunctions
+
+Lanes = Sequence[Any] | NDArray[np.float64]
+"""One lane a coordinate or an equation: a float, or an array (N,) over a batch."""
 
 
+@dataclass(slots=True, eq=False)
 class Planned:
     """An engine whose linear systems go by the elimination that was planned at compile time.
 
-    Parameters
+    Attributes
     ----------
     code
         A module with a planned solve.
-    p : ndarray, shape (k,) or (k, N)
+    p : ndarray, shape (k,) or (k, N), or sequence of float
         Parameters, of all points or a set for each.
+    functions
+        The module's elementary functions of floats, where positions are lists of floats: one of
+        them then takes as long as a few calls of NumPy. None for those of arrays.
     """
 
-    def __init__(self, code: Code, p: Array) -> None:
-        assert code.lanes is not None
-        self.code, self._p = code, p
-        self._lanes = LaneCode(code, code.lanes.arrays, p)
+    code: Code
+    p: Lanes
+    functions: Any = None
 
-    def evaluate(self, q: Array, t: Any) -> Point:
+    @property
+    def _own(self) -> tuple[LaneFunctions, Any]:
+        """The code of the mechanism, and the elementary functions that it is given."""
+        own = self.code.lanes
+        assert own is not None
+        return own, self.functions or own.arrays
+
+    def evaluate(self, q: Any, t: Any) -> Point:
         """Evaluate Phi and the varying entries of Phi_q."""
-        Phi, entries = self._lanes.evaluate(q, t)
-        return Point(q, t, Phi, entries)
+        own, functions = self._own
+        values = own.position(functions, q, t, self.p)
+        m = len(self.code.equations)
+        return Point(q, t, values[:m], values[m:])
 
     def factor(self, point: Point) -> None:
-        """Factor Phi_q of a point, once."""
+        """Factor Phi_q of a point, once; the determinants of its blocks come with it."""
         if point.factors is None:
-            point.factors = self._lanes.factor(point.Phi, point.Phi_q)
+            own, functions = self._own
+            point.factors = own.factor(functions, point.Phi_q)
 
-    def solve(self, point: Point, b: Lanes) -> Array:
-        """Return x of Phi_q x = b, shape (n, N)."""
+    def solve(self, point: Point, b: Lanes) -> Any:
+        """Return x of Phi_q x = b, one lane a coordinate."""
         self.factor(point)
-        return stacked(self._lanes.solve(point.factors, b), point.q.shape[1])
+        own, functions = self._own
+        return own.solve(functions, point.factors[0], b)
 
     def solve_transposed(self, point: Point, b: Array) -> Array:
         """Return x of Phi_q^T x = b: column by column of the inverse, which the plan knows."""
         n = len(self.code.equations)
-        columns = (self.solve(point, np.eye(n)[:, [k]]) for k in range(n))
+        sides = np.eye(n)[:, :, np.newaxis]
+        columns = (stacked(self.solve(point, side), point.q.shape[1]) for side in sides)
         return np.array([np.sum(b * column, axis=0) for column in columns])
+
+    def velocity_and_acceleration(self, point: Point) -> tuple[Lanes, Lanes]:
+        """Return the rates at a point, one lane a coordinate."""
+        own, functions = self._own
+        q_dot = self.solve(point, own.nu(functions, point.q, point.t, self.p))
+        gamma = own.gamma(functions, point.q, q_dot, point.t, self.p)
+        return q_dot, self.solve(point, gamma)
 
     def rates(self, point: Point, besides: Array | None) -> Rates:
         """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
-        q_dot, q_ddot = np.empty((2, *point.q.shape))
-        self.put_rates(point, q_dot, q_ddot)
-        movement = np.empty(0) if besides is None else self.solve(point, besides)
-        return Rates(q_dot, q_ddot, movement)
-
-    def put_rates(self, point: Point, *places: Array) -> None:
-        """Put velocity and acceleration at a point into arrays of shape (n, N)."""
-        self.factor(point)
-        for rows, lanes in zip(
-            places, self._lanes.rates(point.factors, point.q, point.t), strict=True
-        ):
-            for row, lane in zip(rows, lanes, strict=True):
-                row[:] = lane
+        q_dot, q_ddot = self.velocity_and_acceleration(point)
+        movement = () if besides is None else self.solve(point, besides)
+        points = point.q.shape[1]
+        return Rates(stacked(q_dot, points), stacked(q_ddot, points), stacked(movement, points))
 
     def determinants(self, point: Point, before: Point | None = None) -> Array:
         """Return the determinants of the blocks, shape (blocks, N)."""
         self.factor(point)
-        return stacked(point.factors.determinants, point.q.shape[1])
+        return stacked(point.factors[1], point.q.shape[1])
 
     def signs(self, point: Point) -> tuple[float, ...]:
         """Return the signs at the first point."""
@@ -78,8 +96,6 @@ class Planned:
 
 def stacked(lanes: Lanes, points: int) -> Array:
     """Return lanes, some of which may be one number for all points, as an array (..., N)."""
-    if isinstance(lanes, np.ndarray):
-        return lanes
     result = np.empty((len(lanes), points))
     for row, lane in zip(result, lanes, strict=True):
         row[:] = lane

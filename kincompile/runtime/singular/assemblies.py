@@ -11,7 +11,7 @@ from kincompile.criteria import RESIDUAL_FACTOR
 from kincompile.errors import InputError
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.newton import iterate, safeguarded_step
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import norm, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def _periodic(equations: Problem, t: float, guess: Vector) -> NDArray[np.bool_]:
         q[column] += math.tau
         turned = equations.at(q, t)
         periodic[column] = turned is not None and bool(
-            np.allclose(turned.Phi, generic.Phi, rtol=1e-11, atol=1e-11 * generic.residual)
+            np.allclose(turned.Phi, generic.Phi, rtol=1e-11, atol=1e-11 * norm(generic.Phi))
         )
     return periodic
 

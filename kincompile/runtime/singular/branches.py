@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.runtime.engine.code import Array, Code, code_of
-from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.staged import Staged
+from kincompile.runtime.problem import Dense
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.runtime.engine.linear import solve_linear
+from kincompile.runtime.problem import solve_linear
 
 if TYPE_CHECKING:
     from collections.abc import Callable

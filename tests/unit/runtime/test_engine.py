@@ -8,10 +8,10 @@ import sympy
 
 import kincompile as kc
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.engine import Engine, Point
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.staged import Staged
+from kincompile.runtime.problem import Dense
 
 ENGINES: dict[str, Any] = {"dense": Dense, "planned": Planned, "staged": Staged}
 KINDS = tuple(ENGINES)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from kincompile.runtime.engine.planned import Planned
-from kincompile.runtime.march import March, State, first_failed
+from kincompile.runtime.march import March, State
 from kincompile.runtime.problem import problem
-from kincompile.runtime.status import Status
 
 BIFURCATION, RATE = 6.0, math.pi / 12
 P = np.array([1.0])
@@ -56,20 +55,14 @@ def test_past_a_bifurcation_the_other_branch_has_a_kink(march):
     assert checks(march, BIFURCATION - 0.1, BIFURCATION + 0.001, -1) == [True, False]
 
 
-def test_the_first_check_that_fails_gives_the_status():
-    found = ((True, Status.NOT_FINITE), (np.False_, Status.SINGULAR), (False, Status.NOT_FINITE))
-    assert first_failed(found) is Status.SINGULAR
-    assert first_failed(found[:1]) is Status.CONVERGED
-
-
 def test_a_batch_is_corrected_each_as_if_alone(example_named):
     module = example_named("four_bar").module
     equations = problem(module, module.DEFAULTS, module.GUESS, 0.0)
     march = March(equations, Planned(equations.code, module.DEFAULTS), 1e-10)
     guesses = np.add.outer(module.GUESS, [0.0, 1e-3, 0.05])
-    together = march.correct(guesses, 0.0, 25)
+    together = march.correct_together(guesses.copy(), 0.0, 25)
     assert together.good.all()
     for k in range(3):
-        alone = march.correct(guesses[:, [k]], 0.0, 25)
+        alone = march.correct_together(guesses[:, [k]], 0.0, 25)
         np.testing.assert_array_equal(alone.point.q[:, 0], together.point.q[:, k])
         assert alone.iterations[0] == together.iterations[k]
