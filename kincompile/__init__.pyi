@@ -46,6 +46,7 @@ from kincompile.runtime.singular.assemblies import assemblies as assemblies
 from kincompile.runtime.singular.events import Event as Event
 from kincompile.runtime.solve import solve as solve
 from kincompile.runtime.status import Status as Status
+from kincompile.runtime.times import times_at as times_at
 from kincompile.verify.verify import verify as verify
 from kincompile.view.animation import animate as animate
 from kincompile.view.gallery import gallery as gallery

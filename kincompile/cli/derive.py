@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 import kincompile as kc
-from kincompile.cli.shared import output_option, read_model, set_option
+from kincompile.cli.shared import output_option, read_model, set_option, set_values
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
 
@@ -20,7 +20,7 @@ DERIVATIONS = (".html", ".tex", ".md", ".ipynb")
 @output_option("File to write: .html, .tex, .md or .ipynb.")
 @click.option("--time", "at", type=float, default=0.0, metavar="T", help="Time of the numbers.")
 @set_option("parameter, coordinate or rate")
-def command(model: str, output: str, at: float, values: dict[str, float]) -> None:
+def command(model: str, output: str, at: float, values: dict[str, str]) -> None:
     """Show how Phi_q, nu and gamma of MODEL follow from Phi, step by step.
 
     A page for each constraint in nine steps (in vectors, in sines and cosines, in numbers) and for
@@ -30,6 +30,6 @@ def command(model: str, output: str, at: float, values: dict[str, float]) -> Non
     if Path(output).suffix not in DERIVATIONS:
         raise InputError(f"{output}: a derivation is written as {', '.join(DERIVATIONS)}")
     require_writable(output)
-    state = {"t": at, **values}
-    kc.derivation(read_model(model), state).write(output)
+    read = read_model(model)
+    kc.derivation(read, {"t": at, **set_values(read, values)}).write(output)
     click.echo(f"Wrote {output}", err=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, time_grid
+from kincompile.cli.motion import motion_options, time_grid, times_on_grid
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     NOT_CONVERGED,
@@ -13,6 +13,7 @@ from kincompile.cli.shared import (
     print_data,
     read_model,
     require_output,
+    set_values,
 )
 from kincompile.runtime.results.summary import summary
 from kincompile.runtime.results.write import require_known_suffix
@@ -22,21 +23,27 @@ from kincompile.runtime.results.write import require_known_suffix
 @click.argument("model")
 @motion_options
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
+@click.option(
+    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show and write angles in degrees."
+)
 @output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context
 def command(
     context: click.Context,
     model: str,
-    end: float | None,
+    start: str,
+    end: str | float | None,
     points: int | None,
-    values: dict[str, float],
+    grid: str | None,
+    values: dict[str, str],
     through: str | None,
     analysis: str | None,
+    angle_unit: str,
     output: str | None,
 ) -> None:
     """Solve the motion of MODEL over time and summarise it.
 
-    Position, velocity and acceleration are solved at equally spaced times, from 0 to the end. The
+    Position, velocity and acceleration are solved at equally spaced times, from start to end. The
     summary goes to stdout, or to stderr where a file is written. Where the motion does not
     converge, what was found is written nevertheless, and the exit code is 3.
     """
@@ -48,15 +55,18 @@ def command(
         settings = kc.read_analysis(analysis)
         end = settings.end if end is None else end
         points = settings.points if points is None else points
-    times = time_grid(mechanism, end, points)
+    numbers = set_values(mechanism, values)
+    times = time_grid(mechanism, start, end, points, numbers)
     module = kc.compile(mechanism)
+    if grid is not None:
+        times = times_on_grid(mechanism, module, grid, times, numbers)
     with progress_bar() as progress:
-        solution = kc.solve(module, times, values, through=through, progress=progress)
+        solution = kc.solve(module, times, numbers, through=through, progress=progress)
     if output is None:
-        print_data(summary(solution) + "\n")
+        print_data(summary(solution, angle_unit) + "\n")
     else:
-        kc.write(solution, output)
-        click.echo(f"{summary(solution)}\nWrote {output}", err=True)
+        kc.write(solution, output, angle_unit=angle_unit)
+        click.echo(f"{summary(solution, angle_unit)}\nWrote {output}", err=True)
     if not solution.success:
         click.echo(f"Error: {solution.message}", err=True)
         context.exit(NOT_CONVERGED)

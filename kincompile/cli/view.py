@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, time_grid
-from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model
+from kincompile.cli.motion import motion_options, time_grid, times_on_grid
+from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model, set_values
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
 
@@ -23,9 +22,11 @@ def command(
     context: click.Context,
     models: tuple[str, ...],
     output: str,
-    end: float | None,
+    start: str,
+    end: str | None,
     points: int | None,
-    values: dict[str, float],
+    grid: str | None,
+    values: dict[str, str],
     through: str | None,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
@@ -40,8 +41,13 @@ def command(
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
     read = [read_model(model) for model in models]
-    options: dict[str, Any] = {"p": values, "through": through}
-    pages = [kc.page(model, t=time_grid(model, end, points), **options) for model in read]
+    pages = []
+    for model in read:
+        numbers = set_values(model, values)
+        times = time_grid(model, start, end, points, numbers)
+        if grid is not None:
+            times = times_on_grid(model, kc.compile(model), grid, times, numbers)
+        pages.append(kc.page(model, t=times, p=numbers, through=through))
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:
         click.echo(f"Wrote {path}", err=True)

@@ -71,7 +71,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "constraints": Field(_list("constraint")),
     },
     "analysis": {
-        "end": Field(_NUMBER, is_required=False),
+        "end": Field(_EXPRESSION, is_required=False),
         "points": Field(
             {"type": "integer", "minimum": 1, "maximum": MOST_POINTS}, is_required=False
         ),

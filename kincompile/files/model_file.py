@@ -97,12 +97,12 @@ class _ModelReader(FieldReader):
         if not self._is_model(data):
             return None
         self.has_fields((), data, FIELDS["model"])
+        name = self.name(data, (), "the model") or "model"
+        parameters = [self._parameter(*item) for item in self.rows(data, "parameters")]
         options = {
             "length_unit": self.unit(data.get("length_unit", "m"), ("length_unit",), "lengths"),
             **self._analysis(data.get("analysis", {})),
         }
-        name = self.name(data, (), "the model") or "model"
-        parameters = [self._parameter(*item) for item in self.rows(data, "parameters")]
         bodies = [self._body(*item) for item in self.rows(data, "bodies")]
         free = [self._coordinate(*item) for item in self.rows(data, "coordinates")]
         rows = self.rows(data, "constraints")
@@ -165,7 +165,8 @@ class _ModelReader(FieldReader):
         self.has_fields(("analysis",), given, FIELDS["analysis"])
         found: Row = {}
         if "end" in given:
-            found["end"] = self.number(given["end"], ("analysis", "end"))
+            names = {name: symbol for name, symbol in self._names.items() if symbol != t}
+            found["end"] = self.constant(given["end"], ("analysis", "end"), names)
         points = given.get("points", 101)
         if type(points) is int and 1 <= points <= MOST_POINTS:
             return {**found, "points": points}

@@ -50,9 +50,14 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         "kincompile": VERSION,
         "name": system.name,
         "length_unit": system.length_unit,
-        "analysis": {"end": float(system.end), "points": int(system.points)},
+        "analysis": {"end": _end(system), "points": int(system.points)},
         **{name: rows for name, rows in sections.items() if rows},
     }
+
+
+def _end(system: ConstraintSystem) -> int | float | str:
+    given = system.end_given
+    return value(given) if isinstance(given, sympy.Expr) else float(given)
 
 
 def _parameter(item: Parameter) -> dict[str, Any]:

@@ -269,6 +269,13 @@ def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
         return None
 
 
+def number_in(value: Scalar, unit: str, values: dict[str, float]) -> float | None:
+    """Return the number an expression is in a unit: what is counted in degrees stays in them."""
+    if isinstance(value, sympy.Expr) and unit.startswith("deg"):
+        value = cast("sympy.Expr", value.xreplace({deg: sympy.S.One}))
+    return evaluate(value, values)
+
+
 def depends_on(value: Scalar, names: Iterable[str]) -> bool:
     """Return whether any of the names occurs in an expression."""
     return not symbol_names(value).isdisjoint(names)

@@ -38,7 +38,8 @@ class Mechanism(MatrixViews, TextViews):
     length_unit
         Unit of lengths, for documentation.
     end, points
-        Default time grid of an analysis: `points` equally spaced times from 0 to `end`.
+        Default time grid of an analysis: `points` equally spaced times from 0 to `end`, a number or
+        an expression of parameters: ``60 / n`` is a revolution at n rpm.
 
     Attributes
     ----------
@@ -47,7 +48,7 @@ class Mechanism(MatrixViews, TextViews):
     """
 
     def __init__(
-        self, name: str, *, length_unit: str = "m", end: float = 1.0, points: int = 101
+        self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
     ) -> None:
         self.name = name
         self.length_unit = length_unit

@@ -15,9 +15,10 @@ from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import (
     NotAnExpressionError,
+    Scalar,
     as_expression,
     degrees_problem,
-    evaluate,
+    number_in,
 )
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.outputs import (
@@ -68,6 +69,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         As written, with their arguments resolved: the rows of Phi_q.
     equations : tuple of str
         Names of the equations, in order.
+    end : float
+        The last time, at the default parameters; `end_given` is it as it was given.
     body_points : tuple of BodyPoint
         The named points.
     outputs : tuple of ResolvedOutput
@@ -80,8 +83,8 @@ class ConstraintSystem(MatrixViews, TextViews):
     """
 
     __slots__ = (
-        "bodies", "body_points", "constraints", "coordinates", "end", "equations", "length_unit",
-        "name", "outputs", "parameters", "points",
+        "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
+        "length_unit", "name", "outputs", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -94,6 +97,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     outputs: tuple[ResolvedOutput, ...]
     length_unit: str
     end: float
+    end_given: Scalar
     points: int
 
     def __init__(
@@ -107,7 +111,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         bodies: Iterable[Body] = (),
         outputs: Iterable[BodyPoint | Output] = (),
         length_unit: str = "m",
-        end: float = 1.0,
+        end: Scalar = 1.0,
         points: int = 101,
     ) -> None:
         problems: list[str] = []
@@ -121,6 +125,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             *_contact_coordinates(written, defaults, problems),
         ]
         _check_outlines(bodies, defaults, problems)
+        last: Any = _number(end, "end", defaults, problems) if isinstance(end, sympy.Expr) else end
         wanted = _items(outputs, "outputs", problems)
         body_points = tuple(item for item in wanted if isinstance(item, BodyPoint))
         named = (*outputs_of_points(body_points), *(x for x in wanted if isinstance(x, Output)))
@@ -152,7 +157,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
             "outputs": tuple(item for item in found_outputs if item is not None),
-            "length_unit": length_unit, "end": end, "points": points,
+            "length_unit": length_unit, "end": last, "end_given": end, "points": points,
         }  # fmt: skip
         for key, value in values.items():
             object.__setattr__(self, key, value)
@@ -250,7 +255,7 @@ def _number(
 ) -> float:
     """Return a finite number, angles in radians, from a number or an expression of parameters."""
     try:
-        number = evaluate(as_expression(given), values)
+        number = number_in(as_expression(given), unit, values)
     except NotAnExpressionError as error:
         problems.append(f"{where}: {error}; give a finite number")
         return 0.0

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 TIME_UNIT = "s"
 """Unit of t, in which every driver and every rate is written."""
 
+ANGLE_UNITS = {"rad": 1.0, "deg": 180 / np.pi}
+"""What angles are shown in, with the factor from radians."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Column:
@@ -38,10 +41,38 @@ class Column:
     unit: str
     values: NDArray[np.float64]
 
+    def shown(self, angle_unit: str) -> Column:
+        """Return the column as it is shown: in degrees, where angles are and it is one."""
+        unit, factor = shown_unit(self.unit, angle_unit)
+        return self if factor == 1 else Column(self.name, unit, self.values * factor)
+
     @property
     def title(self) -> str:
         """Name and unit, for instance ``x_rod [m]``."""
         return titled(self.name, self.unit)
+
+
+def shown_unit(unit: str, angle_unit: str) -> tuple[str, float]:
+    """Return the unit in which numbers are shown, and the factor to it from their own.
+
+    Parameters
+    ----------
+    unit
+        Their own, as in ``rad/s``.
+    angle_unit
+        ``"rad"`` or ``"deg"``: what angles and their rates are shown in. All else stays.
+
+    Raises
+    ------
+    InputError
+        If there is no such unit of angles.
+    """
+    if angle_unit not in ANGLE_UNITS:
+        raise InputError(f"angle_unit is {angle_unit!r}: angles are shown in 'rad' or in 'deg'.")
+    name, slash, per = unit.partition("/")
+    if name != "rad":
+        return unit, 1.0
+    return f"{angle_unit}{slash}{per}", ANGLE_UNITS[angle_unit]
 
 
 def titled(name: str, unit: str) -> str:
@@ -155,8 +186,8 @@ class MotionTable:
         values = (self.q, self.q_dot, self.q_ddot)[order][..., k]
         return Column(rate(name, order), rate_unit(self.units.get(name, ""), order), values)
 
-    def to_pandas(self) -> pd.DataFrame:
-        """Return the motion as a `pandas.DataFrame`, a row a time.
+    def to_pandas(self, angle_unit: str = "rad") -> pd.DataFrame:
+        """Return the motion as a `pandas.DataFrame`, a row a time; angles in `angle_unit`.
 
         Returns
         -------
@@ -174,15 +205,15 @@ class MotionTable:
         with package_of_extra("pandas", "tables"):
             import pandas as pd
         self.require_one_motion("a table holds", "use to_xarray()")
-        columns = self.columns()
+        columns = [item.shown(angle_unit) for item in self.columns()]
         data: dict[str, NDArray[Any]] = {column.name: column.values for column in columns}
         data |= {"status": self.status, "residual": self.residual}
         frame = pd.DataFrame(data, index=pd.Index(self.t, name="t"))
         frame.attrs["units"] = {"t": TIME_UNIT, **{item.name: item.unit for item in columns}}
         return frame
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the motion as an `xarray.Dataset`.
+    def to_xarray(self, angle_unit: str = "rad") -> xarray.Dataset:
+        """Return the motion as an `xarray.Dataset`; angles in `angle_unit`, ``"rad"`` or ``"deg"``.
 
         Returns
         -------
@@ -200,7 +231,7 @@ class MotionTable:
         dimensions = ("variant", "t") if self.q.ndim > 2 else ("t",)
         variables: dict[str, Any] = {
             item.name: (dimensions, item.values, {"units": item.unit} if item.unit else {})
-            for item in self.columns()
+            for item in (column.shown(angle_unit) for column in self.columns())
         }
         variables |= {name: (dimensions, getattr(self, name)) for name in ("status", "residual")}
         times = {"t": ("t", self.t, {"units": TIME_UNIT})}

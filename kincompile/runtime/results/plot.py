@@ -38,11 +38,13 @@ GAP, EVENT = "0.88", "tab:red"
 """Colours of the times without a solution, and of events."""
 
 
-def plot_columns(solution: MotionTable, names: Sequence[str], ax: Axes | None) -> Axes:
+def plot_columns(
+    solution: MotionTable, names: Sequence[str], ax: Axes | None, angle_unit: str
+) -> Axes:
     """Draw columns of a solution over time, as `Solution.plot` describes."""
     with package_of_extra("matplotlib", "plot"):
         from matplotlib import pyplot as plt
-    panels = _by_unit(solution, names)
+    panels = _by_unit(solution, names, angle_unit)
     if ax is not None:
         _draw_panel(ax, solution, [column for panel in panels for column in panel])
         return ax
@@ -64,11 +66,11 @@ def _size_of(panels: Panels) -> tuple[float, float]:
     return 7.2, 1.2 + 2.4 * len(panels)
 
 
-def _by_unit(solution: MotionTable, names: Sequence[str]) -> Panels:
+def _by_unit(solution: MotionTable, names: Sequence[str], angle_unit: str = "rad") -> Panels:
     """Return the named columns in their order, grouped by unit; all coordinates without a name."""
     panels: dict[str, list[Column]] = {}
     for name in names or solution.coordinates:
-        column = solution.column(name)
+        column = solution.column(name).shown(angle_unit)
         panels.setdefault(column.unit, []).append(column)
     return list(panels.values())
 

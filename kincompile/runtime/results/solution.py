@@ -153,7 +153,7 @@ class Solution(MotionTable):
         for item, value in zip(fields(self), state, strict=True):
             object.__setattr__(self, item.name, value)
 
-    def plot(self, *names: str, ax: Axes | None = None) -> Axes:
+    def plot(self, *names: str, ax: Axes | None = None, angle_unit: str = "rad") -> Axes:
         """Draw columns over time: coordinates, rates, second rates; events and gaps are marked.
 
         Parameters
@@ -163,6 +163,8 @@ class Solution(MotionTable):
         ax : matplotlib.axes.Axes, optional
             Draws all of them into this plot. Without it there is a new figure with a panel for
             each unit, so that metres and radians do not share an axis.
+        angle_unit : {"rad", "deg"}
+            What angles and their rates are drawn in.
 
         Returns
         -------
@@ -176,7 +178,7 @@ class Solution(MotionTable):
         UnsupportedError
             When matplotlib is not installed.
         """
-        return plot_columns(self, names, ax)
+        return plot_columns(self, names, ax, angle_unit)
 
     def _repr_html_(self) -> str:
         return solution_html(self) + (picture_html(self) or plot_html(self))
