@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 import kincompile as kc
-from kincompile.cli.shared import output_option, read_model, set_option, set_values
+from kincompile.cli.shared import output_option, read_model, set_option
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
 
@@ -20,13 +20,15 @@ DERIVATIONS = (".html", ".tex", ".md", ".ipynb")
 @output_option("File to write: .html, .tex, .md or .ipynb.")
 @click.option("--time", "at", type=float, default=0.0, metavar="T", help="Time of the numbers.")
 @set_option("parameter, coordinate or rate")
-def command(model: str, output: str, at: float, values: dict[str, str]) -> None:
+def command(model: str, output: str, at: float, values: tuple[str, ...]) -> None:
     """Show how Phi_q, nu and gamma of MODEL follow from Phi, step by step.
 
     A page for each constraint in nine steps (in vectors, in sines and cosines, in numbers) and for
     the assembled system. The numbers are taken where the mechanism is assembled at the time, or at
     the coordinates that are set.
     """
+    from kincompile.cli.values import set_values
+
     if Path(output).suffix not in DERIVATIONS:
         raise InputError(f"{output}: a derivation is written as {', '.join(DERIVATIONS)}")
     require_writable(output)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, time_grid, times_on_grid
+from kincompile.cli.motion import motion_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     NOT_CONVERGED,
@@ -13,7 +13,6 @@ from kincompile.cli.shared import (
     print_data,
     read_model,
     require_output,
-    set_values,
 )
 from kincompile.runtime.results.summary import summary
 from kincompile.runtime.results.write import require_known_suffix
@@ -35,7 +34,7 @@ def command(
     end: str | float | None,
     points: int | None,
     grid: str | None,
-    values: dict[str, str],
+    values: tuple[str, ...],
     through: str | None,
     analysis: str | None,
     angle_unit: str,
@@ -47,6 +46,8 @@ def command(
     summary goes to stdout, or to stderr where a file is written. Where the motion does not
     converge, what was found is written nevertheless, and the exit code is 3.
     """
+    from kincompile.cli.values import set_values, time_grid, times_on_grid
+
     if output is not None:
         require_known_suffix(output)
         require_output(output, model, "the model itself")

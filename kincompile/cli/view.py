@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, time_grid, times_on_grid
-from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model, set_values
+from kincompile.cli.motion import motion_options
+from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
 
@@ -26,7 +26,7 @@ def command(
     end: str | None,
     points: int | None,
     grid: str | None,
-    values: dict[str, str],
+    values: tuple[str, ...],
     through: str | None,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
@@ -35,6 +35,8 @@ def command(
     a page in a folder, whose index.html links them. Where the motion does not converge, the page
     shows what was found, or the start guess, and the exit code is 3.
     """
+    from kincompile.cli.values import set_values, time_grid, times_on_grid
+
     is_page = Path(output).suffix in (".html", ".htm")
     if is_page:
         require_writable(output)

@@ -93,7 +93,7 @@ def _one_way(known: Solution, name: str, wanted: Array) -> tuple[Array, Array]:
     times, column = known.t[good], known[name][good]
     steps = np.diff(column)
     if not (steps.size and ((steps > 0).all() or (steps < 0).all())):
-        turn = times[1:][np.sign(steps) != np.sign(steps[:1])]
+        turn = times[:-1][np.sign(steps) != np.sign(steps[:1])]
         where = f"at about t = {turn[0]:.6g}" if turn.size else "at once"
         raise InputError(
             f"{known.name}: {name} turns round or stands still {where}, so that it does not tell "
