@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 import kincompile as kc
+from kincompile.cli.motion import set_values
 from kincompile.cli.shared import output_option, read_model, set_option
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
@@ -27,8 +28,6 @@ def command(model: str, output: str, at: float, values: tuple[str, ...]) -> None
     the assembled system. The numbers are taken where the mechanism is assembled at the time, or at
     the coordinates that are set.
     """
-    from kincompile.cli.values import set_values
-
     if Path(output).suffix not in DERIVATIONS:
         raise InputError(f"{output}: a derivation is written as {', '.join(DERIVATIONS)}")
     require_writable(output)

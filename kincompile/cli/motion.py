@@ -1,4 +1,8 @@
-"""The options of a motion: its times, and the values of parameters."""
+"""The options of a motion: its times, and the values of parameters.
+
+What they say is read by `values`, which needs SymPy: it is loaded when a command is called, and not
+for ``--help``.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,13 @@ import click
 from kincompile.cli.shared import set_option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
 
 
 def motion_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -41,3 +51,25 @@ def motion_options(command: Callable[..., None]) -> Callable[..., None]:
     for option in reversed(options):
         command = option(command)
     return command
+
+
+def set_values(model: Mechanism | ConstraintSystem, given: Sequence[str]) -> dict[str, float]:
+    """Return the numbers of the options ``--set``, by name."""
+    from kincompile.cli import values
+
+    return values.set_values(model, given)
+
+
+def motion_times(
+    model: Mechanism | ConstraintSystem,
+    start: str,
+    end: str | float | None,
+    points: int | None,
+    grid: str | None,
+    numbers: dict[str, float],
+) -> NDArray[np.float64]:
+    """Return the times of a motion, shape (N,): equally spaced, or where a coordinate is."""
+    from kincompile.cli import values
+
+    times = values.time_grid(model, start, end, points, numbers)
+    return times if grid is None else values.times_on_grid(model, grid, times, numbers)

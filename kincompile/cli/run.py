@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options
+from kincompile.cli.motion import motion_options, motion_times, set_values
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     NOT_CONVERGED,
@@ -46,8 +46,6 @@ def command(
     summary goes to stdout, or to stderr where a file is written. Where the motion does not
     converge, what was found is written nevertheless, and the exit code is 3.
     """
-    from kincompile.cli.values import set_values, time_grid, times_on_grid
-
     if output is not None:
         require_known_suffix(output)
         require_output(output, model, "the model itself")
@@ -57,10 +55,8 @@ def command(
         end = settings.end if end is None else end
         points = settings.points if points is None else points
     numbers = set_values(mechanism, values)
-    times = time_grid(mechanism, start, end, points, numbers)
+    times = motion_times(mechanism, start, end, points, grid, numbers)
     module = kc.compile(mechanism)
-    if grid is not None:
-        times = times_on_grid(mechanism, module, grid, times, numbers)
     with progress_bar() as progress:
         solution = kc.solve(module, times, numbers, through=through, progress=progress)
     if output is None:

@@ -27,7 +27,6 @@ from kincompile.names import column_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from types import ModuleType
 
     from numpy.typing import NDArray
 
@@ -152,7 +151,6 @@ def _last(
 
 def times_on_grid(
     model: Mechanism | ConstraintSystem,
-    module: ModuleType,
     grid: str,
     times: NDArray[np.float64],
     values: dict[str, float],
@@ -164,6 +162,7 @@ def times_on_grid(
     InputError
         If the grid is not written as NAME=FIRST:LAST:STEP, or the motion does not reach it.
     """
+    module = kc.compile(model)
     name, _, text = grid.partition("=")
     parts = text.split(":")
     if len(parts) != 3:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options
+from kincompile.cli.motion import motion_options, motion_times, set_values
 from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
@@ -35,8 +35,6 @@ def command(
     a page in a folder, whose index.html links them. Where the motion does not converge, the page
     shows what was found, or the start guess, and the exit code is 3.
     """
-    from kincompile.cli.values import set_values, time_grid, times_on_grid
-
     is_page = Path(output).suffix in (".html", ".htm")
     if is_page:
         require_writable(output)
@@ -46,9 +44,7 @@ def command(
     pages = []
     for model in read:
         numbers = set_values(model, values)
-        times = time_grid(model, start, end, points, numbers)
-        if grid is not None:
-            times = times_on_grid(model, kc.compile(model), grid, times, numbers)
+        times = motion_times(model, start, end, points, grid, numbers)
         pages.append(kc.page(model, t=times, p=numbers, through=through))
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:
