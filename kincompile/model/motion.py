@@ -1,6 +1,6 @@
-"""What people write a motion with: `kc.motion.sequence`, `.table`, `.law`.
+"""What people write a motion with: `kc.motion.sequence`, `.table`, `.law`; and cams for it.
 
-Each gives a SymPy expression, for the value of a driver, an equation or the law of a cam.
+A motion is a SymPy expression, for the value of a driver, an equation or the law of a cam.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 import sympy
 
 from kincompile.errors import ModelError
+from kincompile.model.cam_profile import flat_cam, oscillating_cam, roller_cam
 from kincompile.model.expressions import (
     NotAnExpressionError,
     as_expression,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.expressions import Scalar
 
-__all__ = ["law", "sequence", "table"]
+__all__ = ["flat_cam", "law", "oscillating_cam", "roller_cam", "sequence", "table"]
 
 RAMP = sympy.Rational(1, 4)
 """The share of a rise that each ramp of the law "constant velocity" takes, unless told."""
