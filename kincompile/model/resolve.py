@@ -16,6 +16,7 @@ import sympy
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.expressions import (
+    Degree,
     NotAnExpressionError,
     Scalar,
     alpha,
@@ -303,8 +304,11 @@ def checked_expression(
         return None
     if not isinstance(value, sympy.Expr):
         return value
-    problem = smoothness_problem(value, corners=corners) or degrees_problem(value, unit)
-    problem = problem or _falling_problem(value, scope)
+    problem = smoothness_problem(value, corners=corners)
+    # Rare, so that large mechanisms pay for one look alone.
+    if problem is None and (laws := value.atoms(Degree, MotionLaw)):
+        problem = degrees_problem(value, unit) or _falling_problem(laws, scope)
+        value = in_radians(value)
     if problem is not None:
         scope.problems.append(f"{where}: {problem}")
         return None
@@ -312,14 +316,15 @@ def checked_expression(
     if problem is not None:
         scope.problems.append(problem)
         return None
-    return in_radians(value)
+    return value
 
 
-def _falling_problem(value: sympy.Expr, scope: Scope) -> str | None:
+def _falling_problem(laws: Set[sympy.Basic], scope: Scope) -> str | None:
     """Return a message about a motion law whose argument falls with time, or None."""
-    for law in sorted(value.atoms(MotionLaw), key=str):
-        slope = evaluate(law.args[0].diff(t), scope.defaults)
-        if slope is not None and slope <= 0 and law.args[0].has(t):
+    for law in sorted((item for item in laws if isinstance(item, MotionLaw)), key=str):
+        argument = cast("sympy.Expr", law.args[0])
+        slope = evaluate(argument.diff(t), scope.defaults)
+        if slope is not None and slope <= 0 and argument.has(t):
             return (
                 f"the times of {law} must rise, but at the default parameters its argument changes "
                 f"by {slope:g} per unit of time"
@@ -402,7 +407,8 @@ def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
         xi, eta = tuple(given) if is_list else ()
     except (TypeError, ValueError):
         scope.problems.append(
-            f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame"
+            f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame; "
+            "give two numbers, or expressions of parameters"
         )
         return 1, 1
     unit = "" if kind is Kind.AXIS else "length"
@@ -433,7 +439,8 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
         given = _of_alpha(given, scope)
     elif not isinstance(given, Real):
         scope.problems.append(
-            f"{where}: {given!r} is neither a radius rho(alpha) nor a table (angles, radii)"
+            f"{where}: {given!r} is neither a radius rho(alpha) nor a table (angles, radii); "
+            "give an expression of kc.alpha, or two lists of equal length"
         )
         return sympy.S.One
     value = checked_expression(given, where, {*scope.parameters, alpha.name}, scope, unit="length")

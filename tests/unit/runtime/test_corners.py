@@ -111,3 +111,20 @@ def test_that_a_file_gives_the_permission(tmp_path):
     path.write_text(text.replace("corners = true\n", ""), encoding="utf-8")
     with pytest.raises(kc.ModelError, match=r"corners at t = .*corners=True"):
         kc.read(path)
+
+
+@pytest.mark.filterwarnings("ignore::kincompile.errors.CornerWarning")
+def test_that_outputs_have_at_a_corner_what_needs_no_acceleration():
+    m = press(corners=True)
+    tip = m.point("tip", "arm", (0.2, 0.05))
+    m.output("height", tip.y, "m")
+    m.output("pull", kc.outputs.acceleration(tip), "m/s^2")
+    t = np.linspace(0, 2.5, 26)
+    solution = kc.solve(kc.compile(m), t)
+    corner = solution.status == kc.Status.CORNER
+    beside = kc.solve(kc.compile(m), t + 1e-9)
+    assert corner.sum() == 4
+    for name in ("height", "height_dot", "x_tip", "x_tip_dot"):
+        assert solution[name] == pytest.approx(beside[name], abs=1e-8)
+    for name in ("height_ddot", "x_tip_ddot", "pull"):
+        assert (np.isnan(solution[name]) == corner).all()
