@@ -154,17 +154,7 @@ def derivation(
     _require_known(system, constraint, shown := tuple(levels))
     chosen = evaluation(system, state)
     figures = Figures(chosen)
-    sections = tuple(
-        joint_section(figures, item, rows)
-        if isinstance(item, Joint)
-        else equation_section(chosen, item, rows)
-        for item, rows in zip(system.constraints, chosen.code.sections, strict=True)
-        if constraint in (None, item.name)
-    )
-    names: dict[Expression, Glyph] = {}
-    for item in system.constraints:
-        if isinstance(item, Joint):
-            names |= abbreviations(item.template)
+    names, sections = constraint_chapters(figures, constraint)
     constraints = Chapter("constraints", ("The constraints, one by one",), (), sections)
     chapters = [unknowns_section(figures), constraints]
     if constraint is None:
@@ -177,6 +167,26 @@ def derivation(
         chosen.source,
         _state_code(chosen),
     )
+
+
+def constraint_chapters(
+    figures: Figures, constraint: str | None = None
+) -> tuple[dict[Expression, Glyph], tuple[Chapter, ...]]:
+    """Return the nine steps of each constraint, or of one, and the abbreviations in them."""
+    chosen = figures.evaluation
+    constraints = chosen.system.constraints
+    sections = tuple(
+        joint_section(figures, item, rows)
+        if isinstance(item, Joint)
+        else equation_section(chosen, item, rows)
+        for item, rows in zip(constraints, chosen.code.sections, strict=True)
+        if constraint in (None, item.name)
+    )
+    names: dict[Expression, Glyph] = {}
+    for item in constraints:
+        if isinstance(item, Joint):
+            names |= abbreviations(item.template)
+    return names, sections
 
 
 def _require_known(

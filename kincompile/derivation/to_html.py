@@ -35,13 +35,13 @@ CHARACTER = 6.8
 """Width of a character of a pattern's labels, in a monospaced font of 11 pixels."""
 
 
-def as_html(document: Manuscript) -> str:
-    """Return a document as an HTML page."""
+def as_html(document: Manuscript, title: str = "Derivation of") -> str:
+    """Return a document as an HTML page; the title stands before its name."""
     renderer = _HtmlRenderer(document)
     data = {
         "font": read("derivation/math.css"),
-        "title": escape(f"Derivation of {document.name}"),
-        "heading": f"Derivation of <code>{escape(document.name)}</code>",
+        "title": escape(f"{title} {document.name}"),
+        "heading": f"{escape(title)} <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
         "contents": "\n".join(renderer.contents(document.sections)),
         "main": "\n".join(line for item in document.sections for line in renderer.section(item, 0)),
