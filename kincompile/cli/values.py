@@ -17,8 +17,8 @@ import kincompile as kc
 from kincompile.errors import InputError
 from kincompile.files.file_format import MOST_POINTS
 from kincompile.files.safe_expressions import ExpressionError, parse_expression
+from kincompile.model.bodies import default_values
 from kincompile.model.expressions import (
-    as_expression,
     degrees_problem,
     evaluate,
     number_in,
@@ -109,7 +109,7 @@ def time_grid(
     InputError
         If a time is no finite number at the values of the parameters, or there is no point.
     """
-    names = _numbers_of(model) | values
+    names = default_values(model.parameters) | values
     first, last = number(start, f"--start {start}: give a time", names), _last(model, end, names)
     try:
         count = operator.index(model.points if points is None else points)
@@ -123,16 +123,6 @@ def time_grid(
         alone = f"one point is the time {first:g} alone"
         raise InputError(f"{alone}: give --points 2 or more to reach the end")
     return np.linspace(first, last, count)
-
-
-def _numbers_of(model: Mechanism | ConstraintSystem) -> dict[str, float]:
-    """Return the default parameters of a model, which need not have been checked."""
-    found = {
-        item.name: number_in(as_expression(item.default), str(item.unit), {})
-        for item in model.parameters
-        if isinstance(item.default, float | int | sympy.Expr)
-    }
-    return {name: value for name, value in found.items() if value is not None}
 
 
 def _last(
@@ -168,7 +158,7 @@ def times_on_grid(
     if len(parts) != 3:
         raise InputError(f"--grid {grid}: write NAME=FIRST:LAST:STEP, as crank.phi=0:360deg:1deg")
     unit = module.UNITS.get(column_name(name), "")
-    names = _numbers_of(model) | values
+    names = default_values(model.parameters) | values
     what = f"--grid {grid}: give numbers"
     first, last, step = (number(part, what, names, unit) for part in parts)
     count = (last - first) / step if step else -1.0

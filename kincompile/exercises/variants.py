@@ -95,7 +95,7 @@ def variants(mechanism: Mechanism, count: int, seed: int, choices: Choices) -> l
 def _drawn(mechanism: Mechanism, random: Random, choices: Choices) -> _Change:
     values = tuple(
         (item.name, _rounded((item.default or 0.0) * random.choice(FACTORS)))
-        for item in mechanism.parameters
+        for item in mechanism.system().parameters
     )
     bodies = [GROUND.name, *(body.name for body in mechanism.bodies)]
     has_lengths = choices.lengths or not mechanism.parameters
@@ -126,7 +126,7 @@ def _checked(mechanism: Mechanism, change: _Change) -> Mechanism | None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            solution = solve(compile_model(made), np.linspace(0.0, made.end, STEPS))
+            solution = solve(compile_model(made), np.linspace(0.0, made.system().end, STEPS))
         except UnsupportedError:
             raise
         except (KincompileError, Warning):

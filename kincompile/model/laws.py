@@ -243,7 +243,7 @@ class TableLaw(MotionLaw):
     given
         Times, values, and the velocities at both ends.
     table
-        The pieces; the last one goes on beyond the last time, where the period would begin anew.
+        The pieces of the spline.
     table_name
         What the table is called in emitted code.
     """

@@ -117,20 +117,14 @@ def fit_between(times: Any, values: Any, velocities: Any) -> SplineTable:
         Rising times and the value at each, shape (M,), M at least 2.
     velocities
         At the first time and at the last.
-
-    Returns
-    -------
-    SplineTable
-        With one piece more: after the last time the value goes on at the last velocity.
     """
     from scipy.interpolate import PPoly, make_interp_spline
 
     ends = tuple([(1, velocity), (2, 0.0)] for velocity in velocities)
     pieces = PPoly.from_spline(make_interp_spline(times, values, k=DEGREE, bc_type=ends))
     keep = np.diff(pieces.x) > 0
-    rows = [*pieces.c.T[keep].tolist(), [0.0] * (DEGREE - 1) + [velocities[1], values[-1]]]
-    breaks = (*pieces.x[:-1][keep].tolist(), times[-1], 2 * times[-1] - times[0])
-    return SplineTable(breaks, tuple(map(tuple, rows)))
+    breaks = (*pieces.x[:-1][keep].tolist(), times[-1])
+    return SplineTable(breaks, tuple(map(tuple, pieces.c.T[keep].tolist())))
 
 
 def _numbers(values: Any) -> np.ndarray:
