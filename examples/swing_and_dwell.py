@@ -1,14 +1,16 @@
 """An arm swings from 10 to 80 degrees in 0.4 s, dwells, and swings back: modified sine.
 
-A rod lifts a slide with it, as in a pick-and-place unit. Source: dimensions ours; the law is
-Neklutin's modified sine (VDI 2143), whose largest velocity is 1.760 times the mean one.
+A rod lifts a slide with it, as in a pick-and-place unit.
+
+Source: dimensions ours; the law is Neklutin's modified sine (VDI 2143), whose largest velocity is
+1.760 times the mean one.
 """
 
 import numpy as np
 
 import kincompile as kc
 
-mechanism = kc.Mechanism("swing_and_dwell", points=241)
+mechanism = kc.Mechanism("swing_and_dwell", points=361)
 a = mechanism.parameter("a", 0.2, unit="m")
 length = mechanism.parameter("length", 0.35, unit="m")
 low = mechanism.parameter("low", 10 * kc.deg, unit="rad")
@@ -32,7 +34,7 @@ mechanism.add(kc.AbsoluteAngle("motor", arm, swing))
 
 if __name__ == "__main__":
     module = kc.compile(mechanism)
-    solution = kc.solve(module, np.linspace(0, 1.2, mechanism.points))
+    solution = kc.solve(module, np.linspace(0, mechanism.end, mechanism.points))
     print(solution.message)
     mean = np.radians(70) / 0.4
     fastest = solution["arm.phi_dot"].max()

@@ -116,7 +116,8 @@ def time_grid(
     except TypeError:
         count = 0
     if not (math.isfinite(first) and math.isfinite(last)) or count < 1:
-        given = f"end = {model.end!r}, points = {model.points!r}" if end is None else f"--end {end}"
+        own = f"end = {model.end_given!r}, points = {model.points!r}"
+        given = own if end is None else f"--end {end}"
         given = given if math.isfinite(first) else f"--start {start}"
         raise InputError(f"{given}: give a finite time, and at least one point")
     if count == 1 and end:
@@ -131,7 +132,7 @@ def _last(
     """Return the last time, NaN where it is none."""
     if isinstance(end, str):
         return number(end, f"--end {end}: give a time", names)
-    given = getattr(model, "end_given", model.end) if end is None else end
+    given = model.end_given if end is None else end
     try:
         found = evaluate(given, names) if isinstance(given, sympy.Expr) else float(given)
     except (TypeError, ValueError):

@@ -126,7 +126,7 @@ def _checked(mechanism: Mechanism, change: _Change) -> Mechanism | None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            solution = solve(compile_model(made), np.linspace(0.0, made.system().end, STEPS))
+            solution = solve(compile_model(made), np.linspace(0.0, made.end, STEPS))
         except UnsupportedError:
             raise
         except (KincompileError, Warning):
@@ -146,7 +146,7 @@ class _Builder:
         self._made = Mechanism(
             mechanism.name,
             length_unit=mechanism.length_unit,
-            end=mechanism.end,
+            end=mechanism.end_given,
             points=mechanism.points,
         )
         self._bodies = {body.name: self._body(body) for body in mechanism.bodies}

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, TypeVar, cast
 
 import sympy
 
 from kincompile.errors import ModelError
-from kincompile.model.bodies import GROUND, Body, Parameter
+from kincompile.model.bodies import GROUND, Body, Parameter, default_values
 from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
+from kincompile.model.expressions import evaluate
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.outputs import Output
 from kincompile.model.points import BodyPoint
@@ -52,13 +54,26 @@ class Mechanism(MatrixViews, TextViews):
     ) -> None:
         self.name = name
         self.length_unit = length_unit
-        self.end = end
+        self.end_given = end
         self.points = points
         self.ground = GROUND
         self.bodies: list[Body] = []
         self.parameters: list[Parameter] = []
         self.constraints: list[Constraint | Equation] = []
         self.outputs: list[BodyPoint | Output] = []
+
+    @property
+    def end(self) -> float:
+        """The last time, a number at the default parameters; `end_given` is it as it was given."""
+        given = self.end_given
+        if isinstance(given, sympy.Expr):
+            found = evaluate(given, default_values(self.parameters))
+            return math.nan if found is None else found
+        return given
+
+    @end.setter
+    def end(self, given: Scalar) -> None:
+        self.end_given = given
 
     def parameter(self, name: str, default: Scalar | None = None, unit: str = "") -> sympy.Symbol:
         """Declare a parameter and return its symbol, to be used in attributes and drivers.
@@ -161,7 +176,7 @@ class Mechanism(MatrixViews, TextViews):
             bodies=self.bodies,
             outputs=self.outputs,
             length_unit=self.length_unit,
-            end=self.end,
+            end=self.end_given,
             points=self.points,
         )
 
