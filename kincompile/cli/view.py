@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -28,6 +29,7 @@ def command(
     grid: str | None,
     values: tuple[str, ...],
     through: str | None,
+    assembly: int | None,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
 
@@ -41,11 +43,12 @@ def command(
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
     read = [read_model(model) for model in models]
+    options: dict[str, Any] = {"through": through, "assembly": assembly}
     pages = []
     for model in read:
         numbers = set_values(model, values)
         times = motion_times(model, start, end, points, grid, numbers)
-        pages.append(kc.page(model, t=times, p=numbers, through=through))
+        pages.append(kc.page(model, t=times, p=numbers, **options))
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:
         click.echo(f"Wrote {path}", err=True)

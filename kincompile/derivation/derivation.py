@@ -20,7 +20,7 @@ from kincompile.derivation.evaluation import Evaluation, evaluation
 from kincompile.derivation.figures import Figures
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
-from kincompile.derivation.to_html import as_html
+from kincompile.derivation.to_html import as_html, as_slides
 from kincompile.derivation.to_latex import as_tex
 from kincompile.derivation.to_markdown import as_markdown
 from kincompile.derivation.to_notebook import as_notebook
@@ -57,6 +57,10 @@ class Derivation(Manuscript):
         """Return one self-contained page: MathML, no script, no network."""
         return as_html(self)
 
+    def to_slides(self) -> str:
+        """Return a page of slides, one for each constraint, for a screen or to be printed."""
+        return as_slides(self)
+
     def to_latex(self) -> str:
         """Return a LaTeX document, for pdflatex."""
         return as_tex(self)
@@ -75,7 +79,7 @@ class Derivation(Manuscript):
         Parameters
         ----------
         path : path-like
-            Ends with .html, .tex, .md or .ipynb.
+            Ends with .html, .slides.html (a slide for each constraint), .tex, .md or .ipynb.
 
         Raises
         ------
@@ -93,6 +97,7 @@ class Derivation(Manuscript):
 
 
 FORMATS: Mapping[str, Callable[[Derivation], str]] = {
+    ".slides.html": Derivation.to_slides,
     ".html": Derivation.to_html,
     ".tex": Derivation.to_latex,
     ".md": Derivation.to_markdown,

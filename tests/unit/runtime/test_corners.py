@@ -71,6 +71,7 @@ def test_that_the_warning_is_the_same_for_many_parameter_sets(module):
     assert found == [[0.2, 0.7, 1.2, 2.2], [0.2, 0.8, 1.2, 2.2]]
     assert np.isnan(solution.q_ddot[solution.status == kc.Status.CORNER]).all()
     assert solution.success
+    assert solution.variant(1).success
 
 
 def test_that_times_beside_the_corners_have_all(module, recwarn):
