@@ -318,7 +318,8 @@ def interpreted(cases: dict[str, Case], folder: Path) -> Results:
         states = zip(case.q, case.q_dot, case.t, case.p, strict=True)
         with np.errstate(all="ignore"):
             rows = [interpret(program, *state) for state in states]
-        found[name] = dict(zip(QUANTITIES, map(np.array, zip(*rows, strict=True)), strict=True))
+        # Outputs, where there are any, come after them.
+        found[name] = dict(zip(QUANTITIES, map(np.array, zip(*rows, strict=True)), strict=False))
     return found
 
 
