@@ -289,7 +289,7 @@ def interpreted(cases: dict[str, Case], folder: Path) -> Results:
         program = lower(case.model.system())
         states = zip(case.q, case.q_dot, case.t, case.p, strict=True)
         with np.errstate(all="ignore"):
-            rows = [interpret(program, *state) for state in states]
+            rows = [interpret(program, *state)[: len(QUANTITIES)] for state in states]
         found[name] = dict(zip(QUANTITIES, map(np.array, zip(*rows, strict=True)), strict=True))
     return found
 
