@@ -122,7 +122,7 @@ def _rounded(value: float) -> float:
 
 def _checked(mechanism: Mechanism, change: _Change) -> Mechanism | None:
     """Return a variant, None if it does not assemble or its motion is singular somewhere."""
-    made = _Builder(mechanism, change).mechanism()
+    made = _VariantBuilder(mechanism, change).mechanism()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -135,7 +135,7 @@ def _checked(mechanism: Mechanism, change: _Change) -> Mechanism | None:
     return made if is_regular and float(solution.condition.max()) < LARGEST_CONDITION else None
 
 
-class _Builder:
+class _VariantBuilder:
     """Builds the variant of a mechanism, constraint by constraint."""
 
     def __init__(self, mechanism: Mechanism, change: _Change) -> None:

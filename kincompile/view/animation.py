@@ -16,7 +16,7 @@ from kincompile.names import listed, suggestion
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.view.drawing import drawing
-from kincompile.view.marks import BodyPoint
+from kincompile.view.marks import FramePoint
 from kincompile.view.mechanism_plot import draw, move, require_bodies
 from kincompile.writing import require_writable, write_atomically
 
@@ -110,7 +110,7 @@ def _first_frame(
     drawn: Drawing,
     solution: Solution,
     rows: NDArray[np.intp],
-    traced: Iterable[BodyPoint],
+    traced: Iterable[FramePoint],
 ) -> Callable[[int], None]:
     """Draw the first frame, and return what shows another one."""
     positions = solution.q[solution.good]
@@ -183,10 +183,10 @@ def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
     require_writable(path)
 
 
-def _traced(drawn: Drawing, names: Iterable[str]) -> list[BodyPoint]:
+def _traced(drawn: Drawing, names: Iterable[str]) -> list[FramePoint]:
     """Return the points to be traced."""
     frames = zip(drawn.bodies, drawn.frames, strict=True)
-    places = {body: BodyPoint(frame, (0.0, 0.0)) for body, frame in frames}
+    places = {body: FramePoint(frame, (0.0, 0.0)) for body, frame in frames}
     places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
     for name in (chosen := list(names)):
         if name not in places:
