@@ -76,6 +76,11 @@ def escaped(text: object) -> str:
     )
 
 
+def escaped_lines(text: str) -> str:
+    """Return a whole message so that nothing in it is a command; its own line breaks stay."""
+    return "\n".join(map(escaped, text.split("\n")))
+
+
 def shown(value: object) -> str:
     """Return a value as a message shows it: kind or beginning of what is long, texts in quotes."""
     if isinstance(value, str):

@@ -5,11 +5,13 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
 
+from kincompile.compare import rounding
 from kincompile.compare.matrix_text import Cell, split_matrix
 from kincompile.errors import InputError
 from kincompile.files.data_text import MAX_PROBLEMS
@@ -48,6 +50,12 @@ class Written:
         The text of each entry; empty for functions and for arrays of values at states.
     evaluate
         Gives the values and the sizes of their terms at states, both (N, rows, columns).
+    expressions
+        The formulas, row by row; None for functions and arrays.
+    lost
+        Gives what rounding may have taken from values at states, of the same shape.
+    rounding
+        What rounding that is, in words.
     takes_parameters
         Whether it may be evaluated at other parameters than the default ones.
     takes_states
@@ -56,6 +64,9 @@ class Written:
 
     texts: Texts
     evaluate: Callable[[States], tuple[Array, Array]]
+    expressions: tuple[sympy.Expr, ...] | None = None
+    lost: Callable[[States, Array], Array] | None = None
+    rounding: str = "numbers are rounded; they count to half of their last digit"
     takes_parameters: bool = True
     takes_states: bool = True
 
@@ -63,6 +74,12 @@ class Written:
     def shape(self) -> tuple[int, int]:
         """Number of rows and columns."""
         return len(self.texts), len(self.texts[0])
+
+    def formula(self, row: int, column: int) -> sympy.Expr | None:
+        """Return an entry as an expression, None where it is none."""
+        if self.expressions is None:
+            return None
+        return self.expressions[row * self.shape[1] + column]
 
 
 class _Formulas:
@@ -219,6 +236,8 @@ def read_written(
     InputError
         If it is none of these, is ragged, or holds an unknown name; all problems at once.
     """
+    if isinstance(given, list | tuple) and (numbers := _numbers(given)) is not None:
+        given = numbers
     if isinstance(given, np.ndarray) and given.dtype != object:
         return _from_array(quantity, given, at_states)
     if callable(given) and not isinstance(given, sympy.Basic):
@@ -249,6 +268,15 @@ def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> 
     if problems:
         raise InputError(problems)
     return expressions
+
+
+def _numbers(given: object) -> Array | None:
+    """Return rows of floats, as a program prints them, as an array; None where they are not."""
+    try:
+        array = np.asarray(given)
+    except ValueError:
+        return None
+    return array if array.dtype.kind == "f" else None
 
 
 def _rows(quantity: str, given: object) -> list[list[object]]:
@@ -289,18 +317,29 @@ def _line(row: list[object]) -> str:
 def _from_expressions(
     rows: list[list[object]], expressions: list[sympy.Expr], reference: Reference
 ) -> Written:
-    code = reference.compiled(expressions)
     shape = (-1, len(rows), len(rows[0]))
 
     def evaluate(states: States) -> tuple[Array, Array]:
-        values, sizes = code(states)
+        values, sizes = reference.evaluate(expressions, states)
         return values.reshape(shape), sizes.reshape(shape)
 
     texts = tuple(
-        tuple(" ".join(cell.text.split()) if isinstance(cell, Cell) else str(cell) for cell in row)
+        tuple(
+            " ".join(cell.text.split()) if isinstance(cell, Cell) else reference.printed(cell)
+            for cell in row
+        )
         for row in rows
     )
-    return Written(texts, evaluate)
+    literals = [rounding.of_literals(item) for item in expressions]
+    terms = [term for item in literals for term in item]
+    owner = np.repeat(np.arange(len(literals)), [len(item) for item in literals])
+
+    def lost(states: States, values: Array) -> Array:
+        result = np.zeros((len(literals), len(states)))
+        np.add.at(result, owner, np.abs(reference.evaluate(terms, states)[0].T))
+        return result.T.reshape(values.shape)
+
+    return Written(texts, evaluate, tuple(expressions), lost if terms else None)
 
 
 def _no_texts(shape: tuple[int, ...]) -> Texts:
@@ -329,9 +368,15 @@ def _from_array(quantity: str, given: Array, at_states: bool) -> Written:
         values = np.broadcast_to(array, (len(states), *array.shape[-2:]))
         return values, np.abs(values)
 
+    part = rounding.of_array(array.astype(given.dtype))
+
+    def lost(_: States, values: Array) -> Array:
+        return np.broadcast_to(part, values.shape)
+
     if at_states:
-        return Written(_no_texts(array.shape[1:]), evaluate, takes_states=False)
-    return Written(tuple(tuple(f"{item:.6g}" for item in row) for row in array), evaluate)
+        return Written(_no_texts(array.shape[1:]), evaluate, lost=lost, takes_states=False)
+    texts = tuple(tuple(f"{item:.6g}" for item in row) for row in array)
+    return Written(texts, evaluate, lost=lost)
 
 
 def _from_function(quantity: str, function: Callable[..., object], reference: Reference) -> Written:
@@ -343,8 +388,9 @@ def _from_function(quantity: str, function: Callable[..., object], reference: Re
 
     def at(states: States, k: int) -> Array:
         """Return the values at one state, (rows, columns)."""
-        arguments = [getattr(states, name)[k] for name in names]
-        arguments += [states.p[k]] if takes_parameters else []
+        # Copies: what a function does to its arguments must not change the states.
+        arguments = [np.copy(getattr(states, name)[k])[()] for name in names]
+        arguments += [states.p[k].copy()] if takes_parameters else []
         value = np.asarray(function(*arguments), dtype=float)
         return value if quantity == "Phi_q" else value.reshape(-1, 1)
 
@@ -354,16 +400,23 @@ def _from_function(quantity: str, function: Callable[..., object], reference: Re
         return values, np.abs(values)
 
     shape = np.atleast_2d(at(reference.random, 0)).shape
-    return Written(_no_texts(shape), evaluate, takes_parameters=takes_parameters)
+    return Written(
+        _no_texts(shape),
+        evaluate,
+        lost=lambda _, values: rounding.of_function(values),
+        rounding="its values agree to six digits, as differences and single precision do",
+        takes_parameters=takes_parameters,
+    )
 
 
 def _positional_count(function: Callable[..., object]) -> int | None:
     """Return how many arguments a function takes by position, None if that is not known."""
     try:
-        kinds = [item.kind for item in inspect.signature(function).parameters.values()]
+        found = list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):
         return None
-    if inspect.Parameter.VAR_POSITIONAL in kinds:
+    if any(item.kind is inspect.Parameter.VAR_POSITIONAL for item in found):
         return None
     by_position = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return sum(kind in by_position for kind in kinds)
+    # A number as default is an option of the author's, a step for instance, and not p.
+    return sum(item.kind in by_position and not isinstance(item.default, Real) for item in found)

@@ -66,13 +66,14 @@ class _HtmlRenderer(Renderer):
 
     def section(self, section: Chapter, depth: int) -> Iterator[str]:
         yield from super().section(section, depth)
-        yield "</section>"
+        yield "</details></section>" if section.is_folded else "</section>"
 
     def heading(self, section: Chapter, depth: int) -> Iterator[str]:
         level = f'<span class="level {section.level}">{section.level}</span>'
         title = self.runs(section.title) + (level if section.level else "")
+        heading = f"<h{depth + 2}>{title}</h{depth + 2}>"
         yield f'<section id="{escape(section.anchor)}">'
-        yield f"<h{depth + 2}>{title}</h{depth + 2}>"
+        yield f"<details><summary>{heading}</summary>" if section.is_folded else heading
 
     def _paragraph(self, text: str) -> Iterator[str]:
         yield f"<p>{text}</p>"

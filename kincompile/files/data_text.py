@@ -33,8 +33,9 @@ MAX_KEY_PARTS = 4
 MAX_PROBLEMS = 50
 """Problems that are listed; a broken file can have one a line."""
 
-_FRACTION = re.compile(
-    TEXT + r"?|(?P<fraction>(?<![\w.])-?\d{1,40}+(?:\.\d{1,40}+)?\s*+/\s*+"
+_FOREIGN = re.compile(
+    rf"(?P<key>{TEXT}(?=\s*+:))|{TEXT}?|"
+    + r"(?P<fraction>(?<![\w.])-?\d{1,40}+(?:\.\d{1,40}+)?\s*+/\s*+"
     r"-?\d{1,40}+(?:\.\d{1,40}+)?)(?=\s*[,\]}])"
 )
 _PART = rf"(?>[\w-]++|{TEXT}|{LITERAL})"
@@ -158,15 +159,16 @@ def _toml_problem(message: str, text: str) -> tuple[str, int]:
     return f"{escaped(found[1][:200])}, column {found[3]}", int(found[2])
 
 
-def read_json(path: Path, content: bytes, *, has_fractions: bool = False) -> Document:
+def read_json(path: Path, content: bytes, words: Mapping[str, str] | None = None) -> Document:
     """Read JSON.
 
     Parameters
     ----------
     path, content
         The file, and its content.
-    has_fractions
-        Whether a number may be written 187/255; it is read as a text.
+    words
+        Of a foreign format its keys, by their lower case: they are read without regard to case, and
+        a number may be written 187/255, which is read as a text. None for JSON itself.
 
     Raises
     ------
@@ -174,8 +176,8 @@ def read_json(path: Path, content: bytes, *, has_fractions: bool = False) -> Doc
         If it is not JSON, a key is given twice, or a number is not finite; with the line.
     """
     text = decoded(path, content)
-    if has_fractions:
-        text = _FRACTION.sub(_quoted, text)
+    if words is not None:
+        text = _FOREIGN.sub(lambda found: _native(found, words), text)
     _check_bounds(path, text, _JSON_OUTLINE)
     repeated: list[str] = []
     try:
@@ -202,7 +204,10 @@ class _NotFinite(float):
         return super().__new__(cls, name.replace("Infinity", "inf"))
 
 
-def _quoted(found: re.Match[str]) -> str:
+def _native(found: re.Match[str], words: Mapping[str, str]) -> str:
+    """Return a key as it is known here, which is as long; a fraction as a text."""
+    if found["key"] is not None:
+        return f'"{words.get(found[0][1:-1].lower(), found[0][1:-1])}"'
     return found[0] if found["fraction"] is None else f'"{found[0]}"'
 
 

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from kincompile.model.expressions import NotAnExpressionError, as_expression
+from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
+from kincompile.model.points import rate
 from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., sympy.Expr], int]] = {
     },
     "atan2": (sympy.atan2, 2), "ln": (sympy.log, 1),
     "arcsin": (sympy.asin, 1), "arccos": (sympy.acos, 1), "arctan": (sympy.atan, 1),
-    "arctan2": (sympy.atan2, 2),
+    "arctan2": (sympy.atan2, 2), "rate": (rate, 1),
 }  # fmt: skip
 """Functions that may be called, each with its number of arguments."""
 
@@ -404,8 +405,12 @@ class _Reader:
         return [sympy.Pow(sympy.Mul(*factors), right)]
 
     def _check_exponent(self, exponent: sympy.Expr, node: ast.expr) -> None:
-        if exponent.is_number and not abs(exponent) <= MAX_EXPONENT:
-            raise self._error(f"the exponent is beyond {MAX_EXPONENT}", node)
+        if not exponent.is_number:
+            return
+        # Evaluated: of an exact number such as sin(1)^2 + cos(1)^2 SymPy may not know the size.
+        size = evaluate(exponent, {})
+        if size is None or abs(size) > MAX_EXPONENT:
+            raise self._error(f"the exponent is beyond {MAX_EXPONENT}, or not a number", node)
 
     def _checked(self, value: sympy.Expr, node: ast.AST) -> sympy.Expr:
         """Refuse a number that no double can hold: the next operation on it could be endless."""

@@ -314,10 +314,12 @@ def _check_outlines(
             problems.append(f"{where}: {body.outline!r} is not a list of corners (xi, eta)")
             continue
         if len(corners) in (1, 2):
-            problems.append(f"{where}: {len(corners)} corners are no polygon; give 3 or more")
+            problems.append(f"{where}: it has {len(corners)} corners; a polygon has 3 or more")
         for k, corner in enumerate(corners, 1):
             if len(corner) != 2:
-                problems.append(f"{where}: corner {k}, {corner!r}, is not a pair (xi, eta)")
+                problems.append(
+                    f"{where}: corner {k}, {corner!r}, is not a pair (xi, eta); give two numbers"
+                )
             for number in corner:
                 _number(number, f"{where}, corner {k}", values, problems)
 

@@ -30,7 +30,8 @@ NOT_LOADED = {
     "run MODEL": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} scipy.sparse.csgraph",
     "inspect MODEL": f"{PAGES} {EXTRA} {LANGUAGES} kincompile.targets.numpy kincompile.runtime",
     "derive MODEL -o PAGE.html": (
-        f"{EXTRA} {LARGE} kincompile.view kincompile.compare kincompile.verify"
+        f"{EXTRA} {LARGE} kincompile.view.page kincompile.view.mechanism_plot kincompile.compare "
+        "kincompile.verify"
     ),
     "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",

@@ -42,6 +42,8 @@ MODELS: dict[str, Case] = {
     "many digits": ("toml", lambda: "a = " + ("9" * 999 + "_") * 10**4, "thousands of digits"),
     "unknown bodies": ("toml", lambda: TOML + "".join(
         CONSTRAINT.format(k=k).replace('"b"', f'"c{k}"') for k in range(5000)), "there is no body"),
+    "many constraints": ("toml", lambda: TOML + "".join(
+        CONSTRAINT.format(k=k) for k in range(60000)), "500,000 values"),
     "JSON lists": ("json", lambda: "[" * 10**7, "500,000 values"),
     "JSON deep": ("json", lambda: "[" * 10**5 + "]" * 10**5, "nested too deeply"),
     "JSON objects": ("json", lambda: '{"a":' * 10**5 + "1" + "}" * 10**5, "nested too deeply"),
