@@ -128,8 +128,8 @@ def solutions(case, way):
         yield case, kc.solve(module, case.t, method=method)
 
 
-SEEDS = {"methods": 220, "placements": 50, "grouped": 60}
-QUICK = {"methods": 12, "placements": 3, "grouped": 4}
+SEEDS = {"methods": 160, "placements": 40, "grouped": 40}
+QUICK = {"methods": 8, "placements": 2, "grouped": 3}
 
 
 def check_seeds(way, seeds, record):

@@ -115,10 +115,10 @@ def check_files(seed, count, largest, folder, record):
 
 
 def test_a_few_random_files(tmp_path, record):
-    check_files(1, 12, 30_000, tmp_path, record)
+    check_files(1, 8, 30_000, tmp_path, record)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_many_random_files(seed, tmp_path, record):
-    check_files(seed, 80, 1_000_000, tmp_path, record)
+    check_files(seed, 60, 1_000_000, tmp_path, record)
