@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 import kincompile as kc
@@ -11,7 +9,7 @@ from kincompile.cli.shared import output_option, read_model, set_option
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
 
-DERIVATIONS = (".html", ".tex", ".md", ".ipynb")
+DERIVATIONS = (".slides.html", ".html", ".tex", ".md", ".ipynb")
 """Endings of the files that `derive` writes."""
 
 LEVELS = ("vector", "expanded", "numeric")
@@ -20,7 +18,7 @@ LEVELS = ("vector", "expanded", "numeric")
 
 @click.command("derive")
 @click.argument("model")
-@output_option("File to write: .html, .tex, .md or .ipynb.")
+@output_option("File to write: .html, .slides.html, .tex, .md or .ipynb.")
 @click.option("--time", "at", type=float, metavar="T", help="Time of the numbers.")
 @set_option("parameter, coordinate or rate")
 @click.option("--constraint", metavar="NAME", help="Show this constraint alone.")
@@ -41,7 +39,7 @@ def command(
     the assembled system. The numbers are taken where the mechanism is assembled at the time, by
     default one at which nothing is special, or at the coordinates that are set.
     """
-    if Path(output).suffix not in DERIVATIONS:
+    if not output.endswith(DERIVATIONS):
         raise InputError(f"{output}: a derivation is written as {', '.join(DERIVATIONS)}")
     require_writable(output)
     state = values if at is None else {"t": at, **values}

@@ -37,7 +37,7 @@ from kincompile.compare.matching import Matcher, Matching
 from kincompile.compare.reference import QUANTITIES, Reference, Subject
 from kincompile.compare.report import Report
 from kincompile.compare.states import given_states
-from kincompile.compare.written import read_written, vocabulary
+from kincompile.compare.written import TOLD, read_written, vocabulary
 from kincompile.errors import InputError
 from kincompile.model.expressions import symbol_names
 from kincompile.names import listed
@@ -213,7 +213,7 @@ def _read(
                 written[name] = read_written(name, given[name], words, reference, at_states, check)
                 problems += check(*written[name].shape)
             except InputError as error:
-                problems += error.problems
+                problems += [item for item in error.problems if item != TOLD]
     if problems:
         raise InputError(problems)
     return written

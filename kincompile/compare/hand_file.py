@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kincompile.compare.matrix_text import Cell, Rows, split_matrix
+from kincompile.compare.notation import plain
 from kincompile.compare.reference import QUANTITIES
 from kincompile.errors import InputError, ModelError
 from kincompile.files.content import decoded, file_content
@@ -165,7 +166,7 @@ def _from_lines(file: Path, content: bytes) -> HandFile:
     draft = _Draft(escaped(file.name))
     text = decoded(file, content).replace("\r\n", "\n").replace("\r", "\n")
     # Comments and quotes are blanked out, so that every offset stays.
-    text = re.sub(r"[#%][^\n]*", lambda found: " " * len(found[0]), text)
+    text = plain(re.sub(r"[#%][^\n]*", lambda found: " " * len(found[0]), text))
     places = Places(text)
     section: str | None = None
     offset = 0

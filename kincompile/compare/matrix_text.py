@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
+from kincompile.compare.notation import plain
 from kincompile.files.safe_expressions import ExpressionError, Places, unbalanced_bracket
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def split_matrix(text: str, place: Place) -> Rows:
     ExpressionError
         If brackets do not match, or an element is missing.
     """
-    return _Splitter(text, place).rows()
+    return _Splitter(plain(text), place).rows()
 
 
 class _Splitter:

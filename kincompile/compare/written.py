@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ import sympy
 
 from kincompile.compare import rounding
 from kincompile.compare.matrix_text import Cell, split_matrix
+from kincompile.compare.notation import IMAGINARY, plain, real
 from kincompile.errors import InputError
 from kincompile.files.data_text import MAX_PROBLEMS
 from kincompile.files.safe_expressions import (
@@ -20,6 +21,7 @@ from kincompile.files.safe_expressions import (
     FUNCTIONS,
     ExpressionError,
     Place,
+    UnknownNameError,
     extent,
     parse_expression,
 )
@@ -37,6 +39,8 @@ MAX_ALIASES = 1000
 MAX_SIZE = 1_000_000
 """Characters of all formulas and parts with aliases written out; as many take about 10 s."""
 
+TOLD = ""
+"""A problem that was told before: all that a quantity has are names unknown elsewhere too."""
 _NO_ACCELERATIONS = "accelerations are the unknowns of Phi_q q_ddot = gamma; no formula holds them"
 
 
@@ -98,7 +102,7 @@ class _Formulas:
                     "aliases written out; write them shorter"
                 )
             self._size += len(text)
-            self._read[text] = parse_expression(text, words.names, place, words.refused)
+            self._read[text] = real(parse_expression(text, words.names, place, words.refused))
             self._size += extent(self._read[text])[0]
         return self._read[text]
 
@@ -112,7 +116,9 @@ class Vocabulary:
 
     names: Mapping[str, sympy.Expr]
     refused: Mapping[str, str]
+    help: str = ""
     formulas: _Formulas = field(default_factory=_Formulas)
+    told: set[str] = field(default_factory=set)
 
     def read(self, value: object) -> sympy.Expr:
         """Return a text, a `Cell`, a number or a SymPy expression in plain symbols.
@@ -123,19 +129,30 @@ class Vocabulary:
             If it is none of these, or holds an unknown name.
         """
         if isinstance(value, Cell):
-            return self.formulas.read(value.text, value.place, self)
+            return self.formulas.read(plain(value.text), value.place, self)
         if isinstance(value, str):
-            return self.formulas.read(value, None, self)
+            return self.formulas.read(plain(value), None, self)
+        if isinstance(value, sympy.Expr) and value.has(sympy.I):
+            value = value.xreplace({sympy.I: IMAGINARY})
         expression: sympy.Expr = sympy.sympify(as_expression(_without_derivatives(value)))
-        unknown = sorted(symbol_names(expression) - set(self.names))
+        unknown = sorted(symbol_names(expression) - set(self.names) - {IMAGINARY.name})
         if unknown:
-            raise NotAnExpressionError(
-                f"{expression} contains {listed(unknown)}{suggestion(unknown[0], self.names)}; "
-                f"the names are: {listed(self.names, 60)}"
-            )
+            problem = f"{expression} contains {listed(unknown)}"
+            raise UnknownNameError(ExpressionError(problem, 1, 1), unknown[0])
         meanings = {sympy.Symbol(name): item for name, item in self.names.items()}
-        meant: sympy.Expr = expression.xreplace(meanings)
-        return meant
+        return real(expression.xreplace(meanings))
+
+    def problem(self, error: NotAnExpressionError, where: str) -> str | None:
+        """Return what to say about a formula; None where its unknown name was told before."""
+        if not isinstance(error, UnknownNameError):
+            return f"{where}{error}"
+        if error.name in self.told:
+            return None
+        hint = suggestion(error.name, self.names)
+        rest = "" if self.told else f"; {self.help}"
+        self.told.add(error.name)
+        text, _, _ = str(error).partition(";")
+        return f"{where}{text}{hint}{rest}"
 
 
 def _without_derivatives(value: object) -> object:
@@ -153,7 +170,8 @@ def _without_derivatives(value: object) -> object:
 def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabulary:
     """Return the names of a system and the author's own.
 
-    A coordinate ``phi3`` has the rate ``phi3_dot``, also ``phi3d``.
+    A coordinate ``phi3`` has the rate ``phi3_dot``, also ``phi3d``. The coordinates of bodies may
+    be numbered, ``x1``, ``y1``, ``phi_1``, and so may all coordinates, ``q1``, ``q2``.
 
     Parameters
     ----------
@@ -170,15 +188,8 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
     """
     if len(aliases) > MAX_ALIASES:
         raise InputError(f"there are {len(aliases)} aliases; at most {MAX_ALIASES} are read")
-    symbols = [*reference.coordinates, *(item.name for item in reference.system.parameters)]
-    names: dict[str, sympy.Expr] = {name: sympy.Symbol(name) for name in symbols}
-    names["t"] = t
-    refused = {}
-    for name in reference.coordinates:
-        names[rate(name)] = sympy.Symbol(rate(name))
-        names.setdefault(f"{name}d", names[rate(name)])
-        refused[rate(name, 2)] = refused[f"{name}dd"] = _NO_ACCELERATIONS
-    words = Vocabulary(names, refused)
+    names, refused = _names_of(reference)
+    words = Vocabulary(names, refused, _help(reference))
     problems = []
     for name, value in aliases.items():
         problem = _alias_problem(name, names)
@@ -186,7 +197,7 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
             if problem is None:
                 names[name] = words.read(value)
         except NotAnExpressionError as error:
-            problem = str(error)
+            problem = words.problem(error, "")
         if problem is not None:
             problems.append(f"alias {shown(name)}: {problem}")
         if len(problems) == MAX_PROBLEMS:
@@ -194,7 +205,47 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
     if problems:
         raise InputError(problems)
     still_refused = {name: why for name, why in refused.items() if name not in names}
-    return Vocabulary(names, still_refused, words.formulas)
+    return replace(words, refused=still_refused)
+
+
+def _names_of(reference: Reference) -> tuple[dict[str, sympy.Expr], dict[str, str]]:
+    """Return the names of a system with their meanings, and those of accelerations."""
+    symbols = [*reference.coordinates, *(item.name for item in reference.system.parameters)]
+    names: dict[str, sympy.Expr] = {name: sympy.Symbol(name) for name in symbols}
+    names |= {"t": t} | {rate(name): sympy.Symbol(rate(name)) for name in reference.coordinates}
+    refused = {}
+    for written, name in [*((name, name) for name in reference.coordinates), *_numbered(reference)]:
+        names.setdefault(written, names[name])
+        for end in ("_dot", "d"):
+            names.setdefault(f"{written}{end}", names[rate(name)])
+        refused[rate(written, 2)] = refused[f"{written}dd"] = _NO_ACCELERATIONS
+    names.setdefault("I", IMAGINARY)
+    return names, refused
+
+
+def _numbered(reference: Reference) -> Iterator[tuple[str, str]]:
+    """Yield coordinates as courses number them: x1, y1, phi1, also x_1, of body 1; q1 of all."""
+    for number, columns in enumerate(reference.system.body_columns, 1):
+        for letter, column in zip(("x", "y", "phi"), columns, strict=False):
+            for written in (f"{letter}{number}", f"{letter}_{number}"):
+                yield written, reference.coordinates[column]
+    for number, name in enumerate(reference.coordinates, 1):
+        yield f"q{number}", name
+        yield f"q_{number}", name
+
+
+def _help(reference: Reference) -> str:
+    """Return in words which names there are."""
+    system = reference.system
+    names = [*reference.coordinates, *(item.name for item in system.parameters), "t"]
+    text = f"the names are: {listed(names, 60)}, and rates such as {rate(names[0])}"
+    if system.bodies:
+        numbers = listed(f"{k} {body.name}" for k, body in enumerate(system.bodies, 1))
+        text += (
+            f"; bodies are numbered: {numbers}, so that x1 is {reference.coordinates[0]}; for a "
+            "name of your own write a line 'name = formula'"
+        )
+    return text
 
 
 def _alias_problem(name: str, names: Mapping[str, sympy.Expr]) -> str | None:
@@ -254,7 +305,7 @@ def read_written(
 def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> list[sympy.Expr]:
     """Return the entries as expressions, row by row."""
     expressions: list[sympy.Expr] = []
-    problems: list[str] = []
+    problems: list[str | None] = []
     for r, row in enumerate(rows, 1):
         for c, cell in enumerate(row, 1):
             try:
@@ -262,11 +313,11 @@ def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> 
             except NotAnExpressionError as error:
                 # A cell knows its own place in the file.
                 place = "" if isinstance(cell, Cell) else f"row {r}, column {c}: "
-                problems.append(f"{quantity}, {place}{error}")
+                problems.append(words.problem(error, f"{quantity}, {place}"))
         if len(problems) >= MAX_PROBLEMS:
             break
     if problems:
-        raise InputError(problems)
+        raise InputError([item for item in problems if item is not None] or TOLD)
     return expressions
 
 

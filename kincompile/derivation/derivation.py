@@ -20,7 +20,7 @@ from kincompile.derivation.evaluation import Evaluation, evaluation
 from kincompile.derivation.figures import Figures
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
-from kincompile.derivation.to_html import as_html
+from kincompile.derivation.to_html import as_html, as_slides
 from kincompile.derivation.to_latex import as_tex
 from kincompile.derivation.to_markdown import as_markdown
 from kincompile.derivation.to_notebook import as_notebook
@@ -57,6 +57,10 @@ class Derivation(Manuscript):
         """Return one self-contained page: MathML, no script, no network."""
         return as_html(self)
 
+    def to_slides(self) -> str:
+        """Return a page of slides, one for each constraint, for a screen or to be printed."""
+        return as_slides(self)
+
     def to_latex(self) -> str:
         """Return a LaTeX document, for pdflatex."""
         return as_tex(self)
@@ -75,7 +79,7 @@ class Derivation(Manuscript):
         Parameters
         ----------
         path : path-like
-            Ends with .html, .tex, .md or .ipynb.
+            Ends with .html, .slides.html (a slide for each constraint), .tex, .md or .ipynb.
 
         Raises
         ------
@@ -93,6 +97,7 @@ class Derivation(Manuscript):
 
 
 FORMATS: Mapping[str, Callable[[Derivation], str]] = {
+    ".slides.html": Derivation.to_slides,
     ".html": Derivation.to_html,
     ".tex": Derivation.to_latex,
     ".md": Derivation.to_markdown,
@@ -154,17 +159,7 @@ def derivation(
     _require_known(system, constraint, shown := tuple(levels))
     chosen = evaluation(system, state)
     figures = Figures(chosen)
-    sections = tuple(
-        joint_section(figures, item, rows)
-        if isinstance(item, Joint)
-        else equation_section(chosen, item, rows)
-        for item, rows in zip(system.constraints, chosen.code.sections, strict=True)
-        if constraint in (None, item.name)
-    )
-    names: dict[Expression, Glyph] = {}
-    for item in system.constraints:
-        if isinstance(item, Joint):
-            names |= abbreviations(item.template)
+    names, sections = constraint_chapters(figures, constraint)
     constraints = Chapter("constraints", ("The constraints, one by one",), (), sections)
     chapters = [unknowns_section(figures), constraints]
     if constraint is None:
@@ -177,6 +172,26 @@ def derivation(
         chosen.source,
         _state_code(chosen),
     )
+
+
+def constraint_chapters(
+    figures: Figures, constraint: str | None = None
+) -> tuple[dict[Expression, Glyph], tuple[Chapter, ...]]:
+    """Return the nine steps of each constraint, or of one, and the abbreviations in them."""
+    chosen = figures.evaluation
+    constraints = chosen.system.constraints
+    sections = tuple(
+        joint_section(figures, item, rows)
+        if isinstance(item, Joint)
+        else equation_section(chosen, item, rows)
+        for item, rows in zip(constraints, chosen.code.sections, strict=True)
+        if constraint in (None, item.name)
+    )
+    names: dict[Expression, Glyph] = {}
+    for item in constraints:
+        if isinstance(item, Joint):
+            names |= abbreviations(item.template)
+    return names, sections
 
 
 def _require_known(

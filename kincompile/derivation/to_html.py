@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.mathml import MathMLPrinter
 from kincompile.derivation.renderer import Renderer
+from kincompile.derivation.slides import slides_of
 from kincompile.derivation.svg import as_svg
 from kincompile.targets.templates import fill, read
 
@@ -35,13 +36,22 @@ CHARACTER = 6.8
 """Width of a character of a pattern's labels, in a monospaced font of 11 pixels."""
 
 
-def as_html(document: Manuscript) -> str:
-    """Return a document as an HTML page."""
+def as_slides(document: Manuscript) -> str:
+    """Return a derivation as an HTML page of slides."""
+    return as_html(slides_of(document), kind="slides")
+
+
+def as_html(document: Manuscript, title: str = "Derivation of", kind: str = "") -> str:
+    """Return a document as an HTML page; the title stands before its name.
+
+    The kind is the class of the page's body: ``"slides"``, or none.
+    """
     renderer = _HtmlRenderer(document)
     data = {
+        "kind": kind,
         "font": read("derivation/math.css"),
-        "title": escape(f"Derivation of {document.name}"),
-        "heading": f"Derivation of <code>{escape(document.name)}</code>",
+        "title": escape(f"{title} {document.name}"),
+        "heading": f"{escape(title)} <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
         "contents": "\n".join(renderer.contents(document.sections)),
         "main": "\n".join(line for item in document.sections for line in renderer.section(item, 0)),

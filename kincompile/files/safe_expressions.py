@@ -122,6 +122,14 @@ class ExpressionError(NotAnExpressionError):
         self.column = column
 
 
+class UnknownNameError(ExpressionError):
+    """A name that is not among those that may stand in an expression; `name` is it."""
+
+    def __init__(self, error: ExpressionError, name: str) -> None:
+        super().__init__(error.problem, error.line, error.column)
+        self.name = name
+
+
 def parse_expression(
     text: str,
     names: Mapping[str, sympy.Expr],
@@ -353,9 +361,8 @@ class _Reader:
         if name in FUNCTIONS:
             raise self._error(f"{name} is a function; write {name}(...)", node)
         hint = suggestion(name, self._names)
-        raise self._error(
-            f"there is no {name!r}{hint}; the names are: {listed(self._names, 60)}", node
-        )
+        problem = f"there is no {name!r}{hint}; the names are: {listed(self._names, 60)}"
+        raise UnknownNameError(self._error(problem, node), name)
 
     def _chain(self, node: ast.BinOp, depth: int) -> sympy.Expr:
         """Read a chain such as a + b - c, which Python nests to the left, as one level."""

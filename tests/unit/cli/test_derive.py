@@ -48,7 +48,7 @@ def test_that_a_state_can_be_set(kincompile: Any, pendulum: Path, tmp_path: Path
     [
         (
             ("-o", "page.pdf"),
-            "page.pdf: a derivation is written as .html, .tex, .md, .ipynb",
+            "page.pdf: a derivation is written as .slides.html, .html, .tex, .md, .ipynb",
         ),
         (("-o", "nowhere/page.html"), "the folder nowhere does not exist"),
         (("-o", "page.html", "--set", "phi_bib=1"), "did you mean 'phi_bob'"),
