@@ -94,7 +94,8 @@ def random_chain(random: np.random.Generator, kinds: list[str]) -> Chain:
 
     def write_first(m: kc.Mechanism, at: Placement) -> None:
         m.add(kc.Revolute("O", m.ground, at(0), crank.name, _local(crank, 0, at)))
-        m.add(kc.AbsoluteAngle("motor", crank.name, theta(kc.t, sympy.sin) + at.turn - crank.lag))
+        angle = theta(m.parameter("rate", 1.0) * kc.t, sympy.sin)
+        m.add(kc.AbsoluteAngle("motor", crank.name, angle + at.turn - crank.lag))
 
     chain.steps.append(first)
     chain.write.append(write_first)

@@ -5,9 +5,11 @@ the manifold, or on another branch), never one beyond a stretched dyad; and what
 Seeds count from 0 and from 1000; `chain_of` makes everything of one.
 """
 
+import dataclasses
 import time
 import warnings
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -122,14 +124,27 @@ def solutions(case, way):
             moved = case.moved(at)
             yield moved, kc.solve(kc.compile(moved.model), case.t)
         return
+    if way == "variants":
+        found = kc.solve(kc.compile(case.model), case.t, p=np.reshape(RATES, (-1, 1, 1)))
+        for k, rate in enumerate(RATES):
+            names = ("q", "q_dot", "q_ddot", "status")
+            values = {name: getattr(found, name)[k] for name in names}
+            slower = dataclasses.replace(case, t=rate * case.t)
+            yield slower, SimpleNamespace(success=not values["status"].any(), **values)
+        return
     module = kc.compile(case.model, form="grouped" if way == "grouped" else None)
-    methods = {"methods": ("grid", "march"), "grouped": ("march",)}
+    methods = {"methods": ("grid", "march"), "grouped": ("march",), "c": ("march",)}
     for method in methods[way]:
         yield case, kc.solve(module, case.t, method=method)
+    if way == "c":
+        yield case, kc.solve(kc.compile(case.model, target="c"), case.t)
 
 
-SEEDS = {"methods": 160, "placements": 40, "grouped": 40}
-QUICK = {"methods": 8, "placements": 2, "grouped": 3}
+RATES = (1.0, 0.7, 1.0)
+"""How fast the clock of each variant goes; equal ones have equal statuses."""
+
+SEEDS = {"methods": 160, "placements": 40, "grouped": 40, "variants": 40, "c": 8}
+QUICK = {"methods": 8, "placements": 2, "grouped": 3, "variants": 3, "c": 1}
 
 
 def check_seeds(way, seeds, record):
@@ -146,7 +161,7 @@ def check_seeds(way, seeds, record):
             statuses.append(solution.status)
             points += int(np.sum(solution.status == kc.Status.CONVERGED))
         slowest = max(slowest, time.process_time() - started)
-        for status in statuses[1:]:
+        for status in statuses[2:] if way == "variants" else statuses[1:]:
             np.testing.assert_array_equal(status, statuses[0], err_msg=f"seed {seed}")
     record(tried=len(seeds), wrong=0, gave_up=gave_up, slowest=slowest)
     assert points > 5 * len(seeds)
@@ -161,13 +176,17 @@ def _quiet():
 
 
 @pytest.mark.parametrize("way", SEEDS)
-def test_a_few_random_chains(way, record):
+def test_a_few_random_chains(way, record, request):
+    if way == "c":
+        request.getfixturevalue("quick_compiler")
     check_seeds(way, range(QUICK[way]), record)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("way", SEEDS)
-def test_many_random_chains(way, record):
+def test_many_random_chains(way, record, request):
+    if way == "c":
+        request.getfixturevalue("quick_compiler")
     check_seeds(way, range(1000, 1000 + SEEDS[way]), record)
 
 
