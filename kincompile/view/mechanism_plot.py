@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import BodyPoint
+    from kincompile.view.marks import FramePoint
     from kincompile.view.polylines import Polyline
 
 NAME: dict[str, Any] = {
@@ -205,7 +205,7 @@ def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) ->
 
 
 def _write_names(
-    ax: Axes, size: float, labels: Mapping[str, BodyPoint], q: NDArray[np.float64]
+    ax: Axes, size: float, labels: Mapping[str, FramePoint], q: NDArray[np.float64]
 ) -> None:
     """Write names at their places; those of one place together."""
     at: dict[tuple[float, float], list[str]] = {}

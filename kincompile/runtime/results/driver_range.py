@@ -87,11 +87,11 @@ class Limit:
     bodies: tuple[str, ...]
     q: Array
 
-    def __str__(self) -> str:
-        """Return value, kind and bodies."""
+    def text(self, factor: float) -> str:
+        """Return the value times a factor, kind and bodies."""
         if not self.kind:
             return "no limit met"
-        return f"{self.value:.6g} ({self.kind}: {listed(self.bodies)})"
+        return f"{factor * self.value:.6g} ({self.kind}: {listed(self.bodies)})"
 
 
 @dataclass(frozen=True, slots=True)

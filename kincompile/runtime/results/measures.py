@@ -23,6 +23,7 @@ from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.march import March, State
 from kincompile.runtime.problem import problem
+from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges
 from kincompile.tables import table
 
@@ -146,7 +147,11 @@ class Measures:
 
     def __str__(self) -> str:
         """Return tables of outputs and drivers."""
-        parts = (_output_table(self.outputs), _driver_table(self.drivers))
+        return self.table()
+
+    def table(self, angle_unit: str = "rad") -> str:
+        """Return tables of outputs and drivers; angles in ``"rad"`` or ``"deg"``."""
+        parts = (_output_table(self.outputs, angle_unit), _driver_table(self.drivers, angle_unit))
         return "\n\n".join("\n".join(part) for part in parts if part)
 
 
@@ -449,30 +454,40 @@ def _derivative(t: Array, values: Array) -> Array:
     return np.asarray(make_interp_spline(t, values, degree).derivative()(t), dtype=np.float64)
 
 
-def _output_table(outputs: tuple[OutputMeasures, ...]) -> list[str]:
+def _output_table(outputs: tuple[OutputMeasures, ...], angle_unit: str) -> list[str]:
     """Return the lines of the table of outputs."""
     right = ("min", "at t", "max", "stroke", "dead points at", "time ratio", "mean", "rms")
     header = ("output", "unit", "min", "at t", "max", "at t", *right[3:])
-    return table(header, [_output_row(item) for item in outputs], right=right) if outputs else []
+    return (
+        table(header, [_output_row(item, angle_unit) for item in outputs], right=right)
+        if outputs
+        else []
+    )
 
 
-def _output_row(item: OutputMeasures) -> list[str]:
+def _output_row(item: OutputMeasures, angle_unit: str) -> list[str]:
     """Return the cells of an output, with zero for rounding errors."""
     noise = STILL * max(abs(item.least), abs(item.greatest))
-    numbers = item.least, item.t_least, item.greatest, item.t_greatest, item.stroke, item.mean
-    *parts, mean = (_text(0.0 if abs(x) < noise else x) for x in numbers)
+    unit, factor = shown_unit(item.unit, angle_unit)
+
+    def text(number: float) -> str:
+        return _text(0.0 if abs(number) < noise else factor * number)
+
+    extremes = (text(item.least), _text(item.t_least), text(item.greatest), _text(item.t_greatest))
     ratio = "not cyclic"
     if item.period is not None:
         ratio = "-" if item.time_ratio is None else _text(item.time_ratio)
-    return [item.name, item.unit, *parts, _times(item.dead_points), ratio, mean, _text(item.rms)]
+    means = text(item.mean), text(item.rms)
+    return [item.name, unit, *extremes, text(item.stroke), _times(item.dead_points), ratio, *means]
 
 
-def _driver_table(drivers: tuple[DriverRange, ...]) -> list[str]:
+def _driver_table(drivers: tuple[DriverRange, ...], angle_unit: str) -> list[str]:
     """Return the lines of the table of drivers."""
-    rows = [
-        [item.name, item.unit, _text(item.start), *(str(limit) for limit in (item.low, item.high))]
-        for item in drivers
-    ]
+    rows = []
+    for item in drivers:
+        unit, factor = shown_unit(item.unit, angle_unit)
+        limits = (limit.text(factor) for limit in (item.low, item.high))
+        rows.append([item.name, unit, _text(factor * item.start), *limits])
     header = ("driver", "unit", "at start", "goes down to", "goes up to")
     return table(header, rows, right=header[2:3]) if rows else []
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import package_of_extra
-from kincompile.runtime.results.columns import TIME_UNIT, titled
+from kincompile.runtime.results.columns import ANGLE_UNITS, TIME_UNIT, titled
 from kincompile.runtime.results.html import figure_html
 
 if TYPE_CHECKING:
@@ -51,13 +51,13 @@ GAP, EVENT = "0.88", "tab:red"
 
 
 def plot_columns(
-    solution: MotionTable, names: Sequence[str], x: str | None, ax: Axes | None
+    solution: MotionTable, names: Sequence[str], x: str | None, ax: Axes | None, angle_unit: str
 ) -> Axes:
     """Draw columns of a solution over time or another column, as `Solution.plot` describes."""
     with package_of_extra("matplotlib", "plot"):
         from matplotlib import pyplot as plt
-    across = None if x is None else solution.column(x)
-    panels = _by_unit(solution, names)
+    across = None if x is None else solution.column(x).shown(angle_unit)
+    panels = _by_unit(solution, names, angle_unit)
     if ax is not None:
         _draw_panel(ax, solution, [column for panel in panels for column in panel], across)
         return ax
@@ -81,11 +81,11 @@ def _size_of(panels: Panels) -> tuple[float, float]:
     return 7.2, 1.2 + 2.4 * len(panels)
 
 
-def _by_unit(solution: MotionTable, names: Sequence[str]) -> Panels:
+def _by_unit(solution: MotionTable, names: Sequence[str], angle_unit: str = "rad") -> Panels:
     """Return the named columns in their order, grouped by unit."""
     panels: dict[str, list[Column]] = {}
     for name in names or _shown_first(solution):
-        column = solution.column(name)
+        column = solution.column(name).shown(angle_unit)
         panels.setdefault(column.unit, []).append(column)
     return list(panels.values())
 
@@ -108,7 +108,7 @@ def _shown_first(solution: MotionTable) -> Sequence[str]:
 def _is_path(columns: Sequence[Column], across: Column | None) -> bool:
     """Say whether columns over another one are the path of a point: a length over a length."""
     units = {column.unit for column in columns}
-    return across is not None and units == {across.unit} and across.unit not in ("", "rad")
+    return across is not None and units == {across.unit} and across.unit not in ("", *ANGLE_UNITS)
 
 
 def _draw_panels(
@@ -149,7 +149,7 @@ def _draw_curves(
     ax: Axes, solution: MotionTable, column: Column, across: Column | None, k: int, name: str
 ) -> None:
     """Draw a column, of variants a curve each; over another column with dots at equal times."""
-    rows = np.atleast_2d(np.where(solution.status == 0, column.values, np.nan))
+    rows = np.atleast_2d(np.where(solution.good, column.values, np.nan))
     over = np.broadcast_to(solution.t if across is None else across.values, rows.shape)
     # A line needs two points; one that stands alone is drawn as a dot.
     marker, every = ("" if solution.t.size > 1 else "o"), 1
@@ -222,7 +222,7 @@ def _add_colour_bar(ax: Axes, solution: MotionTable) -> None:
 
 def _mark_times(ax: Axes, solution: MotionTable) -> None:
     """Mark events, and the times without a solution."""
-    _mark_gaps(ax, solution.t, solution.status == 0)
+    _mark_gaps(ax, solution.t, solution.good)
     for event in solution.events:
         text = f"{event.kind} at t = {event.t:.4g}"
         ax.axvline(event.t, color=EVENT, linestyle="--", linewidth=1, label=text)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.status import Status
 from kincompile.tables import counted, table
 
@@ -20,13 +21,15 @@ NOISE = 1e-12
 _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 
 
-def summary(solution: Solution) -> str:
+def summary(solution: Solution, angle_unit: str = "rad") -> str:
     """Return the extremes of every coordinate, the measures, and a line on how the solving went.
 
     Parameters
     ----------
     solution
         A solution, complete or partial; points that were not found do not count.
+    angle_unit
+        ``"rad"`` or ``"deg"``.
 
     Returns
     -------
@@ -37,30 +40,31 @@ def summary(solution: Solution) -> str:
         by status, the Newton iterations and the largest residual.
     """
     if solution.q.ndim > 2:
-        return "\n\n".join(_variant(solution, k) for k in range(len(solution.q)))
-    motion = solution.q, solution.q_dot, solution.q_ddot
-    parts = ["\n".join(_table(solution, motion))]
+        return "\n\n".join(_variant(solution, k, angle_unit) for k in range(len(solution.q)))
+    parts = ["\n".join(_table(solution, angle_unit))]
     if np.isfinite(solution.q_dot).any():
-        parts.append(str(solution.measures()))
+        parts.append(solution.measures().table(angle_unit))
     return "\n\n".join(part for part in (*parts, _verdict(solution)) if part)
 
 
-def _variant(solution: Solution, number: int) -> str:
+def _variant(solution: Solution, number: int, angle_unit: str) -> str:
     """Return the summary of a variant, under the values of its parameters."""
     values = ((name, axis[number]) for name, axis in solution.variants.items())
     named = (
         f"{name} = {value:g} {solution.units.get(name, '')}".rstrip() for name, value in values
     )
-    return f"{', '.join(named)}\n{summary(solution.variant(number))}"
+    return f"{', '.join(named)}\n{summary(solution.variant(number), angle_unit)}"
 
 
-def _table(solution: Solution, motion: tuple[NDArray[np.float64], ...]) -> list[str]:
+def _table(solution: Solution, angle_unit: str) -> list[str]:
     """Return the lines of the table of coordinates."""
+    motion = solution.q, solution.q_dot, solution.q_ddot
     shown = [_without_noise(values).T for values in motion]
-    rows = [
-        [name, solution.units[name], *_extremes(solution.t, q), _largest(q_dot), _largest(q_ddot)]
-        for name, q, q_dot, q_ddot in zip(solution.coordinates, *shown, strict=True)
-    ]
+    rows = []
+    for name, q, q_dot, q_ddot in zip(solution.coordinates, *shown, strict=True):
+        unit, factor = shown_unit(solution.units[name], angle_unit)
+        rates = _largest(factor * q_dot), _largest(factor * q_ddot)
+        rows.append([name, unit, *_extremes(solution.t, factor * q), *rates])
     header = ("coordinate", "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
     return table(header, rows, right=_NUMBERS)
 
@@ -111,5 +115,5 @@ def _verdict(solution: Solution) -> str:
 
 def _largest_residual(solution: Solution) -> str:
     """Return the largest residual of the converged points; failures are in `.message`."""
-    found = solution.residual[solution.status == Status.CONVERGED]
+    found = solution.residual[solution.good]
     return f"{found.max():.1e}" if found.size else "-"

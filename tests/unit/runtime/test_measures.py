@@ -208,7 +208,7 @@ def test_how_far_a_cylinder_can_go():
 def test_that_a_crank_that_goes_round_meets_no_limit(found):
     reach = found["motor"]
     assert (reach.low.value, reach.high.value) == (-math.inf, math.inf)
-    assert str(reach.low) == "no limit met"
+    assert reach.low.text(1) == "no limit met"
 
 
 def test_that_a_dwell_is_one_dead_point():
@@ -223,6 +223,14 @@ def test_that_a_dwell_is_one_dead_point():
     output = kc.solve(kc.compile(m), np.linspace(0, 2, 41)).measures()["x"]
     assert output.dead_points == pytest.approx([1.0])
     assert output.mean == pytest.approx(1 / 8, abs=1e-12)
+
+
+def test_that_tables_have_degrees(found):
+    (row,) = (x.split() for x in found.table("deg").splitlines() if x.startswith("turned"))
+    assert row[1:6:2] == ["deg", "0", "1"]
+    assert row[2:7:2] == ["17.1887", "377.189", "360"]
+    (row,) = (x.split() for x in found.table("deg").splitlines() if x.startswith("motor"))
+    assert row[1:3] == ["deg", "17.1887"]
 
 
 def test_the_tables(found):

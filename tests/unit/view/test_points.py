@@ -7,7 +7,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.view.drawing import drawing
-from kincompile.view.marks import Dot, Link
+from kincompile.view.marks import Dot, Hull
 
 T = np.linspace(0, 1, 41)
 L = 1.5
@@ -41,7 +41,7 @@ def test_that_a_point_is_a_mark_on_its_body_and_a_corner_of_it(model):
     drawn = drawing(model, {"L": 2.0})
     (dot,) = drawn.dots
     assert (dot.name, dot.place.point, dot.place.frame) == ("P", (2.0, 0.5), drawn.frames[0])
-    (link,) = (mark for mark in drawn.marks if isinstance(mark, Link))
+    (link,) = (mark for mark in drawn.marks if isinstance(mark, Hull))
     assert (2.0, 0.5) in link.points
     assert isinstance(drawn.marks[-1], Dot)
     assert drawn.to_json()["marks"][-1]["kind"] == "dot"
@@ -59,6 +59,7 @@ def test_that_a_plot_names_points_and_no_joints_unless_asked(model):
 def test_that_an_animation_traces_points_and_their_names_go_with_them(solution):
     plt = pytest.importorskip("matplotlib.pyplot", reason="matplotlib is not installed")
     from matplotlib.animation import AbstractMovieWriter
+    from matplotlib.text import Annotation
 
     class Labels(AbstractMovieWriter):
         """Keeps where the names stand in each frame."""
@@ -71,7 +72,8 @@ def test_that_an_animation_traces_points_and_their_names_go_with_them(solution):
             self.fig = fig
 
         def grab_frame(self, **savefig_kwargs):
-            self.places += [text.xy for text in self.fig.axes[0].texts if text.get_text() == "P"]
+            shown = self.fig.axes[0].texts
+            self.places += [text.xy for text in shown if isinstance(text, Annotation)]
 
         def finish(self):
             """Nothing was begun."""
