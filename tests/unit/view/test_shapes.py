@@ -280,7 +280,7 @@ def test_that_a_drawing_is_plain_data(example):
     data = json.loads(json.dumps(drawing(example.model).to_json(), allow_nan=False))
     kinds = {mark["kind"] for mark in data["marks"]}
     assert kinds <= {
-        "hull", "polygon", "pin", "rail", "slider", "span", "wheel", "contour", "drive",
+        "hull", "polygon", "pin", "rail", "slider", "span", "wheel", "contour", "drive", "dot",
     }  # fmt: skip
     assert data["bodies"] == [body.name for body in example.model.system().bodies]
 
