@@ -15,8 +15,10 @@ import numpy as np
 from kincompile.names import listed
 from kincompile.runtime.engine.code import DRIVERS
 from kincompile.runtime.problem import problem
+from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.singular.events import BIFURCATION, LOCK_UP, involved
 from kincompile.runtime.singular.reach import freed_curve
+from kincompile.tables import table
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -147,3 +149,14 @@ def _limit(equations: Problem, driver: Driver, q: Array, t: float, sign: float) 
     place = found[0]
     kind = LOCK_UP if bracket.turns else BIFURCATION
     return Limit(driver.at(place.t), kind, involved(equations.code, place.tangent[:-1]), place.q)
+
+
+def driver_table(drivers: tuple[DriverRange, ...], angle_unit: str) -> list[str]:
+    """Return the lines of the table of drivers."""
+    rows = []
+    for item in drivers:
+        unit, factor = shown_unit(item.unit, angle_unit)
+        limits = (limit.text(factor) for limit in (item.low, item.high))
+        rows.append([item.name, unit, f"{factor * item.start:.6g}", *limits])
+    header = ("driver", "unit", "at start", "goes down to", "goes up to")
+    return table(header, rows, right=header[2:3]) if rows else []

@@ -24,7 +24,7 @@ from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.march import March, State
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.columns import shown_unit
-from kincompile.runtime.results.driver_range import DriverRange, driver_ranges
+from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
 from kincompile.tables import table
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ class Measures:
 
     def table(self, angle_unit: str = "rad") -> str:
         """Return tables of outputs and drivers; angles in ``"rad"`` or ``"deg"``."""
-        parts = (_output_table(self.outputs, angle_unit), _driver_table(self.drivers, angle_unit))
+        parts = (_output_table(self.outputs, angle_unit), driver_table(self.drivers, angle_unit))
         return "\n\n".join("\n".join(part) for part in parts if part)
 
 
@@ -479,17 +479,6 @@ def _output_row(item: OutputMeasures, angle_unit: str) -> list[str]:
         ratio = "-" if item.time_ratio is None else _text(item.time_ratio)
     means = text(item.mean), text(item.rms)
     return [item.name, unit, *extremes, text(item.stroke), _times(item.dead_points), ratio, *means]
-
-
-def _driver_table(drivers: tuple[DriverRange, ...], angle_unit: str) -> list[str]:
-    """Return the lines of the table of drivers."""
-    rows = []
-    for item in drivers:
-        unit, factor = shown_unit(item.unit, angle_unit)
-        limits = (limit.text(factor) for limit in (item.low, item.high))
-        rows.append([item.name, unit, _text(factor * item.start), *limits])
-    header = ("driver", "unit", "at start", "goes down to", "goes up to")
-    return table(header, rows, right=header[2:3]) if rows else []
 
 
 def _times(times: tuple[float, ...]) -> str:
