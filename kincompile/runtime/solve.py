@@ -14,6 +14,7 @@ What all of them stand on is one position with its scales: problem.Problem.
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -138,9 +139,23 @@ def solve(
             solution = solve_variants(inputs, sets, progress)
         else:
             solution = solve_in_turn(inputs, sets, progress)
+    solution = _finite(solution)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution
+
+
+def _finite(solution: Solution) -> Solution:
+    """Take no point for converged whose numbers are not all finite, whatever has found it."""
+    numbers = solution.q, solution.q_dot, solution.q_ddot
+    is_finite = np.isfinite(sum(values.sum(axis=-1) for values in numbers))
+    wrong = (solution.status == Status.CONVERGED) & ~is_finite
+    if not wrong.any():
+        return solution
+    status = np.where(wrong, Status.NOT_FINITE, solution.status)
+    text = f"{solution.name} failed: {wrong.sum()} points have numbers that are not finite."
+    message = f"{text} {Status.NOT_FINITE.sentence}"
+    return replace(solution, status=status, success=False, message=message)
 
 
 def _solution(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:

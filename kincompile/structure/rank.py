@@ -141,7 +141,13 @@ class _Analysis:
         end: float,
     ) -> None:
         random = np.random.default_rng(SEED)
-        size = size_of(angular, guess) or 1.0
+
+        def entries(q: Array) -> tuple[Array, Array]:
+            Phi, Phi_q = evaluate(q[np.newaxis], np.zeros(1))
+            return Phi[0], Phi_q[0].reshape(-1)
+
+        m, n = entries(guess)[0].size, guess.size
+        size = size_of(entries, np.argwhere(np.ones((m, n))), angular, guess) or 1.0
         self._evaluate = evaluate
         self._angular = angular
         self._scale = np.where(angular, 1.0, size)
@@ -153,7 +159,6 @@ class _Analysis:
         sizes = np.abs(Phi_q) @ self._scale
         terms = np.max(np.where(np.isfinite(sizes), sizes, 0.0), axis=0)
         self._terms = np.where(terms > 0, terms, 1.0)
-        m = terms.size
         self._drivers = list(drivers)
         self._joints = [row for row in range(m) if row not in set(drivers)]
 

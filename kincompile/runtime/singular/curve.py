@@ -117,9 +117,8 @@ class Curve:
 
     def __init__(self, equations: Problem, state: State, duration: float) -> None:
         self.equations = equations
-        spread = equations.spread(state.point.q)
-        self.scale = np.append(spread, duration)
-        terms = equations.terms(state.point, spread)
+        self.scale = np.append(equations.reference, duration)
+        terms = equations.terms(state.point, equations.reference)
         self._weights = 1 / np.where(terms > 0, terms, 1.0)
 
     def start(self, state: State, direction: float) -> CurvePoint | None:

@@ -174,15 +174,15 @@ def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
         return None
     if not (np.isfinite(nu).all() and np.isfinite(point.Phi_q).all()):
         return None
-    scaled = point.Phi_q * equations.spread(point.q)
-    basis, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
-    missing = basis[:, sizes <= IN_RANGE * sizes[0]].T @ nu
-    demanded = float(np.linalg.norm(missing)) > IN_RANGE * float(np.linalg.norm(nu))
+    weights = equations.weights()
+    basis, sizes, _ = np.linalg.svd(_scaled(equations, point.Phi_q), full_matrices=False)
+    missing = basis[:, sizes <= IN_RANGE * sizes[0]].T @ (weights * nu)
+    demanded = float(np.linalg.norm(missing)) > IN_RANGE * float(np.linalg.norm(weights * nu))
     kind = LOCK_UP if demanded else BIFURCATION
     return _event(equations, kind, point.q, t, point.Phi_q)
 
 
-def branch_switch(code: Code, state: State, t: float, q: Vector, spread: Vector) -> Event:
+def branch_switch(code: Code, state: State, t: float, q: Vector, reference: Vector) -> Event:
     """Return the event of a position that the mechanism could only jump to.
 
     Parameters
@@ -193,10 +193,10 @@ def branch_switch(code: Code, state: State, t: float, q: Vector, spread: Vector)
         The last good point of the motion.
     t, q
         The time that was not reached, and the position found there.
-    spread
-        The distance that is large for each coordinate.
+    reference
+        The scale of each coordinate.
     """
-    jump = (q - state.point.q) / spread
+    jump = (q - state.point.q) / reference
     bodies = _involved(code, jump)
     return Event(
         BRANCH_SWITCH, state.t, bodies,
@@ -209,8 +209,7 @@ def branch_switch(code: Code, state: State, t: float, q: Vector, spread: Vector)
 
 def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:
     """Name what moves, and say what to do."""
-    spread = equations.spread(q)
-    _, sizes, directions = np.linalg.svd(Phi_q * spread)
+    _, sizes, directions = np.linalg.svd(_scaled(equations, Phi_q))
     null = directions[-1] / directions[-1][np.argmax(np.abs(directions[-1]))]
     code = equations.code
     # Equal loops become singular together: then several movements are free.
@@ -220,6 +219,11 @@ def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) ->
         kind, t, bodies, _message(kind, t, bodies), q,
         dict(zip(code.coordinates, null.tolist(), strict=True)),
     )  # fmt: skip
+
+
+def _scaled(equations: Problem, Phi_q: Vector) -> Vector:
+    """Return Phi_q in scales of equations and coordinates."""
+    return equations.weights()[:, np.newaxis] * Phi_q * equations.reference
 
 
 def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
