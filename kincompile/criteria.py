@@ -108,7 +108,7 @@ MAX_SUBSTEPS = 10_000
 
 def size_of(
     evaluate: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]],
-    pattern: NDArray[np.signedinteger[Any]],
+    pattern: NDArray[np.signedinteger[Any]] | None,
     angular: NDArray[np.bool_],
     q: NDArray[np.float64],
 ) -> float:
@@ -123,7 +123,7 @@ def size_of(
     evaluate
         Gives Phi (m,) and the entries of Phi_q, (nnz,), at a position.
     pattern : ndarray of int, shape (nnz, 2)
-        Rows and columns of these.
+        Rows and columns of these; None where they are all entries, row by row.
     angular : ndarray of bool, shape (n,)
         Which coordinates are angles.
     q : ndarray, shape (n,)
@@ -136,6 +136,8 @@ def size_of(
     """
     lengths, angles = (np.where(angular == kind, probe_of(q.size), 0.0) for kind in (False, True))
     Phi, entries = evaluate(q + angles)  # at no special pose
+    if pattern is None:
+        pattern = np.argwhere(np.ones((Phi.size, q.size)))
     turns = angular[pattern[:, 1]]
     slopes = _largest_of_rows(pattern, np.where(turns, 0.0, np.abs(entries)), Phi.size)
     arms = _largest_of_rows(pattern, np.where(turns, np.abs(entries), 0.0), Phi.size)

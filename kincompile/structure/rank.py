@@ -146,8 +146,7 @@ class _Analysis:
             Phi, Phi_q = evaluate(q[np.newaxis], np.zeros(1))
             return Phi[0], Phi_q[0].reshape(-1)
 
-        m, n = entries(guess)[0].size, guess.size
-        size = size_of(entries, np.argwhere(np.ones((m, n))), angular, guess) or 1.0
+        size = size_of(entries, None, angular, guess) or 1.0
         self._evaluate = evaluate
         self._angular = angular
         self._scale = np.where(angular, 1.0, size)
@@ -160,7 +159,7 @@ class _Analysis:
         terms = np.max(np.where(np.isfinite(sizes), sizes, 0.0), axis=0)
         self._terms = np.where(terms > 0, terms, 1.0)
         self._drivers = list(drivers)
-        self._joints = [row for row in range(m) if row not in set(drivers)]
+        self._joints = [row for row in range(terms.size) if row not in set(drivers)]
 
     def undefined(self) -> list[int]:
         """Return the rows that are most seldom finite, where no state has all of them finite."""
