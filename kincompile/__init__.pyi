@@ -22,6 +22,8 @@ from kincompile.errors import SolveError as SolveError
 from kincompile.errors import StructuralError as StructuralError
 from kincompile.errors import TemplateError as TemplateError
 from kincompile.errors import UnsupportedError as UnsupportedError
+from kincompile.exercises.kit import exercise as exercise
+from kincompile.exercises.marking import mark as mark
 from kincompile.files.file_format import model_schema as model_schema
 from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis

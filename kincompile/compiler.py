@@ -20,6 +20,7 @@ import logging
 import warnings
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -195,6 +196,7 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
+    from kincompile.runtime.engine.code import JOINT_POINTS
     from kincompile.runtime.load import from_source
 
     loadable = [name for name, item in TARGETS.items() if item.is_loadable]
@@ -215,7 +217,16 @@ def compile(  # noqa: A001 - the public name kc.compile
         module = from_source(emitted.source, system.name, emitted.arrays)
         if isinstance(code, InlineProgram) and target == "c":
             module = _native(module, code)
+    vars(module)[JOINT_POINTS] = partial(_joint_points, system)
     return remember_model(module, system)
+
+
+def _joint_points(system: ConstraintSystem) -> ModuleType:
+    """Return a module whose outputs are the points of joints, for who asks for one of them."""
+    from kincompile.runtime.load import from_source
+
+    program = lower(system.observing(system.joint_points()))
+    return from_source(emit_program("numpy", inline(program)).source, system.name)
 
 
 def _native(module: ModuleType, code: InlineProgram) -> ModuleType:

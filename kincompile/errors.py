@@ -10,6 +10,8 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from kincompile.names import escaped_lines
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
@@ -33,7 +35,9 @@ class _CollectedError(KincompileError):
     """
 
     def __init__(self, problems: str | Iterable[str]) -> None:
-        self.problems = (problems,) if isinstance(problems, str) else tuple(problems)
+        given = (problems,) if isinstance(problems, str) else problems
+        # A message quotes what its reader may not have written: keys, names, paths.
+        self.problems = tuple(map(escaped_lines, given))
         if not self.problems:
             raise InternalError(f"{type(self).__name__} was raised without a problem.")
         super().__init__(self.problems)

@@ -1,9 +1,10 @@
-"""Naming rules: what may be a name, and how coordinates, rates and equations are called."""
+"""Names: what may be one, how coordinates and rates are called, how a message shows them."""
 
 from __future__ import annotations
 
 import re
 from difflib import get_close_matches
+from itertools import islice
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,6 +15,13 @@ RESERVED = frozenset({"t", "pi", "alpha"})
 
 SYMBOLS = frozenset({"a parameter", "a coordinate"})
 """What has a name that occurs in expressions."""
+
+LONGEST = 60
+"""Characters of a value that a message shows."""
+
+_KINDS: dict[type, str] = {dict: "a table", bool: "a truth value", type(None): "null"}
+MOST_CHARACTERS = 100
+"""Length of a name: files are called by it, and an operating system has a limit."""
 
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _UNIT = re.compile(r"(?!.*\*/)[\w°%·*/^.()+ -]*")
@@ -27,8 +35,12 @@ def name_problem(name: object, what: str) -> str | None:
     """
     if not isinstance(name, str) or not _IDENTIFIER.fullmatch(name):
         return (
-            f"{what} is named {name!r}: a name is an ASCII letter followed by letters, digits or "
-            "underscores; rename it"
+            f"{what} is named {_given(name)}: a name is an ASCII letter followed by letters, "
+            "digits or underscores; rename it"
+        )
+    if len(name) > MOST_CHARACTERS:
+        return (
+            f"the name of {what} has {len(name)} characters; give one of at most {MOST_CHARACTERS}"
         )
     if name in RESERVED and what in SYMBOLS:
         return (
@@ -47,9 +59,44 @@ def unit_problem(unit: object, what: str) -> str | None:
     if isinstance(unit, str) and _UNIT.fullmatch(unit):
         return None
     return (
-        f"the unit of {what} is {unit!r}: a unit consists of letters, digits, spaces and "
+        f"the unit of {what} is {_given(unit)}: a unit consists of letters, digits, spaces and "
         'the characters ° % · * / ^ . ( ) + -, as "m", "rad/s" or "kg*m^2"; write it so'
     )
+
+
+def escaped(text: object) -> str:
+    r"""Return a text of a user as a message shows it: on one line, nothing in it a command.
+
+    Line breaks, control characters and marks that turn the direction of writing, which a terminal
+    would obey, become ``\n``, ``\x1b``, ``\u202e``.
+    """
+    return "".join(
+        character if character.isprintable() else character.encode("unicode_escape").decode("ascii")
+        for character in str(text)
+    )
+
+
+def escaped_lines(text: str) -> str:
+    """Return a whole message so that nothing in it is a command; its own line breaks stay."""
+    return "\n".join(map(escaped, text.split("\n")))
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: kind or beginning of what is long, texts in quotes."""
+    if isinstance(value, str):
+        return repr(value if len(value) <= LONGEST else value[: LONGEST - 3] + "...")
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict | bool | None):
+        return _KINDS[type(value)]
+    is_huge = isinstance(value, int) and abs(value) >= 10**40
+    text = "a huge number" if is_huge else escaped(repr(value))
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+
+
+def _given(value: object) -> str:
+    """Return what was given for a name, as Python writes it."""
+    return shown(value) if isinstance(value, str) else escaped(repr(value))[:LONGEST]
 
 
 def rate(name: str, order: int = 1) -> str:
@@ -76,6 +123,9 @@ def listed(names: Iterable[object], most: int = 12) -> str:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return "; did you mean ...?" where a known name is close, else nothing."""
-    close = get_close_matches(name, list(known), n=1)
+    """Return "; did you mean ...?" where a known name is close, else nothing.
+
+    Of long names the beginning is compared, of many the first 1000, which takes a few milliseconds.
+    """
+    close = get_close_matches(name[:40], list(islice(known, 1000)), n=1)
     return f"; did you mean {close[0]!r}?" if close else ""

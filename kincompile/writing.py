@@ -8,7 +8,9 @@ from pathlib import Path
 from kincompile.errors import InputError
 
 
-def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path:
+def write_atomically(
+    path: str | os.PathLike[str], content: str | bytes, *, is_private: bool = False
+) -> Path:
     """Write `content` to `path` in one step: the old file stays whole until the new one is.
 
     The content goes to a temporary file in the same folder, which then replaces `path`. Text is
@@ -21,6 +23,9 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
         The file to write; an existing one is replaced and keeps its permissions.
     content : str or bytes
         The whole content.
+    is_private : bool
+        Whether nobody else may read or write the file, whatever the umask. A link is then replaced
+        by the file.
 
     Returns
     -------
@@ -39,7 +44,7 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
         if _is_device(target):
             target.write_bytes(data)
         else:
-            _replace(target, data)
+            _replace(target, data, is_private)
     except OSError as error:
         raise InputError(_explanation(target, error)) from error
     return target
@@ -75,14 +80,17 @@ def _require_place(target: Path) -> None:
         raise PermissionError
 
 
-def _replace(target: Path, data: bytes) -> None:
+def _replace(target: Path, data: bytes, is_private: bool) -> None:
     """Write a temporary neighbour of `target` and move it into place."""
-    destination = target.resolve()  # through a symbolic link, so that the link itself stays
+    # Through a symbolic link, so that the link itself stays.
+    destination = target if is_private else target.resolve()
     temporary = destination.with_name(f".{destination.name}.{os.urandom(4).hex()}")
     try:
-        with temporary.open("xb") as file:
-            file.write(data)
-        if destination.exists():
+        temporary.touch(0o600 if is_private else 0o666, exist_ok=False)
+        temporary.write_bytes(data)
+        if is_private:
+            temporary.chmod(0o600)
+        elif destination.exists():
             temporary.chmod(destination.stat().st_mode & 0o7777)
         temporary.replace(destination)
     except BaseException:

@@ -22,8 +22,9 @@ import click
 import kincompile as kc
 from kincompile.cli.shared import INTERRUPTED, USAGE_OR_MODEL
 from kincompile.errors import InternalError, KincompileError
+from kincompile.names import escaped_lines
 
-COMMANDS = ("compare", "compile", "derive", "inspect", "run", "schema", "view")
+COMMANDS = ("compare", "compile", "derive", "exercise", "inspect", "mark", "run", "schema", "view")
 """The commands: each is the `command` of the file of its name."""
 
 TRACEBACK = "KINCOMPILE_TRACEBACK"
@@ -72,13 +73,13 @@ def _end(message: str, code: int) -> NoReturn:
     """Write a message to stderr, after the traceback if one is wanted, and end."""
     if os.environ.get(TRACEBACK, "0") not in ("", "0"):
         traceback.print_exc()
-    click.echo(message, err=True)
+    click.echo(escaped_lines(message), err=True)
     raise click.exceptions.Exit(code)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Write a warning to stderr as a message, without the line of code that gave it."""
-    click.echo(f"Warning: {message}", err=True)
+    click.echo(escaped_lines(f"Warning: {message}"), err=True)
 
 
 @click.group(

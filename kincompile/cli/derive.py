@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 import kincompile as kc
@@ -11,25 +9,45 @@ from kincompile.cli.shared import output_option, read_model, set_option
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
 
-DERIVATIONS = (".html", ".tex", ".md", ".ipynb")
+DERIVATIONS = (".slides.html", ".html", ".tex", ".md", ".ipynb")
 """Endings of the files that `derive` writes."""
+
+LEVELS = ("vector", "expanded", "numeric")
+"""The levels of a derivation."""
 
 
 @click.command("derive")
 @click.argument("model")
-@output_option("File to write: .html, .tex, .md or .ipynb.")
-@click.option("--time", "at", type=float, default=0.0, metavar="T", help="Time of the numbers.")
+@output_option("File to write: .html, .slides.html, .tex, .md or .ipynb.")
+@click.option("--time", "at", type=float, metavar="T", help="Time of the numbers.")
 @set_option("parameter, coordinate or rate")
-def command(model: str, output: str, at: float, values: dict[str, float]) -> None:
+@click.option("--constraint", metavar="NAME", help="Show this constraint alone.")
+@click.option(
+    "--levels", default=",".join(LEVELS), metavar="LEVEL,...", help="Levels that are shown."
+)
+def command(
+    model: str,
+    output: str,
+    at: float | None,
+    values: dict[str, float],
+    constraint: str | None,
+    levels: str,
+) -> None:
     """Show how Phi_q, nu and gamma of MODEL follow from Phi, step by step.
 
     A page for each constraint in nine steps (in vectors, in sines and cosines, in numbers) and for
-    the assembled system. The numbers are taken where the mechanism is assembled at the time, or at
-    the coordinates that are set.
+    the assembled system. The numbers are taken where the mechanism is assembled at the time, by
+    default one at which nothing is special, or at the coordinates that are set.
     """
-    if Path(output).suffix not in DERIVATIONS:
+    if not output.endswith(DERIVATIONS):
         raise InputError(f"{output}: a derivation is written as {', '.join(DERIVATIONS)}")
     require_writable(output)
-    state = {"t": at, **values}
-    kc.derivation(read_model(model), state).write(output)
+    state = values if at is None else {"t": at, **values}
+    found = kc.derivation(
+        read_model(model),
+        state or None,
+        constraint=constraint,
+        levels=[level.strip() for level in levels.split(",") if level.strip()],
+    )
+    found.write(output)
     click.echo(f"Wrote {output}", err=True)

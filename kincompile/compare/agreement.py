@@ -102,13 +102,11 @@ def _share(equal: Array, generated: Array) -> float:
 
 def _ratios(written: Array, generated: Array, group: Array) -> list[Array]:
     """Return the ratios of entries that do not vary within a group of states."""
-    found: list[Array] = []
     if np.min(np.bincount(group)[group]) < 2:
-        return found  # one state says nothing about a factor: any two numbers have one
-    for w, g in zip(written.T, generated.T, strict=True):
-        if np.all((np.abs(g) > ABSOLUTE) & (np.abs(w) > ABSOLUTE) & np.isfinite(w)):
-            ratio = w / g
-            first = np.array([ratio[np.argmax(group == k)] for k in group])
-            if np.all(np.abs(ratio - first) <= OF_TERMS * np.abs(first)):
-                found.append(first)
-    return found
+        return []  # one state says nothing about a factor: any two numbers have one
+    usable = (np.abs(generated) > ABSOLUTE) & (np.abs(written) > ABSOLUTE) & np.isfinite(written)
+    columns = usable.all(axis=0)
+    ratios = written[:, columns] / generated[:, columns]
+    first = ratios[np.argmax(group[:, None] == group, axis=0)]
+    is_one = (np.abs(ratios - first) <= OF_TERMS * np.abs(first)).all(axis=0)
+    return list(first.T[is_one])

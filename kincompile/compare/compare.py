@@ -16,24 +16,30 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from kincompile.compare.agreement import ABSOLUTE, ON_MANIFOLD, agrees
-from kincompile.compare.comparison import ComparedEntry, Diagnosis, Difference, Verdict
+from kincompile.compare.agreement import ABSOLUTE, OF_TERMS, ON_MANIFOLD, agrees
+from kincompile.compare.comparison import (
+    ComparedEntry,
+    Convention,
+    Diagnosis,
+    Difference,
+    Verdict,
+)
 from kincompile.compare.conventions import OPPOSITE, conventions_found, stated_signs
 from kincompile.compare.dependence import Dependence
 from kincompile.compare.diagnosis import Diagnostician
 from kincompile.compare.fault import REVERSED, WHOLE_SIGN, WITH_RATES
 from kincompile.compare.hand_file import read_hand_file
 from kincompile.compare.layouts import expected_widths, usual_layout
-from kincompile.compare.matching import Matcher, Matching, Subject
-from kincompile.compare.reference import QUANTITIES, Reference
+from kincompile.compare.matching import Matcher, Matching
+from kincompile.compare.reference import QUANTITIES, Reference, Subject
 from kincompile.compare.report import Report
 from kincompile.compare.states import given_states
-from kincompile.compare.written import read_written, vocabulary
+from kincompile.compare.written import TOLD, read_written, vocabulary
 from kincompile.errors import InputError
+from kincompile.model.expressions import symbol_names
 from kincompile.names import listed
 
 if TYPE_CHECKING:
@@ -42,6 +48,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from kincompile.compare.diagnosis import Given
     from kincompile.compare.joint_faults import Index
     from kincompile.compare.reference import ConstraintBlock
     from kincompile.compare.states import Array, States
@@ -50,6 +57,11 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
 UNEXPLAINED = "not in the catalogue"
+
+NUMBERS = Convention(
+    "numbers for parameters",
+    "numbers stand for parameters: everything is compared at the parameters' default values.",
+)
 
 Spot = tuple[str, int, int]
 """A quantity, and row and column of one of its entries as written."""
@@ -123,7 +135,7 @@ def compare(
     else:
         at = reference.random.with_default_parameters(reference.defaults)
     signs = stated_signs(conventions or {})
-    return _Comparer(Subject(reference, block, at), written, signs, strict).report()
+    return _compared(Subject(reference, block, at), written, signs, strict)
 
 
 def compare_file(
@@ -165,7 +177,19 @@ def compare_file(
         signs = stated_signs(file.conventions)
     except InputError as error:
         raise InputError([f"{file.name}, {problem}" for problem in error.problems]) from error
-    return _Comparer(Subject(reference, block, reference.random), written, signs, strict).report()
+    return _compared(Subject(reference, block, reference.random), written, signs, strict)
+
+
+def _compared(
+    subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float], strict: bool
+) -> Report:
+    """Compare at the given states, and where something differs at others that may explain it."""
+    best = _Comparer(subject, written, signs, strict)
+    for states, convention in best.other_states():
+        other = _Comparer(replace(subject, states=states), written, signs, strict, convention)
+        if other.wrong_count < best.wrong_count:
+            best = other
+    return best.report()
 
 
 def _read(
@@ -182,19 +206,22 @@ def _read(
     for name in QUANTITIES:
         if name in given:
             try:
-                written[name] = read_written(name, given[name], words, reference, at_states)
-                problems += _shape_problems(name, written[name], reference, block)
+
+                def check(rows: int, columns: int, name: str = name) -> list[str]:
+                    return _shape_problems(name, rows, columns, reference, block)
+
+                written[name] = read_written(name, given[name], words, reference, at_states, check)
+                problems += check(*written[name].shape)
             except InputError as error:
-                problems += error.problems
+                problems += [item for item in error.problems if item != TOLD]
     if problems:
         raise InputError(problems)
     return written
 
 
 def _shape_problems(
-    name: str, written: Written, reference: Reference, block: ConstraintBlock | None
+    name: str, rows: int, columns: int, reference: Reference, block: ConstraintBlock | None
 ) -> list[str]:
-    rows, columns = written.shape
     names = reference.equations if block is None else block.constraint.equation_names
     found = []
     if rows != len(names):
@@ -218,19 +245,46 @@ class _Comparer:
         written: Mapping[str, Written],
         signs: Mapping[str, float],
         strict: bool,
+        convention: Convention | None = None,
     ) -> None:
         self._subject = subject
         self._quantities = written
         self._strict = strict
+        self._convention = convention
         self._reference = subject.reference
         self._matcher = Matcher(subject, written, signs)
         self._adopt(self._matcher.match())
         self._drop_doubtful_factors()
+        self._find_equal_on_manifold()
+
+    @property
+    def wrong_count(self) -> int:
+        """The number of entries that are not accepted."""
+        return sum(not self._is_accepted(spot) for spot in self._verdicts)
+
+    def other_states(self) -> Iterator[tuple[States, Convention | None]]:
+        """Yield states at which the author may be right, each with the convention that it is."""
+        reference, states = self._reference, self._subject.states
+        if states is not reference.random or not self.wrong_count:
+            return
+        if not all(np.isfinite(values).all() for values, _ in self._written.values()):
+            yield reference.about_guess(states), None
+        if any(map(self._lacks_a_parameter, self._wrong())):
+            yield states.with_default_parameters(reference.defaults), NUMBERS
+
+    def _lacks_a_parameter(self, spot: Spot) -> bool:
+        """Return whether parameters are missing in an entry, perhaps as numbers stand for them."""
+        name, row, column = spot
+        written = self._quantities[name].formula(row, column)
+        right = symbol_names(self._reference.expression(name, *self._index(spot)))
+        missing = right - (symbol_names(written) if written is not None else set())
+        return any(item.name in missing for item in self._reference.system.parameters)
 
     def _adopt(self, matching: Matching) -> None:
         """Compare under a matching."""
         self._matching = matching
         self._written = self._matcher.written(matching, self._subject.states)
+        self._exact = self._matcher.written(matching, self._subject.states, exact=True)
         self._expected = self._matcher.expected(matching, self._subject.states)
         self._verdicts = {
             spot: verdict for name in self._quantities for spot, verdict in self._judged(name)
@@ -240,12 +294,30 @@ class _Comparer:
         """Yield the verdict of every entry that is compared, row by row."""
         expected = self._expected[name]
         equal = np.all(agrees(*self._written[name], expected), axis=0)
+        exact = np.all(agrees(*self._exact[name], expected), axis=0)
         for row, columns in enumerate(equal):
-            is_plain = self._matching.is_plain(name, row)
-            right = Verdict.EQUAL if is_plain else Verdict.CONVENTION
+            is_plain = self._matching.is_plain(name, row) and self._convention is None
             for column, is_equal in enumerate(columns):
                 if not np.isnan(expected[:, row, column]).all():  # a column of the ground
+                    is_exact = is_plain and exact[row, column]
+                    right = Verdict.EQUAL if is_exact else Verdict.CONVENTION
                     yield (name, row, column), right if is_equal else Verdict.DIFFERENT
+
+    def _conventions(self) -> Iterator[Convention]:
+        """Yield the conventions in which the two differ."""
+        yield from [self._convention] if self._convention else []
+        yield from conventions_found(self._matching, self._reference.equations)
+        for name, item in self._quantities.items():
+            rounded = {
+                self._reference.equations[self._index(spot)[0]]
+                for spot, verdict in self._verdicts.items()
+                if spot[0] == name and verdict is Verdict.CONVENTION
+                if self._matching.is_plain(name, spot[1]) and self._convention is None
+            }
+            if rounded:
+                yield Convention(
+                    "rounded numbers", f"{name}: {item.rounding}.", tuple(sorted(rounded))
+                )
 
     def _wrong(self, block: ConstraintBlock | None = None) -> list[Spot]:
         """Return the entries that are not right, of all constraints or of one."""
@@ -282,13 +354,10 @@ class _Comparer:
         """Return whether one fault explains all that differs in the Jacobian of a constraint."""
         spots = [spot for spot in self._wrong(block) if spot[0] == "Phi_q"]
         return bool(spots) and self._diagnostician.is_one_fault(
-            block, "Phi_q", self._in_system_terms(spots), self._is_exchanged(block)
+            block, self._in_system_terms(spots), self._matching.form(block.rows[0])
         )
 
-    def _is_exchanged(self, block: ConstraintBlock) -> bool:
-        return self._matching.exchanged.issuperset(block.rows)
-
-    def _in_system_terms(self, spots: Sequence[Spot]) -> dict[Index, Array]:
+    def _in_system_terms(self, spots: Sequence[Spot]) -> dict[Index, Given]:
         """Return written entries of a quantity by place, with the conventions taken out."""
         units = self._matching.units.column_factors(self._reference)
         values = {}
@@ -298,19 +367,19 @@ class _Comparer:
             scale = self._matching.factors[row] * self._matching.sign(name)
             if name == "Phi_q":
                 scale = scale * units[place[1]]
-            values[place] = self._written[name][0][:, row, column] / scale
+            written, sizes = (item[:, row, column] / scale for item in self._written[name])
+            values[place] = written, OF_TERMS * np.abs(sizes)
         return values
 
     def report(self) -> Report:
         """Return the outcome."""
-        self._find_equal_on_manifold()
         diagnoses = self._diagnoses()
         block = self._subject.block
         return Report(
             self._reference.system.name,
             None if block is None else block.constraint.name,
             tuple(self._entry(spot, diagnoses.get(spot, ())) for spot in self._verdicts),
-            tuple(conventions_found(self._matching, self._reference.equations)),
+            tuple(self._conventions()),
         )
 
     def _find_equal_on_manifold(self) -> None:
@@ -324,20 +393,22 @@ class _Comparer:
         for block in self._subject.blocks:
             spots = [spot for spot in self._wrong(block) if not self._is_mistake(spot)]
             for rows in (block.rows, range(len(self._reference.equations))) if spots else ():
-                states = self._reference.consistent(self._subject.states, rows)
+                states = self._subject.near(rows)
                 if states is not None:
                     self._compare_on_manifold(states, spots)
 
     def _compare_on_manifold(self, states: States, spots: Sequence[Spot]) -> None:
         written = self._matcher.written(self._matching, states)
+        exact = self._matcher.written(self._matching, states, exact=True)
         expected = self._matcher.expected(self._matching, states)
         for name, row, column in spots:
+            values, sizes = (item[:, row, column] for item in written[name])
             # A value that vanishes on the manifold is measured by its size elsewhere.
             size = np.max(np.abs(self._expected[name][:, row, column]))
-            values, sizes = (item[:, row, column] for item in written[name])
+            size += np.max(exact[name][1][:, row, column])
             off = np.abs(values - expected[name][:, row, column])
-            is_defined = np.isfinite(sizes).all()
-            if is_defined and np.all(off <= ON_MANIFOLD * (size + np.max(sizes))):
+            allowed = ON_MANIFOLD * size + OF_TERMS * np.max(sizes)
+            if np.isfinite(allowed) and np.all(off <= allowed):
                 self._verdicts[name, row, column] = Verdict.MANIFOLD
 
     def _is_mistake(self, spot: Spot) -> bool:
@@ -352,19 +423,11 @@ class _Comparer:
         return name == "Phi" or bool(is_opposite) or self._has_rates(spot)
 
     def _has_rates(self, spot: Spot) -> bool:
-        """Return whether an entry of Phi, Phi_q or nu depends on the rates of the coordinates."""
+        """Return whether rates stand in an entry of Phi, Phi_q or nu."""
         name, row, column = spot
-        return name != "gamma" and bool(self._rates[name][row, column])
-
-    @cached_property
-    def _rates(self) -> dict[str, Array]:
-        """The entries of every quantity that depend on rates, (rows, columns) each."""
-        states = self._subject.states
-        faster = self._matcher.written(self._matching, replace(states, q_dot=2 * states.q_dot))
-        return {
-            name: np.any(values != faster[name][0], axis=0)
-            for name, (values, _) in self._written.items()
-        }
+        expression = self._quantities[name].formula(row, column)
+        names = symbol_names(expression) if expression is not None else set()
+        return name != "gamma" and not names.isdisjoint(self._reference.rates)
 
     def _is_accepted(self, spot: Spot) -> bool:
         """Return whether an entry counts as right."""
@@ -384,7 +447,7 @@ class _Comparer:
                     found |= dict.fromkeys(spots, (self._opposite[name],))
                     continue
                 explained = self._diagnostician.explain(
-                    block, name, self._in_system_terms(spots), self._is_exchanged(block)
+                    block, name, self._in_system_terms(spots), self._matching.form(block.rows[0])
                 )
                 for spot in spots:
                     found[spot] = explained[self._index(spot)] or (self._unexplained(spot),)
@@ -428,22 +491,22 @@ class _Comparer:
     @cached_property
     def _diagnostician(self) -> Diagnostician:
         """The catalogue of faults, kept where many are compared with one model."""
-        if self._subject.states is not self._reference.random:
-            return Diagnostician(self._reference, self._subject.states)
-        if self._reference not in _DIAGNOSTICIANS:
-            found = Diagnostician(self._reference, self._subject.states)
-            _DIAGNOSTICIANS[self._reference] = found
-        return _DIAGNOSTICIANS[self._reference]
+        subject = self._subject
+        return subject.kept("faults", lambda: Diagnostician(subject.reference, subject.states))
 
     def _entry(self, spot: Spot, diagnoses: tuple[Diagnosis, ...]) -> ComparedEntry:
         name, row, column = spot
         system_row, system_column = self._index(spot)
         is_accepted = self._is_accepted(spot)
+        reference, form_row = self._reference, system_row
+        form = self._matching.form(system_row)
+        if form is not None and form.formulas is not None:
+            reference, form_row = form.formulas, form.rows.index(system_row)
         return ComparedEntry(
             name,
             self._reference.equations[system_row],
             self._reference.coordinates[system_column] if name == "Phi_q" else None,
-            self._reference.text(name, system_row, system_column),
+            reference.text(name, form_row, system_column),
             self._quantities[name].texts[row][column],
             self._verdicts[spot],
             is_accepted,
@@ -459,6 +522,3 @@ class _Comparer:
         k = int(np.argmax(np.nan_to_num(np.abs(written - expected), nan=np.inf, posinf=np.inf)))
         state = self._reference.named(self._subject.states, k)
         return Difference(state, float(expected[k]), float(written[k]))
-
-
-_DIAGNOSTICIANS: WeakKeyDictionary[Reference, Diagnostician] = WeakKeyDictionary()

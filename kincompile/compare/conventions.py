@@ -59,9 +59,9 @@ def conventions_found(matching: Matching, equations: Sequence[str]) -> Iterator[
         pairs = listed([f"row {k + 1} is {names[k]}" for k in moved], 30)
         rows = tuple(names[k] for k in moved)
         yield Convention("order of rows", f"the rows have another order: {pairs}.", rows)
-    if exchanged := tuple(equations[row] for row in sorted(matching.exchanged)):
-        text = f"{listed(exchanged)}: the roles of bodies i and j are exchanged."
-        yield Convention("roles of i and j", text, exchanged)
+    for form in matching.forms:
+        own = tuple(equations[row] for row in form.rows)
+        yield Convention(form.kind, f"{listed(own)}: {form.text}.", own)
     yield from _row_factors(matching, names)
     for name, sign in matching.signs.items():
         if sign < 0:

@@ -15,16 +15,19 @@ import numpy as np
 from kincompile.compare.agreement import ABSOLUTE
 from kincompile.compare.comparison import Diagnosis
 from kincompile.compare.entry_faults import entry_faults
-from kincompile.compare.fault import LEFT_ZERO
+from kincompile.compare.fault import LEFT_ZERO, OTHER_FORM, Fault
+from kincompile.compare.forms import known_forms
 from kincompile.compare.joint_faults import Index, JointFaults, NumericFault
-from kincompile.compare.vectors import with_roles_exchanged
+from kincompile.compare.reference import Subject
+from kincompile.compare.states import Array
 from kincompile.model.resolve import Joint
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from kincompile.compare.forms import Form
     from kincompile.compare.reference import ConstraintBlock, Reference
-    from kincompile.compare.states import Array, States
+    from kincompile.compare.states import States
 
 CLOSE = 1e-8
 """Relative; wider than for equality, so that the fault named is not missed by rounding."""
@@ -41,6 +44,10 @@ _NOT_DEFINED = Diagnosis(
 )
 
 
+Given = tuple[Array, Array]
+"""Values of an entry and what rounding may have taken from them, (N,) each."""
+
+
 class Diagnostician:
     """Explains differences in the formulas of one system; keeps the catalogues that it has made.
 
@@ -55,12 +62,16 @@ class Diagnostician:
     def __init__(self, reference: Reference, states: States) -> None:
         self._reference = reference
         self._states = states
-        self._catalogues: dict[tuple[str, str, bool], list[NumericFault]] = {}
-        self._entries: dict[tuple[str, Index], list[NumericFault]] = {}
+        self._catalogues: dict[tuple[tuple[int, ...], str, Form | None], list[NumericFault]] = {}
+        self._entries: dict[tuple[str, Index, Form | None], list[NumericFault]] = {}
         self._generated = reference.values(states)
 
     def explain(
-        self, block: ConstraintBlock, quantity: str, written: Mapping[Index, Array], exchanged: bool
+        self,
+        block: ConstraintBlock,
+        quantity: str,
+        written: Mapping[Index, Given],
+        form: Form | None,
     ) -> dict[Index, tuple[Diagnosis, ...]]:
         """Return the explanations of every entry of a constraint that differs.
 
@@ -71,94 +82,129 @@ class Diagnostician:
         quantity
             Phi, Phi_q, nu or gamma.
         written
-            Values by row and column of the system, shape (N,), with the author's conventions taken
-            out: comparable to the generated values as they are.
-        exchanged
-            Whether its author has the roles of bodies i and j exchanged.
+            By row and column of the system, with the author's conventions taken out: comparable to
+            the generated values as they are.
+        form
+            The form in which its author has it, None where it is written as generated.
         """
-        left = {place: values for place, values in written.items() if np.isfinite(values).all()}
+        left = {place: item for place, item in written.items() if np.isfinite(item[0]).all()}
         found: dict[Index, tuple[Diagnosis, ...]] = {}
         found |= dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
-        catalogue = self._catalogue(block, quantity, exchanged)
+        catalogue = self._catalogue(block, quantity, form)
         found |= _explained(left, [fault for fault in catalogue if len(fault.result) > 1])
         # One entry alone is looked at as it is typed first, in sines and cosines.
-        typed = [fault for place in left for fault in self._entry_catalogue(quantity, place)]
+        typed = [fault for place in left for fault in self._typed(quantity, place, form)]
         catalogue = [*typed, *catalogue]
         found |= _explained(left, catalogue)
-        for place, values in left.items():
-            found[place] = self._one_entry(quantity, place, values, catalogue)
+        for place, given in left.items():
+            right = self._right(quantity, form)[:, place[0], place[1]]
+            found[place] = _one_entry(place, given, right, catalogue)
         return found
 
     def is_one_fault(
-        self, block: ConstraintBlock, quantity: str, written: Mapping[Index, Array], exchanged: bool
+        self, block: ConstraintBlock, written: Mapping[Index, Given], form: Form | None
     ) -> bool:
-        """Return whether a single fault in vectors explains all the entries; see `explain`."""
+        """Return whether a single fault in vectors explains entries of Phi_q; see `explain`."""
         return any(
             len(fault.result) == len(written) and _fits(fault, written)
-            for fault in self._catalogue(block, quantity, exchanged)
+            for fault in self._catalogue(block, "Phi_q", form)
         )
 
     def _catalogue(
-        self, block: ConstraintBlock, quantity: str, exchanged: bool
+        self, block: ConstraintBlock, quantity: str, form: Form | None
     ) -> list[NumericFault]:
         """Return the faults in vectors of a constraint, by row and column of the system."""
-        joint = block.constraint if isinstance(block.constraint, Joint) else None
-        if joint is not None and exchanged:
-            joint = with_roles_exchanged(joint)
-        if joint is None:
-            return []
-        key = (joint.name, quantity, exchanged)
+        joint = block.constraint if form is None else form.joint
+        key = (block.rows, quantity, form)
         if key not in self._catalogues:
-            numbers: dict[str | None, int] = {
-                name: k for k, name in enumerate(self._reference.coordinates)
-            }
-            columns = [numbers.get(name) for name in joint.columns]
-            self._catalogues[key] = []
-            for fault in JointFaults(joint, quantity, self._reference, self._states).faults():
-                result = {
-                    (block.rows[row], target): values
-                    for (row, column), values in fault.result.items()
-                    if (target := columns[column] if quantity == "Phi_q" else 0) is not None
-                }
-                if result:  # a fault in the columns of the ground alone does not show
-                    self._catalogues[key].append(replace(fault, result=result))
+            faults = [] if not isinstance(joint, Joint) else self._faults_of(joint, block, quantity)
+            self._catalogues[key] = [*faults, *self._other_forms(block, quantity, form)]
         return self._catalogues[key]
 
-    def _entry_catalogue(self, quantity: str, place: Index) -> list[NumericFault]:
-        key = (quantity, place)
+    def _faults_of(
+        self, joint: Joint, block: ConstraintBlock, quantity: str
+    ) -> Iterator[NumericFault]:
+        columns = [self._reference.columns.get(name or "") for name in joint.columns]
+        for fault in JointFaults(joint, quantity, self._reference, self._states).faults():
+            result = {
+                (block.rows[row], target): values
+                for (row, column), values in fault.result.items()
+                if (target := columns[column] if quantity == "Phi_q" else 0) is not None
+            }
+            if result:  # a fault in the columns of the ground alone does not show
+                yield replace(fault, result=result)
+
+    def _other_forms(
+        self, block: ConstraintBlock, quantity: str, form: Form | None
+    ) -> Iterator[NumericFault]:
+        """Yield the formulas that are right for another Phi than the author's."""
+        rows, right = list(block.rows), self._right(quantity, form)
+        others = []
+        if form is not None and form.defines:
+            others.append(("another form of the equation", self._right(quantity, None)[:, rows]))
+        if form is None:
+            subject = Subject(self._reference, block, self._states)
+            others += [
+                (item.text, item.evaluate(self._states)[quantity])
+                for item in known_forms(block, subject)
+            ]
+        for text, values in others:
+            result = {
+                (row, column): values[:, k, column]
+                for k, row in enumerate(rows)
+                for column in range(values.shape[-1])
+                if not _close(values[:, k, column], right[:, row, column])
+            }
+            if result and quantity != "Phi":
+                yield Fault(OTHER_FORM, f"it belongs to {text}, and not to your Phi", result)
+
+    def _right(self, quantity: str, form: Form | None) -> Array:
+        """Return the right values by row and column of the system."""
+        right = self._generated.of(quantity)
+        if form is not None:
+            right = right.copy()
+            right[:, list(form.rows)] = form.evaluate(self._states)[quantity]
+        return right
+
+    def _typed(self, quantity: str, place: Index, form: Form | None) -> list[NumericFault]:
+        """Return the faults of one entry as it is typed."""
+        key = (quantity, place, form)
         if key not in self._entries:
-            row, column = place
-            self._entries[key] = list(
-                entry_faults(self._reference, quantity, row, column, self._states)
-            )
+            reference, row = self._reference, place[0]
+            if form is not None and form.formulas is not None:
+                reference, row = form.formulas, form.rows.index(place[0])
+            faults = entry_faults(reference, quantity, row, place[1], self._states)
+            self._entries[key] = [
+                replace(fault, result={place: values})
+                for fault in faults
+                for values in fault.result.values()
+            ]
         return self._entries[key]
 
-    def _one_entry(
-        self, quantity: str, place: Index, values: Array, catalogue: list[NumericFault]
-    ) -> tuple[Diagnosis, ...]:
-        """Explain an entry alone: by a fault that should show elsewhere too, or not at all."""
-        partly = _named(
-            fault
-            for fault in catalogue
-            if place in fault.result and _close(fault.result[place], values)
+
+def _one_entry(
+    place: Index, given: Given, right: Array, catalogue: Sequence[NumericFault]
+) -> tuple[Diagnosis, ...]:
+    """Explain an entry alone: by a fault that should show elsewhere too, or not at all."""
+    partly = _named(
+        fault
+        for fault in catalogue
+        if place in fault.result and _close(fault.result[place], *given)
+    )
+    if partly:
+        return tuple(replace(item, text=f"{item.text} (in this entry alone)") for item in partly)
+    size, off = np.max(np.abs(right)), np.max(np.abs(given[0] - right))
+    if size > ABSOLUTE and off <= ROUNDED * size:
+        text = (
+            f"it is right to {off / size:.1e} of its size: a number was rounded; write more "
+            "digits, or a formula"
         )
-        if partly:
-            return tuple(
-                replace(item, text=f"{item.text} (in this entry alone)") for item in partly
-            )
-        right = self._generated.of(quantity)[:, place[0], place[1]]
-        size, off = np.max(np.abs(right)), np.max(np.abs(values - right))
-        if size > ABSOLUTE and off <= ROUNDED * size:
-            text = (
-                f"it is right to {off / size:.1e} of its size: a number was rounded; write more "
-                "digits, or a formula"
-            )
-            return (Diagnosis(ROUNDED_NUMBER, text),)
-        return ()
+        return (Diagnosis(ROUNDED_NUMBER, text),)
+    return ()
 
 
 def _explained(
-    left: dict[Index, Array], catalogue: Sequence[NumericFault]
+    left: dict[Index, Given], catalogue: Sequence[NumericFault]
 ) -> dict[Index, tuple[Diagnosis, ...]]:
     """Take out the entries that faults explain, those first that explain the most."""
     found: dict[Index, tuple[Diagnosis, ...]] = {}
@@ -171,16 +217,16 @@ def _explained(
     return found
 
 
-def _fits(fault: NumericFault, left: Mapping[Index, Array]) -> bool:
+def _fits(fault: NumericFault, left: Mapping[Index, Given]) -> bool:
     """Return whether a fault shows in entries that differ only, with the author's numbers."""
     return all(
-        place in left and _close(values, left[place]) for place, values in fault.result.items()
+        place in left and _close(values, *left[place]) for place, values in fault.result.items()
     )
 
 
-def _close(one: Array, other: Array) -> bool:
+def _close(one: Array, other: Array, lost: Array | float = 0.0) -> bool:
     size = np.maximum(np.max(np.abs(one)), np.max(np.abs(other)))
-    return bool(np.max(np.abs(one - other)) <= CLOSE * size + ABSOLUTE)
+    return bool(np.all(np.abs(one - other) <= CLOSE * size + ABSOLUTE + lost))
 
 
 def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:

@@ -32,6 +32,7 @@ CROSS_TERM = "cross term 2 Phi_qt q_dot missing"
 QUADRATIC_TERM = "(Phi_q q_dot)_q q_dot missing"
 PHI_TT = "Phi_tt missing"
 WITH_RATES = "rates where none belong"
+OTHER_FORM = "follows from another Phi"
 COUPLING = "coupling 2 w (r_j_dot - r_i_dot) missing"
 SQUARES = "w_j^2 - w_i^2 for (w_j - w_i)^2"
 

@@ -10,24 +10,29 @@ The file is data. It is parsed, never run; a mistake in it is reported with its 
 
 from __future__ import annotations
 
-import json
 import re
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kincompile.compare.matrix_text import Cell, Rows, split_matrix
+from kincompile.compare.notation import plain
 from kincompile.compare.reference import QUANTITIES
-from kincompile.errors import InputError
-from kincompile.files.safe_expressions import ExpressionError, Place
-from kincompile.names import listed, suggestion
+from kincompile.errors import InputError, ModelError
+from kincompile.files.content import decoded, file_content
+from kincompile.files.data_text import MAX_PROBLEMS, read_json, read_toml
+from kincompile.files.safe_expressions import ExpressionError, Place, Places
+from kincompile.names import escaped, listed, shown, suggestion
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
-MAX_BYTES = 2_000_000
+    from kincompile.files.data_lines import Address
+    from kincompile.files.data_text import Document
+
+MAX_BYTES = 1_000_000
+"""Largest hand file; Phi_q of 300 coordinates has a third of this."""
 _STATEMENT = re.compile(r"[ \t]*([A-Za-z_]\w*)[ \t]*=[ \t]*")
 _SECTION = re.compile(r"[ \t]*\[[ \t]*([A-Za-z_]\w*)[ \t]*\][ \t;]*(?=\n|$)")
 _QUOTES = ('"""', "'''", '"', "'")
@@ -70,8 +75,10 @@ class _Draft:
         self.conventions: dict[str, str] = {}
 
     def problem(self, place: Place, text: str) -> None:
-        """Add a problem."""
+        """Add a problem; very many end the reading."""
         self._problems.append(f"{self._name}, line {place.line}, column {place.column}: {text}")
+        if len(self._problems) == MAX_PROBLEMS:
+            raise InputError([*self._problems, "and perhaps more: mend these first"])
 
     def add_matrix(self, name: str, value: str | Rows, place: Place) -> None:
         """Add a quantity."""
@@ -85,14 +92,14 @@ class _Draft:
     def add_alias(self, name: str, text: str, place: Place) -> None:
         """Add an alias."""
         if name in self._aliases:
-            self.problem(place, f"{name!r} is given twice; keep one of them")
+            self.problem(place, f"{shown(name)} is given twice; keep one of them")
         self._aliases[name] = Cell(text, place)
 
     def unknown(self, name: str, place: Place) -> None:
         """Add the problem of a key that means nothing."""
         keys = (*QUANTITIES, "constraint", "aliases", "conventions")
         hint = suggestion(name, keys)
-        self.problem(place, f"there is no quantity {name!r}{hint}; expected: {listed(keys)}")
+        self.problem(place, f"there is no quantity {shown(name)}{hint}; expected: {listed(keys)}")
 
     def finished(self) -> HandFile:
         """Return the file, or raise all the problems at once."""
@@ -124,52 +131,43 @@ def read_hand_file(path: str | os.PathLike[str]) -> HandFile:
         If the file cannot be read, or is not of this form; every problem with its line.
     """
     file = Path(path)
-    text = _text(file)
-    suffix = file.suffix.lower()
-    if suffix == ".json":
-        return _from_data(file.name, text, _json(file.name, text))
-    if suffix != ".toml":
-        return _from_lines(file.name, text)
     try:
-        return _from_data(file.name, text, tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        toml_problem = f"{file.name} is not TOML either: {error}"
-    # TOML forbids matrices without quotes, and people write them.
+        content = file_content(file, MAX_BYTES, follows_links=False)
+        suffix = file.suffix.lower()
+        if suffix == ".json":
+            return _from_json(file, content)
+        return _from_toml(file, content) if suffix == ".toml" else _from_lines(file, content)
+    except ModelError as error:
+        raise InputError(error.problems) from error
+
+
+def _from_json(file: Path, content: bytes) -> HandFile:
     try:
-        return _from_lines(file.name, text)
+        document = read_json(file, content)
+    except ModelError as error:
+        raise ModelError(f"{error}; in JSON a formula stands in quotes") from None
+    return _from_data(file.name, document)
+
+
+def _from_toml(file: Path, content: bytes) -> HandFile:
+    """Read TOML, or matrices without quotes, which TOML forbids and people write."""
+    try:
+        return _from_data(file.name, read_toml(file, content))
+    except ModelError as error:
+        toml_problems = error.problems
+    try:
+        return _from_lines(file, content)
     except InputError as error:
-        raise InputError([*error.problems, toml_problem]) from error
+        raise InputError([*error.problems, *toml_problems]) from error
 
 
-def _text(file: Path) -> str:
-    try:
-        if file.stat().st_size > MAX_BYTES:
-            raise InputError(f"{file} has more than {MAX_BYTES} bytes; a hand file is short.")
-        text = file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{file} is not a text in UTF-8; save it as plain text.") from error
-    except OSError as error:
-        raise InputError(f"cannot read {file}: {error.strerror}. Check the path.") from error
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _json(name: str, text: str) -> object:
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{name}, line {error.lineno}, column {error.colno}: {error.msg}; this is not JSON. "
-            "Matrices are texts or lists of numbers and texts in quotes."
-        ) from error
-    except RecursionError as error:
-        raise InputError(f"{name}: the file is nested too deeply.") from error
-
-
-def _from_lines(file: str, text: str) -> HandFile:
+def _from_lines(file: Path, content: bytes) -> HandFile:
     """Read statements ``name = value``, each as many lines long as its brackets need."""
-    draft = _Draft(file)
+    draft = _Draft(escaped(file.name))
+    text = decoded(file, content).replace("\r\n", "\n").replace("\r", "\n")
     # Comments and quotes are blanked out, so that every offset stays.
-    text = re.sub(r"[#%][^\n]*", lambda found: " " * len(found[0]), text)
+    text = plain(re.sub(r"[#%][^\n]*", lambda found: " " * len(found[0]), text))
+    places = Places(text)
     section: str | None = None
     offset = 0
     while offset < len(text):
@@ -180,12 +178,15 @@ def _from_lines(file: str, text: str) -> HandFile:
             offset = header.end()
         elif found := _STATEMENT.match(text, offset):
             start, offset = found.end(), _value_end(text, found.end())
+            if offset < 0:
+                draft.problem(places[start], f"the quotes {text[start]} are never closed")
+                break
             value = re.sub(r"[\"']", " ", text[start:offset]).rstrip("; \t\n")
-            _add_statement(draft, section, found[1], value, Place().after(text[:start]))
+            _add_statement(draft, section, found[1], value, places[start])
         else:
             if line.strip(" \t;"):
                 draft.problem(
-                    Place().after(text[:offset]),
+                    places[offset],
                     f"expected 'name = value', found {line.strip()[:40]!r}; names are "
                     f"{listed(QUANTITIES)}, and your own for aliases",
                 )
@@ -207,11 +208,11 @@ def _add_statement(draft: _Draft, section: str | None, name: str, value: str, pl
 
 
 def _value_end(text: str, start: int) -> int:
-    """Return where a value ends: at its closing quote, or where its last line ends."""
+    """Return where a value ends, by its quotes or brackets; -1 if its quotes are never closed."""
     for quote in _QUOTES:
         if text.startswith(quote, start):
             close = text.find(quote, start + len(quote))
-            return len(text) if close < 0 else close + len(quote)
+            return close if close < 0 else close + len(quote)
     depth = 0
     for k in range(start, len(text)):
         depth += (text[k] in "([") - (text[k] in ")]")
@@ -223,13 +224,16 @@ def _value_end(text: str, start: int) -> int:
     return len(text)
 
 
-def _from_data(file: str, text: str, data: object) -> HandFile:
+def _from_data(name: str, document: Document) -> HandFile:
     """Read the values of TOML or JSON; a text is found again in the file for its place."""
-    draft = _Draft(file)
-    if not isinstance(data, dict):
-        raise InputError(f"{file}: expected names and values, not {type(data).__name__}.")
-    for key, value in data.items():
-        locate = _Locator(text, key)
+    draft = _Draft(escaped(name))
+    if not isinstance(document.data, dict):
+        raise ModelError(
+            document.problem((), f"expected names and values, not {shown(document.data)}")
+        )
+    places = Places(document.text)
+    for key, value in document.data.items():
+        locate = _Locator(document, places, (key,))
         if key in QUANTITIES:
             _add_data(draft, key, value, locate)
         elif key == "constraint" and isinstance(value, str):
@@ -239,7 +243,8 @@ def _from_data(file: str, text: str, data: object) -> HandFile:
         elif key == "aliases" and isinstance(value, dict):
             for alias, expression in value.items():
                 written = str(expression)
-                draft.add_alias(alias, written, _Locator(text, alias).place(written))
+                place = _Locator(document, places, (key, alias)).place(written)
+                draft.add_alias(alias, written, place)
         else:
             draft.unknown(key, locate.place(""))
     return draft.finished()
@@ -260,7 +265,7 @@ def _add_data(draft: _Draft, name: str, value: object, locate: _Locator) -> None
         elements = row if isinstance(row, list) else [row]
         for item in elements:
             if not isinstance(item, str | int | float) or isinstance(item, bool):
-                text = f"{name}: {item!r} is not an element; expected a number or a text"
+                text = f"{name}: {shown(item)} is not an element; expected a number or a text"
                 draft.problem(locate.place(""), text)
                 return
         cells.append(tuple(Cell(str(item), locate.place(str(item))) for item in elements))
@@ -270,14 +275,17 @@ def _add_data(draft: _Draft, name: str, value: object, locate: _Locator) -> None
 class _Locator:
     """Finds the texts of one key again in the file, one after the other."""
 
-    def __init__(self, text: str, key: str) -> None:
-        self._text = text
-        found = re.search(rf"(?m)^[\s{{,]*[\"']?{re.escape(key)}[\"']?\s*[=:]", text)
-        self._cursor = found.end() if found else 0
+    def __init__(self, document: Document, places: Places, address: Address) -> None:
+        self._text = document.text
+        self._places = places
+        key = str(address[-1])
+        begin = places.begin(document.line(address))
+        found = self._text.find(key, begin)
+        self._cursor = begin if found < 0 else found + len(key)
 
     def place(self, fragment: str) -> Place:
         """Return where a fragment begins; the last place if it is not found."""
         found = self._text.find(fragment, self._cursor) if fragment else -1
         if found >= 0:
             self._cursor = found
-        return Place().after(self._text[: self._cursor])
+        return self._places[self._cursor]

@@ -37,6 +37,13 @@ class Layout:
         order = [-1 if column is None else column for column in self.columns]
         return np.concatenate([values, last], axis=-1)[..., order]
 
+    def by_column(self, values: Array, count: int) -> Array:
+        """Return values in this order by the `count` columns of the system; zeros for the rest."""
+        own = [k for k, column in enumerate(self.columns) if column is not None]
+        result = np.zeros((*values.shape[:-1], count))
+        result[..., [column for column in self.columns if column is not None]] = values[..., own]
+        return result
+
 
 def usual_layout(reference: Reference, block: ConstraintBlock | None, width: int) -> Layout | None:
     """Return the layout of the system's own order for a matrix of a width, None where none fits."""

@@ -12,44 +12,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.compare.agreement import ON_MANIFOLD, agrees, finite, multiple
+from kincompile.compare.agreement import OF_TERMS, agrees, finite, multiple
+from kincompile.compare.forms import Form, exchanged, jacobian_form, known_forms, own_form
 from kincompile.compare.layouts import Layout, other_layouts, usual_layout
 from kincompile.compare.reference import QUANTITIES
 from kincompile.compare.rows import match_rows
-from kincompile.compare.vectors import joint_values, with_roles_exchanged
-from kincompile.model.resolve import Joint
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
-    from kincompile.compare.reference import ConstraintBlock, Reference
+    from kincompile.compare.reference import ConstraintBlock, Reference, Subject
     from kincompile.compare.states import Array, States
     from kincompile.compare.written import Written
 
 DEGREE = np.pi / 180
 _ALIKE = 1e-7  # between rows of length 1, to sort the layouts that are examined
 _MOST_TRIED = 24
-
-
-@dataclass(frozen=True, slots=True)
-class Subject:
-    """What is compared: the equations of a system, or of one constraint, at some states."""
-
-    reference: Reference
-    block: ConstraintBlock | None
-    states: States
-
-    @property
-    def rows(self) -> tuple[int, ...]:
-        """The equations, as rows of the system."""
-        if self.block is not None:
-            return self.block.rows
-        return tuple(range(len(self.reference.equations)))
-
-    @property
-    def blocks(self) -> tuple[ConstraintBlock, ...]:
-        """The constraints."""
-        return self.reference.blocks if self.block is None else (self.block,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +54,8 @@ class Matching:
         The row of the system that each written row is.
     factors
         written = factor * generated, by row and state, shape (rows, N).
-    exchanged
-        Rows of the system whose constraint has the roles of its bodies exchanged.
+    forms
+        The forms of constraints that are not written as they are generated.
     signs
         -1 for nu or gamma where its author states that the whole vector has the opposite sign.
     """
@@ -86,7 +64,7 @@ class Matching:
     units: Units
     rows: tuple[int, ...]
     factors: Array
-    exchanged: frozenset[int] = frozenset()
+    forms: tuple[Form, ...] = ()
     signs: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -94,6 +72,10 @@ class Matching:
         """The written rows that stand in another place than in the system."""
         usual = sorted(self.rows)
         return [k for k, row in enumerate(self.rows) if row != usual[k]]
+
+    def form(self, row: int) -> Form | None:
+        """Return the form of a row of the system, None where it is written as generated."""
+        return next((form for form in self.forms if row in form.rows), None)
 
     def sign(self, quantity: str) -> float:
         """Return the sign of a whole quantity."""
@@ -105,7 +87,7 @@ class Matching:
             self.units == Units()
             and not (quantity == "Phi_q" and self.layout.convention)
             and row not in self.moved
-            and self.rows[row] not in self.exchanged
+            and self.form(self.rows[row]) is None
             and self.sign(quantity) == 1
             and bool(np.all(self.factors[row] == 1))
         )
@@ -149,7 +131,7 @@ class Matcher:
             best = self._better(best, ((usual, item) for item in units))
         if "Phi_q" in self._quantities and best.share < 0.5:
             best = self._better(best, ((item, Units()) for item in self._promising(usual)))
-        return self._with_roles(best.matching)
+        return self._with_forms(best.matching)
 
     def expected(self, matching: Matching, states: States) -> dict[str, Array]:
         """Return the right values by the author's conventions, (N, rows, columns) each.
@@ -168,38 +150,40 @@ class Matcher:
             result[name] = values * (factors * matching.sign(name))[:, :, None]
         return result
 
-    def written(self, matching: Matching, states: States) -> dict[str, tuple[Array, Array]]:
-        """Return values and sizes of the written formulas, (N, rows, columns) each."""
+    def written(
+        self, matching: Matching, states: States, exact: bool = False
+    ) -> dict[str, tuple[Array, Array]]:
+        """Return values and sizes of the written formulas, (N, rows, columns) each.
+
+        Unless they shall be exact, what rounding may have taken from a value counts as so large a
+        term in its size that it is within the tolerance.
+        """
         if matching.units.takes_degrees:
-            states = states.in_degrees(self._reference.angular)
-        return {name: item.evaluate(states) for name, item in self._quantities.items()}
+            states = self._subject.in_degrees(states)
+        found = {name: item.evaluate(states) for name, item in self._quantities.items()}
+        for name, item in self._quantities.items() if not exact else ():
+            values, sizes = found[name]
+            if item.lost is not None:
+                sizes = sizes + item.lost(states, values) / OF_TERMS
+            for form in matching.forms:
+                rows = [k for k, row in enumerate(matching.rows) if row in form.rows]
+                if form.accuracy:
+                    largest = np.max(np.abs(values[:, rows]), axis=-1, keepdims=True)
+                    sizes = sizes.copy()
+                    sizes[:, rows] += largest * form.accuracy / OF_TERMS
+            found[name] = values, sizes
+        return found
 
     def _generated(self, matching: Matching, states: States) -> dict[str, Array]:
-        """Return the generated quantities of the system, in the roles the author gave."""
+        """Return the right quantities of the system, in the forms the author gave."""
         found = self._reference.values(states)
         values = {name: found.of(name) for name in QUANTITIES}
-        for block in self._subject.blocks:
-            if matching.exchanged.issuperset(block.rows):
-                other = self._exchanged(block, states)
-                assert other is not None
-                for name in values:
-                    values[name] = values[name].copy()
-                    values[name][:, list(block.rows)] = other[name]
+        for form in matching.forms:
+            own = form.evaluate(states)
+            for name in values:
+                values[name] = values[name].copy()
+                values[name][:, list(form.rows)] = own[name]
         return values
-
-    def _exchanged(self, block: ConstraintBlock, states: States) -> dict[str, Array] | None:
-        """Return a constraint's quantities with the roles of bodies i and j exchanged."""
-        joint = block.constraint
-        other = with_roles_exchanged(joint) if isinstance(joint, Joint) else None
-        if other is None:
-            return None
-        found = joint_values(other, self._reference, states)
-        values = {name: found.of(name) for name in QUANTITIES}
-        Phi_q = np.zeros((len(states), len(block.rows), len(self._reference.coordinates)))
-        for k, name in enumerate(other.columns):
-            if name is not None:
-                Phi_q[:, :, self._reference.coordinates.index(name)] = found["Phi_q"][:, :, k]
-        return {**values, "Phi_q": Phi_q}
 
     def _usual_layout(self) -> Layout:
         if "Phi_q" not in self._quantities:
@@ -262,54 +246,67 @@ class Matcher:
         matching = replace(plain, rows=tuple(rows[k] for k in order), factors=factors)
         return _Candidate(matching, float(np.mean([item.share == 1.0 for item in found])))
 
-    def _with_roles(self, matching: Matching) -> Matching:
-        """Exchange the roles of i and j in the constraints that this explains entirely.
+    def _with_forms(self, matching: Matching) -> Matching:
+        """Take the other forms in which constraints are written.
 
-        Phi or Phi_q has to show it: in gamma alone the exchange of a revolute joint is its sign.
+        Phi shows them, or Phi_q where there is no Phi; nu and gamma have to follow. Where these are
+        all there is, they have to be right.
         """
-        if not {"Phi", "Phi_q"}.intersection(self._quantities):
+        if matching.units != Units():
             return matching
         written = self.written(matching, self._subject.states)
-        right = self._right_rows(matching, written)
+        defining = [name for name in ("Phi", "Phi_q") if name in written][:1]
+        shown = {name: written[name] for name in defining or written}
+        right = self._right_rows(matching, shown)
         for block in self._subject.blocks:
-            rows = [k for k, row in enumerate(matching.rows) if row in block.rows]
-            if not all(right[rows]) and self._is_same_constraint(block):
-                trial = self._with_exchanged(matching, block, rows, written)
-                if all(self._right_rows(trial, written)[rows]):
+            own = [k for k, row in enumerate(matching.rows) if row in block.rows]
+            if all(right[own]):
+                continue
+            for form in self._forms(block, own, matching):
+                trial = self._with_form(matching, form, own, written)
+                if form.defines or all(self._right_rows(trial, shown)[own]):
                     matching = trial
+                    break
         return matching
 
-    def _is_same_constraint(self, block: ConstraintBlock) -> bool:
-        """Return whether a constraint holds where it holds with its bodies exchanged.
+    def _forms(self, block: ConstraintBlock, own: list[int], matching: Matching) -> Iterator[Form]:
+        """Yield the forms that a constraint may have, those first that need no definition."""
+        subject, rows = self._subject, [matching.rows[k] for k in own]
+        if {"Phi", "Phi_q"}.intersection(self._quantities) and (form := exchanged(block, subject)):
+            yield form
+        if "Phi" in self._quantities:
+            if form := own_form(subject, rows, self._quantities["Phi"], own):
+                yield form
+            return
+        yield from known_forms(block, subject)
+        if "Phi_q" in self._quantities:
 
-        A relative angle that is driven does not: it would turn the other way.
-        """
-        states = self._reference.consistent(self._subject.states, block.rows)
-        other = None if states is None else self._exchanged(block, states)
-        if states is None or other is None:
-            return False
-        size = 1 + np.max(np.abs(states.q))
-        return bool(np.all(np.abs(other["Phi"]) <= ON_MANIFOLD * size**2))
+            def Phi_q(states: States) -> Array:
+                values = self._quantities["Phi_q"].evaluate(states)[0][:, own]
+                return matching.layout.by_column(values, len(self._reference.coordinates))
 
-    def _with_exchanged(
+            if form := jacobian_form(subject, rows, Phi_q):
+                yield form
+
+    def _with_form(
         self,
         matching: Matching,
-        block: ConstraintBlock,
-        rows: list[int],
+        form: Form,
+        own: list[int],
         written: Mapping[str, tuple[Array, Array]],
     ) -> Matching:
-        """Return the matching with one constraint exchanged and the factors that it then has."""
-        states = self._subject.states
+        """Return the matching with one constraint in another form and the factors it then has."""
         factors = matching.factors.copy()
-        factors[rows] = 1.0
-        exchanged = matching.exchanged.union(block.rows)
-        trial = replace(matching, exchanged=exchanged, factors=factors)
-        name = "Phi_q" if "Phi_q" in written else "Phi"
-        values, sizes = written[name]
-        expected = self.expected(trial, states)[name]
-        for k in rows:
-            found = multiple(values[:, k], sizes[:, k], expected[:, k], states.group)
-            factors[k] = found.factor
+        factors[own] = 1.0
+        trial = replace(matching, forms=(*matching.forms, form), factors=factors)
+        if form.defines:
+            return trial
+        expected = self.expected(trial, self._subject.states)
+        for name in [name for name in ("Phi_q", "Phi") if name in written][:1]:
+            for k in own:
+                values, sizes = (item[:, k] for item in written[name])
+                found = multiple(values, sizes, expected[name][:, k], self._subject.states.group)
+                factors[k] = found.factor
         return trial
 
     def _right_rows(self, matching: Matching, written: Mapping[str, tuple[Array, Array]]) -> Array:

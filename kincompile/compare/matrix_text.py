@@ -12,10 +12,13 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
-from kincompile.files.safe_expressions import ExpressionError, Place, unbalanced_bracket
+from kincompile.compare.notation import plain
+from kincompile.files.safe_expressions import ExpressionError, Places, unbalanced_bracket
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from kincompile.files.safe_expressions import Place
 
 _OPERATORS = "+-*/^"
 
@@ -48,14 +51,14 @@ def split_matrix(text: str, place: Place) -> Rows:
     ExpressionError
         If brackets do not match, or an element is missing.
     """
-    return _Splitter(text, place).rows()
+    return _Splitter(plain(text), place).rows()
 
 
 class _Splitter:
     """A text to be split."""
 
     def __init__(self, text: str, place: Place) -> None:
-        self._place = place
+        self._places = Places(text, place)
         # Same length, so that offsets stay: x.*y, x./y, x.^y of MATLAB; its continued lines.
         text = re.sub(r"(?<![0-9])\.(?=[*/^])", " ", text)
         self._text = re.sub(r"\.\.\.[ \t]*\n", lambda found: " " * len(found[0]), text)
@@ -64,6 +67,9 @@ class _Splitter:
         steps = ((character in "([") - (character in ")]") for character in text)
         # Number of brackets open before each character, and at the end.
         self._depth = list(accumulate(steps, initial=0))
+        # Offset of the last character before each that is no blank; -1 where there is none.
+        filled = (-1 if character.isspace() else k for k, character in enumerate(self._text))
+        self._last = list(accumulate(filled, max, initial=-1))
 
     def rows(self) -> Rows:
         start, end = self._inner((0, len(self._text)))
@@ -74,7 +80,7 @@ class _Splitter:
         return tuple(self._row(span) for span in spans)
 
     def _error(self, problem: str, offset: int) -> ExpressionError:
-        place = self._place.after(self._text[:offset])
+        place = self._places[offset]
         return ExpressionError(problem, place.line, place.column)
 
     def _trimmed(self, span: Span) -> Span:
@@ -119,7 +125,7 @@ class _Splitter:
         start, end = span
         if start == end:
             raise self._error("an element is missing here", start)
-        return Cell(self._text[start:end], self._place.after(self._text[:start]))
+        return Cell(self._text[start:end], self._places[start])
 
     def _split(self, span: Span, is_end: Callable[[int, int], bool]) -> list[Span]:
         """Split a span outside of brackets, wherever `is_end(offset, start of the part)` holds."""
@@ -136,17 +142,24 @@ class _Splitter:
 
     def _ends_row(self, k: int, first: int) -> bool:
         """Return whether a row ends here: at a semicolon, or at a line end if it is complete."""
-        before = self._text[first:k].strip()
-        is_complete = before != "" and before[-1] not in _OPERATORS + ",("
-        return self._text[k] == ";" or (self._text[k] == "\n" and is_complete)
+        if self._text[k] == "\n":
+            before = self._last_before(k, first)
+            return before != "" and before not in _OPERATORS + ",("
+        return self._text[k] == ";"
 
     def _separates(self, k: int, first: int) -> bool:
         """Return whether a blank separates two elements, by the rule of MATLAB.
 
         ``a - b`` and ``a-b`` are one element, ``a -b`` is two.
         """
-        before, after = self._text[first:k].rstrip(), self._text[k + 1 :]
-        if not self._text[k].isspace() or not before or not after or after[0].isspace():
+        if not self._text[k].isspace():
+            return False
+        before, after = self._last_before(k, first), self._text[k + 1 : k + 3]
+        if not before or not after or after[0].isspace():
             return False
         is_sign = after[0] in "+-" and not after[1:2].isspace()
-        return before[-1] not in _OPERATORS and (after[0] not in _OPERATORS or is_sign)
+        return before not in _OPERATORS and (after[0] not in _OPERATORS or is_sign)
+
+    def _last_before(self, k: int, first: int) -> str:
+        """Return the last character before `k` that is no blank, "" where a part has none yet."""
+        return self._text[self._last[k]] if self._last[k] >= first else ""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import sympy
 
 from kincompile import quantities
 from kincompile.compare.states import (
+    SEED,
     Array,
     States,
     consistent_states,
@@ -28,13 +30,18 @@ from kincompile.model.mechanism import system_of
 from kincompile.names import listed, rate, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Mapping, Sequence
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.system import ConstraintSystem
 
+Kept = TypeVar("Kept")
+
 QUANTITIES = tuple(item.name for item in quantities.OF_EQUATIONS)
+
+ASIDE = 0.4
+"""How far from the guess the states lie that are brought onto the manifold, in sizes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,28 +81,37 @@ class Reference:
     ------
     ModelError
         If the model cannot be used as written.
+
+    Attributes
+    ----------
+    kept
+        What comparisons at the random states have found out about the system, for the next ones.
     """
 
     def __init__(self, model: Mechanism | ConstraintSystem) -> None:
         self.system = system_of(model)
         self.program = lower(self.system)
         self.coordinates = tuple(item.name for item in self.system.coordinates)
+        self.rates = frozenset(map(rate, self.coordinates))
         self.equations = self.system.equations
         self.angular = is_angular(self.system)
         self.defaults = default_parameters(self.system)
-        self._latest: tuple[States, Values] | None = None
-        self._consistent: dict[tuple[int, ...], States | None] = {}
-        self._texts: dict[tuple[str, int, int], str] = {}
+        self.columns = {name: k for k, name in enumerate(self.coordinates)}
+        guess = np.array([item.guess for item in self.system.coordinates])
+        size = np.max(np.abs(guess), where=~self.angular, initial=0.0) or 1.0
+        self.sizes = np.where(self.angular, 1.0, size)
+        self._values: WeakKeyDictionary[States, Values] = WeakKeyDictionary()
+        self.kept: dict[Hashable, Any] = {}
+        self._evaluated: WeakKeyDictionary[States, dict[sympy.Expr, Array]] = WeakKeyDictionary()
 
     @cached_property
     def blocks(self) -> tuple[ConstraintBlock, ...]:
         """The blocks of the constraints, in order."""
-        number = {name: k for k, name in enumerate(self.coordinates)}
         return tuple(
             ConstraintBlock(
                 item,
                 tuple(range(first, first + len(item.equation_names))),
-                tuple(None if name is None else number[name] for name in item.columns),
+                tuple(None if name is None else self.columns[name] for name in item.columns),
             )
             for first, item in zip(self.system.row_offsets, self.system.constraints, strict=True)
         )
@@ -126,18 +142,22 @@ class Reference:
 
     def text(self, quantity: str, row: int, column: int) -> str:
         """Return an entry as people type it."""
-        key = (quantity, row, column)
-        if key not in self._texts:
-            self._texts[key] = str(self.expression(*key))
-        return self._texts[key]
+        return self.printed(self.expression(quantity, row, column))
+
+    def printed(self, expression: object) -> str:
+        """Return an expression, or a number, as text; SymPy takes long over it."""
+        key = ("text", type(expression), expression)
+        if key not in self.kept:
+            self.kept[key] = str(expression)
+        return str(self.kept[key])
 
     def values(self, states: States) -> Values:
-        """Evaluate the generated quantities; those of the latest states are kept."""
-        if self._latest is None or self._latest[0] is not states:
+        """Evaluate the generated quantities, once at each states."""
+        if states not in self._values:
             with np.errstate(all="ignore"):
                 found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
-            self._latest = states, Values(dict(zip(QUANTITIES, found, strict=False)))
-        return self._latest[1]
+            self._values[states] = Values(dict(zip(QUANTITIES, found, strict=False)))
+        return self._values[states]
 
     @cached_property
     def random(self) -> States:
@@ -150,17 +170,28 @@ class Reference:
 
         return random_states(self.system, is_usable)
 
-    def consistent(self, start: States, rows: Sequence[int]) -> States | None:
-        """Return states near `start` at which the given equations hold, with rates that fit.
+    def near(self, rows: Sequence[int], like: States) -> States | None:
+        """Return states near the assembled guess at which the given equations hold.
 
-        Those near the random states are kept: many comparisons with one model need them.
+        Times and parameters are those of `like`, rates are near them. Near the guess, for an
+        equation may hold in other assemblies too: where the sine of an angle vanishes, the angle is
+        0 or pi. None where no states are found.
         """
-        if start is not self.random:
-            return self._on_manifold(start, list(rows))
-        key = tuple(rows)
-        if key not in self._consistent:
-            self._consistent[key] = self._on_manifold(start, list(rows))
-        return self._consistent[key]
+        return self._on_manifold(self.about_guess(like), list(rows))
+
+    def about_guess(self, like: States) -> States:
+        """Return states with other positions, about the assembled guess."""
+        aside = np.random.default_rng(SEED).uniform(-ASIDE, ASIDE, like.q.shape)
+        return replace(like, q=self._start + self.sizes * aside)
+
+    @cached_property
+    def _start(self) -> Array:
+        """The guess, assembled where that is possible."""
+        guess = np.array([item.guess for item in self.system.coordinates])
+        states = replace(self.random.take(np.arange(2)), q=np.tile(guess, (2, 1)), t=np.zeros(2))
+        states = states.with_default_parameters(self.defaults)
+        found = self._on_manifold(states, list(range(len(self.equations))))
+        return guess if found is None else found.q[0]
 
     def _on_manifold(self, start: States, rows: list[int]) -> States | None:
         def constraints(states: States) -> tuple[Array, Array, Array]:
@@ -170,36 +201,34 @@ class Reference:
 
         return consistent_states(start, constraints)
 
-    def compiled(
-        self, expressions: Sequence[sympy.Expr]
-    ) -> Callable[[States], tuple[Array, Array]]:
-        """Prepare SymPy expressions of coordinates, rates, parameters and time for evaluation.
+    def evaluate(self, expressions: Sequence[sympy.Expr], states: States) -> tuple[Array, Array]:
+        """Evaluate SymPy expressions of coordinates, rates, parameters and time.
 
         Returns
         -------
-        callable
-            Gives, at states, the values and the sizes of their terms: the sum of the absolute
-            values of the terms on the topmost level. Both of shape (N, number of expressions).
+        tuple of arrays
+            The values and the sizes of their terms: the sum of the absolute values of the terms on
+            the topmost level. Both of shape (N, number of expressions).
         """
+        known = self._evaluated.setdefault(states, {})
+        self._add(known, [item for item in expressions if item not in known], states)
+        values, sizes = np.array([known[item] for item in expressions]).transpose(1, 2, 0)
+        return values, sizes
+
+    def _add(
+        self, known: dict[sympy.Expr, Array], expressions: Sequence[sympy.Expr], states: States
+    ) -> None:
+        """Evaluate expressions that are not known yet: value and size of each, (2, N)."""
         graph = Graph()
         convert = Converter(graph, graph.input).convert
         terms = [[convert(term) for term in sympy.Add.make_args(item)] for item in expressions]
-
-        def evaluate(states: States) -> tuple[Array, Array]:
-            values, sizes = np.zeros((2, len(states), len(terms)))
-            with np.errstate(all="ignore"):
-                results = run(graph.nodes, self.inputs(states), self.program.tables)
-                for k, nodes in enumerate(terms):
-                    for node in nodes:
-                        values[:, k] += results[node]
-                        sizes[:, k] += np.abs(results[node])
-            return values, sizes
-
-        return evaluate
-
-    def evaluate(self, expressions: Sequence[sympy.Expr], states: States) -> tuple[Array, Array]:
-        """Evaluate SymPy expressions once; see `compiled`."""
-        return self.compiled(expressions)(states)
+        with np.errstate(all="ignore"):
+            results = run(graph.nodes, self.inputs(states), self.program.tables)
+            for item, nodes in zip(expressions, terms, strict=True):
+                known[item] = np.zeros((2, len(states)))
+                for node in nodes:
+                    known[item][0] += results[node]
+                    known[item][1] += np.abs(results[node])
 
     def named(self, states: States, k: int) -> dict[str, float]:
         """Return one of the states as numbers by name."""
@@ -214,3 +243,43 @@ class Reference:
             inputs[name] = states.q[:, k]
             inputs[rate(name)] = states.q_dot[:, k]
         return inputs
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What is compared: the equations of a system, or of one constraint, at some states."""
+
+    reference: Reference
+    block: ConstraintBlock | None
+    states: States
+
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """The equations, as rows of the system."""
+        if self.block is not None:
+            return self.block.rows
+        return tuple(range(len(self.reference.equations)))
+
+    @property
+    def blocks(self) -> tuple[ConstraintBlock, ...]:
+        """The constraints."""
+        return self.reference.blocks if self.block is None else (self.block,)
+
+    def kept(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
+        """Return what `make` gives; what belongs to the random states is made once."""
+        if self.states is not self.reference.random:
+            return make()
+        if key not in self.reference.kept:
+            self.reference.kept[key] = make()
+        found: Kept = self.reference.kept[key]
+        return found
+
+    def in_degrees(self, states: States) -> States:
+        """Return states with angles and their rates as numbers of degrees."""
+        if states is not self.states:
+            return states.in_degrees(self.reference.angular)
+        return self.kept("degrees", lambda: states.in_degrees(self.reference.angular))
+
+    def near(self, rows: Sequence[int]) -> States | None:
+        """Return states near the guess at which some of the system's equations hold, if any."""
+        return self.kept(("near", tuple(rows)), lambda: self.reference.near(rows, self.states))

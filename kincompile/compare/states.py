@@ -34,7 +34,7 @@ MAX_ITERATIONS = 40
 ON_MANIFOLD = 1e-12
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class States:
     """States of a system: q and q_dot (N, n), t (N,), p (N, k); `group` (N,) numbers equal p."""
 

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
 
+from kincompile.compare import rounding
 from kincompile.compare.matrix_text import Cell, split_matrix
+from kincompile.compare.notation import IMAGINARY, plain, real
 from kincompile.errors import InputError
+from kincompile.files.data_text import MAX_PROBLEMS
 from kincompile.files.safe_expressions import (
     CONSTANTS,
     FUNCTIONS,
     ExpressionError,
     Place,
+    UnknownNameError,
+    extent,
     parse_expression,
 )
 from kincompile.model.expressions import NotAnExpressionError, as_expression, symbol_names, t
-from kincompile.names import listed, name_problem, rate, suggestion
+from kincompile.names import listed, name_problem, rate, shown, suggestion
 
 if TYPE_CHECKING:
     from kincompile.compare.reference import Reference
@@ -28,6 +34,13 @@ if TYPE_CHECKING:
 
 Texts = tuple[tuple[str, ...], ...]
 
+MAX_ALIASES = 1000
+"""Names of the author's own."""
+MAX_SIZE = 1_000_000
+"""Characters of all formulas and parts with aliases written out; as many take about 10 s."""
+
+TOLD = ""
+"""A problem that was told before: all that a quantity has are names unknown elsewhere too."""
 _NO_ACCELERATIONS = "accelerations are the unknowns of Phi_q q_ddot = gamma; no formula holds them"
 
 
@@ -41,6 +54,12 @@ class Written:
         The text of each entry; empty for functions and for arrays of values at states.
     evaluate
         Gives the values and the sizes of their terms at states, both (N, rows, columns).
+    expressions
+        The formulas, row by row; None for functions and arrays.
+    lost
+        Gives what rounding may have taken from values at states, of the same shape.
+    rounding
+        What rounding that is, in words.
     takes_parameters
         Whether it may be evaluated at other parameters than the default ones.
     takes_states
@@ -49,6 +68,9 @@ class Written:
 
     texts: Texts
     evaluate: Callable[[States], tuple[Array, Array]]
+    expressions: tuple[sympy.Expr, ...] | None = None
+    lost: Callable[[States, Array], Array] | None = None
+    rounding: str = "numbers are rounded; they count to half of their last digit"
     takes_parameters: bool = True
     takes_states: bool = True
 
@@ -57,13 +79,46 @@ class Written:
         """Number of rows and columns."""
         return len(self.texts), len(self.texts[0])
 
+    def formula(self, row: int, column: int) -> sympy.Expr | None:
+        """Return an entry as an expression, None where it is none."""
+        if self.expressions is None:
+            return None
+        return self.expressions[row * self.shape[1] + column]
+
+
+class _Formulas:
+    """Formulas that were read, by their text: most entries of a large matrix are alike."""
+
+    def __init__(self) -> None:
+        self._read: dict[str, sympy.Expr] = {}
+        self._size = 0
+
+    def read(self, text: str, place: Place | None, words: Vocabulary) -> sympy.Expr:
+        """Return a text as an expression; the names in it must mean what they meant before."""
+        if text not in self._read:
+            if self._size > MAX_SIZE:
+                raise NotAnExpressionError(
+                    f"all formulas together have more than {MAX_SIZE:,} characters and parts, "
+                    "aliases written out; write them shorter"
+                )
+            self._size += len(text)
+            self._read[text] = real(parse_expression(text, words.names, place, words.refused))
+            self._size += extent(self._read[text])[0]
+        return self._read[text]
+
 
 @dataclass(frozen=True, slots=True)
 class Vocabulary:
-    """Names that a formula may use, and names that exist but may not stand in one."""
+    """Names that a formula may use, and names that exist but may not stand in one.
+
+    Names may be added while formulas are read, but not change what they mean.
+    """
 
     names: Mapping[str, sympy.Expr]
     refused: Mapping[str, str]
+    help: str = ""
+    formulas: _Formulas = field(default_factory=_Formulas)
+    told: set[str] = field(default_factory=set)
 
     def read(self, value: object) -> sympy.Expr:
         """Return a text, a `Cell`, a number or a SymPy expression in plain symbols.
@@ -74,19 +129,30 @@ class Vocabulary:
             If it is none of these, or holds an unknown name.
         """
         if isinstance(value, Cell):
-            return parse_expression(value.text, self.names, value.place, self.refused)
+            return self.formulas.read(plain(value.text), value.place, self)
         if isinstance(value, str):
-            return parse_expression(value, self.names, None, self.refused)
+            return self.formulas.read(plain(value), None, self)
+        if isinstance(value, sympy.Expr) and value.has(sympy.I):
+            value = value.xreplace({sympy.I: IMAGINARY})
         expression: sympy.Expr = sympy.sympify(as_expression(_without_derivatives(value)))
-        unknown = sorted(symbol_names(expression) - set(self.names))
+        unknown = sorted(symbol_names(expression) - set(self.names) - {IMAGINARY.name})
         if unknown:
-            raise NotAnExpressionError(
-                f"{expression} contains {listed(unknown)}{suggestion(unknown[0], self.names)}; "
-                f"the names are: {listed(self.names, 60)}"
-            )
+            problem = f"{expression} contains {listed(unknown)}"
+            raise UnknownNameError(ExpressionError(problem, 1, 1), unknown[0])
         meanings = {sympy.Symbol(name): item for name, item in self.names.items()}
-        meant: sympy.Expr = expression.xreplace(meanings)
-        return meant
+        return real(expression.xreplace(meanings))
+
+    def problem(self, error: NotAnExpressionError, where: str) -> str | None:
+        """Return what to say about a formula; None where its unknown name was told before."""
+        if not isinstance(error, UnknownNameError):
+            return f"{where}{error}"
+        if error.name in self.told:
+            return None
+        hint = suggestion(error.name, self.names)
+        rest = "" if self.told else f"; {self.help}"
+        self.told.add(error.name)
+        text, _, _ = str(error).partition(";")
+        return f"{where}{text}{hint}{rest}"
 
 
 def _without_derivatives(value: object) -> object:
@@ -104,7 +170,8 @@ def _without_derivatives(value: object) -> object:
 def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabulary:
     """Return the names of a system and the author's own.
 
-    A coordinate ``phi3`` has the rate ``phi3_dot``, also ``phi3d``.
+    A coordinate ``phi3`` has the rate ``phi3_dot``, also ``phi3d``. The coordinates of bodies may
+    be numbered, ``x1``, ``y1``, ``phi_1``, and so may all coordinates, ``q1``, ``q2``.
 
     Parameters
     ----------
@@ -119,27 +186,66 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
     InputError
         If an alias is not a name, hides a name of the system, or is not an expression.
     """
-    symbols = [*reference.coordinates, *(item.name for item in reference.system.parameters)]
-    names: dict[str, sympy.Expr] = {name: sympy.Symbol(name) for name in symbols}
-    names["t"] = t
-    refused = {}
-    for name in reference.coordinates:
-        names[rate(name)] = sympy.Symbol(rate(name))
-        names.setdefault(f"{name}d", names[rate(name)])
-        refused[rate(name, 2)] = refused[f"{name}dd"] = _NO_ACCELERATIONS
+    if len(aliases) > MAX_ALIASES:
+        raise InputError(f"there are {len(aliases)} aliases; at most {MAX_ALIASES} are read")
+    names, refused = _names_of(reference)
+    words = Vocabulary(names, refused, _help(reference))
     problems = []
     for name, value in aliases.items():
         problem = _alias_problem(name, names)
         try:
             if problem is None:
-                names[name] = Vocabulary(names, refused).read(value)
+                names[name] = words.read(value)
         except NotAnExpressionError as error:
-            problem = str(error)
+            problem = words.problem(error, "")
         if problem is not None:
-            problems.append(f"alias {name!r}: {problem}")
+            problems.append(f"alias {shown(name)}: {problem}")
+        if len(problems) == MAX_PROBLEMS:
+            break
     if problems:
         raise InputError(problems)
-    return Vocabulary(names, {name: why for name, why in refused.items() if name not in names})
+    still_refused = {name: why for name, why in refused.items() if name not in names}
+    return replace(words, refused=still_refused)
+
+
+def _names_of(reference: Reference) -> tuple[dict[str, sympy.Expr], dict[str, str]]:
+    """Return the names of a system with their meanings, and those of accelerations."""
+    symbols = [*reference.coordinates, *(item.name for item in reference.system.parameters)]
+    names: dict[str, sympy.Expr] = {name: sympy.Symbol(name) for name in symbols}
+    names |= {"t": t} | {rate(name): sympy.Symbol(rate(name)) for name in reference.coordinates}
+    refused = {}
+    for written, name in [*((name, name) for name in reference.coordinates), *_numbered(reference)]:
+        names.setdefault(written, names[name])
+        for end in ("_dot", "d"):
+            names.setdefault(f"{written}{end}", names[rate(name)])
+        refused[rate(written, 2)] = refused[f"{written}dd"] = _NO_ACCELERATIONS
+    names.setdefault("I", IMAGINARY)
+    return names, refused
+
+
+def _numbered(reference: Reference) -> Iterator[tuple[str, str]]:
+    """Yield coordinates as courses number them: x1, y1, phi1, also x_1, of body 1; q1 of all."""
+    for number, columns in enumerate(reference.system.body_columns, 1):
+        for letter, column in zip(("x", "y", "phi"), columns, strict=False):
+            for written in (f"{letter}{number}", f"{letter}_{number}"):
+                yield written, reference.coordinates[column]
+    for number, name in enumerate(reference.coordinates, 1):
+        yield f"q{number}", name
+        yield f"q_{number}", name
+
+
+def _help(reference: Reference) -> str:
+    """Return in words which names there are."""
+    system = reference.system
+    names = [*reference.coordinates, *(item.name for item in system.parameters), "t"]
+    text = f"the names are: {listed(names, 60)}, and rates such as {rate(names[0])}"
+    if system.bodies:
+        numbers = listed(f"{k} {body.name}" for k, body in enumerate(system.bodies, 1))
+        text += (
+            f"; bodies are numbered: {numbers}, so that x1 is {reference.coordinates[0]}; for a "
+            "name of your own write a line 'name = formula'"
+        )
+    return text
 
 
 def _alias_problem(name: str, names: Mapping[str, sympy.Expr]) -> str | None:
@@ -149,7 +255,12 @@ def _alias_problem(name: str, names: Mapping[str, sympy.Expr]) -> str | None:
 
 
 def read_written(
-    quantity: str, given: object, words: Vocabulary, reference: Reference, at_states: bool
+    quantity: str,
+    given: object,
+    words: Vocabulary,
+    reference: Reference,
+    at_states: bool,
+    shape_problems: Callable[[int, int], list[str]],
 ) -> Written:
     """Read one quantity in any of the forms a user may give it.
 
@@ -167,20 +278,34 @@ def read_written(
         The system that the quantity belongs to.
     at_states
         Whether an array holds values at given states.
+    shape_problems
+        Says what is wrong with a number of rows and columns. It is asked before any formula is
+        read: a file can hold more of them than anyone could wait for.
 
     Raises
     ------
     InputError
         If it is none of these, is ragged, or holds an unknown name; all problems at once.
     """
+    if isinstance(given, list | tuple) and (numbers := _numbers(given)) is not None:
+        given = numbers
     if isinstance(given, np.ndarray) and given.dtype != object:
         return _from_array(quantity, given, at_states)
     if callable(given) and not isinstance(given, sympy.Basic):
         return _from_function(quantity, given, reference)
     rows = _rows(quantity, given)
     _check_rectangular(quantity, rows)
-    problems: list[str] = []
+    if quantity != "Phi_q" and len(rows) == 1:
+        rows = [[cell] for cell in rows[0]]
+    if problems := shape_problems(len(rows), len(rows[0])):
+        raise InputError(problems)
+    return _from_expressions(rows, _expressions(quantity, rows, words), reference)
+
+
+def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> list[sympy.Expr]:
+    """Return the entries as expressions, row by row."""
     expressions: list[sympy.Expr] = []
+    problems: list[str | None] = []
     for r, row in enumerate(rows, 1):
         for c, cell in enumerate(row, 1):
             try:
@@ -188,12 +313,21 @@ def read_written(
             except NotAnExpressionError as error:
                 # A cell knows its own place in the file.
                 place = "" if isinstance(cell, Cell) else f"row {r}, column {c}: "
-                problems.append(f"{quantity}, {place}{error}")
+                problems.append(words.problem(error, f"{quantity}, {place}"))
+        if len(problems) >= MAX_PROBLEMS:
+            break
     if problems:
-        raise InputError(problems)
-    if quantity != "Phi_q" and len(rows) == 1:
-        rows = [[cell] for cell in rows[0]]
-    return _from_expressions(rows, expressions, reference)
+        raise InputError([item for item in problems if item is not None] or TOLD)
+    return expressions
+
+
+def _numbers(given: object) -> Array | None:
+    """Return rows of floats, as a program prints them, as an array; None where they are not."""
+    try:
+        array = np.asarray(given)
+    except ValueError:
+        return None
+    return array if array.dtype.kind == "f" else None
 
 
 def _rows(quantity: str, given: object) -> list[list[object]]:
@@ -234,18 +368,29 @@ def _line(row: list[object]) -> str:
 def _from_expressions(
     rows: list[list[object]], expressions: list[sympy.Expr], reference: Reference
 ) -> Written:
-    code = reference.compiled(expressions)
     shape = (-1, len(rows), len(rows[0]))
 
     def evaluate(states: States) -> tuple[Array, Array]:
-        values, sizes = code(states)
+        values, sizes = reference.evaluate(expressions, states)
         return values.reshape(shape), sizes.reshape(shape)
 
     texts = tuple(
-        tuple(" ".join(cell.text.split()) if isinstance(cell, Cell) else str(cell) for cell in row)
+        tuple(
+            " ".join(cell.text.split()) if isinstance(cell, Cell) else reference.printed(cell)
+            for cell in row
+        )
         for row in rows
     )
-    return Written(texts, evaluate)
+    literals = [rounding.of_literals(item) for item in expressions]
+    terms = [term for item in literals for term in item]
+    owner = np.repeat(np.arange(len(literals)), [len(item) for item in literals])
+
+    def lost(states: States, values: Array) -> Array:
+        result = np.zeros((len(literals), len(states)))
+        np.add.at(result, owner, np.abs(reference.evaluate(terms, states)[0].T))
+        return result.T.reshape(values.shape)
+
+    return Written(texts, evaluate, tuple(expressions), lost if terms else None)
 
 
 def _no_texts(shape: tuple[int, ...]) -> Texts:
@@ -274,9 +419,15 @@ def _from_array(quantity: str, given: Array, at_states: bool) -> Written:
         values = np.broadcast_to(array, (len(states), *array.shape[-2:]))
         return values, np.abs(values)
 
+    part = rounding.of_array(array.astype(given.dtype))
+
+    def lost(_: States, values: Array) -> Array:
+        return np.broadcast_to(part, values.shape)
+
     if at_states:
-        return Written(_no_texts(array.shape[1:]), evaluate, takes_states=False)
-    return Written(tuple(tuple(f"{item:.6g}" for item in row) for row in array), evaluate)
+        return Written(_no_texts(array.shape[1:]), evaluate, lost=lost, takes_states=False)
+    texts = tuple(tuple(f"{item:.6g}" for item in row) for row in array)
+    return Written(texts, evaluate, lost=lost)
 
 
 def _from_function(quantity: str, function: Callable[..., object], reference: Reference) -> Written:
@@ -288,8 +439,9 @@ def _from_function(quantity: str, function: Callable[..., object], reference: Re
 
     def at(states: States, k: int) -> Array:
         """Return the values at one state, (rows, columns)."""
-        arguments = [getattr(states, name)[k] for name in names]
-        arguments += [states.p[k]] if takes_parameters else []
+        # Copies: what a function does to its arguments must not change the states.
+        arguments = [np.copy(getattr(states, name)[k])[()] for name in names]
+        arguments += [states.p[k].copy()] if takes_parameters else []
         value = np.asarray(function(*arguments), dtype=float)
         return value if quantity == "Phi_q" else value.reshape(-1, 1)
 
@@ -299,16 +451,23 @@ def _from_function(quantity: str, function: Callable[..., object], reference: Re
         return values, np.abs(values)
 
     shape = np.atleast_2d(at(reference.random, 0)).shape
-    return Written(_no_texts(shape), evaluate, takes_parameters=takes_parameters)
+    return Written(
+        _no_texts(shape),
+        evaluate,
+        lost=lambda _, values: rounding.of_function(values),
+        rounding="its values agree to six digits, as differences and single precision do",
+        takes_parameters=takes_parameters,
+    )
 
 
 def _positional_count(function: Callable[..., object]) -> int | None:
     """Return how many arguments a function takes by position, None if that is not known."""
     try:
-        kinds = [item.kind for item in inspect.signature(function).parameters.values()]
+        found = list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):
         return None
-    if inspect.Parameter.VAR_POSITIONAL in kinds:
+    if any(item.kind is inspect.Parameter.VAR_POSITIONAL for item in found):
         return None
     by_position = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return sum(kind in by_position for kind in kinds)
+    # A number as default is an option of the author's, a step for instance, and not p.
+    return sum(item.kind in by_position and not isinstance(item.default, Real) for item in found)

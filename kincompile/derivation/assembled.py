@@ -244,7 +244,7 @@ def _cell(evaluation: Evaluation, entry: Entry) -> Runs:
 def _newton(evaluation: Evaluation) -> Chapter:
     blocks: list[Block] = [
         text(
-            "From the guess, each step solves ",
+            f"{evaluation.start or 'From the guess'}, each step solves ",
             Math(Equated((Joined((PHI_Q, DELTA_Q)), Joined(("-", PHI))))),
             " and adds the correction. It stops when the correction is small; that correction has "
             "been applied.",
@@ -276,7 +276,7 @@ def _first_step(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]
     """Yield the first correction with all its numbers."""
     if result.iterations == 0:
         return
-    guess = result.iterates[0]
+    guess = result.iterates[0] + 0.0
     Phi, Phi_q = evaluation.module.position(guess, evaluation.t, evaluation.p)
     correction = result.iterates[1] - guess
     yield text("The first step in numbers:")
@@ -288,9 +288,10 @@ def _first_step(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]
         (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
         for name, *values in columns
     ]
-    yield table(("coordinate", "guess", Math(DELTA_Q), "after the step"), rows)
+    yield table(("coordinate", "before", Math(DELTA_Q), "after the step"), rows)
     yield NotebookCode(
-        "correction = np.linalg.solve(Phi_q(GUESS, t, p), -Phi(GUESS, t, p))\n"
+        f"start = np.array({guess.tolist()})\n"
+        "correction = np.linalg.solve(Phi_q(start, t, p), -Phi(start, t, p))\n"
         "print(np.round(correction, 6))"
     )
 

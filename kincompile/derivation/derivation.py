@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.assembled import assembled_section, unknowns_section
-from kincompile.derivation.document import Chapter, Manuscript
+from kincompile.derivation.document import LEVELS, Chapter, Manuscript, of_levels
 from kincompile.derivation.equation_section import equation_section
 from kincompile.derivation.evaluation import Evaluation, evaluation
 from kincompile.derivation.figures import Figures
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
-from kincompile.derivation.to_html import as_html
+from kincompile.derivation.to_html import as_html, as_slides
 from kincompile.derivation.to_latex import as_tex
 from kincompile.derivation.to_markdown import as_markdown
 from kincompile.derivation.to_notebook import as_notebook
@@ -28,13 +28,13 @@ from kincompile.errors import InputError
 from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
-from kincompile.names import listed
+from kincompile.names import listed, suggestion
 from kincompile.tables import counted
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
     import numpy as np
@@ -57,6 +57,10 @@ class Derivation(Manuscript):
         """Return one self-contained page: MathML, no script, no network."""
         return as_html(self)
 
+    def to_slides(self) -> str:
+        """Return a page of slides, one for each constraint, for a screen or to be printed."""
+        return as_slides(self)
+
     def to_latex(self) -> str:
         """Return a LaTeX document, for pdflatex."""
         return as_tex(self)
@@ -75,7 +79,7 @@ class Derivation(Manuscript):
         Parameters
         ----------
         path : path-like
-            Ends with .html, .tex, .md or .ipynb.
+            Ends with .html, .slides.html (a slide for each constraint), .tex, .md or .ipynb.
 
         Raises
         ------
@@ -93,6 +97,7 @@ class Derivation(Manuscript):
 
 
 FORMATS: Mapping[str, Callable[[Derivation], str]] = {
+    ".slides.html": Derivation.to_slides,
     ".html": Derivation.to_html,
     ".tex": Derivation.to_latex,
     ".md": Derivation.to_markdown,
@@ -116,7 +121,11 @@ def format_of(path: str | os.PathLike[str]) -> Callable[[Derivation], str]:
 
 
 def derivation(
-    model: Mechanism | ConstraintSystem, state: Mapping[str, float] | float | None = None
+    model: Mechanism | ConstraintSystem,
+    state: Mapping[str, float] | float | None = None,
+    *,
+    constraint: str | None = None,
+    levels: Iterable[str] = LEVELS,
 ) -> Derivation:
     """Show how Phi_q, nu and gamma of a mechanism follow from Phi, step by step.
 
@@ -126,8 +135,12 @@ def derivation(
         A mechanism or a system of free equations; it may lack equations.
     state
         Where the numbers are taken: a time, at which the mechanism is assembled, or values by name
-        (coordinates, rates, parameters and ``t``), taken as they are. The time 0 by default; the
-        guess where the mechanism does not assemble.
+        (coordinates, rates, parameters and ``t``), taken as they are. By default a time at which
+        nothing is special, so that a wrong sign shows; the guess where nothing assembles.
+    constraint
+        Name of the constraint to show; all, and the assembled system, by default.
+    levels
+        Which of the levels are shown: in vectors, in sines and cosines, in numbers.
 
     Returns
     -------
@@ -139,30 +152,63 @@ def derivation(
     ModelError
         If the model cannot be used as written; every problem is listed.
     InputError
-        If the state has unknown names, or the formulas have no finite values there.
+        If the state has unknown names, the formulas have no finite values there, or there is no
+        such constraint or level.
     """
     system = system_of(model)
+    _require_known(system, constraint, shown := tuple(levels))
     chosen = evaluation(system, state)
     figures = Figures(chosen)
-    sections = tuple(
-        joint_section(figures, item, rows)
-        if isinstance(item, Joint)
-        else equation_section(chosen, item, rows)
-        for item, rows in zip(system.constraints, chosen.code.sections, strict=True)
-    )
-    names: dict[Expression, Glyph] = {}
-    for item in system.constraints:
-        if isinstance(item, Joint):
-            names |= abbreviations(item.template)
+    names, sections = constraint_chapters(figures, constraint)
     constraints = Chapter("constraints", ("The constraints, one by one",), (), sections)
+    chapters = [unknowns_section(figures), constraints]
+    if constraint is None:
+        chapters.append(assembled_section(chosen))
     return Derivation(
         system.name,
         _summary(chosen),
-        (unknowns_section(figures), constraints, assembled_section(chosen)),
+        tuple(of_levels(item, shown) for item in chapters),
         names,
         chosen.source,
         _state_code(chosen),
     )
+
+
+def constraint_chapters(
+    figures: Figures, constraint: str | None = None
+) -> tuple[dict[Expression, Glyph], tuple[Chapter, ...]]:
+    """Return the nine steps of each constraint, or of one, and the abbreviations in them."""
+    chosen = figures.evaluation
+    constraints = chosen.system.constraints
+    sections = tuple(
+        joint_section(figures, item, rows)
+        if isinstance(item, Joint)
+        else equation_section(chosen, item, rows)
+        for item, rows in zip(constraints, chosen.code.sections, strict=True)
+        if constraint in (None, item.name)
+    )
+    names: dict[Expression, Glyph] = {}
+    for item in constraints:
+        if isinstance(item, Joint):
+            names |= abbreviations(item.template)
+    return names, sections
+
+
+def _require_known(
+    system: ConstraintSystem, constraint: str | None, levels: tuple[str, ...]
+) -> None:
+    """Check the name of a constraint and those of levels."""
+    names = [item.name for item in system.constraints]
+    if constraint is not None and constraint not in names:
+        raise InputError(
+            f"{system.name} has no constraint {constraint!r}{suggestion(constraint, names)}; "
+            f"constraints are: {listed(names)}"
+        )
+    unknown = [level for level in levels if level not in LEVELS]
+    if unknown or not levels:
+        raise InputError(
+            f"there is no level {', '.join(unknown) or 'left'}; levels are: {listed(LEVELS)}"
+        )
 
 
 def _summary(chosen: Evaluation) -> str:

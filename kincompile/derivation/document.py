@@ -6,7 +6,7 @@ these classes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
@@ -159,6 +159,8 @@ class Chapter:
         Its parts, after the blocks.
     level
         "vector", "expanded" or "numeric"; "" where that says nothing.
+    is_folded
+        Whether it is folded away where the medium can fold.
     """
 
     anchor: str
@@ -166,6 +168,7 @@ class Chapter:
     blocks: tuple[Block, ...] = ()
     sections: tuple[Chapter, ...] = ()
     level: str = ""
+    is_folded: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,6 +197,16 @@ class Manuscript:
     abbreviations: Mapping[Expression, Glyph]
     source: str
     state: str
+
+
+LEVELS = ("vector", "expanded", "numeric")
+"""The levels of a derivation: in vectors, in sines and cosines, in numbers."""
+
+
+def of_levels(chapter: Chapter, levels: tuple[str, ...]) -> Chapter:
+    """Return a chapter with the parts of some levels, and those that belong to none."""
+    kept = (item for item in chapter.sections if item.level in ("", *levels))
+    return replace(chapter, sections=tuple(of_levels(item, levels) for item in kept))
 
 
 def text(*runs: Run) -> Text:

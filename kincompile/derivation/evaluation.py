@@ -15,6 +15,7 @@ from kincompile.derivation.document import Display, Math
 from kincompile.derivation.emitted_lines import emitted_lines
 from kincompile.derivation.expanded import Writer
 from kincompile.derivation.formulas import Decimal, Equated, Glyph, PartialDerivative, size
+from kincompile.derivation.positions import followed, generic_time, newton_table
 from kincompile.errors import InputError
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
@@ -64,7 +65,9 @@ class Evaluation:
     Phi, Phi_q, nu, gamma
         The values of the emitted module there.
     assembly
-        The iterates of Newton's method from the guess; None where the system is not square.
+        The iterates of Newton's method; None where the system is not square.
+    start
+        In words, from where they come.
     is_assembled
         Whether the state lies on the constraints.
     problem
@@ -86,6 +89,7 @@ class Evaluation:
     nu: Array
     gamma: Array
     assembly: NewtonResult | None
+    start: str
     is_assembled: bool
     problem: str
 
@@ -188,13 +192,12 @@ def evaluation(system: ConstraintSystem, state: Mapping[str, float] | float | No
     source = emit_program("numpy", code).source
     module = from_source(source, system.name)
     problem = counting_problem(system, code.pattern())
-    if isinstance(state, int | float) or state is None:
-        t = _finite("t", 0.0 if state is None else state)
-        given: dict[str, float] = {}
-    else:
+    given: dict[str, float] = {}
+    if isinstance(state, int | float):
+        given["t"] = _finite("t", state)
+    elif state is not None:
         given = _checked(system, state)
-        t = given.pop("t", 0.0)
-    return _evaluated(system, code, source, module, problem, t, given)
+    return _evaluated(system, code, source, module, problem, given)
 
 
 def _finite(name: str, value: Any) -> float:
@@ -226,18 +229,19 @@ def _evaluated(
     source: str,
     module: ModuleType,
     problem: str,
-    t: float,
     given: dict[str, float],
 ) -> Evaluation:
     names = [item.name for item in system.coordinates]
     guess = np.array([item.guess for item in system.coordinates], dtype=float)
     p = np.array([given.get(item.name, item.default) for item in system.parameters], dtype=float)
-    assembly = None if problem else newton(module, t, guess, p)
     is_given = any(name in given for name in (*names, *map(rate, names)))
-    converged = assembly is not None and assembly.status is Status.CONVERGED
-    is_assembled = converged and not is_given
-    start = assembly.q if is_assembled and assembly is not None else guess
-    q = np.array([given.get(name, start[k]) for k, name in enumerate(names)])
+    t, found = _position(module, system, given, is_given, guess, p, problem)
+    is_assembled = found is not None and not is_given
+    assembly, start = None, ""
+    if not problem:
+        assembly, start = newton_table(module, t, guess, guess if found is None else found, p)
+    default = found if is_assembled and found is not None else guess
+    q = np.array([given.get(name, default[k]) for k, name in enumerate(names)])
     with np.errstate(all="ignore"):  # what is not finite is refused below
         Phi, Phi_q = module.position(q, t, p)
         nu = module.nu(q, t, p)
@@ -249,8 +253,32 @@ def _evaluated(
     q_ddot = _solved(Phi_q, gamma) if is_assembled else np.zeros_like(q)
     return Evaluation(
         system, code, source, module, _origin(t, is_assembled, is_given), t, q, q_dot, q_ddot, p,
-        Phi, Phi_q, nu, gamma, assembly, is_assembled, problem,
+        Phi, Phi_q, nu, gamma, assembly, start, is_assembled, problem,
     )  # fmt: skip
+
+
+def _position(
+    module: ModuleType,
+    system: ConstraintSystem,
+    given: Mapping[str, float],
+    is_given: bool,
+    guess: Array,
+    p: Array,
+    problem: str,
+) -> tuple[float, Array | None]:
+    """Return the time of the numbers, and the assembled position there if there is one.
+
+    Without a time, a generic one that the motion reaches; 0 where it does not.
+    """
+    if not (problem or is_given or "t" in given):
+        t = generic_time(system.end)
+        q = followed(module, t, p)
+        if q is not None:
+            return t, q
+    t = given.get("t", 0.0)
+    result = None if problem else newton(module, t, guess, p)
+    converged = result is not None and result.status is Status.CONVERGED
+    return t, result.q if result is not None and converged else None
 
 
 def _solved(Phi_q: Array, side: Array) -> Array:

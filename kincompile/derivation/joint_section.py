@@ -41,6 +41,7 @@ from kincompile.derivation.joint_terms import (
 from kincompile.derivation.steps import Steps
 from kincompile.derive.derivation import RowBlock, derive
 from kincompile.derive.partials import partials
+from kincompile.derive.rules import Rule
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import depends_on, evaluate
 from kincompile.model.matrices import SymbolicEnvironment
@@ -89,6 +90,14 @@ class _JointSteps(Steps[RowBlock]):
         """Return the symbol of a row block, numbered where there are several."""
         index = str(k + 1) if len(self.derivatives) > 1 else ""
         return Glyph(letter, index, exponent=self.name)
+
+    @property
+    def is_trivial(self) -> bool:
+        """Whether the sum rule was enough: an angle is prescribed."""
+        steps = [
+            step for row in partials(self.joint.template) for item in row for step in item.steps
+        ]
+        return all(step.rule is Rule.SUM for step in telling(steps))
 
     def attributes(self, figure: Figure) -> Chapter:
         written = type(self.joint.written)

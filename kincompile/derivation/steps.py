@@ -81,7 +81,13 @@ class Steps(ABC, Generic[Derived]):
     def section(self, kind: str, is_driver: bool, *steps: Chapter) -> Chapter:
         """Return the steps under the kind and the name of the constraint."""
         title = f"{kind} (driver) " if is_driver else f"{kind} "
-        return Chapter(f"constraint-{self.name}", (title, Verbatim(self.name)), (), steps)
+        names: Runs = (title, Verbatim(self.name))
+        return Chapter(f"constraint-{self.name}", names, (), steps, is_folded=self.is_trivial)
+
+    @property
+    def is_trivial(self) -> bool:
+        """Whether the derivation needs no rule, so that it is folded away."""
+        return False
 
     def step(self, number: int, title: str, *blocks: Block, level: str | None = None) -> Chapter:
         """Return one step, of the level of the derived ones unless another is given."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.mathml import MathMLPrinter
 from kincompile.derivation.renderer import Renderer
+from kincompile.derivation.slides import slides_of
 from kincompile.derivation.svg import as_svg
 from kincompile.targets.templates import fill, read
 
@@ -35,13 +36,22 @@ CHARACTER = 6.8
 """Width of a character of a pattern's labels, in a monospaced font of 11 pixels."""
 
 
-def as_html(document: Manuscript) -> str:
-    """Return a document as an HTML page."""
+def as_slides(document: Manuscript) -> str:
+    """Return a derivation as an HTML page of slides."""
+    return as_html(slides_of(document), kind="slides")
+
+
+def as_html(document: Manuscript, title: str = "Derivation of", kind: str = "") -> str:
+    """Return a document as an HTML page; the title stands before its name.
+
+    The kind is the class of the page's body: ``"slides"``, or none.
+    """
     renderer = _HtmlRenderer(document)
     data = {
+        "kind": kind,
         "font": read("derivation/math.css"),
-        "title": escape(f"Derivation of {document.name}"),
-        "heading": f"Derivation of <code>{escape(document.name)}</code>",
+        "title": escape(f"{title} {document.name}"),
+        "heading": f"{escape(title)} <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
         "contents": "\n".join(renderer.contents(document.sections)),
         "main": "\n".join(line for item in document.sections for line in renderer.section(item, 0)),
@@ -66,13 +76,14 @@ class _HtmlRenderer(Renderer):
 
     def section(self, section: Chapter, depth: int) -> Iterator[str]:
         yield from super().section(section, depth)
-        yield "</section>"
+        yield "</details></section>" if section.is_folded else "</section>"
 
     def heading(self, section: Chapter, depth: int) -> Iterator[str]:
         level = f'<span class="level {section.level}">{section.level}</span>'
         title = self.runs(section.title) + (level if section.level else "")
+        heading = f"<h{depth + 2}>{title}</h{depth + 2}>"
         yield f'<section id="{escape(section.anchor)}">'
-        yield f"<h{depth + 2}>{title}</h{depth + 2}>"
+        yield f"<details><summary>{heading}</summary>" if section.is_folded else heading
 
     def _paragraph(self, text: str) -> Iterator[str]:
         yield f"<p>{text}</p>"

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from kincompile.errors import ModelError
-from kincompile.files.data_text import decoded, listed_problems, read_json
-from kincompile.files.file_fields import FieldReader, shown
+from kincompile.files.content import decoded
+from kincompile.files.data_text import listed_problems, read_json
+from kincompile.files.file_fields import FieldReader
 from kincompile.files.file_format import MOST_POINTS
 from kincompile.model.absolute import AbsoluteAngle, AbsoluteDistance, AbsoluteX, AbsoluteY
 from kincompile.model.expressions import evaluate, t
@@ -27,7 +28,7 @@ from kincompile.model.gears import RackAndPinion
 from kincompile.model.joints import Revolute, Translational
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.relative import Distance, RelativeX, RelativeY
-from kincompile.names import listed, name_problem, suggestion
+from kincompile.names import listed, name_problem, shown, suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,7 +46,7 @@ Row = dict[str, Any]
 
 _ADAMS = re.compile(r"\s*(?:!|ADAMS|adams|(?i:part|marker|joint|default units|file|simulate)\b)")
 _MATLAB = {".*": " *", "./": " /", ".^": " ^"}
-_ANALYSES = ("kinematics", "dynamics", "inverseDynamics")
+_ANALYSES = ("Kinematics", "Dynamics", "InverseDynamics")
 _IGNORED = {
     "forces": "forces and contacts are left out: they do not change kinematics",
     "contacts": "contacts are left out: they do not change kinematics",
@@ -119,16 +120,25 @@ def read_acf(path: Path, content: bytes) -> AnalysisSettings:
     if not isinstance(data, dict):
         raise ModelError(reader.document.problem((), f"expected an object, not {shown(data)}"))
     end = _positive(reader, data, "tend")
-    kind = data.get("simulation", _ANALYSES[0])
-    if kind not in _ANALYSES:
-        text = f"only the kinematics is solved here, not {shown(kind)}; use one of: "
-        reader.problem(("simulation",), text + listed(_ANALYSES))
-    elif kind != _ANALYSES[0]:
-        LOG.warning("%s: %s is asked for; the kinematics is solved", path, kind)
+    _check_kind(reader, data.get("simulation", _ANALYSES[0]))
     steps = _steps(reader, data, end)
     if reader.problems:
         raise listed_problems(reader.problems)
     return AnalysisSettings(end, steps + 1)
+
+
+def _check_kind(reader: FieldReader, given: Any) -> None:
+    """Check which analysis is asked for; of each the times can be used."""
+    letters = "".join(filter(str.isalnum, given)).lower() if isinstance(given, str) else ""
+    kind = next((word for word in _ANALYSES if word.lower() == letters), None)
+    if kind is None:
+        text = f"there is no analysis {shown(given)}; analyses are: {listed(_ANALYSES)}"
+        reader.problem(("simulation",), text)
+    elif kind != _ANALYSES[0]:
+        LOG.warning(
+            "%s: %s is asked for; its times are read, and the kinematics is solved at them, "
+            "without masses and forces", reader.document.file, kind,
+        )  # fmt: skip
 
 
 def _steps(reader: FieldReader, data: Row, end: float) -> int:
@@ -165,7 +175,7 @@ def _document(path: Path, content: bytes) -> Document:
             f"{path}, line 1: this is a file of MSC Adams, which uses the ending "
             f"{path.suffix} too; what is read here is JSON, as simEngine2D writes it"
         )
-    return read_json(path, content, has_fractions=True)
+    return read_json(path, content, _WORDS)
 
 
 class _AdmReader(FieldReader):
@@ -244,8 +254,9 @@ class _AdmReader(FieldReader):
 
     def _constraint(self, address: Address, row: Row) -> Constraint | None:
         kind = row.get("type")
+        kind = _TYPES.get(kind.lower(), kind) if isinstance(kind, str) else kind
         if not isinstance(kind, str) or kind not in _CONSTRAINTS:
-            hint = suggestion(kind[:40], _CONSTRAINTS) if isinstance(kind, str) else ""
+            hint = suggestion(kind, _CONSTRAINTS) if isinstance(kind, str) else ""
             given = f"no constraint type {shown(kind)}" if "type" in row else "no type"
             text = f"there is {given}{hint}; types are: {listed(_CONSTRAINTS)}"
             self.problem((*address, "type"), text)
@@ -327,3 +338,11 @@ _CONSTRAINTS: Mapping[str, tuple[type[Constraint], tuple[str, ...]]] = {
     ),
 }  # fmt: skip
 """Constraint types of simEngine2D: what each becomes, and the fields that are its arguments."""
+
+_TYPES = {kind.lower(): kind for kind in _CONSTRAINTS}
+_KEYS = {key for _, keys in _CONSTRAINTS.values() for key in keys} | {
+    "simulation", "tend", "stepSize", "outputSteps", "name", "bodies", "constraints", "id", "q0",
+    "type", *_IGNORED,
+}  # fmt: skip
+_WORDS = {key.lower(): key for key in _KEYS}
+"""Types and keys by their lower case: simEngine2D's own files differ in it."""

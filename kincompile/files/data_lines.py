@@ -9,8 +9,9 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from bisect import bisect_left
 from typing import TYPE_CHECKING
+
+from kincompile.files.safe_expressions import Places
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,32 +19,27 @@ if TYPE_CHECKING:
 Address = tuple[str | int, ...]
 """The keys and indices that lead to a value, for instance ``("bodies", 0, "guess")``."""
 
+# Possessive: a text of some megabytes, matched otherwise, would take a hundred times its memory.
+JSON_TEXT = r'"[^"\\]*+(?:\\.[^"\\]*+)*+"'
+TEXT = r'"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"'
+LITERAL = r"'[^'\n]*+'"
+LONG_TEXTS = r'"""(?:[^\\]|\\.)*?"{3,5}|' + r"'''.*?'{3,5}"
+"""Texts in quotes, of JSON and the four kinds of TOML."""
+
 _TOKEN = re.compile(
-    r'"""(?:[^\\]|\\.)*?"{3,5}|' + r"'''.*?'{3,5}|"
-    r'"(?:[^"\\\n]|\\.)*"|' + r"'[^'\n]*'|#[^\n]*|\n|[\[\]{},:=.]|[^\s\[\]{},:=.#\"']+",
-    re.DOTALL,
+    rf"{LONG_TEXTS}|{TEXT}|{LITERAL}|" + r"#[^\n]*|\n|[\[\]{},:=.]|[^\s\[\]{},:=.#\"']+", re.DOTALL
 )
-_JSON_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{},:]|[^\s\[\]{},:"]+', re.DOTALL)
-
-
-class _Lines:
-    """From offsets to line numbers."""
-
-    def __init__(self, text: str) -> None:
-        self._ends = [found.start() for found in re.finditer("\n", text)]
-
-    def __getitem__(self, offset: int) -> int:
-        return bisect_left(self._ends, offset) + 1
+_JSON_TOKEN = re.compile(JSON_TEXT + r'|[\[\]{},:]|[^\s\[\]{},:"]+', re.DOTALL)
 
 
 def json_lines(text: str) -> Iterator[tuple[Address, int]]:
     """Yield the address and line of each value of a JSON text, in order; a key twice if it is."""
-    lines = _Lines(text)
+    places = Places(text)
     outline = _Outline(())
     for found in _JSON_TOKEN.finditer(text):
         place = outline.take(found[0], ":")
         if place is not None:
-            yield place, lines[found.start()]
+            yield place, places[found.start()].line
 
 
 class _Outline:
@@ -106,7 +102,7 @@ class _TomlScan:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._lines = _Lines(text)
+        self._places = Places(text)
         self._counts: dict[Address, int] = {}
         self._table: Address = ()
 
@@ -124,7 +120,7 @@ class _TomlScan:
             elif outline is not None:
                 place = outline.take(token, "=")
                 if place is not None:
-                    yield place, self._lines[found.start()]
+                    yield place, self._places[found.start()].line
             elif token == "=" and statement[:1] != ["["]:
                 outline = _Outline((*self._table, *_key(statement)))
             else:
@@ -144,7 +140,7 @@ class _TomlScan:
         if is_array:
             self._counts[address] = self._counts.get(address, -1) + 1
         self._table = self._entered(address)
-        yield self._table, self._lines[end]
+        yield self._table, self._places[end].line
 
     def _entered(self, address: Address) -> Address:
         """Return the address of a table; of an array of tables, that of its last one."""

@@ -14,7 +14,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import ModelError
-from kincompile.files.data_lines import json_lines, toml_lines
+from kincompile.files.content import decoded
+from kincompile.files.data_lines import JSON_TEXT, LITERAL, LONG_TEXTS, TEXT, json_lines, toml_lines
+from kincompile.names import escaped, shown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,14 +24,31 @@ if TYPE_CHECKING:
 
     from kincompile.files.data_lines import Address
 
-MAX_BYTES = 16_000_000
-"""Largest data file; a mechanism of 10,000 bodies has a quarter of this."""
+MAX_VALUES = 500_000
+"""Values in a file; a mechanism of 10,000 bodies has about half of this."""
+MAX_NESTING = 32
+"""Lists and tables within each other."""
+MAX_KEY_PARTS = 4
+"""Parts of a dotted key: Python's reader of TOML takes time and memory with their square."""
 MAX_PROBLEMS = 50
 """Problems that are listed; a broken file can have one a line."""
 
-_FRACTION = re.compile(
-    r'"(?:[^"\\\n]|\\.)*"|(?P<fraction>-?\d+(?:\.\d+)?\s*/\s*-?\d+(?:\.\d+)?)(?=\s*[,\]}])'
+_FOREIGN = re.compile(
+    rf"(?P<key>{TEXT}(?=\s*+:))|{TEXT}?|"
+    + r"(?P<fraction>(?<![\w.])-?\d{1,40}+(?:\.\d{1,40}+)?\s*+/\s*+"
+    r"-?\d{1,40}+(?:\.\d{1,40}+)?)(?=\s*[,\]}])"
 )
+_PART = rf"(?>[\w-]++|{TEXT}|{LITERAL})"
+_TOML_OUTLINE = re.compile(
+    LONG_TEXTS + r'|(?P<unclosed>"""|' + r"''')|"
+    rf"(?P<key>{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_KEY_PARTS}}})|{_PART}|"
+    r"#[^\n]*+|(?P<open>[\[{])|(?P<close>[\]}])",
+    re.DOTALL,
+)
+_JSON_OUTLINE = re.compile(JSON_TEXT + r"?|(?P<open>[\[{])|(?P<close>[\]}])", re.DOTALL)
+"""What opens and closes; texts are passed over, each character a bounded number of times."""
+_DIGITS = re.compile(r"(?<![\d_])[\d_]{1000}")
+"""A number that Python's readers refuse for its length, or take much memory for."""
 
 
 @dataclass(frozen=True)
@@ -73,30 +92,43 @@ class Document:
 def listed_problems(problems: Sequence[str]) -> ModelError:
     """Return the error that lists problems, the first of very many."""
     unique = list(dict.fromkeys(problems))
-    rest = len(unique) - MAX_PROBLEMS
-    return ModelError(unique[:MAX_PROBLEMS] + ([f"and {rest} more problems"] if rest > 0 else []))
+    is_rest = len(unique) > MAX_PROBLEMS
+    more = [f"and more: these are the first {MAX_PROBLEMS}"] if is_rest else []
+    return ModelError(unique[:MAX_PROBLEMS] + more)
 
 
-def decoded(path: Path, content: bytes) -> str:
-    """Return the text of a data file.
+def _check_bounds(path: Path, text: str, outline: re.Pattern[str]) -> None:
+    """Refuse what would take a reader much time or memory, before it begins.
 
     Raises
     ------
     ModelError
-        If it is too large, or not UTF-8.
+        If the text has too many values, numbers of too many digits, keys of too many parts, lists
+        too deep in each other, or a text of several lines that does not end; with the line.
     """
-    if len(content) > MAX_BYTES:
-        raise ModelError(
-            f"{path}: the file has more than {MAX_BYTES:,} bytes, too many for a model"
-        )
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise ModelError(
-            f"{path}, line {line}: this is not text in UTF-8 (byte 0x{content[error.start]:02x}); "
-            "save the file as UTF-8"
-        ) from None
+    if sum(text.count(mark) for mark in ",=[{") > MAX_VALUES:
+        raise ModelError(f"{escaped(path)}: the file has more than {MAX_VALUES:,} values")
+    if digits := _DIGITS.search(text):
+        raise _problem(path, text, digits.start(), "a number has thousands of digits")
+    depth = 0
+    for found in outline.finditer(text):
+        kind, problem = found.lastgroup, ""
+        if kind is None:
+            continue
+        depth += (kind == "open") - (kind == "close")
+        if depth > MAX_NESTING:
+            problem = f"the file is nested too deeply, more than {MAX_NESTING} levels"
+        elif kind == "unclosed":
+            problem = f"this is not TOML: this {found[0]} opens a text that is never closed"
+        elif kind == "key":
+            problem = f"the key {shown(found[0])} has more than {MAX_KEY_PARTS} parts"
+        if problem:
+            raise _problem(path, text, found.start(), problem)
+
+
+def _problem(path: Path, text: str, offset: int, problem: str) -> ModelError:
+    line = text.count("\n", 0, offset) + 1
+    return ModelError(f"{escaped(path)}, line {line}: {problem}")
 
 
 def read_toml(path: Path, content: bytes) -> Document:
@@ -108,23 +140,13 @@ def read_toml(path: Path, content: bytes) -> Document:
         If it is not TOML; the message has the line.
     """
     text = decoded(path, content)
+    _check_bounds(path, text, _TOML_OUTLINE)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         what, line = _toml_problem(str(error), text)
-        raise ModelError(f"{path}, line {line}: this is not TOML: {what}") from None
-    except RecursionError:
-        raise ModelError(f"{path}, line 1: the file is nested too deeply") from None
-    except ValueError:
-        raise _too_long(path, text) from None
-    return Document(str(path), text, data, is_toml=True)
-
-
-def _too_long(path: Path, text: str) -> ModelError:
-    """Return the error of a number that Python's readers refuse for its length."""
-    digits = re.search(r"[\d_]{1000}", text)
-    line = text[: digits.start() if digits else 0].count("\n") + 1
-    return ModelError(f"{path}, line {line}: a number has thousands of digits")
+        raise ModelError(f"{escaped(path)}, line {line}: this is not TOML: {what}") from None
+    return Document(escaped(path), text, data, is_toml=True)
 
 
 def _toml_problem(message: str, text: str) -> tuple[str, int]:
@@ -134,18 +156,19 @@ def _toml_problem(message: str, text: str) -> tuple[str, int]:
         return message.replace(" (at end of document)", ", the file ends here"), (
             text.rstrip().count("\n") + 1
         )
-    return f"{found[1]}, column {found[3]}", int(found[2])
+    return f"{escaped(found[1][:200])}, column {found[3]}", int(found[2])
 
 
-def read_json(path: Path, content: bytes, *, has_fractions: bool = False) -> Document:
+def read_json(path: Path, content: bytes, words: Mapping[str, str] | None = None) -> Document:
     """Read JSON.
 
     Parameters
     ----------
     path, content
         The file, and its content.
-    has_fractions
-        Whether a number may be written 187/255; it is read as a text.
+    words
+        Of a foreign format its keys, by their lower case: they are read without regard to case, and
+        a number may be written 187/255, which is read as a text. None for JSON itself.
 
     Raises
     ------
@@ -153,8 +176,9 @@ def read_json(path: Path, content: bytes, *, has_fractions: bool = False) -> Doc
         If it is not JSON, a key is given twice, or a number is not finite; with the line.
     """
     text = decoded(path, content)
-    if has_fractions:
-        text = _FRACTION.sub(_quoted, text)
+    if words is not None:
+        text = _FOREIGN.sub(lambda found: _native(found, words), text)
+    _check_bounds(path, text, _JSON_OUTLINE)
     repeated: list[str] = []
     try:
         data = json.loads(
@@ -164,13 +188,10 @@ def read_json(path: Path, content: bytes, *, has_fractions: bool = False) -> Doc
         )
     except json.JSONDecodeError as error:
         raise ModelError(
-            f"{path}, line {error.lineno}: this is not JSON: {error.msg}, column {error.colno}"
+            f"{escaped(path)}, line {error.lineno}: this is not JSON: {error.msg}, "
+            f"column {error.colno}"
         ) from None
-    except RecursionError:
-        raise ModelError(f"{path}, line 1: the file is nested too deeply") from None
-    except ValueError:
-        raise _too_long(path, text) from None
-    document = Document(str(path), text, data, is_toml=False)
+    document = Document(escaped(path), text, data, is_toml=False)
     if repeated:
         raise listed_problems(_repetitions(document))
     return document
@@ -183,7 +204,10 @@ class _NotFinite(float):
         return super().__new__(cls, name.replace("Infinity", "inf"))
 
 
-def _quoted(found: re.Match[str]) -> str:
+def _native(found: re.Match[str], words: Mapping[str, str]) -> str:
+    """Return a key as it is known here, which is as long; a fraction as a text."""
+    if found["key"] is not None:
+        return f'"{words.get(found[0][1:-1].lower(), found[0][1:-1])}"'
     return found[0] if found["fraction"] is None else f'"{found[0]}"'
 
 
@@ -202,8 +226,8 @@ def _repetitions(document: Document) -> list[str]:
     for address, line in json_lines(document.text):
         if address in first and isinstance(address[-1], str):
             problems.append(
-                f"{document.file}, line {line}: the key {address[-1]!r} is given a second time, "
-                f"after line {first[address]}; keep one of them"
+                f"{document.file}, line {line}: the key {shown(address[-1])} is given a second "
+                f"time, after line {first[address]}; keep one of them"
             )
         first.setdefault(address, line)
     return problems

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from kincompile.files.data_text import MAX_PROBLEMS, listed_problems
 from kincompile.files.safe_expressions import ExpressionError, parse_expression
-from kincompile.names import listed, name_problem, suggestion, unit_problem
+from kincompile.names import LONGEST, escaped, listed, name_problem, shown, suggestion, unit_problem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,13 +18,6 @@ if TYPE_CHECKING:
     from kincompile.files.data_text import Document
     from kincompile.files.file_format import Field
 
-_KINDS: dict[type, str] = {
-    dict: "a table",
-    list: "a list",
-    str: "a text",
-    bool: "a truth value",
-    type(None): "null",
-}
 _SINGULAR = {"bodies": "body"}
 
 
@@ -50,10 +44,12 @@ class FieldReader:
         self._parsed: dict[tuple[str, bool, bool], sympy.Expr] = {}
 
     def problem(self, address: Address, text: str) -> None:
-        """Note a problem with the value at an address."""
+        """Note a problem with the value at an address; very many end the reading."""
         where = self._field(address)
         message = f"{where}: {text}" if where else text
         self.problems.append(self.document.problem(address, message))
+        if len(self.problems) > MAX_PROBLEMS:
+            raise listed_problems(self.problems)
 
     def remember(self, words: str, address: Address) -> None:
         """Remember the address of what the checks of the whole system call by these words."""
@@ -72,7 +68,7 @@ class FieldReader:
         for part in address:
             if isinstance(part, str):
                 data = data.get(part) if isinstance(data, dict) else None
-                words.append(part)
+                words.append(escaped(part[:LONGEST]))
                 continue
             data = data[part] if isinstance(data, list) else None
             name = data.get("name") if isinstance(data, dict) else None
@@ -89,7 +85,7 @@ class FieldReader:
         """Check which fields a table has; return whether none is missing."""
         for key in row:
             if key not in fields:
-                hint = suggestion(key[:40], fields)
+                hint = suggestion(key, fields)
                 text = f"there is no such field{hint}; fields are: {listed(fields, 20)}"
                 self.problem((*address, key), text)
         missing = [key for key, item in fields.items() if item.is_required and key not in row]
@@ -173,15 +169,3 @@ class FieldReader:
             self.problem(address, f"expected {what}, not {shown(value)}")
             return [1.0] * count
         return [self.expression(item, (*address, k), names) for k, item in enumerate(value)]
-
-
-def shown(value: Any) -> str:
-    """Return a value as a message shows it: kind and beginning of what is long."""
-    if isinstance(value, str):
-        return repr(value if len(value) <= 60 else value[:57] + "...")
-    if isinstance(value, list):
-        return f"a list of {len(value)}"
-    if isinstance(value, dict | bool | None):
-        return _KINDS[type(value)]
-    text = repr(value) if not isinstance(value, int) or abs(value) < 10**40 else "a huge number"
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.model.arguments import Kind
 from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.names import MOST_CHARACTERS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,7 +39,9 @@ class Field:
 
 
 _TEXT: dict[str, Any] = {"type": "string"}
-_NAME: dict[str, Any] = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$"}
+_NAME: dict[str, Any] = {
+    "type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": MOST_CHARACTERS,
+}  # fmt: skip
 _NUMBER: dict[str, Any] = {"type": "number"}
 _EXPRESSION: dict[str, Any] = {"$ref": "#/$defs/expression"}
 _POINT: dict[str, Any] = {
@@ -62,6 +65,8 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "bodies": Field(_list("body"), is_required=False),
         "coordinates": Field(_list("coordinate"), is_required=False),
         "constraints": Field(_list("constraint")),
+        "points": Field(_list("point"), is_required=False),
+        "outputs": Field(_list("output"), is_required=False),
     },
     "analysis": {
         "end": Field(_NUMBER, is_required=False),
@@ -78,6 +83,12 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "name": Field(_NAME),
         "guess": Field({**_POINT, "minItems": 3, "maxItems": 3}, is_required=False),
         "outline": Field({"type": "array", "items": _POINT, "minItems": 3}, is_required=False),
+    },
+    "point": {"name": Field(_NAME), "body": Field(_NAME), "local": Field(_POINT)},
+    "output": {
+        "name": Field(_NAME),
+        "expression": Field(_EXPRESSION),
+        "unit": Field(_TEXT, is_required=False),
     },
     "coordinate": {"name": Field(_NAME), "guess": Field(_EXPRESSION, is_required=False)},
     "profile": {

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from kincompile.errors import InputError
 from kincompile.files.adm_file import read_acf, read_adm
-from kincompile.files.data_text import MAX_BYTES
+from kincompile.files.content import file_content
 from kincompile.files.model_file import read_data_model
 from kincompile.files.python_file import read_python
+from kincompile.names import escaped
 
 if TYPE_CHECKING:
     import os
@@ -86,8 +87,10 @@ def read_analysis(path: str | os.PathLike[str]) -> AnalysisSettings:
     """
     file = Path(path)
     if file.suffix.lower() != ".acf":
-        raise InputError(f"cannot read an analysis from {file}: one is a file ending in .acf")
-    return read_acf(file, _content(file))
+        raise InputError(
+            f"cannot read an analysis from {escaped(file)}: one is a file ending in .acf"
+        )
+    return read_acf(file, file_content(file))
 
 
 def _read(
@@ -97,25 +100,9 @@ def _read(
 ) -> Mechanism | ConstraintSystem:
     """Read a file by one of the readers."""
     reader = readers.get(file.suffix.lower())
-    content = _content(file)
+    content = file_content(file, endings=_READERS)
     if reader is None:
-        raise InputError(f"cannot read a model from {file}: a model is {what} {' or '.join(_DATA)}")
-    return reader(file, content)
-
-
-def _content(file: Path) -> bytes:
-    """Return the bytes of a file; of too large a data file as many as it takes to see that."""
-    try:
-        with file.open("rb") as stream:
-            return stream.read(-1 if file.suffix.lower() == ".py" else MAX_BYTES + 1)
-    except FileNotFoundError:
-        near = [file.with_name(file.name + suffix) for suffix in _READERS if file.name]
-        hint = next((f"did you mean {path}?" for path in near if path.is_file()), "check the path")
-        raise InputError(f"cannot read {file}: there is no such file; {hint}") from None
-    except IsADirectoryError:
-        raise InputError(f"cannot read {file}: it is a folder; give a file in it") from None
-    except (OSError, ValueError) as error:  # ValueError: a null character in the name
-        reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"cannot read {file}: {reason}; check the path and its permissions"
-        ) from error
+            f"cannot read a model from {escaped(file)}: a model is {what} {' or '.join(_DATA)}"
+        )
+    return reader(file, content)

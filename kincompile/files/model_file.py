@@ -24,7 +24,7 @@ import sympy
 
 from kincompile.errors import ModelError
 from kincompile.files.data_text import listed_problems, read_json, read_toml
-from kincompile.files.file_fields import FieldReader, shown
+from kincompile.files.file_fields import FieldReader
 from kincompile.files.file_format import (
     FIELDS,
     MOST_POINTS,
@@ -36,10 +36,12 @@ from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.model.equation import Equation
-from kincompile.model.expressions import alpha, t
+from kincompile.model.expressions import alpha, as_sympy, t
 from kincompile.model.mechanism import Mechanism
+from kincompile.model.outputs import Output, outputs_of_points
+from kincompile.model.points import BodyPoint
 from kincompile.model.system import ConstraintSystem
-from kincompile.names import listed, suggestion
+from kincompile.names import listed, rate, shown, suggestion
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -104,15 +106,18 @@ class _ModelReader(FieldReader):
         parameters = [self._parameter(*item) for item in self.rows(data, "parameters")]
         bodies = [self._body(*item) for item in self.rows(data, "bodies")]
         free = [self._coordinate(*item) for item in self.rows(data, "coordinates")]
+        points = [self._point(*item) for item in self.rows(data, "points")]
         rows = self.rows(data, "constraints")
         for _, row in rows:
             self._declare_contacts(row)
         constraints = [self._constraint(*item) for item in rows]
+        outputs = [self._output(*item) for item in self.rows(data, "outputs")]
         content = {
             "parameters": [item for item in parameters if item],
             "bodies": [item for item in bodies if item],
             "coordinates": dict(item for item in free if item),
             "constraints": [item for item in constraints if item],
+            "outputs": [item for item in (*points, *outputs) if item],
         }
         return self._checked(name, content, options)
 
@@ -135,7 +140,7 @@ class _ModelReader(FieldReader):
         """Return the model; its checks see what has been good so far."""
         model = Mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
-        model.constraints = content["constraints"]
+        model.constraints, model.outputs = content["constraints"], content["outputs"]
         free = content["coordinates"]
         if self.problems and not (model.constraints and (model.bodies or free)):
             return None
@@ -150,6 +155,7 @@ class _ModelReader(FieldReader):
                 parameters=model.parameters,
                 guess=list(free.values()),
                 bodies=model.bodies,
+                outputs=model.outputs,
                 **options,
             )
         except ModelError as error:
@@ -232,6 +238,33 @@ class _ModelReader(FieldReader):
             self.remember(f"guess of {name}", address)
         return (name, guess) if self._is_free(name, address) else None
 
+    def _point(self, address: Address, row: Row) -> BodyPoint | None:
+        """Return a named point; its coordinates may occur in every formula."""
+        complete = self.has_fields(address, row, FIELDS["point"])
+        name = self.name(row, address, "a point")
+        self.remember(f"point {name!r}", address)
+        body = self._body_name(row.get("body", GROUND.name), (*address, "body"))
+        place = (*address, "local")
+        local = self.expressions(row.get("local", [0, 0]), place, self._names, "[xi, eta]", 2)
+        if not name or not self._is_free(name, address, "point") or not complete:
+            return None
+        point = BodyPoint(name, GROUND if body == GROUND.name else Body(body), tuple(local))
+        self._names |= {item.name: as_sympy(item.expression) for item in outputs_of_points([point])}
+        return point
+
+    def _output(self, address: Address, row: Row) -> Output | None:
+        """Return an output: a formula in coordinates and rates, parameters and t."""
+        complete = self.has_fields(address, row, FIELDS["output"])
+        name = self.name(row, address, "an output")
+        self.remember(f"output {name!r}", address)
+        unit = self.unit(row.get("unit", ""), (*address, "unit"), f"output {name!r}")
+        symbols = [item for item, value in self._names.items() if value.is_Symbol]
+        rates = [rate(item, order) for item in symbols for order in (1, 2)]
+        names = {**self._names, **{item: sympy.Symbol(item) for item in rates}}
+        found = self.expression(row.get("expression", 0), (*address, "expression"), names)
+        is_new = self._is_free(name, address, "output")
+        return Output(name, found, unit) if is_new and complete else None
+
     def _declare_contacts(self, row: Row) -> None:
         """Declare the contact parameters of a cam, which any equation may name."""
         kind, name = row.get("type"), row.get("name")
@@ -245,7 +278,7 @@ class _ModelReader(FieldReader):
         kind = row.get("type")
         known = (*CONSTRAINTS, "Equation")
         if not isinstance(kind, str) or kind not in known:
-            hint = suggestion(kind[:40], known) if isinstance(kind, str) else ""
+            hint = suggestion(kind, known) if isinstance(kind, str) else ""
             given = f"no type {shown(kind)}" if "type" in row else "no type"
             self.problem((*address, "type"), f"there is {given}{hint}; types: {listed(known, 20)}")
             return None
@@ -310,7 +343,7 @@ class _ModelReader(FieldReader):
         if not isinstance(given, str):
             self.problem(address, f"expected the name of a body, not {shown(given)}")
         elif given not in self._bodies and given != GROUND.name:
-            near = suggestion(given[:40], list(self._bodies)[:1000])
+            near = suggestion(given, self._bodies)
             known = listed((GROUND.name, *self._bodies))
             self.problem(address, f"there is no body {shown(given)}{near}; bodies are: {known}")
         return str(given)

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 import warnings
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from kincompile.model.expressions import NotAnExpressionError, as_expression
+from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
+from kincompile.model.points import rate
 from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
@@ -29,6 +32,10 @@ MAX_NODES = 2_000
 """Numbers, names and operations in one expression."""
 MAX_DEPTH = 60
 """Levels of nesting; a sum or product of many terms is one level."""
+MAX_EXPANDED = 20_000
+"""Parts of one expression, each name counted with all that it stands for."""
+MAX_EXPANDED_DEPTH = 120
+"""Levels of one expression, each name counted with all that it stands for."""
 MAX_EXPONENT = 64
 """Largest exponent."""
 MAX_BITS = 1024
@@ -44,7 +51,7 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., sympy.Expr], int]] = {
     },
     "atan2": (sympy.atan2, 2), "ln": (sympy.log, 1),
     "arcsin": (sympy.asin, 1), "arccos": (sympy.acos, 1), "arctan": (sympy.atan, 1),
-    "arctan2": (sympy.atan2, 2),
+    "arctan2": (sympy.atan2, 2), "rate": (rate, 1),
 }  # fmt: skip
 """Functions that may be called, each with its number of arguments."""
 
@@ -69,11 +76,32 @@ class Place:
     line: int = 1
     column: int = 1
 
-    def after(self, text: str) -> Place:
-        """Return where a text ends that begins here."""
-        lines = text.count("\n")
-        first = 1 if lines else self.column
-        return Place(self.line + lines, len(text) - (text.rfind("\n") + 1) + first)
+
+class Places:
+    """The places of the characters of a text; each is found by bisection.
+
+    Parameters
+    ----------
+    text
+        The text.
+    first
+        Where it begins in its file.
+    """
+
+    def __init__(self, text: str, first: Place | None = None) -> None:
+        self._first = first or Place()
+        self._ends = [found.start() for found in re.finditer("\n", text)]
+
+    def begin(self, line: int) -> int:
+        """Return the offset of the first character of a line of the text."""
+        return self._ends[line - 2] + 1 if line > 1 else 0
+
+    def __getitem__(self, offset: int) -> Place:
+        """Return the place of the character with an offset."""
+        lines = bisect_left(self._ends, offset)
+        if not lines:
+            return Place(self._first.line, self._first.column + offset)
+        return Place(self._first.line + lines, offset - self._ends[lines - 1])
 
 
 class ExpressionError(NotAnExpressionError):
@@ -92,6 +120,14 @@ class ExpressionError(NotAnExpressionError):
         self.problem = problem
         self.line = line
         self.column = column
+
+
+class UnknownNameError(ExpressionError):
+    """A name that is not among those that may stand in an expression; `name` is it."""
+
+    def __init__(self, error: ExpressionError, name: str) -> None:
+        super().__init__(error.problem, error.line, error.column)
+        self.name = name
 
 
 def parse_expression(
@@ -147,6 +183,16 @@ def parse_expression(
         raise source.error("the expression is nested too deeply", 0) from None
 
 
+@lru_cache(maxsize=10_000)
+def extent(value: sympy.Basic) -> tuple[int, int]:
+    """Return the parts of an expression, those that it shares counted each time, and its levels.
+
+    The effort is that of the shared form, in which each part is there once.
+    """
+    inner = [extent(item) for item in value.args]
+    return 1 + sum(parts for parts, _ in inner), 1 + max((deep for _, deep in inner), default=0)
+
+
 class _Source:
     """The text as written, as Python reads it, and the way from one to the other."""
 
@@ -195,7 +241,7 @@ class _Source:
 
     def error(self, problem: str, offset: int) -> ExpressionError:
         """Return an error at a place in the text."""
-        place = self._place.after(self.text[:offset])
+        place = Places(self.text, self._place)[offset]
         return ExpressionError(problem, place.line, place.column)
 
     def node_error(self, problem: str, node: ast.AST) -> ExpressionError:
@@ -244,6 +290,7 @@ class _Reader:
         self._names = names
         self._refused = refused
         self._nodes = 0
+        self._expanded = 0
 
     def read(self, node: ast.expr, depth: int = 0) -> sympy.Expr:
         """Return the value of a node."""
@@ -252,7 +299,7 @@ class _Reader:
             case ast.Constant():
                 value = self._number(node)
             case ast.Name():
-                return self._name(node)
+                return self._name(node, depth)
             case ast.UnaryOp(op=ast.UAdd() | ast.USub()):
                 operand = self.read(node.operand, depth + 1)
                 return operand if isinstance(node.op, ast.UAdd) else -operand
@@ -278,6 +325,22 @@ class _Reader:
         if depth > MAX_DEPTH:
             raise self._error(f"the expression is nested more than {MAX_DEPTH} levels deep", node)
 
+    def _expand(self, value: sympy.Expr, node: ast.Name, depth: int) -> None:
+        """Count what a name stands for, which may hold names itself and double with each."""
+        parts, levels = extent(value)
+        self._expanded += parts
+        if self._expanded > MAX_EXPANDED:
+            raise self._error(
+                f"with {node.id} written out, the expression has more than {MAX_EXPANDED:,} parts",
+                node,
+            )
+        if depth + levels > MAX_EXPANDED_DEPTH:
+            raise self._error(
+                f"with {node.id} written out, the expression is nested more than "
+                f"{MAX_EXPANDED_DEPTH} levels deep",
+                node,
+            )
+
     def _number(self, node: ast.Constant) -> sympy.Expr:
         value = node.value
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -286,9 +349,10 @@ class _Reader:
             raise self._error("this number is too large for floating point", node)
         return sympy.Integer(value) if isinstance(value, int) else sympy.Float(value)
 
-    def _name(self, node: ast.Name) -> sympy.Expr:
+    def _name(self, node: ast.Name, depth: int) -> sympy.Expr:
         name = node.id
         if name in self._names:
+            self._expand(self._names[name], node, depth)
             return self._names[name]
         if name in self._refused:
             raise self._error(f"{name!r} cannot stand here: {self._refused[name]}", node)
@@ -297,9 +361,8 @@ class _Reader:
         if name in FUNCTIONS:
             raise self._error(f"{name} is a function; write {name}(...)", node)
         hint = suggestion(name, self._names)
-        raise self._error(
-            f"there is no {name!r}{hint}; the names are: {listed(self._names, 60)}", node
-        )
+        problem = f"there is no {name!r}{hint}; the names are: {listed(self._names, 60)}"
+        raise UnknownNameError(self._error(problem, node), name)
 
     def _chain(self, node: ast.BinOp, depth: int) -> sympy.Expr:
         """Read a chain such as a + b - c, which Python nests to the left, as one level."""
@@ -349,8 +412,12 @@ class _Reader:
         return [sympy.Pow(sympy.Mul(*factors), right)]
 
     def _check_exponent(self, exponent: sympy.Expr, node: ast.expr) -> None:
-        if exponent.is_number and not abs(exponent) <= MAX_EXPONENT:
-            raise self._error(f"the exponent is beyond {MAX_EXPONENT}", node)
+        if not exponent.is_number:
+            return
+        # Evaluated: of an exact number such as sin(1)^2 + cos(1)^2 SymPy may not know the size.
+        size = evaluate(exponent, {})
+        if size is None or abs(size) > MAX_EXPONENT:
+            raise self._error(f"the exponent is beyond {MAX_EXPONENT}, or not a number", node)
 
     def _checked(self, value: sympy.Expr, node: ast.AST) -> sympy.Expr:
         """Refuse a number that no double can hold: the next operation on it could be endless."""

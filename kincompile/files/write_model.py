@@ -12,7 +12,7 @@ from kincompile.errors import ModelError
 from kincompile.files.file_format import SMOOTHNESS, VERSION
 from kincompile.model.arguments import Kind
 from kincompile.model.constraint import CamConstraint, Constraint
-from kincompile.model.expressions import as_expression
+from kincompile.model.expressions import as_expression, as_sympy
 from kincompile.model.resolve import Joint
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
@@ -41,6 +41,11 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         "coordinates": [
             {"name": item.name, "guess": item.guess} for item in _free_coordinates(system)
         ],
+        "points": [
+            {"name": item.name, "body": item.body.name, "local": [value(x) for x in item.local]}
+            for item in system.body_points
+        ],
+        "outputs": _outputs(system),
         "constraints": [_constraint(item) for item in system.constraints],
     }
     return {
@@ -61,6 +66,18 @@ def _body(item: Body) -> dict[str, Any]:
     row: dict[str, Any] = {"name": item.name, "guess": [value(number) for number in item.guess]}
     corners = [[value(number) for number in corner] for corner in item.outline]
     return {**row, "outline": corners} if corners else row
+
+
+def _outputs(system: ConstraintSystem) -> list[dict[str, Any]]:
+    """Return the outputs but those of points, whose coordinates have names in the others."""
+    count = 2 * len(system.body_points)
+    named = {item.written.expression: sympy.Symbol(item.name) for item in system.outputs[:count]}
+    rows = []
+    for item in system.outputs[count:]:
+        expression = as_sympy(item.written.expression).xreplace(named)
+        row = {"name": item.name, "expression": value(expression)}
+        rows.append({**row, "unit": item.unit} if item.unit else row)
+    return rows
 
 
 def _free_coordinates(system: ConstraintSystem) -> Iterable[Coordinate]:

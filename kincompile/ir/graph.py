@@ -43,7 +43,7 @@ class Graph:
         return found
 
     def const(self, value: Constant) -> int:
-        """Return a number; a whole number is kept as an int, a fraction exactly.
+        """Return a number; a whole number is kept as an int, a fraction of floats exactly.
 
         Raises
         ------
@@ -55,6 +55,8 @@ class Graph:
                 "a constant of the model is beyond 1e308, the range of floating-point numbers; "
                 "choose other units"
             )
+        if isinstance(value, Fraction) and max(abs(value.numerator), value.denominator) > LARGEST:
+            value = float(value)  # such as (10^400 + 1) / 10^400
         if -EXACT < value < EXACT and value == (whole := int(value)):
             value = whole
         elif isinstance(value, Fraction) and value.denominator == 1:

@@ -13,18 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.calculus.rotations import PlaneRotation
 from kincompile.ir.graph import Graph, Node, number_of, operands_of
+from kincompile.ir.interpret import Placed, by_kernel
 from kincompile.ir.program import FrameEntry
 from kincompile.names import rate
-from kincompile.quantities import over
+from kincompile.quantities import quantity_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from kincompile.ir.program import Instance, Program
+    from kincompile.ir.program import FrameKernel, Instance, Program
+    from kincompile.quantities import Quantity
 
     Index = NDArray[np.intp]
 
@@ -36,8 +37,8 @@ class Source:
     Attributes
     ----------
     kind
-        ``"q"``, ``"q_dot"``, ``"cos"`` and ``"sin"`` (of body angles), ``"number"`` (an attribute)
-        or ``"value"`` (computed from t, p and contact parameters).
+        ``"q"``, ``"q_dot"``, ``"q_ddot"``, ``"number"`` (an attribute), ``"value"`` (computed from
+        t, p and contact parameters), or an entry of the frames of bodies, as ``"frame_1.c"``.
     index
         Index for each constraint, into the vector of that kind.
     """
@@ -63,11 +64,8 @@ class Group:
     outputs
         By quantity ``(row, column, node)``, as in the kernel, without what is on the ground or
         zero.
-    rows
-        First row of each constraint, shape (L,).
-    columns
-        Column of each of the type's coordinates for each constraint, shape (L, c); -1 on the
-        ground.
+    placed
+        Where their entries stand.
     hints
         Speaking names of nodes.
     """
@@ -77,13 +75,41 @@ class Group:
     nodes: tuple[Node, ...]
     inputs: Mapping[str, Source]
     outputs: Mapping[str, tuple[tuple[int, int, int], ...]]
-    rows: Index
-    columns: Index
+    placed: Placed
     hints: Mapping[int, str]
+
+    @property
+    def size(self) -> int:
+        """Number of constraints."""
+        return len(self.placed.columns)
 
     def number(self, node: int) -> Any:
         """Return the number a node stands for, None where it is not a plain number."""
         return number_of(self.nodes, node)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameGroup:
+    """Bodies of one kind, whose frames are computed together.
+
+    Attributes
+    ----------
+    name
+        Name of the code, for instance ``frame_1``.
+    kernel
+        Its code.
+    columns
+        Columns of each body's coordinates, shape (coordinates, L).
+    """
+
+    name: str
+    kernel: FrameKernel
+    columns: Index
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of the sources that its entries are."""
+        return tuple(f"{self.name}.{symbol}" for symbol in self.kernel.symbols)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,27 +124,38 @@ class GroupedProgram:
         Attributes that are plain numbers, shape (K,).
     values
         Nodes of `program.values` that depend on t, p or contact parameters.
-    angles
-        Columns of the body angles whose cosine and sine are needed.
+    frames
+        The bodies, by kind.
     """
 
     program: Program
     groups: tuple[Group, ...]
     numbers: NDArray[np.float64]
     values: tuple[int, ...]
-    angles: tuple[int, ...]
+    frames: tuple[FrameGroup, ...]
 
     def pattern(self) -> NDArray[np.intp]:
         """Return row and column of every entry of Phi_q, shape (nnz, 2), group by group."""
-        parts = [
-            np.stack((item.rows + row, item.columns[:, column]), axis=1)
-            for item in self.groups
-            for row, column, _ in item.outputs["Phi_q"]
-        ]
-        return np.concatenate(parts) if parts else np.empty((0, 2), dtype=np.intp)
+        return self.entries(quantity_named("Phi_q"))[0]
+
+    def entries(self, quantity: Quantity) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return row and column of every entry, shape (entries, 2), group by group, and its value.
+
+        The value is NaN where it is not a plain number.
+        """
+        places, values = [np.empty((0, 2), dtype=np.intp)], [np.empty(0)]
+        for item in self.groups:
+            for row, column, node in item.outputs[quantity.name]:
+                value = item.number(node)
+                places.append(np.stack(item.placed.entry(quantity, row, column), axis=1))
+                values.append(np.full(item.size, np.nan if value is None else float(value)))
+        return np.concatenate(places), np.concatenate(values)
 
 
-KINDS = ("q", "q_dot", *PlaneRotation.names, "number", "value")
+KINDS = ("q", "q_dot", "q_ddot", "number", "value")
+"""Kinds of sources; entries of frames follow."""
+
+NUMBER, VALUE = 3, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,8 +164,10 @@ class _Nodes:
 
     Attributes
     ----------
+    kinds
+        Kinds of sources.
     kind : ndarray of int, shape (nodes,)
-        Position in `KINDS`.
+        Position in `kinds`.
     index : ndarray of int, shape (nodes,)
         Index into the vector of that kind; for computed values the node itself.
     number : ndarray, shape (nodes,)
@@ -137,23 +176,27 @@ class _Nodes:
         Equal where nodes are computed by the same operations, whatever the names and numbers.
     """
 
+    kinds: tuple[str, ...]
     kind: Index
     index: Index
     number: NDArray[np.float64]
     structure: Index
 
 
-def _classify(program: Program) -> _Nodes:
+def _classify(program: Program, groups: Sequence[FrameGroup]) -> _Nodes:
     names = [item.name for item in program.coordinates]
-    places = {name: (0, k) for k, name in enumerate(names)}
-    places.update({rate(name): (1, k) for k, name in enumerate(names)})
-    frames = {
-        node: (KINDS.index(name), k)
-        for k, body in enumerate(program.bodies)
-        for name, node in zip(PlaneRotation.names, body.entries, strict=True)
-    }
+    orders = range(3 if program.observers else 2)
+    places = {rate(name, order): (order, k) for order in orders for k, name in enumerate(names)}
+    kinds = (*KINDS, *(kind for item in groups for kind in item.kinds))
+    frames: dict[int, tuple[int, int]] = {}
+    first = len(KINDS)
+    for item in groups:
+        bodies = (body for body in program.bodies if body.kernel is item.kernel)
+        for k, body in enumerate(bodies):
+            frames |= {node: (first + entry, k) for entry, node in enumerate(body.entries)}
+        first += len(item.kinds)
     nodes = program.values
-    kind = np.full(len(nodes), KINDS.index("value"))
+    kind = np.full(len(nodes), VALUE)
     index = np.arange(len(nodes))
     number = np.full(len(nodes), np.nan)
     for node, (operation, *operands) in enumerate(nodes):
@@ -165,41 +208,50 @@ def _classify(program: Program) -> _Nodes:
             number[node] = -number[operands[0]]
         elif node in frames:
             kind[node], index[node] = frames[node]
-    kind[~np.isnan(number)] = KINDS.index("number")
-    return _Nodes(kind, index, number, _structures(nodes, kind))
+    kind[~np.isnan(number)] = NUMBER
+    return _Nodes(kinds, kind, index, number, _structures(nodes, kind, len(kinds)))
 
 
-def _structures(nodes: Sequence[Node], kind: Index) -> Index:
-    """Return a number for the structure of each node: its kind, or operation and operands."""
+def _structures(nodes: Sequence[Node], kind: Index, first: int) -> Index:
+    """Return a number for the structure of each node: its kind, or from `first` on."""
     structure = kind.tolist()
     known: dict[tuple[Any, ...], int] = {}
-    for node in np.flatnonzero(kind == KINDS.index("value")).tolist():
+    for node in np.flatnonzero(kind == VALUE).tolist():
         content = nodes[node]
         operands = operands_of(content)
         if operands:
             literals = content[1 : len(content) - len(operands)]
             key = (content[0], literals, *(structure[k] for k in operands))
-            structure[node] = known.setdefault(key, len(KINDS) + len(known))
+            structure[node] = known.setdefault(key, first + len(known))
     return np.array(structure)
 
 
 def group(program: Program) -> GroupedProgram:
     """Arrange a program by groups."""
-    by_kernel: dict[int, list[Instance]] = {}
-    for instance in program.instances:
-        by_kernel.setdefault(id(instance.kernel), []).append(instance)
-    nodes = _classify(program)
-    builder = _Builder(nodes, program.values)
+    frames = _frame_groups(program)
+    nodes = _classify(program, frames)
+    builder = _Builder(nodes, program)
     groups: list[Group] = []
-    for instances in by_kernel.values():
+    for _, instances in by_kernel(program):
         groups += builder.groups(instances)
-    groups.sort(key=lambda item: int(item.rows[0]))
+    groups.sort(key=lambda item: int(item.placed.rows["equations"][0]))
     return GroupedProgram(
         program,
         tuple(groups),
         np.array(builder.numbers),
         tuple(builder.values),
-        tuple(body.columns[-1] for body in program.bodies),
+        frames,
+    )
+
+
+def _frame_groups(program: Program) -> tuple[FrameGroup, ...]:
+    """Return the bodies of each kind."""
+    columns: dict[int, tuple[FrameKernel, list[range]]] = {}
+    for body in program.bodies:
+        columns.setdefault(id(body.kernel), (body.kernel, []))[1].append(body.columns)
+    return tuple(
+        FrameGroup(f"frame_{k}", kernel, np.array(own, dtype=np.intp).T)
+        for k, (kernel, own) in enumerate(columns.values(), 1)
     )
 
 
@@ -229,8 +281,9 @@ FEW = 8
 class _Builder:
     """Makes groups, and collects the numbers and computed values that they read."""
 
-    def __init__(self, nodes: _Nodes, code: Sequence[Node]) -> None:
-        self._nodes, self._code = nodes, code
+    def __init__(self, nodes: _Nodes, program: Program) -> None:
+        self._nodes, self._code = nodes, program.values
+        self._quantities = program.quantities
         self._counts: dict[str, int] = {}
         self._values: dict[int, int] = {}
         self.numbers: list[float] = []
@@ -239,10 +292,7 @@ class _Builder:
     def groups(self, instances: list[Instance]) -> list[Group]:
         """Split the constraints of one kernel by their shape."""
         bindings = np.array([instance.bindings for instance in instances])
-        columns = np.array(
-            [[-1 if c is None else c for c in instance.columns] for instance in instances]
-        )
-        rows = np.array([instance.first_row for instance in instances])
+        placed = Placed.of(instances)
         numbers = self._nodes.number[bindings]
         # What shapes the code: attributes that are zero, and the ground, whose cosine is one.
         of_frame = np.array([isinstance(item, FrameEntry) for item in instances[0].kernel.inputs])
@@ -250,33 +300,27 @@ class _Builder:
         expressions = np.stack([self._expressions(nodes) for nodes in bindings.T], axis=1)
         expressions = expressions[:, expressions.any(axis=0)]
         # One byte string a constraint compares faster than a row of numbers.
-        key = np.concatenate((shapes, columns < 0, expressions), axis=1).astype(np.int32)
+        key = np.concatenate((shapes, placed.columns < 0, expressions), axis=1).astype(np.int32)
         whole = key.view(f"V{key.itemsize * key.shape[1]}").reshape(-1)
         _, which = np.unique(whole, return_inverse=True)
         found = []
         for number in dict.fromkeys(which.tolist()):
             members = np.flatnonzero(which == number)
-            part = bindings[members], columns[members], rows[members]
-            found.append(self._group(instances[members[0]], *part))
+            sample = instances[members[0]]
+            found.append(self._group(sample, bindings[members], placed.some(members)))
         return found
 
     def _expressions(self, nodes: Index) -> Index:
         """Return the structure of each constraint's expression, where many of them share few."""
         structures = np.zeros_like(nodes)
-        is_value = self._nodes.kind[nodes] == KINDS.index("value")
+        is_value = self._nodes.kind[nodes] == VALUE
         if is_value.any():
             structures[is_value] = self._nodes.structure[nodes[is_value]]
             if FEW * np.unique(structures).size > np.unique(nodes).size:
                 structures[:] = 0
         return structures
 
-    def _group(
-        self,
-        sample: Instance,
-        bindings: Index,
-        columns: Index,
-        rows: Index,
-    ) -> Group:
+    def _group(self, sample: Instance, bindings: Index, placed: Placed) -> Group:
         kernel = sample.kernel
         graph, sources = Graph(), _Sources()
         inputs = {
@@ -297,10 +341,9 @@ class _Builder:
                     if sample.place(quantity, row, column) is not None
                     and not (quantity.is_matrix and graph.value_of(new[node]) == 0)
                 )
-                for quantity in over({"equations", "coordinates"})
+                for quantity in self._quantities
             },
-            rows,
-            columns,
+            placed,
             {
                 new[hint.node]: hint.name
                 for hint in kernel.hints
@@ -333,7 +376,7 @@ class _Builder:
 
     def _shared_operation(self, nodes: Index) -> tuple[str, ...] | None:
         """Return the operation, with the function's name, that computes each of many values."""
-        is_value = self._nodes.kind[nodes] == KINDS.index("value")
+        is_value = self._nodes.kind[nodes] == VALUE
         if not is_value.all() or np.unique(nodes).size <= FEW:
             return None
         found = {self._operation(node) for node in nodes.tolist()}
@@ -352,7 +395,7 @@ class _Builder:
     def _source(self, nodes: Index) -> Source:
         """Return where an input comes from; numbers here and expressions there are all computed."""
         kinds = np.unique(self._nodes.kind[nodes])
-        kind = KINDS[kinds[0]] if kinds.size == 1 else "value"
+        kind = self._nodes.kinds[kinds[0]] if kinds.size == 1 else "value"
         if kind == "number":
             first = len(self.numbers)
             self.numbers += self._nodes.number[nodes].tolist()

@@ -78,16 +78,17 @@ def interpret(
     for node, value in enumerate(values):
         every[..., node] = value
     found = [np.zeros((*shape, *program.shape_of(item)), dtype) for item in program.quantities]
-    for kernel, instances in _by_kernel(program):
+    for kernel, instances in by_kernel(program):
         bindings = np.array([instance.bindings for instance in instances], dtype=np.intp)
         bound = {name: every[..., bindings[:, k]] for k, name in enumerate(kernel.inputs)}
         results = run(kernel.nodes, bound, program.tables)
-        placed = _Placed.of(instances)
+        placed = Placed.of(instances)
         for quantity, array in zip(program.quantities, found, strict=True):
             for row, column, node in kernel.outputs.get(quantity.name, ()):
-                moving, index = placed.index(quantity, row, column)
+                rows, columns = placed.entry(quantity, row, column)
+                moving = (rows >= 0) & (columns >= 0)
                 entries = np.broadcast_to(results[node], (*shape, len(instances)))[..., moving]
-                at: Any = (..., *index)
+                at: Any = (..., rows[moving], columns[moving])[: 2 + quantity.is_matrix]
                 if quantity.adds:
                     np.add.at(array, at, entries)
                 else:
@@ -96,15 +97,23 @@ def interpret(
 
 
 @dataclass(frozen=True, slots=True)
-class _Placed:
-    """First rows of the constraints of one kernel, by kind, and their columns, -1 on the ground."""
+class Placed:
+    """Where the entries of constraints of one kernel stand.
+
+    Attributes
+    ----------
+    rows
+        First row of each constraint, shape (L,), in the equations and in the outputs.
+    columns
+        Column of each of the type's coordinates, shape (L, c), -1 on the ground.
+    """
 
     rows: Mapping[str, Array]
     columns: Array
 
     @classmethod
-    def of(cls, instances: Sequence[Instance]) -> _Placed:
-        """Collect the places of constraints."""
+    def of(cls, instances: Sequence[Instance]) -> Placed:
+        """Return the places of constraints."""
         rows = {
             "equations": np.array([instance.first_row for instance in instances]),
             "outputs": np.array([instance.first_output for instance in instances]),
@@ -112,19 +121,22 @@ class _Placed:
         grounded = [[-1 if c is None else c for c in instance.columns] for instance in instances]
         return cls(rows, np.array(grounded, dtype=np.intp).reshape(len(instances), -1))
 
-    def index(self, quantity: Quantity, row: int, column: int) -> tuple[Array, tuple[Array, ...]]:
-        """Return which constraints have an entry, and the index of theirs in the system."""
-        at = (
-            self.columns[:, row]
-            if quantity.rows == "coordinates"
-            else self.rows[quantity.rows] + row
-        )
-        by = self.columns[:, column] if quantity.columns == "coordinates" else at * 0 + column
-        moving = np.flatnonzero((at >= 0) & (by >= 0))
-        return moving, (at[moving], by[moving])[: 1 + quantity.is_matrix]
+    def some(self, members: Array) -> Placed:
+        """Return the places of some of the constraints."""
+        rows = {kind: first[members] for kind, first in self.rows.items()}
+        return Placed(rows, self.columns[members])
+
+    def entry(self, quantity: Quantity, row: int, column: int) -> tuple[Array, Array]:
+        """Return row and column of an entry of the kernel for each constraint, -1 on the ground."""
+        if quantity.rows == "coordinates":
+            rows = self.columns[:, row]
+        else:
+            rows = self.rows[quantity.rows] + row
+        is_own = quantity.columns == "coordinates"
+        return rows, self.columns[:, column] if is_own else np.full_like(rows, column)
 
 
-def _by_kernel(program: Program) -> list[tuple[Kernel, list[Instance]]]:
+def by_kernel(program: Program) -> list[tuple[Kernel, list[Instance]]]:
     """Return the instances of each kernel, which run together as arrays."""
     found: dict[int, tuple[Kernel, list[Instance]]] = {}
     for instance in (*program.instances, *program.observers):

@@ -181,7 +181,7 @@ def frame_kernel(kind: BodyKind) -> FrameKernel:
     }
     new = graph.instantiate(environment.graph.nodes, numbers)
     entries = tuple(new[item.node] for item in found)
-    return FrameKernel(tuple(graph.nodes), entries, own.rotation.symbols)
+    return FrameKernel(tuple(graph.nodes), entries, tuple(kind.letters), own.rotation.symbols)
 
 
 @cache

@@ -131,7 +131,7 @@ def _too_deep(constraint: Joint | FreeEquation) -> str:
 
 
 def _tables(constraint: Joint | FreeEquation) -> dict[str, SplineTable]:
-    if isinstance(constraint, FreeEquation):
+    if isinstance(constraint, FreeEquation) or not constraint.profiles:
         return {}
     splines = (
         item for profile in constraint.profiles.values() for item in profile.atoms(PeriodicSpline)
@@ -263,5 +263,4 @@ class _Binder:
     def frame_of(self, body: Body, columns: range) -> BodyFrame:
         """Return a body with the nodes that its frame gives."""
         entries = self._body(body)[2 * len(columns) :]
-        labels = tuple(f"{symbol}_{body.name}" for symbol in frame_kernel(body.kind).symbols)
-        return BodyFrame(body.name, columns, entries, labels)
+        return BodyFrame(body.name, frame_kernel(body.kind), columns, entries)

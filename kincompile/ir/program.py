@@ -95,18 +95,19 @@ class FrameKernel:
         The code, whose inputs are the numbers of the coordinates.
     entries
         Nodes of what it gives.
-    symbols
-        Symbols of those in names, ``c`` and ``s``.
+    letters, symbols
+        Letters of the coordinates, and symbols of the entries: ``c`` and ``s``.
     """
 
     nodes: tuple[Node, ...]
     entries: tuple[int, ...]
+    letters: tuple[str, ...]
     symbols: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class BodyFrame:
-    """A body: the frame kernel bound to its coordinates.
+    """A body: the frame kernel of its kind bound to its coordinates.
 
     Attributes
     ----------
@@ -116,14 +117,17 @@ class BodyFrame:
         Columns of its coordinates.
     entries
         Nodes of `Program.values` that its frame gives: cosine and sine of its angle.
-    labels
-        Their names in emitted code, ``c_crank`` and ``s_crank``.
     """
 
     name: str
+    kernel: FrameKernel
     columns: range
     entries: tuple[int, ...]
-    labels: tuple[str, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the entries in emitted code: ``c_crank`` and ``s_crank``."""
+        return tuple(f"{symbol}_{self.name}" for symbol in self.kernel.symbols)
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,16 +252,22 @@ class Program:
 
     def names_of(self, kind: Rows | Columns) -> tuple[str, ...]:
         """Return the names of what the rows or columns of a quantity belong to."""
-        names: dict[str, tuple[str, ...]] = {
-            "equations": self.equations,
-            "coordinates": tuple(item.name for item in self.coordinates),
-            "outputs": tuple(item.name for item in self.observers),
-            "parameters": tuple(item.name for item in self.parameters),
-            "none": (),
-        }
-        return names[kind]
+        return tuple(item if isinstance(item, str) else item.name for item in self._owners(kind))
+
+    def _owners(self, kind: Rows | Columns) -> tuple[str | Coordinate | Instance | Parameter, ...]:
+        """Return what the rows or columns of a quantity belong to."""
+        match kind:
+            case "equations":
+                return self.equations
+            case "coordinates":
+                return self.coordinates
+            case "outputs":
+                return self.observers
+            case "parameters":
+                return self.parameters
+        return ()
 
     def shape_of(self, quantity: Quantity) -> tuple[int, ...]:
         """Return the shape of a quantity: (rows,) or (rows, columns)."""
-        shape = (len(self.names_of(quantity.rows)),)
-        return (*shape, len(self.names_of(quantity.columns))) if quantity.is_matrix else shape
+        shape = (len(self._owners(quantity.rows)),)
+        return (*shape, len(self._owners(quantity.columns))) if quantity.is_matrix else shape

@@ -86,6 +86,6 @@ def redundancy_warning(system: ConstraintSystem, found: Sequence[Surplus]) -> st
     """Return the warning about consistent redundant equations."""
     sentences = ". ".join(f"{item.text}; to remove it, {item.remedy}" for item in found)
     return (
-        f"{system.name!r} is redundant: all equations are solved together in the sense of least "
-        f"squares, and whether they agree is checked at every point. {sentences}"
+        f"{system.name!r} has redundant equations: all are solved together by least squares, and "
+        f"whether they agree is checked at every point. {sentences}"
     )

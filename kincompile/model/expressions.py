@@ -182,8 +182,9 @@ def unknown_problem(value: Scalar, declared: Collection[str], what: str) -> str 
     unknown = sorted(name for name in symbol_names(value) if name not in declared)
     if not unknown:
         return None
+    verb = "is" if len(unknown) == 1 else "are"
     return (
-        f"{what} contains {listed(unknown)}, which nobody declared"
+        f"{what} contains {listed(unknown)}, which {verb} not declared"
         f"{suggestion(unknown[0], declared)}; declare it as a parameter or use one of: "
         f"{listed(sorted(declared))}"
     )

@@ -29,8 +29,10 @@ from kincompile.names import rate as rate_name
 from kincompile.names import unit_problem
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from kincompile.model.expressions import Scalar
-    from kincompile.model.resolve import Scope
+    from kincompile.model.resolve import Joint, Scope
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +156,17 @@ def _coordinates(place: Place) -> tuple[sympy.Expr, sympy.Expr]:
     return as_sympy(x), as_sympy(y)
 
 
-def outputs_of_points(points: tuple[BodyPoint, ...]) -> tuple[Output, ...]:
+def point_of(joint: Joint) -> BodyPoint | None:
+    """Return the first point of a joint that is on a moving body, under the joint's name."""
+    bodies = dict(zip(("i", "j"), joint.bodies, strict=False))
+    for item in joint.written.arguments().values():
+        body = bodies.get(item.on)
+        if item.kind is Kind.POINT and body is not None and not body.is_ground:
+            return BodyPoint(joint.name, body, joint.points[item.symbol])
+    return None
+
+
+def outputs_of_points(points: Sequence[BodyPoint]) -> tuple[Output, ...]:
     """Return the outputs that points are: x and y of each."""
     return tuple(
         Output(f"{letter}_{item.name}", getattr(item, letter), None)

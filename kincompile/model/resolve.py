@@ -334,7 +334,8 @@ def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
         xi, eta = tuple(given) if is_list else ()
     except (TypeError, ValueError):
         scope.problems.append(
-            f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame"
+            f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame; "
+            "give two numbers, or expressions of parameters"
         )
         return 1, 1
     point = _attribute(xi, where, scope), _attribute(eta, where, scope)
@@ -364,7 +365,8 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
         given = _of_alpha(given, scope)
     elif not isinstance(given, Real):
         scope.problems.append(
-            f"{where}: {given!r} is neither a radius rho(alpha) nor a table (angles, radii)"
+            f"{where}: {given!r} is neither a radius rho(alpha) nor a table (angles, radii); "
+            "give an expression of kc.alpha, or two lists of equal length"
         )
         return sympy.S.One
     value = checked_expression(given, where, {*scope.parameters, alpha.name}, scope)

@@ -19,6 +19,7 @@ from kincompile.model.outputs import (
     Output,
     ResolvedOutput,
     outputs_of_points,
+    point_of,
     resolve_output,
     resolve_point,
 )
@@ -158,6 +159,32 @@ class ConstraintSystem(MatrixViews, TextViews):
         """Return the system itself."""
         return self
 
+    def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
+        """Return the same system with these points as its outputs, and no others."""
+        names = [item.name for item in self.coordinates]
+        scope = Scope(
+            {body.name: body for body in self.bodies},
+            names,
+            {item.name: item for item in self.parameters},
+        )
+        found = [resolve_output(x, scope, self.length_unit) for x in outputs_of_points(points)]
+        other = ConstraintSystem.__new__(ConstraintSystem)
+        values = {key: getattr(self, key) for key in self.__slots__}
+        values |= {"body_points": tuple(points), "outputs": tuple(filter(None, found))}
+        for key, value in values.items():
+            object.__setattr__(other, key, value)
+        return other
+
+    def joint_points(self) -> tuple[BodyPoint, ...]:
+        """Return a point for each joint that has one: on body i, or on body j if i is the ground.
+
+        Those whose coordinates would have the name of a body's are left out.
+        """
+        taken = {body.name for body in self.bodies}
+        joints = (item for item in self.constraints if isinstance(item, Joint))
+        found = (point_of(item) for item in joints if item.name not in taken)
+        return tuple(item for item in found if item is not None)
+
     @property
     def row_offsets(self) -> tuple[int, ...]:
         """First row of each constraint, from 0: the exclusive prefix scan of equation counts."""
@@ -287,10 +314,12 @@ def _check_outlines(
             problems.append(f"{where}: {body.outline!r} is not a list of corners (xi, eta)")
             continue
         if len(corners) in (1, 2):
-            problems.append(f"{where}: {len(corners)} corners are no polygon; give 3 or more")
+            problems.append(f"{where}: it has {len(corners)} corners; a polygon has 3 or more")
         for k, corner in enumerate(corners, 1):
             if len(corner) != 2:
-                problems.append(f"{where}: corner {k}, {corner!r}, is not a pair (xi, eta)")
+                problems.append(
+                    f"{where}: corner {k}, {corner!r}, is not a pair (xi, eta); give two numbers"
+                )
             for number in corner:
                 _number(number, f"{where}, corner {k}", values, problems)
 

@@ -46,7 +46,9 @@ def present_in(module: ModuleType) -> tuple[Quantity, ...]:
 
 def functions(module: ModuleType) -> tuple[str, ...]:
     """Return the functions of an emitted module."""
-    return (*quantities.functions(present_in(module)), "Phi_q_nonzeros")
+    present = present_in(module)
+    matrices = (item.name for item in present if item.is_matrix)
+    return (*quantities.functions(present), *(f"{name}_nonzeros" for name in matrices))
 
 
 def check(module: ModuleType) -> None:

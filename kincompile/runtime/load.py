@@ -31,7 +31,10 @@ _SHARED = "\nclass _Quantity:\n"
 
 
 def load(path: str | os.PathLike[str]) -> ModuleType:
-    """Load an emitted module from its file, and check that it keeps the contract.
+    """Run the file of an emitted module, and check that it keeps the contract.
+
+    The file is a Python program: all of it runs before anything is checked. Load only files that
+    you trust.
 
     The search path, the module cache and the file's folder stay as they are: two files of the same
     name do not disturb each other, and a file that was emitted again a moment ago is read afresh.

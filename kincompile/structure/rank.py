@@ -4,6 +4,11 @@ Counting looks at no length. A parallelogram with a third parallel bar counts as
 moves: on the manifold :math:`\Phi = 0` some rows of Phi_q depend on the others, at every position,
 while at positions that are not assembled they do not. So the rank is taken where it matters: at
 seeded random states that are assembled first, joints alone, so that the drivers choose nothing.
+
+A row may also depend on the others at every state that was found, and yet repeat none: rhombi in a
+chain have components of their manifold on which a loop lies flat, and Phi_q is singular throughout.
+So the mechanism is moved with the independent joints alone. A row that repeats them depends on
+them there as well; one that does not is independent of them, and the states were singular.
 """
 
 from __future__ import annotations
@@ -38,6 +43,15 @@ that shorten the residual by less than a hundredth."""
 DEPENDENT = 1e-6
 """Part of a row that is left when the rows before are taken out of it, below which it depends."""
 
+ASIDE = (0.1, 0.03, 0.01, 1e-3, 1e-4)
+"""How far a state is moved along the tangents of the independent joints, in scales."""
+
+ON_MANIFOLD = 0.25
+"""Part of such a step that assembling the joints may change: else it led to another branch."""
+
+UNSURE = 1e-3
+"""What stands for `DEPENDENT` where no position is settled: each is wrong by the root of that."""
+
 SETTLED = 1e-8
 """Last step, in scales of the coordinates, of a position that is known well enough for a rank:
 at a singular position equations hold to 1e-12 when the position is still wrong by 1e-6."""
@@ -53,7 +67,8 @@ class RankReport:
     Attributes
     ----------
     rank
-        Rank of Phi_q at generic states at which the joints are assembled.
+        Rank of Phi_q at generic states at which the joints are assembled; where all that were found
+        are singular, at states beside them that the independent joints allow.
     redundant
         Rows that depend on rows before them and hold whenever those do.
     conflicting
@@ -176,11 +191,15 @@ class _Analysis:
         chosen = held & settled if (held & settled).any() else held
         order = [*self._joints, *self._drivers]
         if chosen.any():
-            scaled = self._scaled(q[chosen], self._t[chosen])
+            limit = DEPENDENT if settled[chosen].all() else UNSURE
+            matrix = self._beside(q[chosen], self._t[chosen], limit)
         else:  # which joints are too many, if any, shows elsewhere too
-            q, scaled = self._q, self._scaled(self._q[1:], self._t[1:])
-        kept, dependent, matrix = _best(scaled, order)
-        wrong = self._contradictions(q, kept, dependent) if dependent else set()
+            q, matrix = self._q, max(self._scaled(self._q[1:], self._t[1:]), key=_rank)
+        kept, dependent = _split(matrix, order)
+        # A joint that holds at an assembled state, and depends on others beside it, repeats them.
+        repeating = [row for row in dependent if row not in self._drivers and chosen.any()]
+        doubtful = [row for row in dependent if row not in repeating]
+        wrong = self._contradictions(q, kept, doubtful, repeating) if doubtful else set()
         if not chosen.any() and not wrong:
             wrong = set(dependent)
         nearest, together, _ = self._assemble(kept, q[:1], self._t[:1])
@@ -198,14 +217,37 @@ class _Analysis:
             residuals=self._evaluate(nearest, self._t[:1])[0][0],
         )
 
-    def _contradictions(self, q: Array, kept: list[int], dependent: list[int]) -> set[int]:
-        """Return which dependent rows fail where the independent ones hold."""
+    def _beside(self, q: Array, t: Array, limit: float) -> Array:
+        """Return Phi_q at the best of some assembled states, or where it has a larger rank beside.
+
+        There the independent joints hold, and a row that repeats them depends on them, too.
+        """
+        matrices = self._scaled(q, t)
+        best = max(range(len(q)), key=lambda k: _rank_and_gap(matrices[k], limit))
+        kept, dependent = _split(matrices[best], self._joints, limit)
+        if not dependent or len(kept) == matrices.shape[2]:
+            return np.asarray(matrices[best])
+        tangents = np.linalg.svd(matrices[best][kept])[2][len(kept) :]
+        random, lengths = np.random.default_rng(SEED), np.array(ASIDE)[:, np.newaxis]
+        steps = random.uniform(-1, 1, (len(ASIDE), len(tangents))) @ tangents
+        steps *= lengths / np.max(np.abs(steps), axis=1, keepdims=True)
+        times, start = np.full(len(ASIDE), t[best]), q[best] + steps * self._scale
+        moved, held, settled = self._assemble(kept, start, times)
+        near = (np.abs(moved - start) <= ON_MANIFOLD * lengths * self._scale).all(axis=1)
+        beside = self._scaled(moved, times)[held & settled & near]
+        return np.asarray(max([matrices[best], *beside], key=_rank))
+
+    def _contradictions(
+        self, q: Array, kept: list[int], dependent: list[int], repeating: list[int]
+    ) -> set[int]:
+        """Return which dependent rows fail where the independent ones and those repeating hold."""
         found, held, _ = self._assemble(kept, q, self._t)
         if not held.any():  # the drivers lead where the joints cannot follow
             return set(dependent) & set(self._drivers)
-        Phi, _ = self._evaluate(found[held], self._t[held])
+        missed = np.abs(self._evaluate(found[held], self._t[held])[0]) / self._terms
+        on_branch = (missed[:, repeating] <= ASSEMBLED * 10).all(axis=1)
         # The median, for drivers may agree at one time; and a state may be on another branch.
-        missed = np.median(np.abs(Phi) / self._terms, axis=0)
+        missed = np.median(missed[on_branch] if on_branch.any() else missed, axis=0)
         return {row for row in dependent if not missed[row] <= ASSEMBLED * 10}
 
     def _scaled(self, q: Array, t: Array) -> Array:
@@ -271,18 +313,21 @@ def _damped(matrix: Array, Phi: Array, damping: float) -> Array:
     return np.asarray(factors.solve(matrix.T @ Phi), dtype=np.float64)
 
 
-def _best(matrices: Array, order: Sequence[int]) -> tuple[list[int], list[int], Array]:
-    """Return independent and dependent rows at the state of largest rank, and Phi_q there."""
-    best = max(matrices, key=_rank)
-    return (*_split(best, order), best)
-
-
 def _rank(matrix: Array) -> int:
     """Return the rank of a matrix with rows of length one."""
     return int(np.linalg.matrix_rank(matrix, tol=DEPENDENT))
 
 
-def _split(matrix: Array, order: Sequence[int]) -> tuple[list[int], list[int]]:
+def _rank_and_gap(matrix: Array, limit: float) -> tuple[int, float]:
+    """Return the rank of a matrix with rows of length one, and its smallest singular value."""
+    values = np.linalg.svd(matrix, compute_uv=False)
+    rank = int(np.sum(values > limit))
+    return rank, float(values[rank - 1]) if rank else 0.0
+
+
+def _split(
+    matrix: Array, order: Sequence[int], limit: float = DEPENDENT
+) -> tuple[list[int], list[int]]:
     """Take rows in an order; return those independent of the ones before, and the others."""
     basis = np.empty((min(matrix.shape), matrix.shape[1]))
     kept: list[int] = []
@@ -293,7 +338,7 @@ def _split(matrix: Array, order: Sequence[int]) -> tuple[list[int], list[int]]:
         for _ in range(2):  # once more, for the rounding errors of the first time
             rest = rest - known.T @ (known @ rest)
         length = np.linalg.norm(rest)
-        if length > DEPENDENT and len(kept) < len(basis):
+        if length > limit and len(kept) < len(basis):
             basis[len(kept)] = rest / length
             kept.append(row)
         else:

@@ -11,7 +11,7 @@ from kincompile.names import rate
 from kincompile.targets.schedule import Assignment, Scheduler
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
     from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
     from kincompile.ir.program import Program
@@ -120,10 +120,13 @@ def vectors(program: Program) -> dict[str, list[str]]:
     return {**states, "p": parameters}
 
 
-def input_names(program: Program, table: NameTable) -> dict[str, str]:
-    """Return the names of all inputs in a target, by the model's."""
-    names = [name for members in vectors(program).values() for name in members]
-    return {"t": "t", **{name: table.take(name) for name in names}}
+def input_names(
+    program: Program, table: NameTable, read: Container[str] | None = None
+) -> dict[str, str]:
+    """Return the names of the inputs in a target, by the model's: all, or those that are read."""
+    names = (name for members in vectors(program).values() for name in members)
+    own = {name: table.take(name) for name in names if read is None or name in read}
+    return {"t": "t", **own}
 
 
 def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, str]]:

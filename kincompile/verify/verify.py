@@ -24,11 +24,13 @@ from kincompile.errors import RedundantConstraintWarning
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.origins import model_of
-from kincompile.quantities import OF_EQUATIONS
+from kincompile.quantities import OF_EQUATIONS, over
 from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.engine.code import code_of, require_square
 from kincompile.tables import indented, table
 from kincompile.verify.oracles import ORACLES, Oracle
+from kincompile.verify.outputs import LIMIT as LARGEST_ERROR
+from kincompile.verify.outputs import errors_of_outputs
 from kincompile.verify.planned_solve import LIMIT, PlannedSolve
 from kincompile.verify.samples import Samples, samples_of
 
@@ -59,6 +61,8 @@ THE_MODEL = "the model"
 SOLVE, DETERMINANTS, ALL_BLOCKS = "solve", "determinants", "all blocks"
 """What else is compared: the planned solve, equation by equation, and the determinants it gives."""
 
+OF_OUTPUTS = tuple(item.name for item in over({"outputs"}))
+
 LARGEST = 8
 """How many of the largest errors of each quantity stand for all."""
 
@@ -73,7 +77,7 @@ class Check:
         ``"Phi_q"``, ``"nu"`` or ``"gamma"``; ``"Phi"`` for the functions that give Phi with others;
         ``"solve"`` for the planned solve, and ``"determinants"``.
     equation
-        Name of the equation; of determinants ``"all blocks"``.
+        Name of the equation, or of the output; of determinants ``"all blocks"``.
     coordinate
         Of Phi_q, the coordinate of the entry with the largest error; else "".
     oracle
@@ -153,7 +157,7 @@ class Verification:
         if len(self.checks) <= len(ORACLES) * ALL_SHOWN:
             return list(self.checks)
         shown: set[Check] = {check for check in self.checks if not check.passed}
-        for quantity in (*ORACLES, SOLVE):
+        for quantity in (*ORACLES, SOLVE, *OF_OUTPUTS):
             own = [check for check in self.checks if check.quantity == quantity]
             shown |= set(sorted(own, key=lambda check: -check.error)[:LARGEST])
         return [check for check in self.checks if check in shown]
@@ -209,7 +213,11 @@ def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
     require_square(code_of(module))
     with np.errstate(all="ignore"):
         samples = samples_of(module)
-        checks = (*_checks(samples), *_checks_of_solve(samples))
+        checks = (
+            *_checks(samples),
+            *_checks_of_solve(samples),
+            *_checks_of_outputs(samples),
+        )
     states = len(samples.q) - samples.assembled, samples.assembled
     return Verification(module.NAME, states, checks)
 
@@ -266,6 +274,15 @@ def _checks_of_solve(samples: Samples) -> Iterator[Check]:
     if plan.has_blocks:
         error = plan.error_of_determinants()
         yield Check(DETERMINANTS, ALL_BLOCKS, "", oracle, error, error <= LIMIT)
+
+
+def _checks_of_outputs(samples: Samples) -> Iterator[Check]:
+    """Yield the checks of the derivatives of outputs, if there are any."""
+    if not hasattr(samples.module, "OUTPUTS"):
+        return
+    for quantity, output, coordinate, error in errors_of_outputs(samples, model_of(samples.module)):
+        oracle = THE_MODEL if quantity == "outputs" else "differences"
+        yield Check(quantity, output, coordinate, oracle, error, error <= LARGEST_ERROR)
 
 
 def _judged(

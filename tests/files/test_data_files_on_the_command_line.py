@@ -81,10 +81,10 @@ def test_that_a_folder_and_a_file_without_permission_are_refused(tmp_path, monke
     (tmp_path / "folder.toml").mkdir()
     assert "it is a folder; give a file in it" in run("run", tmp_path / "folder.toml").stderr
 
-    def denied(self, mode):
+    def denied(path, flags):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", denied)
+    monkeypatch.setattr("kincompile.files.content.os.open", denied)
     done = run("run", FOUR_BAR)
     assert (done.exit_code, "four_bar.toml: Permission denied; check" in done.stderr) == (2, True)
 

@@ -22,7 +22,7 @@ def test_that_the_example_swings(tmp_path):
 
 
 def test_that_each_table_has_its_fields():
-    for table in ("model", "analysis", "parameter", "body", "coordinate"):
+    for table in ("model", "analysis", "parameter", "body", "coordinate", "point", "output"):
         for field in FIELDS[table]:
             assert f"`{field}`" in PAGE
 

@@ -181,7 +181,12 @@ def test_that_the_other_format_with_the_same_ending_is_recognised(tmp_path, text
         ('{"tend": "1", "outputSteps": 3}', "line 1: tend: expected a number, not '1'"),
         ('{"tend": 1,\n"outputSteps": 2.5}', "line 2: outputSteps: expected a whole number"),
         ('{"tend": 1, "stepSize": 1e-9}', "line 1: stepSize: this is more than"),
-        ('{"tend": 1, "outputSteps": 3,\n"simulation": "equilibrium"}', "line 2: simulation: only"),
+        (
+            '{"tend": 1, "outputSteps": 3,\n"simulation": "equilibrium"}',
+            "line 2: simulation: there is no",
+        ),
+        ('{"tend": 1, "outputSteps": 3,\n"simulation": 3}', "line 2: simulation: there is no"),
+        ('{"tend": 1, "outputSteps": 3,\n"Tend": 3}', "line 2: the key 'tend' is given a second"),
         ("[1]", "line 1: expected an object, not a list"),
     ],
 )
@@ -197,7 +202,51 @@ def test_that_steps_of_a_size_make_a_grid(tmp_path, caplog):
     path = tmp_path / "a.acf"
     path.write_text('{"simulation": "dynamics", "tend": 2, "stepSize": 0.5}', encoding="utf-8")
     assert kc.read_analysis(path).points == 5
-    assert "dynamics is asked for; the kinematics is solved" in caplog.text
+    assert "Dynamics is asked for; its times are read, and the kinematics is solved" in caplog.text
+
+
+# The six .acf files of rserban/simEngine2D, folder Models.
+COURSE = {
+    "dynamics": ("Dynamics", 10.0, 0.001, 1000), "finalExam": ("Dynamics", 4.0, 0.005, 400),
+    "kinematics": ("Kinematics", 5.0, 0.01, 500), "project1": ("Kinematics", 5.0, 0.01, 300),
+    "project2": ("Dynamics", 1.0, 0.001, 500), "shurikenCatapult": ("Kinematics", 5.0, 0.01, 500),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", [str, str.lower, str.upper, str.swapcase])
+@pytest.mark.parametrize("name", COURSE)
+def test_that_the_analyses_of_the_course_are_read_in_any_case(tmp_path, caplog, name, change):
+    kind, end, step, count = COURSE[name]
+    keys = [change(key) for key in ("simulation", "tend", "stepSize", "outputSteps")]
+    content = dict(zip(keys, (change(kind), end, step, count), strict=True))
+    path = tmp_path / f"{name}.acf"
+    path.write_text(json.dumps(content, indent="\t"), encoding="utf-8")
+    settings = kc.read_analysis(path)
+    assert (settings.end, settings.points) == (end, count + 1)
+    assert ("without masses and forces" in caplog.text) == (kind == "Dynamics")
+
+
+@pytest.mark.parametrize("word", ["inverse dynamics", "Inverse-Dynamics", "INVERSE_DYNAMICS"])
+def test_that_inverse_dynamics_has_times_too(tmp_path, caplog, word):
+    path = tmp_path / "a.acf"
+    path.write_text(f'{{"simulation": "{word}", "tend": 1, "outputSteps": 2}}', encoding="utf-8")
+    assert kc.read_analysis(path).points == 3
+    assert "InverseDynamics is asked for" in caplog.text
+
+
+@pytest.mark.parametrize("change", [str.lower, str.upper, str.swapcase])
+def test_that_types_and_keys_of_a_model_are_read_in_any_case(change):
+    text = ADM
+    for word in (
+        "bodies", "constraints", "id", "q0", "type", "body1", "sP1", "vP1", "body2", "sP2", "vP2",
+        "fun", "RevoluteJoint", "TranslationalJoint", "AbsoluteAngle", "RelativeDistance",
+    ):  # fmt: skip
+        text = text.replace(f'"{word}"', f'"{change(word)}"')
+    assert text != ADM
+    changed, usual = (read_adm(Path("arm.adm"), item.encode()) for item in (text, ADM))
+    assert changed.to_toml() == usual.to_toml()
+    with pytest.raises(kc.ModelError, match=r"line 8: constraint 'pin', sP1, entry 1: nan"):
+        read_adm(Path("arm.adm"), text.replace("[-1, 0]", "[NaN, 0]").encode())
 
 
 def test_that_an_analysis_is_an_acf_file(tmp_path):

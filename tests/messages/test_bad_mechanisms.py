@@ -112,7 +112,7 @@ BAD = {
     "coordinate": (revolute((crank_x, 0)), "point_i: x_crank depends on x_crank; an attribute is"),
     "undeclared": (
         revolute((sympy.Symbol("LL"), 0)),
-        r"Revolute 'A', point_i contains LL, which nobody declared; did you mean 'L'\?; declare it "
+        r"Revolute 'A', point_i contains LL, which is not declared; did you mean 'L'\?; declare it "
         "as a parameter or use one of: L, phi_crank",
     ),
     "zero axis": (
@@ -137,8 +137,8 @@ BAD = {
         "AbsoluteAngle 'motor', angle: the value phi_crank . t depends on phi_crank; a driver is a "
         "function of t and parameters only; write a coordinate-dependent condition as an Equation",
     ),
-    "nobody's symbol": (driver(sympy.Symbol("omega") * t), "angle contains omega, which nobody"),
-    "undefined function": (driver(f(t)), "angle contains f, which nobody declared"),
+    "nobody's symbol": (driver(sympy.Symbol("omega") * t), "angle contains omega, which is not"),
+    "undefined function": (driver(f(t)), "angle contains f, which is not declared"),
     "function of another": (driver(f(L)), r"angle: the function f\(L\) is not defined; give it"),
     "rate": (
         driver(dynamicsymbols("s").diff(t)),
@@ -189,9 +189,9 @@ BAD = {
         r"\(angles, radii\)",
     ),
     "pairs": (profile([(0, 1), (1, 1), (2, 1)]), r"profile: \[\(0, 1\), .* nor a table"),
-    "profile of time": (profile(1 + t**2), "profile contains t, which nobody declared"),
-    "profile of a coordinate": (profile(1 + crank_phi), "profile contains phi_crank, which nobody"),
-    "profile of two": (profile(x * sympy.Symbol("y")), "profile contains x, y, which nobody"),
+    "profile of time": (profile(1 + t**2), "profile contains t, which is not declared"),
+    "profile of a coordinate": (profile(1 + crank_phi), "profile contains phi_crank, which is"),
+    "profile of two": (profile(x * sympy.Symbol("y")), "profile contains x, y, which are"),
     "profile with a kink": (profile(1 + sympy.Abs(alpha)), r"Abs\(alpha\) has no continuous"),
     "profile of numbers": (
         profile(np.cos),

@@ -94,11 +94,13 @@ def in_module(module, states):
     return {name: getattr(module, name)(*states) for name in NAMES}
 
 
-@pytest.mark.parametrize("target", ["numpy", "c"])
+@pytest.mark.parametrize(
+    ("target", "form"), [("numpy", "inline"), ("numpy", "grouped"), ("c", "inline")]
+)
 def test_that_outputs_and_their_rates_are_what_sympy_derives(
-    target, model, states, expected, quick_compiler
+    target, form, model, states, expected, quick_compiler
 ):
-    module = kc.compile(model, target=target)
+    module = kc.compile(model, target=target, form=form)
     assert_same(in_module(module, states), expected)
     together = module.observe(*states)
     for name, found in zip(NAMES, together, strict=False):

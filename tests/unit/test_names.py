@@ -1,7 +1,13 @@
-"""Naming rules."""
+"""Naming rules, and names in messages."""
+
+from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+import kincompile as kc
+from kincompile.cli import cli
+from kincompile.errors import InputError, ModelError
 from kincompile.model.bodies import Body
 from kincompile.names import (
     listed,
@@ -54,3 +60,36 @@ def test_that_a_long_list_is_cut() -> None:
 def test_that_a_close_name_is_suggested() -> None:
     assert suggestion("crnk", ["rod", "crank"]) == "; did you mean 'crank'?"
     assert suggestion("wheel", ["rod", "crank"]) == ""
+
+
+TOML = 'kincompile = 1\nname = "m"\n'
+HOSTILE = "\x1b]0;pwned\x07\u202e\u2028"
+
+
+def test_that_a_message_holds_no_command_of_a_terminal(tmp_path: Path) -> None:
+    files = {
+        "key.toml": TOML + '"\\u001b]0;pwned\\u0007\\u202E" = 1\n',
+        "key.json": '{"kincompile": 1, "name": "m", "constraints": [{"\\u001b]0;p\\u0007": 1}]}',
+        "twice.json": '{"\\u001b]0;p\\u0007": 1, "\\u001b]0;p\\u0007": 2}',
+        "name.toml": TOML.replace('"m"', '"\\u001b]0;pwned\\u0007"'),
+        "unit.toml": TOML + 'length_unit = "\\u001b]0;pwned\\u0007"\n',
+        "deep.toml": TOML + '"\\u001b".a.b.c.d.e = 1\n',
+        f"path{HOSTILE}.toml": "a = ",
+        f"path{HOSTILE}.py": "import nothing_of_this_name",
+    }
+    for name, content in files.items():
+        path = tmp_path / name
+        path.write_text(content, encoding="utf-8")
+        with pytest.raises(ModelError) as caught:
+            kc.read_model(path)
+        assert all(ch.isprintable() or ch == "\n" for ch in str(caught.value)), name
+        done = CliRunner().invoke(cli, ["inspect", str(path)])
+        assert done.exit_code == 2
+        assert all(ch.isprintable() or ch == "\n" for ch in done.output), name
+    with pytest.raises(InputError, match=r"\\x1b\]0;pwned\\x07\\u202e\\u2028"):
+        kc.read(tmp_path / f"missing{HOSTILE}.toml")
+
+
+def test_that_a_name_has_a_length() -> None:
+    assert name_problem("a" * 100, "a body") is None
+    assert "has 101 characters" in str(name_problem("a" * 101, "a body"))

@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 PLACE = "_code"
 """Where a module keeps its `Code`."""
 
+JOINT_POINTS = "_joint_points"
+"""Where a module keeps the function that compiles the points of its joints, on request."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LaneFunctions:

@@ -1,9 +1,13 @@
 """A C library built with the machine's own compiler, once, and kept in the user's cache.
 
 A library is named by a digest of all that decides its bytes: source, flags, compiler and processor.
-Beside it lies the digest of its own bytes. It is built in a folder of its own and moved into place
-in one step once it was loaded, and what does not agree with its digest is never loaded but
-built again: so neither a crash nor a second process that builds the same does any harm.
+Beside it lies the digest of its own bytes. That finds damage; it does not protect from anyone who
+can write there. So the cache is its user's alone: folders have mode 0700 and files 0600, whatever
+the umask; a link, and what another user owns or may write to, is not used.
+
+A library is built in a folder of its own and moved into place in one step once it was loaded, and
+what does not agree with its digest is never loaded but built again: so neither a crash nor a second
+process that builds the same does any harm.
 """
 
 from __future__ import annotations
@@ -14,19 +18,22 @@ import os
 import platform
 import shlex
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
+import warnings
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kincompile.errors import InputError, UnsupportedError
+from kincompile.errors import InputError, KincompileWarning, UnsupportedError
+from kincompile.names import escaped
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
 COMPILERS = ("cc", "gcc", "clang")
 """Compilers that are looked for where the environment variable CC names none."""
@@ -71,17 +78,19 @@ def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDL
     digest = hashlib.sha256()
     for part in (*command, _version(command[0]), _processor(), *files, *files.values()):
         digest.update(part.encode() + b"\0")
-    kept = _cache_folder() / f"{name}-{digest.hexdigest()[:32]}.so"
-    if _is_intact(kept):
+    folder = _own_folder(_cache_folder())
+    kept = None if folder is None else folder / f"{name}-{digest.hexdigest()[:32]}.so"
+    if kept is not None and _is_intact(kept):
         # One that cannot be loaded, from a folder without leave to run code, is built elsewhere.
         with suppress(UnsupportedError):
             return _loaded(kept, name, fingerprint)
     try:
-        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            built = _built(command, Path(folder), files)
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as temporary:
+            built = _built(command, Path(temporary), files)
             _try(built, name)
             loaded = _loaded(built, name, fingerprint)
-            _keep(built.read_bytes(), kept)
+            if kept is not None:
+                _keep(built.read_bytes(), kept)
             return loaded
     except OSError as error:
         raise UnsupportedError(
@@ -136,8 +145,40 @@ def _cache_folder() -> Path:
     return user_cache_path("kincompile") / "native"
 
 
+def _own_folder(folder: Path) -> Path | None:
+    """Return the cache if it is its user's alone, None where it is not; it may not exist yet."""
+    for path in (folder.parent, folder):
+        if reason := _distrust(path, stat.S_ISDIR):
+            warnings.warn(
+                f"the cache of compiled libraries {escaped(path)} is not used: {reason}; C code is "
+                "built each time. Remove it, or make it a folder that only you can write "
+                "to (chmod 700)",
+                KincompileWarning,
+                stacklevel=2,
+            )
+            return None
+    return folder
+
+
+def _distrust(path: Path, is_kind: Callable[[int], bool]) -> str:
+    """Return why a file or folder of the cache could be the work of another user, "" if not."""
+    try:
+        found = path.lstat()
+    except OSError:  # it is not there, or cannot be reached: then nothing is loaded from it
+        return ""
+    if stat.S_ISLNK(found.st_mode):
+        return "it is a link"
+    if not is_kind(found.st_mode):
+        return ""
+    if hasattr(os, "geteuid") and found.st_uid != os.geteuid():
+        return "it belongs to another user"
+    return "others may write to it" if found.st_mode & 0o022 else ""
+
+
 def _is_intact(path: Path) -> bool:
-    """Return whether a library is there and has the bytes it was kept with."""
+    """Return whether a library is there, is the user's own and has the bytes it was kept with."""
+    if any(_distrust(item, stat.S_ISREG) for item in (path, _checksum(path))):
+        return False
     with suppress(OSError):
         return _checksum(path).read_text(encoding="ascii") == _digest(path.read_bytes())
     return False
@@ -147,9 +188,12 @@ def _keep(library: bytes, path: Path) -> None:
     """Put a library into the cache."""
     # A cache that cannot be written to, or is full, is no obstacle.
     with suppress(OSError, InputError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, library)
-        write_atomically(_checksum(path), _digest(library))
+        for folder in reversed(path.parents):
+            if not folder.exists():
+                folder.mkdir(exist_ok=True)
+                folder.chmod(0o700)
+        write_atomically(path, library, is_private=True)
+        write_atomically(_checksum(path), _digest(library), is_private=True)
 
 
 def _checksum(path: Path) -> Path:

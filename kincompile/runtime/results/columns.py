@@ -52,6 +52,33 @@ def rate_unit(unit: str, order: int) -> str:
     return f"{unit}{('', '/s', '/s^2')[order]}" if unit else ""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Observed:
+    """Outputs and their rates over a time grid of N points.
+
+    Attributes
+    ----------
+    names
+        Names of the k outputs.
+    units
+        Unit of each, by name.
+    y, y_dot, y_ddot : ndarray, shape (N, k)
+        Values and time derivatives; NaN where the motion was not found, or where a derivative would
+        need the third one of q. Of B variants they have a leading axis of length B.
+    """
+
+    names: tuple[str, ...]
+    units: dict[str, str]
+    y: NDArray[np.float64]
+    y_dot: NDArray[np.float64]
+    y_ddot: NDArray[np.float64]
+
+    def column(self, name: str, order: int) -> Column:
+        """Return an output, its rate or its second rate."""
+        values = (self.y, self.y_dot, self.y_ddot)[order][..., self.names.index(name)]
+        return Column(rate(name, order), rate_unit(self.units[name], order), values)
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MotionTable:
     """The part of a solution that tables, files and plots show; `Solution` has the attributes."""
@@ -68,8 +95,23 @@ class MotionTable:
     units: dict[str, str]
     events: list[Event]
 
+    @property
+    def observed(self) -> Observed:
+        """The outputs over the motion."""
+        raise NotImplementedError
+
+    @property
+    def joints(self) -> Observed:
+        """The points of joints over the motion."""
+        raise NotImplementedError
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all that has a column: the coordinates, then the outputs."""
+        return (*self.coordinates, *self.observed.names)
+
     def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """Return the values of a coordinate, its rate or its second rate, shape (N,).
+        """Return the values of a coordinate or output, its rate or second rate, shape (N,).
 
         Raises
         ------
@@ -79,7 +121,7 @@ class MotionTable:
         return self.column(name).values
 
     def column(self, name: str) -> Column:
-        """Return a coordinate, its rate or its second rate: name, unit and values.
+        """Return a coordinate or output, its rate or its second rate: name, unit and values.
 
         Raises
         ------
@@ -89,20 +131,25 @@ class MotionTable:
         wanted = column_name(str(name))
         for order in range(3):
             stem = wanted.removesuffix(rate("", order))
-            if stem in self.coordinates and rate(stem, order) == wanted:
-                return self._column(self.coordinates.index(stem), order)
+            if stem in self.names and rate(stem, order) == wanted:
+                return self._column(self.names.index(stem), order)
+            if wanted != name and rate(stem, order) == wanted and stem in self.joints.names:
+                return self.joints.column(stem, order)
         near = suggestion(wanted, (column.name for column in self.columns())) or "."
+        outputs = f", the outputs {listed(self.observed.names)}" if self.observed.names else ""
         raise InputError(
             f"{self.name} has no column {name!r}{near} The coordinates are "
-            f"{listed(self.coordinates)}; add _dot or _ddot for the rates."
+            f"{listed(self.coordinates)}{outputs}; add _dot or _ddot for the rates."
         )
 
     def columns(self) -> list[Column]:
-        """Return the coordinates, then their rates, then their second rates."""
-        return [self._column(k, order) for order in range(3) for k in range(len(self.coordinates))]
+        """Return the coordinates and outputs, then their rates, then their second rates."""
+        return [self._column(k, order) for order in range(3) for k in range(len(self.names))]
 
     def _column(self, k: int, order: int) -> Column:
-        name = self.coordinates[k]
+        name = self.names[k]
+        if k >= len(self.coordinates):
+            return self.observed.column(name, order)
         values = (self.q, self.q_dot, self.q_ddot)[order][..., k]
         return Column(rate(name, order), rate_unit(self.units.get(name, ""), order), values)
 

@@ -51,8 +51,8 @@ def solution_html(solution: MotionTable) -> str:
     ends = (0, -1) if solution.q.ndim == 2 else ()
     header = ("coordinate", "unit", *(f"t = {t[k]:g}" for k in ends), "smallest", "largest")
     rows: list[tuple[str, ...]] = []
-    for k, name in enumerate(solution.coordinates):
-        values = solution.q[..., k].ravel()
+    for name in solution.names:
+        values = solution.column(name).values.ravel()
         numbers = (*values[list(ends)], *_extremes(values))
         rows.append((name, solution.units.get(name, ""), *(f"{x:.6g}" for x in numbers)))
     return _first_rows(solution.name, title, header, rows)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.html import picture_html
-from kincompile.runtime.results.columns import MotionTable
+from kincompile.runtime.engine.code import JOINT_POINTS
+from kincompile.runtime.results.columns import MotionTable, Observed
 from kincompile.runtime.results.html import solution_html
+from kincompile.runtime.results.observed import observed
 from kincompile.runtime.results.plot import plot_columns, plot_html
 from kincompile.runtime.singular.branches import counted_signatures, signatures
 from kincompile.runtime.singular.condition import conditions
@@ -75,6 +77,38 @@ class Solution(MotionTable):
     parameters: dict[str, Any]
     statistics: dict[str, int]
     module: ModuleType | None
+    _observed: dict[str, Observed] = field(default_factory=dict)
+
+    @property
+    def observed(self) -> Observed:
+        """The outputs and their rates; evaluated on first access."""
+        if "outputs" not in self._observed:
+            self._observed["outputs"] = self._over_motion(self._require_module("its outputs"))
+        return self._observed["outputs"]
+
+    @property
+    def joints(self) -> Observed:
+        """The points of the joints, as outputs ``x_<joint>`` and ``y_<joint>``, on request."""
+        if JOINT_POINTS not in self._observed:
+            module = self._require_module("its joints")
+            compiled = vars(module).get(JOINT_POINTS)
+            own = module if compiled is None else compiled()
+            self._observed[JOINT_POINTS] = self._over_motion(own)
+        return self._observed[JOINT_POINTS]
+
+    def _over_motion(self, module: ModuleType) -> Observed:
+        p = np.array(list(self.parameters.values()), dtype=np.float64).T
+        if self.q.ndim > 2 and not p.size:
+            p = np.zeros((len(self.q), 0))
+        return observed(module, (self.q, self.q_dot, self.q_ddot), self.t, p)
+
+    def _require_module(self, wanted: str) -> ModuleType:
+        if self.module is None:
+            raise InputError(
+                f"this Solution of {self.name} was pickled, and the compiled module was not: read "
+                f"{wanted} before pickling, or solve again."
+            )
+        return self.module
 
     @property
     def condition(self) -> NDArray[np.float64]:
@@ -99,21 +133,20 @@ class Solution(MotionTable):
 
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
         """Return a function of module, q, t and p for the motion, or for that of each variant."""
-        if self.module is None:
-            raise InputError(
-                f"this Solution of {self.name} was pickled, and the compiled module was not: read "
-                ".condition and .branch before pickling, or solve again."
-            )
+        module = self._require_module(".condition and .branch")
         p = np.array(list(self.parameters.values()), dtype=np.float64)
         if self.q.ndim == 2:
-            return function(self.module, self.q, self.t, p)
+            return function(module, self.q, self.t, p)
         sets = p.T if p.size else np.zeros((len(self.q), 0))
         variants = zip(self.q, sets, strict=True)
-        return np.array([function(self.module, q, self.t, one) for q, one in variants])
+        return np.array([function(module, q, self.t, one) for q, one in variants])
 
     def __getstate__(self) -> list[Any]:
-        """Return everything but the module, which cannot be pickled."""
-        return [getattr(self, item.name) for item in fields(self)[:-1]] + [None]
+        """Return everything but the module, which cannot be pickled; outputs are evaluated now."""
+        if self.module is not None:
+            _ = self.observed
+        given = {item.name: getattr(self, item.name) for item in fields(self)}
+        return list((given | {"module": None}).values())
 
     def __setstate__(self, state: list[Any]) -> None:
         """Restore the attributes that `__getstate__` returned."""

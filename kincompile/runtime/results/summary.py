@@ -21,7 +21,7 @@ _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 
 
 def summary(solution: Solution) -> str:
-    """Return a table with the extremes of every coordinate, and a line on how the solving went.
+    """Return the extremes of every coordinate and output, and a line on how the solving went.
 
     Parameters
     ----------
@@ -35,13 +35,25 @@ def summary(solution: Solution) -> str:
         absolute values of its first and second derivative [unit/s, unit/s^2]; then the points by
         status, the Newton iterations and the largest residual.
     """
-    motion = [_without_noise(values).T for values in (solution.q, solution.q_dot, solution.q_ddot)]
+    own = solution.observed
+    motion = solution.q, solution.q_dot, solution.q_ddot
+    lines = _table("coordinate", solution, solution.coordinates, motion)
+    if own.names:
+        lines += ["", *_table("output", solution, own.names, (own.y, own.y_dot, own.y_ddot))]
+    return "\n".join([*lines, "", _verdict(solution)])
+
+
+def _table(
+    kind: str, solution: Solution, names: tuple[str, ...], motion: tuple[NDArray[np.float64], ...]
+) -> list[str]:
+    """Return the lines of the table of coordinates or outputs."""
+    shown = [_without_noise(values).T for values in motion]
     rows = [
         [name, solution.units[name], *_extremes(solution.t, q), _largest(q_dot), _largest(q_ddot)]
-        for name, q, q_dot, q_ddot in zip(solution.coordinates, *motion, strict=True)
+        for name, q, q_dot, q_ddot in zip(names, *shown, strict=True)
     ]
-    header = ("coordinate", "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
-    return "\n".join([*table(header, rows, right=_NUMBERS), "", _verdict(solution)])
+    header = (kind, "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
+    return table(header, rows, right=_NUMBERS)
 
 
 def _without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -36,8 +36,8 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
     solution : Solution
         The solution, complete or partial.
     path : path-like
-        ``.csv``: one row per point, with the columns t, the coordinates, their first and second
-        derivatives, status, residual; the header has names and units, such as ``x_rod [m]``.
+        ``.csv``: one row per point, with the columns t, the coordinates and outputs, their first
+        and second derivatives, status, residual; the header has names and units: ``x_rod [m]``.
         ``.npz``: the arrays and names of the solution for `numpy.load`. ``.json``: the same as
         text, null where a number was not found.
 
@@ -85,11 +85,12 @@ def _npz(solution: Solution) -> bytes:
     """Return the arrays, with names as arrays of text, so that nothing needs to be unpickled."""
     text = {
         "coordinates": solution.coordinates,
+        **({"outputs": solution.observed.names} if solution.observed.names else {}),
         "equations": solution.equations,
         "units": [solution.units[name] for name in solution.coordinates],
         "parameters": list(solution.parameters),
     }
-    arrays = {name: getattr(solution, name) for name in ARRAYS}
+    arrays = {name: getattr(solution, name) for name in ARRAYS} | _outputs(solution)
     arrays |= {name: np.array(getattr(solution, name)) for name in ("success", "message", "name")}
     arrays |= {name: np.array(names, dtype=np.str_) for name, names in text.items()}
     arrays["parameter_values"] = np.array(list(solution.parameters.values()), dtype=np.float64)
@@ -98,15 +99,24 @@ def _npz(solution: Solution) -> bytes:
     return buffer.getvalue()
 
 
+def _outputs(solution: Solution) -> dict[str, NDArray[np.float64]]:
+    """Return the arrays of outputs, where there are any."""
+    own = solution.observed
+    return {name: getattr(own, name) for name in ("y", "y_dot", "y_ddot")} if own.names else {}
+
+
 def _json(solution: Solution) -> str:
     """Return the document."""
     names = ("name", "success", "message", "coordinates", "equations", "units")
     document = {name: getattr(solution, name) for name in names}
+    if solution.observed.names:
+        document["outputs"] = solution.observed.names
     document |= {
         "parameters": {k: np.asarray(v).tolist() for k, v in solution.parameters.items()},
         "statuses": {str(int(status)): status.sentence for status in Status},
     }
-    document |= {name: _nullable(getattr(solution, name)) for name in ARRAYS}
+    arrays = {name: getattr(solution, name) for name in ARRAYS} | _outputs(solution)
+    document |= {name: _nullable(values) for name, values in arrays.items()}
     return json.dumps(document, allow_nan=False, ensure_ascii=False) + "\n"
 
 

@@ -49,7 +49,7 @@ KEYWORDS = (
 RESERVED: tuple[str, ...] = (
     *KEYWORDS, "at", "lane", "t", "far", "exact", "F", "right", "to", "PI", "LANES",
     "square", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
-    *ELEMENTARY,
+    "fabs", "fmax", *ELEMENTARY,
 )  # fmt: skip
 """Names that the functions of a mechanism use."""
 

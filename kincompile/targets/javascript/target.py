@@ -38,16 +38,29 @@ KEYWORDS = (
 )  # fmt: skip
 """Words of the language, and names that it does not let be declared."""
 
+STANDARD = (
+    "AggregateError", "Array", "ArrayBuffer", "Atomics", "BigInt", "BigInt64Array",
+    "BigUint64Array", "Boolean", "DataView", "Date", "Error", "EvalError", "FinalizationRegistry",
+    "Float32Array", "Float64Array", "Function", "Infinity", "Int16Array", "Int32Array",
+    "Int8Array", "Intl", "Iterator", "JSON", "Map", "Math", "NaN", "Number", "Object", "Promise",
+    "Proxy", "RangeError", "ReferenceError", "Reflect", "RegExp", "Set", "SharedArrayBuffer",
+    "String", "Symbol", "SyntaxError", "TypeError", "URIError", "Uint16Array", "Uint32Array",
+    "Uint8Array", "Uint8ClampedArray", "WeakMap", "WeakRef", "WeakSet", "WebAssembly",
+    "decodeURI", "decodeURIComponent", "encodeURI", "encodeURIComponent", "escape", "eval",
+    "globalThis", "isFinite", "isNaN", "parseFloat", "parseInt", "undefined", "unescape",
+)  # fmt: skip
+"""What the language brings along; a constant of such a name would hide it."""
+
 RESERVED: tuple[str, ...] = (
-    *KEYWORDS, *quantities.singles(quantities.QUANTITIES), "q", "q_dot", "q_ddot", "t", "p",
-    "Array", "Math", "require_length", "square", "spline", "DEFAULTS", "N_COORDINATES",
+    *KEYWORDS, *STANDARD, *quantities.singles(quantities.QUANTITIES), "q", "q_dot", "q_ddot", "t",
+    "p", "require_length", "square", "spline", "DEFAULTS", "N_COORDINATES", "N_EQUATIONS",
 )  # fmt: skip
 """Names that the functions use."""
 
 TAKEN_BY_ENVIRONMENT = (
-    "document", "exports", "location", "module", "require", "top", "window",
+    *STANDARD, "console", "document", "exports", "location", "module", "require", "top", "window",
 )  # fmt: skip
-"""Names that a page or node does not let a script declare."""
+"""Names that a page or node does not let a script declare, or needs itself."""
 
 
 def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.errors import UnsupportedError
+from kincompile.ir.graph import pruned
 from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
 from kincompile.quantities import FORMAT, kernels
 from kincompile.targets.evaluators import input_names, inputs_read, schedule
@@ -35,172 +35,200 @@ from kincompile.targets.target import Emitted
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from kincompile.ir.grouping import Group, GroupedProgram
+    from kincompile.ir.graph import Node
+    from kincompile.ir.grouping import FrameGroup, Group, GroupedProgram
     from kincompile.ir.program import Program
+    from kincompile.quantities import Quantity
+    from kincompile.targets.evaluators import Listing
 
 
 def emit_grouped(grouped: GroupedProgram) -> Emitted:
     """Return a program as a NumPy module with a companion file of arrays."""
-    program = grouped.program
-    arrays: dict[str, NDArray[Any]] = {
-        "numbers": grouped.numbers,
-        "angles": np.array(grouped.angles, dtype=np.intp),
-    }
-    rows, columns, constants, order = pattern_of(grouped)
-    arrays["pattern"] = np.stack((rows, columns), axis=1)
-    arrays["constants"] = np.nan_to_num(constants)
-    arrays["coordinates"] = _text([item.name for item in program.coordinates])
-    arrays["units"] = _text([item.unit for item in program.coordinates])
-    arrays["equations"] = _text(program.equations)
-    for name, spline in program.tables.items():
-        arrays[f"{name}.breaks"] = np.array(spline.breaks)
-        arrays[f"{name}.coefficients"] = np.array(spline.coefficients)
-    arrays["bodies"] = _text([body.name for body in program.bodies])
-    columns_of = [(body.columns.start, len(body.columns)) for body in program.bodies]
-    arrays["body_columns"] = np.array(columns_of, dtype=np.intp).reshape(-1, 2)
-    arrays["guess"] = np.array([item.guess for item in program.coordinates])
-    code: list[str] = []
-    called: set[str] = set()
-    tables = [_group_code(item, grouped, arrays, code, called) for item in grouped.groups]
-    _entry_numbers(grouped, order, arrays)
-    code += ["", "", *_values_code(grouped, called)]
-    stages = plan_solving(program, rows, columns, constants)
-    arrays |= solving_arrays(stages)
-    code += solving_code(stages, program)
-    source = fill(
-        "numpy/grouped.py.jinja",
-        _data(grouped, code, tables, solving_table(stages), sorted(called), len(rows)),
-    )
-    files = {f"{program.name}.py": source}
+    program, module = grouped.program, _Module(grouped)
+    for quantity in program.quantities:
+        module.add_places(quantity)
+    groups = [line for item in grouped.groups for line in module.group(item)]
+    frames = [module.frames(item) for item in grouped.frames]
+    module.code += ["", "", *module.values()]
+    pattern, varies = module.arrays["pattern"], module.varies
+    constants = np.where(varies, np.nan, module.arrays["constants"])
+    stages = plan_solving(program, pattern[:, 0], pattern[:, 1], constants)
+    module.code += solving_code(stages, program)
+    data = _data(module, frames, groups, solving_table(stages))
+    arrays = _constants(program) | module.arrays | solving_arrays(stages)
+    files = {f"{program.name}.py": fill("numpy/grouped.py.jinja", data)}
     return Emitted(program.name, files, _small(arrays), program.unsolvable)
 
 
-def pattern_of(
-    grouped: GroupedProgram,
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp]]:
-    """Return rows, columns and constants of Phi_q row by row, and the order of its entries."""
-    rows, columns, constants = [], [], []
-    for item in grouped.groups:
-        for row, column, node in item.outputs["Phi_q"]:
-            value = item.number(node)
-            rows.append(item.rows + row)
-            columns.append(item.columns[:, column])
-            constants.append(np.full(item.rows.size, np.nan if value is None else float(value)))
-    found = [np.concatenate(parts) for parts in (rows, columns, constants)]
-    order = np.lexsort((found[1], found[0]))
-    return found[0][order], found[1][order], found[2][order], order
+def _constants(program: Program) -> dict[str, NDArray[Any]]:
+    """Return names and numbers of the mechanism, as arrays."""
+    columns_of = [(body.columns.start, len(body.columns)) for body in program.bodies]
+    arrays: dict[str, NDArray[Any]] = {
+        "coordinates": _text([item.name for item in program.coordinates]),
+        "units": _text([item.unit for item in program.coordinates]),
+        "equations": _text(program.equations),
+        "bodies": _text([body.name for body in program.bodies]),
+        "body_columns": np.array(columns_of, dtype=np.intp).reshape(-1, 2),
+        "guess": np.array([item.guess for item in program.coordinates]),
+    }
+    for name, spline in program.tables.items():
+        arrays[f"{name}.breaks"] = np.array(spline.breaks)
+        arrays[f"{name}.coefficients"] = np.array(spline.coefficients)
+    return arrays
 
 
-def _entry_numbers(
-    grouped: GroupedProgram, order: NDArray[np.intp], arrays: dict[str, NDArray[Any]]
-) -> None:
-    """Write down where each group's varying entries of Phi_q stand in the pattern."""
-    place = np.empty(order.size, dtype=np.intp)
-    place[order] = np.arange(order.size)
-    start = 0
-    for item in grouped.groups:
-        count = item.rows.size
-        kept = []
-        for _, _, node in item.outputs["Phi_q"]:
-            if item.number(node) is None:
-                kept.append(place[start : start + count])
-            start += count
-        arrays[f"{item.name}.entries"] = np.array(kept, dtype=np.intp).reshape(-1, count)
+class _Module:
+    """The code and the arrays of a module, while they are written.
 
+    Attributes
+    ----------
+    code
+        Lines of the functions.
+    called
+        Elementary functions that they call.
+    arrays
+        What goes into the companion file, by name.
+    varies : ndarray of bool, shape (nnz,)
+        Which entries of Phi_q are not plain numbers.
+    """
 
-def _group_code(
-    item: Group,
-    grouped: GroupedProgram,
-    arrays: dict[str, NDArray[Any]],
-    code: list[str],
-    called: set[str],
-) -> list[str]:
-    """Write the functions of a group; return the lines of its entry in the module's table."""
-    table = NameTable((*RESERVED, *grouped.program.tables))
-    names = {name: table.take(name) for name in item.inputs}
-    sections = (ConstraintRows(item.sample, "", _local_entries(item)),)
-    inline = InlineProgram(grouped.program, item.nodes, sections, item.hints)
-    arrays[f"{item.name}.rows"] = item.rows
-    lines = [f'Group("{item.name}", {len(item.outputs["Phi"])}, {{']
-    lines += [f'    "{names[name]}": "{source.kind}",' for name, source in item.inputs.items()]
-    lines.append("}, {")
-    for name, source in item.inputs.items():
-        arrays[f"{item.name}.{names[name]}"] = source.index
-    for quantity in grouped.program.quantities:
-        if quantity.rows == "coordinates":
-            places = [item.columns[:, row] for row, _, _ in item.outputs[quantity.name]]
-            shape = len(places), item.rows.size
-            arrays[f"{item.name}.{quantity.name}"] = np.array(places, dtype=np.intp).reshape(shape)
-    for function, computed in _kernels(grouped.program).items():
-        listing = schedule(inline, computed, names, table)
-        called |= set(listing.functions)
-        read = [names[name] for name in item.inputs if name in listing.inputs]
-        printer = Printer(NUMPY, inline.nodes, listing.names)
-        body = function_body(inline, listing, printer, "plain")
-        code += ["", "", f"def _{item.name}_{function}({', '.join(('f', *read))}):"]
-        code += [f'    """{function} of {item.rows.size} constraints like "{item.sample.name}"."""']
-        code += [f"    {line}" for line in body]
-        quoted = "".join(f'"{name}", ' for name in read)
-        lines.append(f'    "{function}": (_{item.name}_{function}, ({quoted})),')
-    return [*lines, "}),"]
+    def __init__(self, grouped: GroupedProgram) -> None:
+        self.grouped, self.program = grouped, grouped.program
+        self.code: list[str] = []
+        self.called: set[str] = set()
+        self.arrays: dict[str, NDArray[Any]] = {"numbers": grouped.numbers}
+        self.varies: NDArray[np.bool_] = np.empty(0, dtype=bool)
+
+    def add_places(self, quantity: Quantity) -> None:
+        """Write down where each group's entries of a quantity stand, and those that never change.
+
+        An entry of a matrix stands in its pattern; plain numbers are not computed by the groups.
+        """
+        entries, values = self.grouped.entries(quantity)
+        numbers, computed = entries[:, 0], np.full(values.size, True)
+        if quantity.is_matrix:
+            width, computed = self.program.shape_of(quantity)[1], np.isnan(values)
+            whole, numbers = np.unique(entries @ (width, 1), return_inverse=True)
+            constants = np.zeros(whole.size)
+            np.add.at(constants, numbers[~computed], values[~computed])
+            suffix = "" if quantity.name == "Phi_q" else f"_{quantity.name}"
+            self.arrays[f"pattern{suffix}"] = np.stack(divmod(whole, width), axis=1)
+            self.arrays[f"constants{suffix}"] = constants
+            if not suffix:
+                self.varies = np.full(whole.size, False)
+                self.varies[numbers[computed]] = True
+        start = 0
+        for item in self.grouped.groups:
+            end = start + len(item.outputs[quantity.name]) * item.size
+            own = numbers[start:end][computed[start:end]]
+            self.arrays[f"{item.name}.{quantity.name}"] = own.reshape(-1, item.size)
+            start = end
+
+    def group(self, item: Group) -> list[str]:
+        """Write the functions of a group; return the lines of its entry in the module's table."""
+        table = NameTable((*RESERVED, *self.program.tables))
+        names = {name: table.take(name) for name in item.inputs}
+        entries = {
+            name: tuple(Entry(*entry) for entry in own) for name, own in item.outputs.items()
+        }
+        code = self._inline(item.nodes, entries, item.hints)
+        lines = [f'Group("{item.name}", {{']
+        lines += [f'    "{names[name]}": "{source.kind}",' for name, source in item.inputs.items()]
+        lines.append("}, {")
+        for name, source in item.inputs.items():
+            self.arrays[f"{item.name}.{names[name]}"] = source.index
+        for kernel, computed in _kernels(self.program).items():
+            if not any(item.outputs[name] for name in computed):
+                continue
+            listing, body = self._body(code, computed, names, table)
+            read = [names[name] for name in item.inputs if name in listing.inputs]
+            what = f'{kernel} of {item.size} constraints like "{item.sample.name}"'
+            self._function(f"_{item.name}_{kernel}", read, what, body)
+            quoted = "".join(f'"{name}", ' for name in read)
+            lines.append(f'    "{kernel}": (_{item.name}_{kernel}, ({quoted})),')
+        return [*lines, "}),"]
+
+    def frames(self, item: FrameGroup) -> str:
+        """Write the function of the frames of a kind of body; return its line in the table."""
+        kernel, table = item.kernel, NameTable(RESERVED)
+        names = {k: table.take(letter) for k, letter in enumerate(kernel.letters)}
+        read = [k for k in names if ("input", k) in kernel.nodes]
+        entries = tuple(Entry(k, 0, node) for k, node in enumerate(kernel.entries))
+        hints = dict(zip(kernel.entries, kernel.symbols, strict=True))
+        code = self._inline(kernel.nodes, {"frame": entries}, hints, (kernel.entries,))
+        _, body = self._body(code, ("frame",), names, table)
+        what = f"{', '.join(kernel.symbols)} of the frames of {item.columns.shape[1]} bodies"
+        self._function(f"_{item.name}", [names[k] for k in read], what, body)
+        self.arrays[f"{item.name}.columns"] = item.columns[read]
+        kinds = ", ".join(f'"{kind}"' for kind in item.kinds)
+        return f'Frames("{item.name}", _{item.name}, ({kinds},)),'
+
+    def values(self) -> list[str]:
+        """Return the function of the values that depend on t, p and contact parameters."""
+        program = self.program
+        nodes, new = pruned(program.values, self.grouped.values)
+        table = NameTable((*RESERVED, *program.tables))
+        names = input_names(program, table, {node[1] for node in nodes if node[0] == "input"})
+        entries = tuple(Entry(k, 0, new[node]) for k, node in enumerate(self.grouped.values))
+        code = self._inline(tuple(nodes), {"values": entries}, {})
+        listing, body = self._body(code, ("values",), names, table)
+        unpack = [f"{name} = {vector}[{k}]" for vector, k, name in inputs_read(program, listing)]
+        return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
+
+    def _inline(
+        self,
+        nodes: tuple[Node, ...],
+        entries: Mapping[str, tuple[Entry, ...]],
+        hints: Mapping[int, str],
+        frames: tuple[tuple[int, ...], ...] = (),
+    ) -> InlineProgram:
+        """Return code as that of one constraint, which is not named in it."""
+        rows = ConstraintRows(self.program.instances[0], "", entries)
+        return InlineProgram(self.program, nodes, (rows,), hints, frames)
+
+    def _body(
+        self,
+        code: InlineProgram,
+        computed: Sequence[str],
+        names: Mapping[Any, str],
+        table: NameTable,
+    ) -> tuple[Listing, list[str]]:
+        """Return the listing and the lines of a function."""
+        listing = schedule(code, computed, names, table)
+        self.called |= set(listing.functions)
+        printer = Printer(NUMPY, code.nodes, listing.names)
+        return listing, function_body(code, listing, printer, "plain")
+
+    def _function(self, name: str, read: Sequence[str], what: str, body: Sequence[str]) -> None:
+        """Write a function."""
+        self.code += ["", "", f"def {name}({', '.join(('f', *read))}):", f'    """{what}."""']
+        self.code += [f"    {line}" for line in body]
 
 
 def _kernels(program: Program) -> dict[str, tuple[str, ...]]:
     """Return what is computed together; right sides alone, because Phi_q is then at hand."""
     found = kernels(program.quantities)
     del found["kinematics"]
-    for quantity in program.quantities:
-        if quantity.rows == "outputs" or (quantity.is_matrix and quantity.name != "Phi_q"):
-            raise UnsupportedError(f"the grouped form has no {quantity.name}; use form='inline'")
     return found
 
 
 def _public(program: Program, nonzeros: int) -> Iterator[str]:
     """Yield the public functions of the quantities."""
     for quantity, name, lines in public_functions(program, nonzeros):
-        wanted = name.removeprefix("Phi_q_")
         states = ", ".join(quantity.states)
         yield from lines
-        yield f'    return _evaluate(("{wanted}",), t, p, {states})[0]\n\n'
-
-
-def _local_entries(item: Group) -> dict[str, tuple[Entry, ...]]:
-    return {
-        name: tuple(Entry(*output) for output in outputs) for name, outputs in item.outputs.items()
-    }
-
-
-def _values_code(grouped: GroupedProgram, called: set[str]) -> list[str]:
-    """Return the function of the values that depend on t, p and contact parameters."""
-    program = grouped.program
-    table = NameTable((*RESERVED, *program.tables))
-    names = input_names(program, table)
-    sample = program.instances[0]
-    entries = tuple(Entry(k, 0, node) for k, node in enumerate(grouped.values))
-    inline = InlineProgram(
-        program, program.values, (ConstraintRows(sample, "", {"values": entries}),), {}
-    )
-    listing = schedule(inline, ("values",), names, table)
-    called |= set(listing.functions)
-    unpack = [f"{name} = {vector}[{k}]" for vector, k, name in inputs_read(program, listing)]
-    printer = Printer(NUMPY, inline.nodes, listing.names)
-    body = function_body(inline, listing, printer, "plain")
-    return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
+        yield f'    return _evaluate(("{name}",), t, p, {states})[0]\n\n'
 
 
 def _data(
-    grouped: GroupedProgram,
-    code: list[str],
-    tables: Sequence[list[str]],
-    solving: Sequence[str],
-    called: Sequence[str],
-    nonzeros: int,
+    module: _Module, frames: Sequence[str], groups: Sequence[str], stages: Sequence[str]
 ) -> dict[str, Any]:
-    program = grouped.program
+    """Return what goes into the template, by slot."""
+    program, nonzeros = module.program, len(module.arrays["pattern"])
     return {
         "title": program.name,
         "name": program.name,
@@ -210,8 +238,12 @@ def _data(
         "m": len(program.equations),
         "nonzeros": nonzeros,
         "k": len(program.parameters),
+        "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
+        "output_units": indented(
+            wrapped(f'"{item.name}": "{item.unit}"' for item in program.outputs)
+        ),
         "solvability": solvability_text(program),
-        "is_planned": bool(solving),
+        "is_planned": bool(stages),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "parameter_units": indented(
             wrapped(f'"{item.name}": "{item.unit}"' for item in program.parameters)
@@ -221,21 +253,42 @@ def _data(
             for name in program.tables
         ),
         "defaults": tuple_text((repr(item.default) for item in program.parameters), 62),
-        "kernels": "\n".join(code),
+        "kernels": "\n".join(module.code),
         "functions": "\n".join(_public(program, nonzeros)),
-        "sizes": indented(_sizes(program)),
-        "groups": indented(line for lines in tables for line in lines),
-        "stages": indented(solving),
-        **support(called, has_frames=True, has_large_blocks=True),
+        "patterns": "\n".join(_patterns(program)),
+        "quantities": indented(_results(program)),
+        "kernel_table": indented(
+            f"{name!r}: {given}," for name, given in _kernels(program).items()
+        ),
+        "frames": indented(frames),
+        "groups": indented(groups),
+        "stages": indented(stages),
+        **support(module.called, has_large_blocks=True),
     }
 
 
-def _sizes(program: Program) -> list[str]:
-    """Return the numbers of rows of the vectors; those whose rows are shared are sums."""
-    rows = {"equations": "N_EQUATIONS", "coordinates": "N_COORDINATES"}
-    vectors = [item for item in program.quantities if not item.is_matrix]
-    sizes = [f'"{item.name}": {rows[item.rows]},' for item in vectors]
-    return [*sizes, '"nonzeros": len(PATTERN),']
+def _matrices(program: Program) -> list[tuple[Quantity, str]]:
+    """Return the matrices, and what the names of their arrays end in."""
+    matrices = [item for item in program.quantities if item.is_matrix]
+    return [(item, "" if item.name == "Phi_q" else f"_{item.name}") for item in matrices]
+
+
+def _patterns(program: Program) -> Iterator[str]:
+    """Yield the lines that read the patterns of matrices."""
+    for _, suffix in _matrices(program):
+        yield f'PATTERN{suffix} = np.array(_data["pattern{suffix}"], dtype=int)'
+
+
+def _results(program: Program) -> Iterator[str]:
+    """Yield the lines of the table of quantities."""
+    suffixes = dict(_matrices(program))
+    for item in program.quantities:
+        shape = ", ".join(map(str, program.shape_of(item)))
+        own = "None" if item.rows == "equations" and not item.adds else "0.0"
+        shape, suffix = f"{shape}" if item.is_matrix else f"{shape},", suffixes.get(item)
+        if suffix is not None:
+            own = f'_data["constants{suffix}"], PATTERN{suffix}'
+        yield f'"{item.name}": Quantity(({shape}), {item.adds}, {own}),'
 
 
 def _text(names: Sequence[str]) -> NDArray[np.uint8]:

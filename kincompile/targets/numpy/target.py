@@ -88,7 +88,6 @@ def files(
         "is_planned": plan is not None,
         **support(
             called,
-            has_frames="cos_sin" in called,
             has_large_blocks=plan is not None and plan.has_large_blocks,
         ),
     }
@@ -211,12 +210,12 @@ def public_functions(
             yield quantity, name, (f"def {name}({states}, t, p=DEFAULTS):", f'    """{text}"""')
 
 
-def support(called: Collection[str], *, has_frames: bool, has_large_blocks: bool) -> dict[str, str]:
+def support(called: Collection[str], *, has_large_blocks: bool) -> dict[str, str]:
     """Return the parts that both forms of a module have in common, by slot."""
     functions = {
         "scalar_functions": indented(_scalar_functions(sorted(called))),
         "array_functions": indented(_array_functions(sorted(called))),
-        "has_frames": has_frames,
+        "has_frames": "cos_sin" in called,
         "has_large_blocks": has_large_blocks,
     }
     files = {"arguments": {}, "spline": {}, "elementary": functions}

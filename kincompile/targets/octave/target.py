@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from kincompile import quantities
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.targets.lines import indented, pieces
+from kincompile.targets.naming import NameTable
 from kincompile.targets.octave.dialect import NAMES, OCTAVE
 from kincompile.targets.statements import Statements
 from kincompile.targets.templates import fill
@@ -40,9 +41,16 @@ KEYWORDS = (
 )  # fmt: skip
 """Words of MATLAB and of Octave."""
 
+CALLED = (
+    *NAMES.values(), "abs", "all", "either", "error", "find", "in_reals", "isempty", "isreal",
+    "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "numel", "pi", "polyval", "size",
+    "sum", "zeros",
+)  # fmt: skip
+"""Functions that the files call; a script of such a name would be called in their place."""
+
 RESERVED: tuple[str, ...] = (
-    *KEYWORDS, *quantities.singles(quantities.QUANTITIES), *NAMES.values(), "q",
-    "q_dot", "q_ddot", "t", "p", "pi", "zeros", "nargin", "either", "in_reals", "NaN", "isreal",
+    *KEYWORDS, *CALLED, *quantities.singles(quantities.QUANTITIES), "q", "q_dot", "q_ddot", "t",
+    "p",
 )  # fmt: skip
 """Names that the functions use."""
 
@@ -82,7 +90,7 @@ def files(
         If the mechanism's time grid is none.
     """
     program = code.program
-    found = {program.name: _script(code)}
+    found = {NameTable((*KEYWORDS, *CALLED)).take(program.name): _script(code)}
     for name, lines in functions.items():
         found[f"{program.name}_{name}"] = _function_file(name, code, "\n".join(lines))
     for name, spline in program.tables.items():

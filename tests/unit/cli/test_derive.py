@@ -5,11 +5,12 @@ from typing import Any
 
 import pytest
 
-from kincompile.cli.derive import DERIVATIONS
+from kincompile.cli import derive
 from kincompile.derivation.derivation import FORMATS
+from kincompile.derivation.document import LEVELS
 
 
-@pytest.mark.parametrize("ending", DERIVATIONS)
+@pytest.mark.parametrize("ending", FORMATS)
 def test_that_a_derivation_is_written(
     kincompile: Any, pendulum: Path, tmp_path: Path, ending: str
 ) -> None:
@@ -20,8 +21,9 @@ def test_that_a_derivation_is_written(
     assert "pendulum" in path.read_text(encoding="utf-8")
 
 
-def test_that_the_command_knows_every_format() -> None:
-    assert tuple(FORMATS) == DERIVATIONS
+def test_that_the_command_knows_every_format_and_level() -> None:
+    assert tuple(FORMATS) == derive.DERIVATIONS
+    assert derive.LEVELS == LEVELS
 
 
 def test_that_the_time_of_the_numbers_can_be_chosen(
@@ -44,11 +46,16 @@ def test_that_a_state_can_be_set(kincompile: Any, pendulum: Path, tmp_path: Path
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("-o", "page.pdf"), "page.pdf: a derivation is written as .html, .tex, .md, .ipynb"),
+        (
+            ("-o", "page.pdf"),
+            "page.pdf: a derivation is written as .slides.html, .html, .tex, .md, .ipynb",
+        ),
         (("-o", "nowhere/page.html"), "the folder nowhere does not exist"),
         (("-o", "page.html", "--set", "phi_bib=1"), "did you mean 'phi_bob'"),
         (("-o", "page.html", "--set", "phi_bob"), "give NAME=VALUE"),
         (("-o", "page.html", "--time", "inf"), "t: inf is not a finite number"),
+        (("-o", "page.html", "--constraint", "moter"), "no constraint 'moter'"),
+        (("-o", "page.html", "--levels", "vector,numbers"), "no level numbers"),
     ],
 )
 def test_that_wrong_use_is_a_message(

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+import kincompile as kc
 from kincompile.cli import COMMANDS
 
 PROGRAM = """
@@ -30,10 +31,13 @@ NOT_LOADED = {
     "run MODEL": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} scipy.sparse.csgraph",
     "inspect MODEL": f"{PAGES} {EXTRA} {LANGUAGES} kincompile.targets.numpy kincompile.runtime",
     "derive MODEL -o PAGE.html": (
-        f"{EXTRA} {LARGE} kincompile.view kincompile.compare kincompile.verify"
+        f"{EXTRA} {LARGE} kincompile.view.page kincompile.view.mechanism_plot kincompile.compare "
+        "kincompile.verify"
     ),
     "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
+    "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
+    "mark KIT": "rich platformdirs matplotlib kincompile.view.page kincompile.verify",
     "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
 }
 
@@ -56,6 +60,9 @@ def test_that_a_command_loads_what_it_uses(line, pendulum, tmp_path):
     hand = tmp_path / "hand.txt"
     hand.write_text("nu = [0, 0, 2]\n", encoding="utf-8")
     places = {"MODEL": pendulum, "HAND": hand, "PAGE.html": tmp_path / "page.html"}
+    places |= {"FOLDER": tmp_path / "new", "KIT": tmp_path / "kit"}
+    if "KIT" in line:
+        kc.exercise(kc.read_model(pendulum)).write(places["KIT"])
     loaded = loaded_by([str(places.get(word, word)) for word in line.split()])
     assert "click" in loaded
     assert sorted(loaded & set(NOT_LOADED[line].split())) == []

@@ -144,7 +144,7 @@ def test_that_a_warning_is_a_message_without_a_line_of_code(process, pendulum):
         )
     done = process("run", pendulum)
     assert done.returncode == 0
-    assert done.stderr.startswith("Warning: 'pendulum' is redundant: ")
+    assert done.stderr.startswith("Warning: 'pendulum' has redundant equations: ")
     assert "pin2" in done.stderr
     assert ".py" not in done.stderr
 

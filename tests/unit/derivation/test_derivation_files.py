@@ -18,6 +18,7 @@ import kincompile as kc
 from kincompile.errors import InputError
 
 MOST_BYTES = 2_000_000
+BOLD_GAMMA = "\N{MATHEMATICAL BOLD SMALL GAMMA}"
 VOID = {"meta", "link", "wbr", "br", "img"}
 
 
@@ -155,17 +156,28 @@ def test_that_a_notebook_computes_the_numbers_of_the_page(example_named: Any) ->
     assert names["correction"].shape == (9,)
 
 
-@pytest.mark.parametrize("ending", ["html", "tex", "md", "ipynb"])
+def test_that_slides_have_one_constraint_each(gallery: Any) -> None:
+    text = kc.derivation(gallery).to_slides()
+    page = Page(text)
+    constraints = [f"constraint-{item.name}" for item in gallery.system().constraints]
+    assert [item for item in page.ids if not item.startswith("Phi")] == ["mechanism", *constraints]
+    slide = text[text.index('id="constraint-slide"') : text.index('id="constraint-rt"')]
+    assert slide.count('<svg class="figure"') == 1
+    assert slide.count(f"&#{ord(BOLD_GAMMA)};") == 2
+    assert "<table>" not in slide
+
+
+@pytest.mark.parametrize("ending", ["html", "slides.html", "tex", "md", "ipynb"])
 def test_that_the_ending_names_the_format(ending: str, example_named: Any, tmp_path: Path) -> None:
     derivation = kc.derivation(example_named("simple_pendulum").model)
     path = derivation.write(tmp_path / f"page.{ending}")
-    beginning = {"html": "<!DOCTYPE html>", "tex": r"\documentclass", "md": "# ", "ipynb": "{"}
-    assert path.read_text(encoding="utf-8").startswith(beginning[ending])
+    beginning = {"tex": r"\documentclass", "md": "# ", "ipynb": "{"}
+    assert path.read_text(encoding="utf-8").startswith(beginning.get(ending, "<!DOCTYPE html>"))
 
 
 def test_that_another_ending_is_refused(example_named: Any, tmp_path: Path) -> None:
     derivation = kc.derivation(example_named("simple_pendulum").model)
-    with pytest.raises(InputError, match=r"page\.pdf.*\.html, \.tex, \.md, \.ipynb"):
+    with pytest.raises(InputError, match=r"page\.pdf.*\.slides\.html, \.html, \.tex, \.md"):
         derivation.write(tmp_path / "page.pdf")
     assert list(tmp_path.iterdir()) == []
 

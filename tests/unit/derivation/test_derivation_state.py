@@ -25,14 +25,41 @@ def table(derivation: Any, anchor: str, sections_of: Any, k: int = 0) -> Table:
     return found
 
 
-def test_that_the_default_is_the_assembled_state_at_time_zero(example_named: Any) -> None:
+def test_that_the_default_is_an_assembled_state_where_nothing_is_special(
+    example_named: Any,
+) -> None:
     example = example_named("four_bar")
     chosen = evaluation(example.model.system(), None)
-    assert chosen.origin == "the assembled state at t = 0"
-    solution = kc.solve(example.module, [0.0])
-    np.testing.assert_allclose(chosen.q, solution.q[0], atol=1e-9)
-    np.testing.assert_allclose(chosen.q_dot, solution.q_dot[0], atol=1e-9)
-    np.testing.assert_allclose(chosen.q_ddot, solution.q_ddot[0], atol=1e-9)
+    t = 0.382 * example.model.end
+    assert chosen.origin == f"the assembled state at t = {t:.3g}"
+    solution = kc.solve(example.module, np.linspace(0, t, 50))
+    np.testing.assert_allclose(chosen.q, solution.q[-1], atol=1e-9)
+    np.testing.assert_allclose(chosen.q_dot, solution.q_dot[-1], atol=1e-9)
+    np.testing.assert_allclose(chosen.q_ddot, solution.q_ddot[-1], atol=1e-9)
+    # No angle is 0 or a right one, no entry of Phi_q that varies is zero: a wrong sign shows.
+    angles = chosen.q[2::3]
+    assert np.min(np.abs(np.sin(2 * angles))) > 1e-3
+
+
+def test_that_time_zero_serves_where_the_motion_does_not_reach_the_generic_time() -> None:
+    m = kc.Mechanism("short", end=10.0)
+    arm = m.body("arm", guess=(0, 1, 1.5))
+    m.add(kc.Revolute("A", m.ground, (0, 0), arm, (-1, 0)))
+    m.add(kc.AbsoluteX("reach", arm, (0, 0), kc.t))  # at most 1
+    assert evaluation(m.system(), None).origin == "the assembled state at t = 0"
+
+
+def test_that_newton_starts_from_a_moved_position_where_the_guess_is_assembled() -> None:
+    m = kc.Mechanism("pendulum")
+    bob = m.body("bob", guess=(1, 0, 0))
+    m.add(kc.Revolute("A", m.ground, (0, 0), bob, (-1, 0)))
+    m.add(kc.AbsoluteAngle("motor", bob, kc.t / 3))
+    chosen = evaluation(m.system(), 0.0)
+    assert chosen.assembly is not None
+    assert chosen.assembly.iterations >= 3
+    assert chosen.start.startswith("From the assembled position with coordinates moved by some")
+    np.testing.assert_allclose(chosen.assembly.q, (1, 0, 0), atol=1e-9)
+    np.testing.assert_allclose(chosen.q, (1, 0, 0), atol=1e-9)
 
 
 def test_that_another_time_may_be_chosen(example_named: Any) -> None:
@@ -74,7 +101,7 @@ def test_that_the_guess_serves_where_the_mechanism_does_not_assemble(
 def test_that_the_six_corrections_of_problem_3_5_6_are_shown(
     example_named: Any, sections_of: Any
 ) -> None:
-    derivation = kc.derivation(example_named("problem_3_5_6").model)
+    derivation = kc.derivation(example_named("problem_3_5_6").model, 0)
     shown = table(derivation, "newton", sections_of)
     corrections = [number(row[-1][0]) for row in shown.rows[:6]]
     expected = [0.2244281, 0.2447443, 0.0427423, 2.028785e-3, 3.93443e-6, 1.511e-11]

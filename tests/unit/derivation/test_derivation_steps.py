@@ -1,5 +1,6 @@
 """The steps that are recorded while differentiating, and what a page makes of them."""
 
+import re
 from typing import Any
 
 import pytest
@@ -78,6 +79,43 @@ def test_that_every_joint_has_nine_steps_in_three_levels(gallery: Any, sections_
             assert levels == {"", "vector", "expanded", "numeric"}
         else:
             assert levels == {"", "expanded", "numeric"}
+
+
+def test_that_a_constraint_and_levels_can_be_chosen(gallery: Any, sections_of: Any) -> None:
+    derivation = kc.derivation(gallery, constraint="slide", levels=("vector",))
+    sections = sections_of(derivation)
+    assert [item.anchor for item in derivation.sections] == ["unknowns", "constraints"]
+    assert {item.level for item in sections} == {"", "vector"}
+    (slide,) = derivation.sections[1].sections
+    assert slide.anchor == "constraint-slide"
+    assert len(slide.sections) == 6
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"constraint": "slid"}, "no constraint 'slid'; did you mean 'slide'"),
+        ({"levels": ("vectors",)}, "no level vectors; levels are: vector, expanded, numeric"),
+        ({"levels": ()}, "no level left; levels are: vector, expanded, numeric"),
+    ],
+)
+def test_that_an_unknown_choice_is_refused(gallery: Any, options: Any, message: str) -> None:
+    with pytest.raises(kc.InputError, match=message):
+        kc.derivation(gallery, **options)
+
+
+def test_that_links_lead_somewhere_at_every_level(gallery: Any) -> None:
+    for level in ("vector", "expanded", "numeric"):
+        text = kc.derivation(gallery, levels=(level,)).to_html()
+        links = set(re.findall(r'href="#([^"]*)"', text))
+        assert links <= set(re.findall(r'id="([^"]*)"', text))
+
+
+def test_that_only_a_prescribed_angle_is_folded_away(gallery: Any, sections_of: Any) -> None:
+    derivation = kc.derivation(gallery)
+    folded = {item.anchor for item in sections_of(derivation) if item.is_folded}
+    assert folded == {"constraint-aphi", "constraint-rphi"}
+    assert derivation.to_html().count("<details><summary><h3>") == 2
 
 
 def test_that_every_entry_has_a_line_with_code_and_number(gallery: Any, sections_of: Any) -> None:

@@ -45,7 +45,7 @@ def alike(write: Any) -> kc.ConstraintSystem:
 def test_that_equations_of_one_structure_are_one_group(write: Any) -> None:
     program = group(lower(alike(write), share_equations=True))
     assert len(program.groups) == 2
-    assert sorted(item.rows.size for item in program.groups) == [1, COUNT - 1]
+    assert sorted(item.size for item in program.groups) == [1, COUNT - 1]
 
 
 @pytest.mark.parametrize("write", ALIKE.values(), ids=ALIKE)
@@ -75,7 +75,7 @@ def test_that_the_numbers_are_those_of_equations_written_out(write: Any) -> None
 def test_that_other_structures_are_other_groups(one: Any, other: Any) -> None:
     equations = [one, other, *(item - t for item in x[2:])]
     program = group(lower(system(equations), share_equations=True))
-    assert [item.rows.size for item in program.groups][:2] == [1, 1]
+    assert [item.size for item in program.groups][:2] == [1, 1]
 
 
 def test_that_conditions_are_shared_too() -> None:

@@ -269,3 +269,12 @@ def test_that_large_and_small_constants_keep_their_value(graph: Graph, value: An
 def test_that_a_product_beyond_floats_is_refused(graph: Graph, value: Any) -> None:
     with pytest.raises(ModelError, match=r"beyond 1e308, the range of .*; choose other units"):
         graph.mul(graph.const(value), graph.const(value))
+
+
+def test_that_a_fraction_of_numbers_beyond_floats_is_a_constant():
+    graph = Graph()
+    assert graph.value_of(graph.const(Fraction(10**400 + 1, 10**400))) == 1
+    assert graph.value_of(graph.const(Fraction(-3 * 10**400, 2 * 10**400 + 1))) == -1.5
+    assert graph.value_of(graph.const(Fraction(1, 10**400))) == 0
+    with pytest.raises(ModelError, match="beyond 1e308"):
+        graph.const(Fraction(10**800, 10**400))

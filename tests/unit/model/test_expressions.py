@@ -115,5 +115,5 @@ def test_that_names_are_found() -> None:
 def test_that_what_nobody_declared_is_listed() -> None:
     assert unknown_problem(x + 1, ["x"], "here") is None
     message = unknown_problem(x + y + sympy.Symbol("z"), {"x", "yy"}, "here") or ""
-    assert message.startswith("here contains y, z, which nobody declared; did you mean 'yy'?")
+    assert message.startswith("here contains y, z, which are not declared; did you mean 'yy'?")
     assert message.endswith("use one of: x, yy")

@@ -52,7 +52,7 @@ def test_that_an_array_is_an_outline():
             [(0, 0), 3, (1, 0)],
             r"outline of arm: \[\(0, 0\), 3, \(1, 0\)\] is not a list of corners",
         ),
-        ([(0, 0), (1, 0)], "outline of arm: 2 corners are no polygon; give 3 or more"),
+        ([(0, 0), (1, 0)], "outline of arm: it has 2 corners; a polygon has 3 or more"),
         ([(0, 0), (1, 0), (1, 2, 3)], r"corner 3, \(1, 2, 3\), is not a pair"),
         ([(0, 0), (1, 0), (0, "b")], "outline of arm, corner 3: 'b' is not a number"),
         ([(0, 0), (1, 0), (0, kc.t)], "outline of arm, corner 3: t is not a number at the default"),
@@ -68,7 +68,7 @@ def test_that_a_wrong_outline_is_told(outline, message):
     [
         ("3", "line 9: body 'arm', outline: expected a list of corners"),
         ("[[0, 0], [1], [0, 1]]", r"line 9: body 'arm', outline, entry 2: expected \[xi, eta\]"),
-        ("[[0, 0], [1, 1]]", "line 9: outline of arm: 2 corners are no polygon"),
+        ("[[0, 0], [1, 1]]", "line 9: outline of arm: it has 2 corners"),
     ],
 )
 def test_that_a_wrong_outline_in_a_file_is_told_with_its_line(tmp_path, outline, message):

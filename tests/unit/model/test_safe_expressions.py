@@ -1,5 +1,6 @@
 """Text to SymPy through a whitelist: what is read, what is refused, where a message points."""
 
+import random
 from contextlib import suppress
 from pathlib import Path
 
@@ -191,3 +192,38 @@ def _larger(inner: st.SearchStrategy[sympy.Expr]) -> st.SearchStrategy[sympy.Exp
 @given(st.recursive(_ATOMS, _larger, max_leaves=8))
 def test_that_what_sympy_prints_is_read_back(expression: sympy.Expr) -> None:
     assert parse_expression(str(expression), NAMES) == expression
+
+
+# Exact numbers whose size SymPy does not know without evaluating them.
+EXACT_ONE = "(sin(1)^2+cos(1)^2)"
+
+
+@pytest.mark.parametrize("base", ["2", "x"])
+def test_that_an_exponent_is_evaluated_where_its_size_is_not_known(base):
+    assert parse_expression(f"{base}^(2+{EXACT_ONE}-1)", NAMES).is_Pow
+    for exponent in (
+        f"64+{EXACT_ONE}",
+        f"-65-{EXACT_ONE}",
+        f"1/({EXACT_ONE}-1)",
+        "exp(exp(exp(9)))",
+    ):
+        with pytest.raises(ExpressionError, match="the exponent is beyond 64, or not a number"):
+            parse_expression(f"{base}^({exponent})", NAMES)
+
+
+def test_that_random_exact_numbers_never_bring_another_error():
+    rng = random.Random(12)
+    parts = [EXACT_ONE, f"({EXACT_ONE}-1)", "sqrt(2)", "asin(1)", "log(2)", "pi", "64", "1/3", "x"]
+    forms = ["({a}+{b})", "({a}-{b})", "({a}*{b})", "({a}/{b})", "({a})^({b})", "asin({a})",
+             "sqrt({a})", "atan2({a}, {b})", "acosh({a})", "log({a})",
+             "Piecewise(({a}, {a} < {b}), ({b}, True))"]  # fmt: skip
+    refused = 0
+    for _ in range(300):
+        text = rng.choice(parts)
+        for _ in range(rng.randint(1, 4)):
+            text = rng.choice(forms).format(a=text, b=rng.choice(parts))
+        with suppress(ExpressionError):
+            parse_expression(text, NAMES)
+            continue
+        refused += 1
+    assert 0 < refused < 300

@@ -1,7 +1,9 @@
 """Compilers that are missing or broken, caches that are corrupt, read-only or shared."""
 
+import ctypes
 import hashlib
 import os
+import stat
 import subprocess
 import sys
 import tempfile
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
+from kincompile.errors import KincompileWarning
 from kincompile.runtime.native import library as c_library
 
 COMPILE = """
@@ -283,6 +286,90 @@ def test_nothing_is_left_in_the_temporary_folder(monkeypatch, cache, tmp_path):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     kc.compile(tiny(), target="c")
     assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def modes(folder: Path) -> set[int]:
+    """Return the permissions of a folder and of what is in it."""
+    return {stat.S_IMODE(path.lstat().st_mode) for path in (folder, *folder.iterdir())}
+
+
+@pytest.mark.parametrize("umask", [0, 0o077])
+def test_the_cache_is_its_users_alone_whatever_the_umask(cache, umask):
+    before = os.umask(umask)
+    try:
+        assert_right(kc.compile(tiny(), target="c"))
+    finally:
+        os.umask(before)
+    assert modes(cache) == {0o700, 0o600}
+    assert stat.S_IMODE(cache.parent.stat().st_mode) == 0o700
+
+
+@pytest.fixture
+def loaded(monkeypatch):
+    """Return the list of the libraries that are loaded."""
+    found = []
+    load = ctypes.CDLL
+
+    def record(path):
+        found.append(Path(path))
+        return load(path)
+
+    monkeypatch.setattr(ctypes, "CDLL", record)
+    return found
+
+
+@pytest.mark.parametrize(("ending", "mode"), [(".so", 0o602), (".sha256", 0o620)])
+def test_a_file_that_others_may_write_is_built_again(cache, loaded, mode, ending):
+    kc.compile(tiny(), target="c")
+    library = next(cache.glob("*.so"))
+    library.with_suffix(ending).chmod(mode)
+    loaded.clear()
+    assert_right(kc.compile(tiny(), target="c"))
+    assert library not in loaded
+    assert modes(cache) == {0o700, 0o600}
+    assert_right(kc.compile(tiny(), target="c"))
+    assert loaded[-1] == library
+
+
+def test_a_file_that_is_a_link_is_replaced_and_not_loaded(cache, loaded, tmp_path):
+    kc.compile(tiny(), target="c")
+    library = next(cache.glob("*.so"))
+    library.rename(tmp_path / "elsewhere.so")
+    before = (tmp_path / "elsewhere.so").read_bytes()
+    library.symlink_to(tmp_path / "elsewhere.so")
+    loaded.clear()
+    assert_right(kc.compile(tiny(), target="c"))
+    assert library not in loaded
+    assert not library.is_symlink()
+    assert (tmp_path / "elsewhere.so").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("place", "fault"),
+    [("native", "writable"), ("kincompile", "writable"), ("native", "link"),
+     ("kincompile", "another owner")],
+)  # fmt: skip
+def test_a_folder_that_is_not_the_users_alone_is_not_used(
+    cache, loaded, tmp_path, monkeypatch, place, fault
+):
+    kc.compile(tiny(), target="c")
+    folder = cache if place == "native" else cache.parent
+    if fault == "writable":
+        folder.chmod(0o777)
+        reason = "others may write to it"
+    elif fault == "link":
+        folder.rename(tmp_path / "elsewhere")
+        folder.symlink_to(tmp_path / "elsewhere")
+        reason = "it is a link"
+    else:
+        monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+        reason = "it belongs to another user"
+    content = {path: path.read_bytes() for path in cache.iterdir()}
+    loaded.clear()
+    with pytest.warns(KincompileWarning, match=rf"{folder} is not used: {reason}; C code is"):
+        assert_right(kc.compile(tiny(), target="c"))
+    assert all(cache not in path.parents for path in loaded)
+    assert {path: path.read_bytes() for path in cache.iterdir()} == content
 
 
 def compile_command(times: int = 1) -> list[str]:

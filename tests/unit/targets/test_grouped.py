@@ -10,6 +10,7 @@ import kincompile as kc
 from kincompile import compiler
 from kincompile.ir.grouping import group
 from kincompile.ir.lower import lower
+from kincompile.quantities import quantity_named
 from kincompile.runtime.engine import stages as staged
 from kincompile.runtime.engine.code import code_of
 from kincompile.structure import stages
@@ -312,14 +313,8 @@ def test_an_impossible_position_ends_with_a_status():
 
 def stages_of(link, count=12):
     grouped = group(lower(loops(count, link).system()))
-    rows, columns = grouped.pattern().T
-    values = np.concatenate(
-        [
-            np.full(item.rows.size, np.nan if item.number(node) is None else item.number(node))
-            for item in grouped.groups
-            for _, _, node in item.outputs["Phi_q"]
-        ]
-    )
+    entries, values = grouped.entries(quantity_named("Phi_q"))
+    rows, columns = entries.T
     order = np.lexsort((columns, rows))
     return plan_stages(rows[order], columns[order], values[order], 9 * count)
 

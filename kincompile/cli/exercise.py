@@ -1,0 +1,29 @@
+"""`kincompile exercise`: a variant of a model for each student, with entries to derive by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+import kincompile as kc
+from kincompile.cli.shared import output_option, read_model
+
+
+@click.command("exercise")
+@click.argument("model")
+@output_option("Folder to write, a new one.")
+@click.option("--students", type=int, default=1, metavar="N", help="Number of variants.")
+@click.option("--seed", type=int, default=0, metavar="S", help="The same seed, the same files.")
+@click.option("--signs", is_flag=True, help="Turn frames of bodies, so that signs differ too.")
+@click.option("--lengths", is_flag=True, help="Change points and distances given as numbers too.")
+def command(model: str, output: str, students: int, seed: int, signs: bool, lengths: bool) -> None:
+    """Write an exercise on MODEL: a page and a hand-in file for each student.
+
+    Each student has a variant of the mechanism that assembles and moves, drawn on a page, and the
+    same entries of Phi_q and gamma to derive. The folder instructor has the solutions; `kincompile
+    mark` checks what is handed in.
+    """
+    made = kc.exercise(read_model(model), students, seed, signs=signs, lengths=lengths)
+    written = made.write(Path(output))
+    click.echo(f"Wrote {written}: {made!r}", err=True)

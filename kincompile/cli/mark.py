@@ -1,0 +1,28 @@
+"""`kincompile mark`: the hand-in files of an exercise, marked."""
+
+from __future__ import annotations
+
+import click
+
+import kincompile as kc
+from kincompile.cli.shared import output_option, print_data
+from kincompile.writing import require_writable
+
+
+@click.command("mark")
+@click.argument("folder")
+@output_option("File to write, .csv; without it, the table goes to stdout.", required=False)
+def command(folder: str, output: str | None) -> None:
+    """Mark the hand-in files in FOLDER, which `kincompile exercise` wrote.
+
+    The table has a line for each student: points, those of each blank, and the reasons. Formulas
+    are parsed, never run.
+    """
+    if output is not None:
+        require_writable(output)
+    marks = kc.mark(folder)
+    if output is None:
+        print_data(marks.to_csv())
+    else:
+        marks.write(output)
+        click.echo(f"Wrote {output}", err=True)

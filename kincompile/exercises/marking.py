@@ -1,0 +1,225 @@
+"""`kc.mark`: the hand-in files of an exercise checked, points and reasons for each student."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from dataclasses import dataclass, fields
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kincompile.compare.compare import compare
+from kincompile.compare.reference import Reference
+from kincompile.errors import InputError, KincompileError
+from kincompile.exercises.blanks import Blank
+from kincompile.exercises.kit import BLANKS, FORMAT, HAND_IN, INSTRUCTOR, MODELS, STUDENTS
+from kincompile.files.files import read
+from kincompile.writing import write_atomically
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping, Sequence
+
+    from kincompile.compare.comparison import ComparedEntry
+    from kincompile.model.system import ConstraintSystem
+
+MOST_BYTES = 100_000
+"""Size of a hand-in file above which it is not read."""
+
+MOST_CHARACTERS = 300
+"""Characters of a reason."""
+
+_LINE = re.compile(r"\s*(B\d+)\s*=\s*(.*?)\s*")
+
+RIGHT, EMPTY = "right", "not filled"
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Points of a blank, with the reason.
+
+    Attributes
+    ----------
+    blank
+        What was to be filled.
+    points
+        1 where it is right, else 0.
+    reason
+        ``"right"``, ``"not filled"``, or what is wrong, without the right formula.
+    """
+
+    blank: Blank
+    points: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """The marks of all students of an exercise.
+
+    Attributes
+    ----------
+    folder
+        The exercise.
+    students
+        The marks of each student by name; none where nothing was handed in.
+    """
+
+    folder: Path
+    students: Mapping[str, tuple[Mark, ...]]
+
+    def to_csv(self) -> str:
+        """Return a table: a line a student, with points, those of each blank, and reasons."""
+        blanks = next(iter(self.students.values()))
+        rows = StringIO()
+        table = csv.writer(rows, lineterminator="\n")
+        names = [item.blank.name for item in blanks]
+        table.writerow(["student", "points", "of", *names, "reasons"])
+        for student, marks in self.students.items():
+            points = [item.points for item in marks]
+            lost = (item for item in marks if item.reason != RIGHT)
+            reasons = "; ".join(f"{item.blank.name}: {item.reason}" for item in lost)
+            table.writerow([student, sum(points), len(points), *points, reasons])
+        return rows.getvalue()
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the table to a file, in one step."""
+        return write_atomically(path, self.to_csv())
+
+
+def mark(folder: str | os.PathLike[str]) -> Marks:
+    """Mark the hand-in files of an exercise that `exercise` wrote.
+
+    An entry is right if it is equal to the derived one at random states, however it is written; of
+    gamma, if it is equal wherever the constraints hold. Formulas are parsed, never run.
+
+    Raises
+    ------
+    InputError
+        If the folder is no exercise.
+    """
+    target = Path(folder)
+    blanks, students = _key(target)
+    found: dict[str, tuple[Mark, ...]] = {}
+    for student in students:
+        model = read(target / INSTRUCTOR / MODELS / f"{student}.toml").system()
+        answers, problem = _answers(target / STUDENTS / student / HAND_IN)
+        found[student] = (
+            tuple(Mark(item, 0, problem) for item in blanks)
+            if problem
+            else _marked(Reference(model), blanks, answers)
+        )
+    return Marks(target, found)
+
+
+def _key(folder: Path) -> tuple[list[Blank], list[str]]:
+    """Return the blanks and the students of an exercise."""
+    path = folder / INSTRUCTOR / BLANKS
+    try:
+        data: Any = json.loads(path.read_text(encoding="utf-8"))
+        blanks = [
+            Blank(**{item.name: row[item.name] for item in fields(Blank)}) for row in data["blanks"]
+        ]
+        if data["format"] != FORMAT or not blanks:
+            raise InputError(
+                f"{path} has the format {data['format']}, and this version reads {FORMAT}"
+            )
+    except OSError as error:
+        raise InputError(
+            f"{folder} is no exercise: {path} cannot be read; give the folder that "
+            "`kincompile exercise` wrote"
+        ) from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{path} is not the key of an exercise; write the exercise again with the same seed"
+        ) from error
+    students = sorted(item.stem for item in (folder / INSTRUCTOR / MODELS).glob("*.toml"))
+    if not students:
+        raise InputError(f"{folder / INSTRUCTOR / MODELS} has no models of students")
+    return blanks, students
+
+
+def _answers(path: Path) -> tuple[dict[str, str], str]:
+    """Return the formulas of a hand-in file by blank, and what is wrong with the whole file."""
+    try:
+        if not path.is_file():
+            return {}, "nothing handed in"
+        content = path.read_bytes()[: MOST_BYTES + 1]
+        if len(content) > MOST_BYTES:
+            return {}, f"the file has more than {MOST_BYTES} bytes"
+        text = content.decode("utf-8-sig")
+    except OSError as error:
+        return {}, f"the file cannot be read: {error.strerror}"
+    except UnicodeDecodeError:
+        return {}, "the file is not a text in UTF-8"
+    lines = (_LINE.fullmatch(line.partition("#")[0]) for line in text.splitlines())
+    return {found[1]: found[2] for found in lines if found}, ""
+
+
+def _marked(
+    reference: Reference, blanks: Sequence[Blank], answers: Mapping[str, str]
+) -> tuple[Mark, ...]:
+    """Mark the blanks of each constraint together; alone where one of them cannot be read."""
+    found: dict[Blank, Mark] = {item: Mark(item, 0, EMPTY) for item in blanks}
+    filled = [item for item in blanks if answers.get(item.name)]
+    for constraint in dict.fromkeys(item.constraint for item in filled):
+        own = [item for item in filled if item.constraint == constraint]
+        try:
+            found |= _compared(reference, own, answers)
+        except KincompileError:
+            for item in own:
+                found |= _alone(reference, item, answers)
+    return tuple(found.values())
+
+
+def _alone(reference: Reference, blank: Blank, answers: Mapping[str, str]) -> dict[Blank, Mark]:
+    try:
+        return _compared(reference, [blank], answers)
+    except KincompileError as error:
+        return {blank: Mark(blank, 0, _short(f"cannot be read: {error}"))}
+
+
+def _compared(
+    reference: Reference, blanks: Sequence[Blank], answers: Mapping[str, str]
+) -> dict[Blank, Mark]:
+    """Compare answers to blanks of one constraint, among entries that are right.
+
+    Phi is given on the page, so it fixes the sign of every row.
+    """
+    system = reference.system
+    Phi_q: list[list[Any]] = system.Phi_q.tolist()
+    Phi, gamma = ([row[0] for row in item.tolist()] for item in (system.Phi, system.gamma))
+    for item in blanks:
+        if item.column is None:
+            gamma[item.row] = answers[item.name]
+        else:
+            Phi_q[item.row][item.column] = answers[item.name]
+    constraint = blanks[0].constraint
+    own = slice(*_rows(system, constraint))
+    report = compare(
+        reference, Phi=Phi[own], Phi_q=Phi_q[own], gamma=gamma[own], constraint=constraint
+    )
+    entries = {entry.label: entry for entry in report.entries}
+    return {item: _mark_of(item, entries[item.label(system)]) for item in blanks}
+
+
+def _mark_of(blank: Blank, entry: ComparedEntry) -> Mark:
+    if entry.accepted:
+        return Mark(blank, 1, RIGHT)
+    texts = [item.text for item in entry.diagnoses]
+    return Mark(blank, 0, _short(texts[0] if texts else "different from the derived entry"))
+
+
+def _rows(system: ConstraintSystem, constraint: str) -> tuple[int, int]:
+    """Return the first row of a constraint, and the row after its last."""
+    names = [item.name for item in system.constraints]
+    k = names.index(constraint)
+    first = system.row_offsets[k]
+    return first, first + len(system.constraints[k].equation_names)
+
+
+def _short(text: str) -> str:
+    line = " ".join(text.split())
+    return line if len(line) <= MOST_CHARACTERS else f"{line[: MOST_CHARACTERS - 3]}..."

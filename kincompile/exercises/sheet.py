@@ -1,0 +1,190 @@
+"""The page of a student: the mechanism drawn, its constraints in vectors, blanks, hints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import sympy
+
+from kincompile.calculus.expressions import Symbol
+from kincompile.derivation.derivation import constraint_chapters
+from kincompile.derivation.document import (
+    Chapter,
+    Display,
+    Figure,
+    Manuscript,
+    Math,
+    Verbatim,
+    table,
+    text,
+)
+from kincompile.derivation.evaluation import evaluation
+from kincompile.derivation.figures import Figures
+from kincompile.derivation.formulas import (
+    VELOCITY_TERM,
+    Call,
+    Equated,
+    Glyph,
+    Joined,
+    Matrix,
+    PartialDerivative,
+)
+from kincompile.model.resolve import Joint
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.derivation.formulas import Formula
+    from kincompile.exercises.blanks import Blank
+    from kincompile.model.system import ConstraintSystem
+
+RULE_STEP, BLOCK_STEP, GAMMA_STEP = 2, 3, 5
+"""Steps of a derivation, from 0, that hints are taken from."""
+
+LINE = "_" * 22
+"""Where a formula is written on paper."""
+
+
+def sheet(system: ConstraintSystem, blanks: Sequence[Blank], student: str) -> Manuscript:
+    """Return the page of one student."""
+    figures = Figures(evaluation(system, None))
+    names, chapters = constraint_chapters(figures)
+    given = tuple(
+        Chapter(item.anchor, item.title, (), item.sections[:2])
+        for item, constraint in zip(chapters, system.constraints, strict=True)
+        if isinstance(constraint, Joint)
+    )
+    parts = (
+        _mechanism(figures),
+        Chapter("given", ("The constraints",), (), given),
+        _tasks(system, blanks),
+        _hints(system, blanks, chapters),
+    )
+    summary = f"Student {student}. Write the formulas into hand_in.txt, which has a line for each."
+    return Manuscript(system.name, summary, parts, names, "", "")
+
+
+def solutions(
+    name: str, systems: Sequence[ConstraintSystem], blanks: Sequence[Blank], students: Sequence[str]
+) -> Manuscript:
+    """Return the page of the instructor: the right formula of every blank of every student."""
+    chapters = []
+    for system, student in zip(systems, students, strict=True):
+        rows: list[tuple[Run | Runs, ...]] = [
+            (item.name, Math(_symbol(item, system)), Math(item.answer(system))) for item in blanks
+        ]
+        shown = table(("blank", "entry", "formula"), rows)
+        chapters.append(Chapter(f"student-{student}", (f"Student {student}",), (shown,)))
+    summary = f"{len(systems)} students, {len(blanks)} blanks each. Not for students."
+    return Manuscript(name, summary, tuple(chapters), {}, "", "")
+
+
+def _mechanism(figures: Figures) -> Chapter:
+    system = figures.evaluation.system
+    blocks: list[Block] = []
+    if (shown := figures.mechanism()) is not None:
+        blocks.append(Figure(shown))
+    blocks.append(
+        text(
+            "The coordinates of a body are x and y of its origin and the angle phi of its frame; "
+            "points and directions of bodies are given in their frames. The ground is fixed."
+        )
+    )
+    rows: list[tuple[Run | Runs, ...]] = [
+        (Verbatim(body.name), *(Verbatim(name) for name in body.coordinates))
+        for body in system.bodies
+    ]
+    blocks.append(table(("body", "x", "y", "phi"), rows))
+    return Chapter("mechanism", ("The mechanism",), tuple(blocks))
+
+
+def _symbol(blank: Blank, system: ConstraintSystem) -> Formula:
+    """Return the symbol of an entry: the derivative of its Phi, or its gamma."""
+    equation = system.equations[blank.row]
+    if blank.column is None:
+        return Glyph("gamma", equation, bold=False)
+    name = system.coordinates[blank.column].name
+    return PartialDerivative(Glyph("Phi", equation, bold=False), Symbol(name))
+
+
+def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> Chapter:
+    angle = system.bodies[0].coordinates[-1]
+    note = text(
+        "Derive each entry in sines and cosines, with the numbers of this page and the names of "
+        "the coordinates; the rate of ", Verbatim(angle), " is ", Verbatim(rate(angle)),
+        ". With ", Math(Equated((Joined((Glyph("Phi", "q"), Glyph("q", dots=2))), Glyph("gamma")))),
+        ", gamma is what stands on the right side of the acceleration equation.",
+    )  # fmt: skip
+    rows: list[tuple[Run | Runs, ...]] = [
+        (Verbatim(item.name), Math(_symbol(item, system)), LINE) for item in blanks
+    ]
+    shown = table(("blank", "entry", "formula"), rows)
+    return Chapter("tasks", ("The blanks",), (note, shown))
+
+
+def _hints(
+    system: ConstraintSystem, blanks: Sequence[Blank], chapters: Sequence[Chapter]
+) -> Chapter:
+    """Return three hints for each constraint and quantity that has a blank, folded away."""
+    found: list[Chapter] = []
+    for chapter, constraint in zip(chapters, system.constraints, strict=True):
+        for quantity in ("Phi_q", "gamma"):
+            own = [x for x in blanks if (x.constraint, x.quantity) == (constraint.name, quantity)]
+            if not own or not isinstance(constraint, Joint):
+                continue
+            steps = [*_three(quantity, constraint, chapter)]
+            anchor = f"hints-{constraint.name}-{quantity}"
+            hints = tuple(
+                Chapter(f"{anchor}-{k}", (f"Hint {k}: {title}",), blocks, is_folded=True)
+                for k, (title, blocks) in enumerate(steps, 1)
+            )
+            names = ", ".join(item.name for item in own)
+            title: Runs = (f"{names}: {quantity} of ", Verbatim(constraint.name))
+            found.append(Chapter(anchor, title, (), hints))
+    note = text("Each leads a little further. Try without them first.")
+    return Chapter("hints", ("Hints in three steps",), (note,), tuple(found))
+
+
+def _three(
+    quantity: str, joint: Joint, chapter: Chapter
+) -> Iterator[tuple[str, tuple[Block, ...]]]:
+    """Yield three hints: the way, the vectors, what is left to write out."""
+    if quantity == "Phi_q":
+        yield "the rules", chapter.sections[RULE_STEP].blocks
+        yield "the blocks in vectors", chapter.sections[BLOCK_STEP].blocks
+        yield "the matrices", tuple(_matrices(joint))
+        return
+    blocks = chapter.sections[GAMMA_STEP].blocks
+    displays = [item for item in blocks if isinstance(item, Display)]
+    firsts = [item.formula.parts[0] for item in displays if isinstance(item.formula, Equated)]
+    way = tuple(item for item, left in zip(displays, firsts, strict=True) if left == VELOCITY_TERM)
+    yield "differentiate this along the motion, and change the sign", way
+    found = {left: item for item, left in zip(displays, firsts, strict=True) if _is_gamma(left)}
+    yield "the result in vectors", tuple(found.values())
+    yield "the matrices", tuple(_matrices(joint))
+
+
+def _is_gamma(formula: Formula) -> bool:
+    return isinstance(formula, Glyph) and formula.letter == "gamma"
+
+
+def _matrices(joint: Joint) -> Iterator[Block]:
+    """Yield A and B of each body that moves, in sines and cosines."""
+    for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
+        if body.is_ground:
+            yield text(f"Body {frame.index} is the ground: A is the identity, and its rates are 0.")
+            continue
+        angle = Symbol(str(sympy.sympify(body.phi)))
+        cosine, sine = (Call(name, (angle,)) for name in ("cos", "sin"))
+        minus_cosine, minus_sine = (_minus(item) for item in (cosine, sine))
+        for letter, rows in (
+            ("A", ((cosine, minus_sine), (sine, cosine))),
+            ("B", ((minus_sine, minus_cosine), (cosine, minus_sine))),
+        ):
+            yield Display(Equated((Glyph(letter, frame.index), Matrix(rows))))
+
+
+def _minus(formula: Call) -> Formula:
+    return Joined(("-", formula))

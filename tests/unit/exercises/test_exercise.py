@@ -1,0 +1,291 @@
+"""Exercises: variants that assemble, pages without solutions, marks that are right both ways."""
+
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.exercises import kit as kits
+from kincompile.model.catalogue import CONSTRAINTS
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def read(name: str) -> Any:
+    """Return one of the ready exercises."""
+    return kc.read_model(ROOT / "examples" / name)
+
+
+def ready() -> list[str]:
+    """Return the models that docs/exercises.md lists."""
+    text = (ROOT / "docs" / "exercises.md").read_text(encoding="utf-8")
+    return re.findall(r"`examples/([\w/]+\.toml)`", text)
+
+
+def by_hand(system: Any, row: int, column: int | None) -> Any:
+    """Return an entry by SymPy alone, from Phi: the oracle that the kit does not use."""
+    q = [sympy.Symbol(item.name) for item in system.coordinates]
+    q_dot = [sympy.Symbol(f"{item.name}_dot") for item in system.coordinates]
+    Phi = system.Phi[row]
+    if column is not None:
+        return Phi.diff(q[column])
+    velocity = sum(Phi.diff(x) * rate for x, rate in zip(q, q_dot, strict=True))
+    total = sum(velocity.diff(x) * rate for x, rate in zip(q, q_dot, strict=True))
+    return -(total + 2 * velocity.diff(kc.t) + Phi.diff(kc.t, 2))
+
+
+def fill(folder: Path, student: str, change: dict[str, Any]) -> None:
+    """Write the hand-in file of a student: right answers, some of them changed."""
+    system = kc.read(folder / "instructor" / "models" / f"{student}.toml").system()
+    blanks = json.loads((folder / "instructor" / "blanks.json").read_text())["blanks"]
+    lines = ["# my answers"]
+    for item in blanks:
+        answer = by_hand(system, item["row"], item["column"])
+        lines.append(f"{item['name']} = {change.get(item['name'], lambda x: x)(answer)}")
+    (folder / "students" / student / "hand_in.txt").write_text("\n".join(lines), encoding="utf-8")
+
+
+def rows_of(folder: Path) -> dict[str, dict[str, str]]:
+    """Return the lines of the table of marks by student."""
+    table = csv.DictReader(StringIO(kc.mark(folder).to_csv()))
+    return {row["student"]: row for row in table}
+
+
+@pytest.fixture(scope="module")
+def four_bar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a written exercise with four students."""
+    folder = tmp_path_factory.mktemp("kit") / "four_bar"
+    kc.exercise(read("four_bar.toml"), 4, 3, signs=True).write(folder)
+    return folder
+
+
+def test_that_the_ready_exercises_have_every_type_of_constraint() -> None:
+    found = {type(item) for name in ready() for item in read(name).constraints}
+    assert set(CONSTRAINTS.values()) <= found
+
+
+@pytest.mark.parametrize("name", ready())
+def test_that_variants_of_a_ready_exercise_assemble_and_differ(name: str) -> None:
+    made = kc.exercise(read(name), 2, 5, signs=True, lengths=True)
+    texts = set()
+    for variant in made.variants:
+        solution = kc.solve(kc.compile(variant), np.linspace(0, variant.end, 40))
+        assert solution.success, solution.message
+        assert not variant.parameters
+        texts.add(variant.to_toml())
+    assert len(texts) == 2
+    quantities = {item.quantity for item in made.blanks}
+    assert quantities == {"Phi_q", "gamma"}
+    for item in made.blanks:  # what is asked for varies, and is no riddle
+        answer = item.answer(made.variants[0].system())
+        assert answer.free_symbols
+        assert sympy.count_ops(answer) <= 100
+
+
+IN_SHORT = ("inverted_slider_crank.toml", "gear_train.toml", "exercises/relative_constraints.toml")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(x, marks=() if x in IN_SHORT else pytest.mark.slow) for x in ready()]
+)
+def test_that_right_answers_have_all_points(name: str, tmp_path: Path) -> None:
+    folder = kc.exercise(read(name), 1, 2, signs=True).write(tmp_path / "kit")
+    fill(folder, "01", {})
+    row = rows_of(folder)["01"]
+    assert (row["points"], row["reasons"]) == (row["of"], "")
+
+
+def test_that_frames_that_are_turned_change_signs_and_not_the_motion() -> None:
+    model = read("inverted_slider_crank.toml")
+    plain = kc.exercise(model, 6, 1).variants
+    turned = kc.exercise(model, 6, 1, signs=True).variants
+    points = [[item.constraints[1].point_i for item in made] for made in (plain, turned)]
+    assert all(x >= 0 for x, _ in points[0])
+    assert any(x < 0 for x, _ in points[1])
+
+
+def test_that_a_model_without_parameters_varies_in_its_lengths() -> None:
+    made = kc.exercise(read("slider_crank.toml"), 3, 1).variants
+    assert len({str(item.constraints[1].point_i) for item in made}) > 1
+
+
+def test_that_a_wrong_sign_costs_its_blank_and_is_named(four_bar: Path) -> None:
+    fill(four_bar, "01", {"B2": lambda x: -x, "B8": lambda x: -x})
+    row = rows_of(four_bar)["01"]
+    assert [name for name in row if name.startswith("B") and row[name] == "0"] == ["B2", "B8"]
+    assert row["points"] == str(int(row["of"]) - 2)
+    assert re.search(r"B2: .*wrong sign.*; B8: .*wrong sign", row["reasons"])
+
+
+def test_that_all_signs_wrong_is_no_convention(four_bar: Path) -> None:
+    fill(four_bar, "02", {f"B{k}": lambda x: -x for k in range(1, 10)})
+    assert rows_of(four_bar)["02"]["points"] == "0"
+
+
+def test_that_the_sign_of_a_whole_row_is_that_of_the_given_constraint(tmp_path: Path) -> None:
+    m = kc.Mechanism("tethered")
+    plate = m.body("plate", guess=(1.0, 1.2, 0.0))
+    m.add(kc.AbsoluteDistance("rod", plate, (-0.3, 0.2), (0, 0), 1.5))
+    m.add(kc.AbsoluteX("push", plate, (0.2, 0.1), 1.2 + kc.t / 10))
+    m.add(kc.AbsoluteAngle("turn", plate, kc.t / 2))
+    folder = kc.exercise(m, 1, 1).write(tmp_path / "kit")
+    blanks = json.loads((folder / "instructor" / "blanks.json").read_text())["blanks"]
+    rod = [item["name"] for item in blanks if item["constraint"] == "rod"]
+    assert len(rod) == 4  # the whole row of Phi_q, and gamma
+    fill(folder, "01", {name: (lambda x: -x) for name in rod})
+    row = rows_of(folder)["01"]
+    assert [row[name] for name in rod] == ["0"] * 4
+
+
+def test_that_another_form_of_an_answer_is_right(four_bar: Path) -> None:
+    fill(four_bar, "03", {"B1": lambda x: f"({x})*(cos(1)^2 + sin(1)^2)", "B3": sympy.factor})
+    row = rows_of(four_bar)["03"]
+    assert row["points"] == row["of"]
+
+
+def test_that_what_cannot_be_read_costs_its_own_blank(four_bar: Path) -> None:
+    change = {
+        "B1": lambda _: "__import__('os').system('true')", "B4": lambda _: "sin(",
+        "B5": lambda _: "", "B9": lambda _: "wobble",
+    }  # fmt: skip
+    fill(four_bar, "04", change)
+    row = rows_of(four_bar)["04"]
+    assert [row[f"B{k}"] for k in range(1, 10)] == list("011001110")
+    for part in ("B1: cannot be read", "B4: cannot be read", "B5: not filled", "wobble"):
+        assert part in row["reasons"]
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (None, "nothing handed in"),
+        (b"\xff\xfe\x00", "not a text in UTF-8"),
+        (b"B1 = 1\n" * 20_000, "more than 100000 bytes"),
+        (b"", "not filled"),
+    ],
+)
+def test_that_a_hand_in_file_that_is_no_hand_in_has_no_points(
+    four_bar: Path, content: bytes | None, reason: str
+) -> None:
+    path = four_bar / "students" / "02" / "hand_in.txt"
+    path.unlink(missing_ok=True)
+    if content is not None:
+        path.write_bytes(content)
+    row = rows_of(four_bar)["02"]
+    assert row["points"] == "0"
+    assert reason in row["reasons"]
+
+
+def test_that_a_page_has_hints_and_no_solution(four_bar: Path) -> None:
+    page = (four_bar / "students" / "01" / "exercise.html").read_text(encoding="utf-8")
+    assert page.count("Hint 1:") == page.count("Hint 2:") == page.count("Hint 3:") > 3
+    assert '<svg class="figure"' in page
+    assert "script" not in page
+    assert sorted(item.name for item in (four_bar / "students" / "01").iterdir()) == [
+        "exercise.html", "hand_in.txt",
+    ]  # fmt: skip
+    solutions = (four_bar / "instructor" / "solutions.html").read_text(encoding="utf-8")
+    lines = re.findall(r"<td>B1</td><td>.*?</td><td>(<math>.*?</math>)</td>", solutions)
+    assert len(lines) == 4
+    assert lines[0] not in page
+
+
+def test_that_the_same_seed_gives_the_same_bytes_and_another_other_ones() -> None:
+    model = read("four_bar.toml")
+    first = kc.exercise(model, 2, 8, signs=True).files()
+    assert kc.exercise(model, 2, 8, signs=True).files() == first
+    assert kc.exercise(model, 2, 9, signs=True).files() != first
+    assert kc.exercise(model, 1, 8, signs=True).files().items() <= first.items() | {
+        (key, text) for key, text in kc.exercise(model, 1, 8, signs=True).files().items()
+        if "solutions" in key
+    }  # fmt: skip
+
+
+def test_that_bytes_do_not_depend_on_the_order_of_sets(tmp_path: Path) -> None:
+    program = (
+        "import sys, hashlib, kincompile as kc\n"
+        "files = kc.exercise(kc.read_model(sys.argv[1]), 2, 4, signs=True).files()\n"
+        "print(hashlib.sha256(repr(sorted(files.items())).encode()).hexdigest())\n"
+    )
+    found = set()
+    for value in ("1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": value}
+        model = str(ROOT / "examples" / "shaper.toml")
+        done = subprocess.run(
+            [sys.executable, "-c", program, model],
+            env=environment, cwd=tmp_path, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        found.add(done.stdout)
+    assert len(found) == 1
+
+
+def test_that_a_kit_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: Any) -> None:
+    made = kc.exercise(read("four_bar.toml"), 2)
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "hand_in.txt").write_text("precious", encoding="utf-8")
+    with pytest.raises(kc.InputError, match="old exists: name a new folder"):
+        made.write(tmp_path / "old")
+    with pytest.raises(kc.InputError, match=r"the folder .*nowhere does not exist"):
+        made.write(tmp_path / "nowhere" / "kit")
+
+    def broken(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(kits, "as_html", broken)
+    with pytest.raises(kc.InputError, match="No space left on device"):
+        made.write(tmp_path / "kit")
+    assert sorted(item.name for item in tmp_path.iterdir()) == ["old"]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: kc.exercise(read("problem_3_5_6.toml")), "no mechanism of bodies and joints"),
+        (lambda: kc.exercise(read("four_bar.toml"), 0), "0 students: give a number from 1 to 500"),
+        (lambda: kc.exercise(still()), "no variant was found for student 1"),
+        (lambda: kc.exercise(prescribed()), "no joint whose Phi_q or gamma varies"),
+    ],
+)
+def test_that_a_model_that_makes_no_exercise_is_refused(make: Any, message: str) -> None:
+    with pytest.raises(kc.InputError, match=message):
+        make()
+
+
+def still() -> kc.Mechanism:
+    """Return a mechanism that cannot move as far as it is driven."""
+    m = kc.Mechanism("still", end=3.0)
+    arm = m.body("arm", guess=(1, 0, 0))
+    m.add(kc.Revolute("A", m.ground, (0, 0), arm, (-1, 0)))
+    m.add(kc.AbsoluteX("push", arm, (0, 0), 0.5 + kc.t))
+    return m
+
+
+def prescribed() -> kc.Mechanism:
+    """Return a mechanism without a rotation in its constraints."""
+    m = kc.Mechanism("prescribed")
+    arm = m.body("arm")
+    m.add(kc.AbsoluteX("x", arm, (0, 0), kc.t))
+    m.add(kc.AbsoluteY("y", arm, (0, 0), 1))
+    m.add(kc.AbsoluteAngle("phi", arm, 1))
+    return m
+
+
+@pytest.mark.parametrize(
+    "content", [None, "[]", "{", '{"blanks": 3}', '{"format": 9, "blanks": []}']
+)
+def test_that_a_folder_that_is_no_exercise_is_refused(tmp_path: Path, content: str | None) -> None:
+    if content is not None:
+        (tmp_path / "instructor").mkdir()
+        (tmp_path / "instructor" / "blanks.json").write_text(content, encoding="utf-8")
+    with pytest.raises(kc.InputError, match=r"no exercise|not the key|format 9"):
+        kc.mark(tmp_path)
