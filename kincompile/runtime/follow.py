@@ -189,13 +189,14 @@ class _Way:
         """Find the event that ends the motion; return the way through it if there is one."""
         motion, equations, state = self._motion, self._march.equations, outcome.state
         t = float(self._times[self._index - 1])
-        if not self._may_be_dense:
+        if not self._may_be_dense or outcome.exhausted:
             return None
         if state is None:
             if outcome.status is Status.SINGULAR and outcome.position is not None:
                 motion.events += filter(None, [singular_start(equations, outcome.position, t)])
             return None
-        found = locate(self._march, state, t, abs(t - float(self._times[0])))
+        # A rounding error before it a state is too near to say what it is: the point before is not.
+        found = locate(self._march, state, t) or self._locate_from_point(t)
         if found is not None:
             motion.events.append(found[0])
             return found[1]
@@ -203,6 +204,15 @@ class _Way:
             q = outcome.nearest.q
             motion.events.append(branch_switch(equations.code, state, t, q, equations.reference))
         return None
+
+    def _locate_from_point(self, t: float) -> tuple[Event, Passage | None] | None:
+        """Find the event that ends the motion from the last of the times that was reached."""
+        index = self._index - 2
+        if index < 0:
+            return None
+        q = np.ascontiguousarray(self._motion.q[index])
+        state = self._state(q, float(self._times[index])).state
+        return None if state is None else locate(self._march, state, t)
 
     def go_through(self, passage: Passage) -> Outcome:
         """Fill the points within the passage through a bifurcation, and take the next one."""
@@ -251,7 +261,9 @@ class _Way:
         """Return the march of the mechanism, whose scales are those at a position."""
         inputs, time = self._inputs, float(self._times[0])
         equations = problem(inputs.code.module, inputs.p, q, time, staged=True, engine=engine)
-        return March(equations, equations.engine, inputs.tolerance)
+        march = March(equations, equations.engine, inputs.tolerance)
+        march.alive = lambda: self._progress(self._index, len(self._times))
+        return march
 
     def _leave_stages(self, q: NDArray[np.float64]) -> None:
         """Solve dense matrices from here on: they have the last word."""
@@ -270,10 +282,14 @@ class _Way:
         t = float(self._times[self._index])
         outcome = march.advance(state, t, most)
         doubtful = outcome.state is None or outcome.state.sensitivity > TOO_NEAR
-        if self._is_staged and (doubtful or outcome.status is not Status.CONVERGED):
+        doubtful = doubtful or outcome.status is not Status.CONVERGED
+        if self._is_staged and doubtful and not outcome.exhausted:
             self._leave_stages(state.point.q)
             known = self._state(state.point.q, state.t)
-            return known if known.state is None else self._advance(known.state)
+            careful = known if known.state is None else self._advance(known.state)
+            spent = careful.iterations + outcome.iterations
+            self._motion.iterations[self._index - 1] = spent
+            return replace(careful, iterations=spent)
         if outcome.position is None and self._may_be_dense:
             outcome = give_up(march, outcome, t, self._inputs)
         self._put(outcome)

@@ -11,6 +11,7 @@ step is halved, and doubled again once it succeeds.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -35,11 +36,14 @@ from kincompile.runtime.problem import Dense, column, unsolvable, within
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.engine.engine import Engine, Point
     from kincompile.runtime.problem import Problem
+
+SIGN_OF_LIFE = 256
+"""Sub-steps between two times after which progress is shown."""
 
 SAME_DETERMINANT = 0.5
 """Part of a determinant down to which Phi_q counts as no nearer to singular."""
@@ -92,6 +96,8 @@ class Outcome:
         Where the motion does not lead to that time: where Newton's method ends there.
     jumps : bool
         Whether the mechanism is assembled there: it could only jump to it.
+    exhausted : bool
+        Whether the sub-steps on the way were too many.
     strays : bool
         Whether it was assembled on another branch than its guess shows.
     """
@@ -102,6 +108,7 @@ class Outcome:
     position: Point | None = None
     nearest: Point | None = None
     jumps: bool = False
+    exhausted: bool = False
     strays: bool = False
 
 
@@ -143,6 +150,7 @@ class March:
     def __init__(self, equations: Problem, engine: Engine, tolerance: float) -> None:
         self.equations, self.engine = equations, engine
         self.tolerance = max(tolerance, equations.floor)
+        self.alive: Callable[[], object] = lambda: None
         self._residual = max(RESIDUAL_FACTOR * tolerance, ROUNDING)
         # Factors of Phi_q a rounding error away serve the rates; a dense matrix has none to save.
         self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
@@ -288,15 +296,23 @@ class March:
         is_far = following.sensitivity <= TOO_NEAR
         return following, all_hold(found.good & near & is_far, checks), found.iterations
 
+    def time_of(self, state: State) -> float:
+        """Return the time in which something moves as far as its scale, infinite at rest."""
+        reference = self.equations.reference
+        speed, growth = (np.abs(x) / reference for x in (state.q_dot, state.q_ddot))
+        return float(1 / max(speed.max(), math.sqrt(growth.max()), 1e-300))
+
     def advance(self, state: State, t: float, most: int) -> Outcome:
         """Follow the motion from a good state to time `t`, in sub-steps where need be.
 
         Where it does not get there, the last good state on the way is in the outcome.
         """
         step, iterations = t - state.t, 0
-        smallest = abs(step) * SMALLEST_PART
+        smallest = min(abs(step), self.time_of(state)) * SMALLEST_PART
         status = Status.NOT_CONVERGED
-        for _ in range(MAX_SUBSTEPS):
+        for count in range(MAX_SUBSTEPS):
+            if count % SIGN_OF_LIFE == SIGN_OF_LIFE - 1:
+                self.alive()
             whole = abs(step) >= abs(t - state.t)
             outcome = self.step(state, t if whole else state.t + step, most)
             iterations += outcome.iterations
@@ -312,6 +328,8 @@ class March:
                 break
             else:
                 step /= 2
+        else:
+            return Outcome(Status.NOT_CONVERGED, iterations, state, exhausted=True)
         return Outcome(status, iterations, state)
 
 

@@ -209,6 +209,8 @@ def start(march: March, t: float, inputs: Inputs) -> Outcome:
 def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome:
     """Find out what is there at a time that the motion does not reach."""
     assert outcome.state is not None
+    if outcome.exhausted:
+        return outcome
     limits = inputs.tolerance, inputs.max_iterations
     attempt = assemble(march.equations, t, outcome.state.point.q, *limits)
     # What is wrong there, rather than on the way.

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
+from kincompile.criteria import MAX_ITERATIONS, MAX_SUBSTEPS, TOLERANCE
 from kincompile.errors import BranchSwitchWarning, SingularConfigurationWarning, SolveError
 from kincompile.names import listed
 from kincompile.runtime.follow import follow
@@ -233,6 +233,10 @@ def _why(outcome: Outcome, events: Sequence[Event], t: float) -> str:
     """
     if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
         return NOT_ASSEMBLED
+    if outcome.exhausted:
+        return (
+            f"Between these two times {MAX_SUBSTEPS:,} steps were not enough: ask for more times."
+        )
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
     if not events or outcome.state is None:
         return general

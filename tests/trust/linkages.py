@@ -125,3 +125,33 @@ def dead_centre(lengths=(0.3, 1.0, 0.8, 1.1)):
     m.add(kc.Revolute("D", three, (-c, 0), m.ground, (ground, 0)))
     m.add(kc.AbsoluteAngle("motor", three, kc.t + draught.linkage().q[8]))
     return draught.linkage()
+
+
+def peaucellier(arm=15.0, side=6.0, crank=5.0):
+    """Return Peaucellier's inversor, whose crank turns by t / 5 and locks it at 2 acos(0.9)."""
+    draught = Draught("peaucellier")
+    m, pivot = draught.mechanism, np.array([crank, 0.0])
+    end = np.array([2 * crank, 0.0])
+    up, down = (meeting(np.zeros(2), end, arm, side, s) for s in (1, -1))
+    pencil = up + down - end
+    ends = {
+        "OA": ((0, 0), up), "OC": ((0, 0), down), "AB": (up, end), "CB": (down, end),
+        "AP": (up, pencil), "CP": (down, pencil), "crank": (pivot, end),
+    }  # fmt: skip
+    bars = {name: draught.bar(name, *points) for name, points in ends.items()}
+
+    def pin(name, one, other):
+        (i, at), (j, there) = ((bars[bar][0], (s * bars[bar][1], 0)) for bar, s in (one, other))
+        m.add(kc.Revolute(name, i, at, j, there))
+
+    for name, bar, point in (("O1", "OA", (0, 0)), ("O2", "OC", (0, 0)), ("O3", "crank", pivot)):
+        m.add(kc.Revolute(name, m.ground, tuple(point), bars[bar][0], (-bars[bar][1], 0)))
+    pin("A1", ("OA", 1), ("AB", -1))
+    pin("C1", ("OC", 1), ("CB", -1))
+    pin("B1", ("AB", 1), ("crank", 1))
+    pin("B2", ("CB", 1), ("crank", 1))
+    pin("A2", ("OA", 1), ("AP", -1))
+    pin("C2", ("OC", 1), ("CP", -1))
+    pin("P", ("AP", 1), ("CP", 1))
+    m.add(kc.AbsoluteAngle("motor", bars["crank"][0], kc.t / 5))
+    return draught.linkage()

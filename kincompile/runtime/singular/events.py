@@ -116,9 +116,7 @@ _QUINTIC = np.array([
 """Coefficients of s^3, s^4, s^5 from q, h q_dot, h^2 q_ddot at both ends of the interval."""
 
 
-def locate(
-    march: March, state: State, latest: float, duration: float
-) -> tuple[Event, Passage | None] | None:
+def locate(march: March, state: State, latest: float) -> tuple[Event, Passage | None] | None:
     """Find the singular configuration that a motion cannot pass.
 
     Parameters
@@ -129,8 +127,6 @@ def locate(
         The last good point of the motion.
     latest
         The time that was not reached.
-    duration
-        A time that is long for the motion.
 
     Returns
     -------
@@ -139,7 +135,9 @@ def locate(
         on to that time, or nowhere.
     """
     equations = march.equations
-    curve = Curve(equations, state, duration)
+    # A time that belongs to the motion, whatever span was asked for.
+    speed = float(np.max(np.abs(state.q_dot) / equations.reference))
+    curve = Curve(equations, state, 1 / speed if speed > 0 else abs(latest - state.t))
     forward = math.copysign(1.0, latest - state.t)
     start = curve.start(state, forward)
     bracket = start and curve.next_singular(start, latest + LATE * (latest - state.t))
@@ -149,7 +147,7 @@ def locate(
     if singular is None:
         return None
     place, at = singular
-    if (place.t - latest) * forward > LATE * max(duration, abs(latest - state.t)):
+    if (place.t - latest) * forward > LATE * abs(latest - state.t):
         return None
     kind = LOCK_UP if bracket.turns else BIFURCATION
     event = _event(equations, kind, place.q, place.t, place.point.Phi_q)
