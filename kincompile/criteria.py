@@ -79,6 +79,10 @@ SMALLEST_DETERMINANT = 1e-5
 """Determinant of a block, relative to the largest along the motion, below which a point that was
 not looked at closely is not trusted."""
 
+FOLDED = 1e-9
+"""Determinant of a block at the guess, beside that at the assembled position, up to which the guess
+shows no branch: bodies without a guess lie on one line."""
+
 # On the branch. Errors of a prediction are in radians and sizes of the mechanism
 
 SMALL_ERROR, LARGE_ERROR = 0.05, 0.5
@@ -96,6 +100,14 @@ number rounding errors decide."""
 
 KINK_UNSEEN, SMOOTH_UNSEEN = 16.0, 1e-6
 """The same where the sensitivity is not known: looser, as the step is divided by those who know."""
+
+# Corners of drivers
+
+CORNER = 1e-9
+"""Jump of a velocity, relative to the largest over the times, that is a corner of a driver."""
+
+SAME_TIME = 4 * float(np.finfo(np.float64).eps)
+"""How far, relative to the largest, a time may be from a corner and still be the corner's."""
 
 # Steps
 

@@ -49,6 +49,8 @@ class Motion:
         Points so near to a singular configuration that their rates are uncertain.
     note : str
         A remark for the message of the solution.
+    is_folded : bool
+        Whether the guess shows no branch.
     """
 
     q: Array
@@ -62,6 +64,7 @@ class Motion:
     passed: list[Event] = field(default_factory=list)
     near: list[int] = field(default_factory=list)
     note: str = ""
+    is_folded: bool = False
 
     @classmethod
     def over(cls, inputs: Inputs) -> Motion:
@@ -142,6 +145,7 @@ class _Way:
             self._leave_stages(inputs.guess)
             outcome = start(self._march, time, inputs)
         self._put(outcome)
+        self._motion.is_folded = outcome.is_folded
         if self._may_be_dense and outcome.strays:
             self._motion.note = (
                 f" The position at t = {time:.10g} is on another branch than the guess: "

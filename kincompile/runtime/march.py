@@ -100,6 +100,8 @@ class Outcome:
         Whether the sub-steps on the way were too many.
     strays : bool
         Whether it was assembled on another branch than its guess shows.
+    is_folded : bool
+        Whether the guess that it was assembled from shows no branch.
     """
 
     status: Status
@@ -110,6 +112,7 @@ class Outcome:
     jumps: bool = False
     exhausted: bool = False
     strays: bool = False
+    is_folded: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -197,13 +197,14 @@ def start(march: March, t: float, inputs: Inputs) -> Outcome:
     here = [march.equations.at(q, t) for q in (inputs.guess, found.q)]
     guess, point = (known for known in here if known is not None)
     left = march.equations.leaves_branch(guess, point)
+    folded = march.equations.is_folded(guess, point)
     state = march.state(point)
     # Towards a singular position Newton's method creeps, and ends a rounding error before it.
     if not isinstance(state, Status) and crawls(attempt.corrections):
         state = Status.SINGULAR if state.sensitivity > TOO_NEAR else state
     if isinstance(state, Status):
-        return Outcome(state, iterations, None, point, strays=left)
-    return Outcome(Status.CONVERGED, iterations, state, point, strays=left)
+        return Outcome(state, iterations, None, point, strays=left, is_folded=folded)
+    return Outcome(Status.CONVERGED, iterations, state, point, strays=left, is_folded=folded)
 
 
 def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome:

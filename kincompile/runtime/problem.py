@@ -17,6 +17,7 @@ import numpy as np
 from kincompile.criteria import (
     AGREEMENT,
     FAR,
+    FOLDED,
     RESIDUAL_FACTOR,
     ROUNDING,
     STEEP,
@@ -121,6 +122,11 @@ class Problem:
     def strays(self, guess: Point, found: Point) -> bool:
         """Say whether a position found from a guess is not what the guess shows."""
         return self.is_far(found.q, guess.q) or self.leaves_branch(guess, found)
+
+    def is_folded(self, guess: Point, found: Point) -> bool:
+        """Say whether a guess shows no branch: beside a position, a determinant is zero there."""
+        here, there = (self.engine.determinants(point, point).tolist() for point in (guess, found))
+        return any(abs(one) <= FOLDED * abs(two) for one, two in zip(here, there, strict=True))
 
     def has_converged(
         self, before: Point, point: Point, tolerance: float, corrections: list[float]

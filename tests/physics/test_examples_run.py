@@ -18,11 +18,12 @@ FIGURES = {
     "gear_train": "turns of the arm: 1.000000",
     "rack_and_pinion": "pinion +2.000 rad, rack +0.1000 m",
     "cam_flat_follower": "highest: 60.000 mm at a cam angle of 270 degrees",
-    "jansen": "the leg swings from 146.683 to 211.231 degrees",
-    "klann": "the leg swings from -144.324 to -108.832 degrees",
+    "jansen": "the foot steps 67.908 mm and lifts 22.457 mm",
+    "klann": "the foot steps 64.194 mm and lifts 31.271 mm",
     "shaper": "the ram's stroke is 0.311110 m",
     "double_wishbone": "camber from -0.012 to +0.549 degrees",
     "cam_by_table": "highest: 60.000 mm at a cam angle of 270 degrees",
+    "swing_and_dwell": "the arm's largest speed is 1.760 times the mean of its swing",
     "slot_follower": "back at 152.95, where it was: 152.95",
 }
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from kincompile.errors import InputError, package_of_extra
 from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     import xarray
     from numpy.typing import NDArray
@@ -18,6 +21,9 @@ if TYPE_CHECKING:
 
 TIME_UNIT = "s"
 """Unit of t, in which every driver and every rate is written."""
+
+ANGLE_UNITS = {"rad": 1.0, "deg": 180 / np.pi}
+"""What angles are shown in, with the factor from radians."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,10 +42,38 @@ class Column:
     unit: str
     values: NDArray[np.float64]
 
+    def shown(self, angle_unit: str) -> Column:
+        """Return the column as it is shown: in degrees, where angles are and it is one."""
+        unit, factor = shown_unit(self.unit, angle_unit)
+        return self if factor == 1 else Column(self.name, unit, self.values * factor)
+
     @property
     def title(self) -> str:
         """Name and unit, for instance ``x_rod [m]``."""
         return titled(self.name, self.unit)
+
+
+def shown_unit(unit: str, angle_unit: str) -> tuple[str, float]:
+    """Return the unit in which numbers are shown, and the factor to it from their own.
+
+    Parameters
+    ----------
+    unit
+        Their own, as in ``rad/s``.
+    angle_unit
+        ``"rad"`` or ``"deg"``: what angles and their rates are shown in. All else stays.
+
+    Raises
+    ------
+    InputError
+        If there is no such unit of angles.
+    """
+    if angle_unit not in ANGLE_UNITS:
+        raise InputError(f"angle_unit is {angle_unit!r}: angles are shown in 'rad' or in 'deg'.")
+    name, slash, per = unit.partition("/")
+    if name != "rad":
+        return unit, 1.0
+    return f"{angle_unit}{slash}{per}", ANGLE_UNITS[angle_unit]
 
 
 def titled(name: str, unit: str) -> str:
@@ -50,6 +84,10 @@ def titled(name: str, unit: str) -> str:
 def rate_unit(unit: str, order: int) -> str:
     """Return the unit of a time derivative: of m, m/s and m/s^2; of none, none."""
     return f"{unit}{('', '/s', '/s^2')[order]}" if unit else ""
+
+
+def _units(unit: str) -> dict[str, str]:
+    return {"units": unit} if unit else {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +132,8 @@ class MotionTable:
     coordinates: tuple[str, ...]
     units: dict[str, str]
     events: list[Event]
+    parameters: dict[str, Any]
+    sweep: dict[str, NDArray[np.float64]]
 
     @property
     def observed(self) -> Observed:
@@ -153,40 +193,54 @@ class MotionTable:
         values = (self.q, self.q_dot, self.q_ddot)[order][..., k]
         return Column(rate(name, order), rate_unit(self.units.get(name, ""), order), values)
 
-    def to_pandas(self) -> pd.DataFrame:
-        """Return the motion as a `pandas.DataFrame`, a row a time.
+    @property
+    def variants(self) -> dict[str, NDArray[Any]]:
+        """What the variants differ in, shape (B,): the parameters by name, or their numbers."""
+        apart = [name for name, values in self.parameters.items() if np.ptp(values) > 0]
+        names = list(self.sweep) or apart
+        return {name: self.parameters[name] for name in names} or {
+            "variant": np.arange(len(self.q))
+        }
+
+    def to_pandas(self, angle_unit: str = "rad") -> pd.DataFrame:
+        """Return the motion as a `pandas.DataFrame`, a row a time; angles in `angle_unit`.
 
         Returns
         -------
         pandas.DataFrame
-            Index t; a column for each coordinate, rate and second rate, then status and residual.
+            Index t, of variants the parameters in which they differ, and t; a column for each
+            coordinate, rate and second rate, then status and residual.
             ``.attrs["units"]`` has the units by column.
 
         Raises
         ------
         UnsupportedError
             If pandas is not installed.
-        InputError
-            If the solution is one of variants, which a table cannot hold.
         """
         with package_of_extra("pandas", "tables"):
             import pandas as pd
-        self.require_one_motion("a table holds", "use to_xarray()")
-        columns = self.columns()
-        data: dict[str, NDArray[Any]] = {column.name: column.values for column in columns}
-        data |= {"status": self.status, "residual": self.residual}
-        frame = pd.DataFrame(data, index=pd.Index(self.t, name="t"))
+        columns = [item.shown(angle_unit) for item in self.columns()]
+        data: dict[str, NDArray[Any]] = {item.name: item.values.ravel() for item in columns}
+        data |= {"status": self.status.ravel(), "residual": self.residual.ravel()}
+        index: Any = pd.Index(self.t, name="t")
+        if self.q.ndim > 2:
+            axes = {name: np.repeat(axis, self.t.size) for name, axis in self.variants.items()}
+            times = np.tile(self.t, len(self.q))
+            index = pd.MultiIndex.from_arrays([*axes.values(), times], names=[*axes, "t"])
+        frame = pd.DataFrame(data, index=index)
         frame.attrs["units"] = {"t": TIME_UNIT, **{item.name: item.unit for item in columns}}
         return frame
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the motion as an `xarray.Dataset`.
+    def to_xarray(self, angle_unit: str = "rad") -> xarray.Dataset:
+        """Return the motion as an `xarray.Dataset`; angles in `angle_unit`, ``"rad"`` or ``"deg"``.
 
         Returns
         -------
         xarray.Dataset
             A variable for each coordinate, rate and second rate, status and residual, over the
-            dimension t, of variants over variant and t. Each has its unit in ``.attrs["units"]``.
+            dimension t. Of variants, a parameter with an array of values is a dimension of its
+            name; where several were taken in pairs the dimension is variant, and each is a
+            coordinate along it. Each has its unit in ``.attrs["units"]``.
 
         Raises
         ------
@@ -195,15 +249,36 @@ class MotionTable:
         """
         with package_of_extra("xarray", "tables"):
             import xarray
-        dimensions = ("variant", "t") if self.q.ndim > 2 else ("t",)
+        axes = self._axes()
+        dimensions = (*dict.fromkeys(dimension for dimension, _ in axes.values()), "t")
+        sizes = {dimension: values.size for dimension, values in axes.values()}
+        shape = (*sizes.values(), self.t.size)
         variables: dict[str, Any] = {
-            item.name: (dimensions, item.values, {"units": item.unit} if item.unit else {})
-            for item in self.columns()
+            item.name: (dimensions, item.values.reshape(shape), _units(item.unit))
+            for item in (column.shown(angle_unit) for column in self.columns())
         }
-        variables |= {name: (dimensions, getattr(self, name)) for name in ("status", "residual")}
-        times = {"t": ("t", self.t, {"units": TIME_UNIT})}
+        for name in ("status", "residual"):
+            variables[name] = (dimensions, getattr(self, name).reshape(shape))
+        coords: dict[str, Any] = {
+            name: (dimension, values, _units(self.units.get(name, "")))
+            for name, (dimension, values) in axes.items()
+        }
+        coords["t"] = ("t", self.t, _units(TIME_UNIT))
         about = {"name": self.name, "message": self.message}
-        return xarray.Dataset(variables, coords=times, attrs=about)
+        return xarray.Dataset(variables, coords=coords, attrs=about)
+
+    def _axes(self) -> dict[str, tuple[str, NDArray[Any]]]:
+        """Return what the variants differ in: by name the dimension, and the values along it."""
+        if self.q.ndim == 2:
+            return {}
+        if self.sweep and len(self.q) == math.prod(values.size for values in self.sweep.values()):
+            return {name: (name, values) for name, values in self.sweep.items()}
+        return {name: ("variant", values) for name, values in self.variants.items()}
+
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """Where position and velocity were found, shape (N,): at corners of drivers too."""
+        return np.asarray((self.status == Status.CONVERGED) | (self.status == Status.CORNER))
 
     def require_one_motion(self, what: str, remedy: str) -> None:
         """Check that the motion is not one of variants.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,6 +60,8 @@ class Solution(MotionTable):
         Unit of each coordinate and parameter, "" if none.
     parameters : dict
         Value of each parameter that was used; of variants one each, shape (B,).
+    sweep : dict
+        Of variants, the arrays of values that were given, by the names of their parameters.
     statistics : dict
         How it was found: ``coarse``, points of the coarse march of a grid; ``marched``, points that
         were followed one by one with a pivoted solve; of large mechanisms ``pivoted``, solves for
@@ -74,7 +76,6 @@ class Solution(MotionTable):
     iterations: NDArray[np.int64]
     success: bool
     equations: tuple[str, ...]
-    parameters: dict[str, Any]
     statistics: dict[str, int]
     module: ModuleType | None
     _observed: dict[str, Observed] = field(default_factory=dict)
@@ -131,6 +132,23 @@ class Solution(MotionTable):
             return counted_signatures(self.q, self.t, passed)
         return self._at_points(signatures)
 
+    def variant(self, number: int) -> Solution:
+        """Return one of the variants, counted from 0, as a solution of its own.
+
+        Raises
+        ------
+        InputError
+            When there is none of this number.
+        """
+        if self.q.ndim == 2 or not -len(self.q) <= number < len(self.q):
+            count = f"{len(self.q)} variants, counted from 0" if self.q.ndim > 2 else "no variants"
+            raise InputError(f"this Solution of {self.name} has {count}: there is no {number!r}.")
+        names = ("q", "q_dot", "q_ddot", "status", "residual", "iterations")
+        arrays: dict[str, Any] = {name: getattr(self, name)[number] for name in names}
+        own = {name: float(values[number]) for name, values in self.parameters.items()}
+        one = replace(self, **arrays, parameters=own, sweep={}, _observed={})
+        return replace(one, success=bool(one.good.all()))
+
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
         """Return a function of module, q, t and p for the motion, or for that of each variant."""
         module = self._require_module(".condition and .branch")
@@ -153,7 +171,7 @@ class Solution(MotionTable):
         for item, value in zip(fields(self), state, strict=True):
             object.__setattr__(self, item.name, value)
 
-    def plot(self, *names: str, ax: Axes | None = None) -> Axes:
+    def plot(self, *names: str, ax: Axes | None = None, angle_unit: str = "rad") -> Axes:
         """Draw columns over time: coordinates, rates, second rates; events and gaps are marked.
 
         Parameters
@@ -163,6 +181,8 @@ class Solution(MotionTable):
         ax : matplotlib.axes.Axes, optional
             Draws all of them into this plot. Without it there is a new figure with a panel for
             each unit, so that metres and radians do not share an axis.
+        angle_unit : {"rad", "deg"}
+            What angles and their rates are drawn in.
 
         Returns
         -------
@@ -176,7 +196,7 @@ class Solution(MotionTable):
         UnsupportedError
             When matplotlib is not installed.
         """
-        return plot_columns(self, names, ax)
+        return plot_columns(self, names, ax, angle_unit)
 
     def _repr_html_(self) -> str:
         return solution_html(self) + (picture_html(self) or plot_html(self))
@@ -193,7 +213,7 @@ class Solution(MotionTable):
         """Return the outcome in a few words."""
         if self.success:
             return f"converged, largest residual {np.max(self.residual):.1e}"
-        good = np.count_nonzero(self.status == 0)
+        good = np.count_nonzero(self.good)
         return f"failed, {good} of {self.status.size} points converged; see .message"
 
 
