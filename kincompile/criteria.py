@@ -9,17 +9,16 @@ what its terms contribute at those scales. So no system of units is judged other
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
 
 # Sizes
-
-NO_SIZE = 1e-12
-"""Lengths up to this are taken for rounding errors of zero; the unit then stands for the size."""
 
 WILD = 1e3
 """A coordinate beyond this many references is an iterate gone wild, not a larger scale."""
@@ -48,6 +47,11 @@ MAX_CORRECTIONS = 6
 """Iterations from a prediction after which it is given up; a good one takes three."""
 
 # Assembled
+
+FAR = math.pi / 4
+"""Angle between a guess and a position beyond which small steps from the guess may well lead to a
+nearer one. Of 3000 guesses within 30 degrees and a tenth of a length of an assembly Newton's own
+steps miss 21, and end 56 degrees away and more."""
 
 RESIDUAL_FACTOR = 10.0
 """How much larger than the tolerance, relative to its terms, a residual may be at the end."""
@@ -114,18 +118,90 @@ MAX_SUBSTEPS = 10_000
 """Sub-steps between two times after which the march is given up, about a second."""
 
 
-def size_of(angular: NDArray[np.bool_], *positions: ArrayLike) -> float:
-    """Return the size of a mechanism: the largest length in its positions, 0.0 where none has one.
+def size_of(
+    evaluate: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]],
+    pattern: NDArray[np.signedinteger[Any]] | None,
+    angular: NDArray[np.bool_],
+    q: NDArray[np.float64],
+) -> float:
+    """Return the size of a mechanism as its equations show it, wherever it stands.
+
+    Divided by the derivative with respect to a length, the derivative with respect to an angle is a
+    lever arm: the largest one is the size. Where equations have none, it is the distance over which
+    their derivatives change by as much as they are. Where even these are constant, any unit serves.
 
     Parameters
     ----------
+    evaluate
+        Gives Phi (m,) and the entries of Phi_q, (nnz,), at a position.
+    pattern : ndarray of int, shape (nnz, 2)
+        Rows and columns of these; None where they are all entries, row by row.
     angular : ndarray of bool, shape (n,)
         Which coordinates are angles.
-    *positions : array_like, shape (n,)
-        Guesses and assembled positions.
+    q : ndarray, shape (n,)
+        A guess, or an assembled position.
+
+    Returns
+    -------
+    float
+        In the unit of the lengths; 0.0 where the equations are linear in them.
     """
-    size = float(np.max(np.abs(np.where(angular, 0.0, np.asarray(positions))), initial=0.0))
-    return size if size > NO_SIZE else 0.0
+    lengths, angles = (np.where(angular == kind, probe_of(q.size), 0.0) for kind in (False, True))
+    Phi, entries = evaluate(q + angles)  # at no special pose
+    if pattern is None:
+        pattern = np.argwhere(np.ones((Phi.size, q.size)))
+    turns = angular[pattern[:, 1]]
+    slopes = _largest_of_rows(pattern, np.where(turns, 0.0, np.abs(entries)), Phi.size)
+    arms = _largest_of_rows(pattern, np.where(turns, np.abs(entries), 0.0), Phi.size)
+    size = _largest(arms[slopes > 0] / slopes[slopes > 0])
+    if size:
+        return size
+    farthest = _largest(q[~angular]) or 1.0
+    step = SMALL_PART * farthest
+    near = _bends(evaluate, pattern, q, step * lengths)
+    if near.size:
+        size = float(np.min(near, where=near > 10 * step, initial=np.inf))
+        if size < np.inf:
+            generic = _bends(evaluate, pattern, q + size * lengths, step * lengths)
+            known = generic[np.isfinite(generic) & (generic > 0)]
+            size = known.size / float(np.sum(1 / known)) if known.size else 0.0
+        # Nothing is so small beside its place but the distance from a pole.
+        size = size if 10 * step < size < np.inf else farthest
+    return size
+
+
+SMALL_PART, CONSTANT = 1e-8, 1e-12
+"""Step, as a part of the largest length, over which derivatives are compared, and the part of them
+up to which a change is a rounding error."""
+
+
+def _bends(
+    evaluate: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]],
+    pattern: NDArray[np.signedinteger[Any]],
+    q: NDArray[np.float64],
+    step: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return, of each equation that is not linear, over which distance its derivatives change."""
+    Phi, entries = evaluate(q)
+    change = np.abs(evaluate(q + step)[1] - entries) / _largest(step)
+    bends, slopes = (
+        _largest_of_rows(pattern, values, Phi.size) for values in (change, np.abs(entries))
+    )
+    curved = bends * _largest(step) > CONSTANT * slopes
+    bends, slopes, Phi = bends[curved], slopes[curved], np.abs(Phi[curved])
+    return np.asarray(np.maximum(slopes / bends, np.sqrt(Phi / bends)))
+
+
+def _largest_of_rows(pattern: Any, entries: NDArray[np.float64], m: int) -> NDArray[np.float64]:
+    """Return the largest of the entries of each row, 0.0 where it has none."""
+    largest = np.zeros(m)
+    np.maximum.at(largest, pattern[:, 0], entries)
+    return largest
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    """Return the largest size of finite values, 0.0 where there is none."""
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
 def probe_of(n: int) -> NDArray[np.float64]:

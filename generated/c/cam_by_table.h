@@ -86,12 +86,14 @@ enum {
 };
 
 // A motion over the times t, rising or falling, with one set of parameters. Newton starts from the
-// guess and stops when a correction is at most tolerance * (1 + ||q||); that correction is applied.
+// guess, without safeguards: it should be near an assembled position. It stops when a correction,
+// of lengths in sizes of the mechanism, is at most the tolerance; that correction is applied.
 typedef struct {
     size_t count;
     const double *t;      // count times
     const double *p;      // 1 parameters
     const double *guess;  // 7 coordinates
+    double size;          // of the mechanism: a long lever arm, such as its largest link
     double tolerance;     // such as 1e-10
     int max_iterations;   // such as 25
     cam_by_table_output q, q_dot, q_ddot;  // 7 entries a point
@@ -112,7 +114,7 @@ typedef struct {
     const double *t;      // count times
     cam_by_table_input p;  // 1 parameters a variant
     const double *guess;  // 7 coordinates
-    double tolerance;
+    double size, tolerance;
     int max_iterations;
     cam_by_table_output q, q_dot, q_ddot;
     ptrdiff_t time;

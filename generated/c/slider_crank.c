@@ -707,6 +707,7 @@ void slider_crank_solve(const slider_crank_system *system)
 typedef struct {
     double reference[N][LANES];  // scale of each coordinate: 1 rad, or the size of the mechanism
     double magnitude[M][LANES];  // what the terms of each equation contribute at a generic position
+    double noise[M][LANES];      // what rounding errors of the coordinates leave of each equation
     double tolerance;
 } scales;
 
@@ -745,25 +746,26 @@ enum { MAX_CORRECTIONS = 6 };
 static const double SMALLEST_PART = 9.5367431640625e-07;
 enum { MAX_SUBSTEPS = 10000 };
 
-// Measure the mechanism by a guess and the positions in a strip, which stay as they are.
-static void measure(strip *b, const double *guess, size_t count, scales *s)
+// Measure the equations of a mechanism around the positions in a strip, which stay as they are.
+static void measure(strip *b, double size, size_t count, scales *s)
 {
-    double q[N][LANES], size[LANES] = { 0 };
+    double q[N][LANES];
     memcpy(q, b->q, sizeof q);
     for (int i = 0; i < N; i++)
-        for (size_t k = 0; !ANGULAR[i] && k < count; k++)
-            size[k] = fmax(size[k], fmax(fabs(q[i][k]), fabs(guess[i])));
-    for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
-            s->reference[i][k] = ANGULAR[i] || size[k] <= 1e-12 ? 1 : size[k];
+            s->reference[i][k] = ANGULAR[i] ? 1 : size;
             b->q[i][k] += s->reference[i][k] * PROBE[i];
         }
     position_of_strip(b, count);
     memset(s->magnitude, 0, sizeof s->magnitude);
+    memset(s->noise, 0, sizeof s->noise);
     for (int e = 0; e < NONZEROS; e++) {
-        const int *place = slider_crank_pattern[e];
-        for (size_t k = 0; k < count; k++)
-            s->magnitude[place[0]][k] += fabs(b->Phi_q[e][k]) * s->reference[place[1]][k];
+        const int i = slider_crank_pattern[e][0], j = slider_crank_pattern[e][1];
+        for (size_t k = 0; k < count; k++) {
+            const double slope = fabs(b->Phi_q[e][k]), reference = s->reference[j][k];
+            s->magnitude[i][k] += slope * reference;
+            s->noise[i][k] += ROUNDING * slope * (reference + fabs(q[j][k]));
+        }
     }
     memcpy(b->q, q, sizeof q);
 }
@@ -816,7 +818,7 @@ static void complete(strip *b, const scales *s, size_t count, outcome *o)
     for (int i = 0; i < M; i++) {
         const double part = fmax(RESIDUAL_FACTOR * s->tolerance, ROUNDING);
         for (size_t k = 0; k < count; k++) {
-            const double allowed = part * s->magnitude[i][k];
+            const double allowed = part * s->magnitude[i][k] + s->noise[i][k];
             const double size = fabs(b->Phi[i][k]);
             o->residual[k] = size > o->residual[k] ? size : o->residual[k];
             excess[k] += size <= allowed ? 0 : 1;
@@ -919,7 +921,7 @@ static void advance(strip *b, const scales *s, state *at, double t, size_t k, ou
     outcome found;
     place_constants(&alone, matrices, 1);
     for (int i = 0; i < M; i++)
-        own.magnitude[i][0] = s->magnitude[i][k];
+        own.magnitude[i][0] = s->magnitude[i][k], own.noise[i][0] = s->noise[i][k];
     for (int i = 0; i < N; i++)
         own.reference[i][0] = s->reference[i][k];
     own.tolerance = s->tolerance;
@@ -982,18 +984,17 @@ static void assemble(const slider_crank_variants *all, strip *b, scales *s, size
         for (int i = 0; i < N; i++)
             b->q[i][k] = all->guess[i];
     }
-    measure(b, all->guess, count, s);
+    measure(b, all->size, count, s);
     correct(b, s, count, all->max_iterations, o);
     complete(b, s, count, o);
-    // The guess may be rough: from here on the assembled mechanism gives the size.
-    measure(b, all->guess, count, s);
+    measure(b, all->size, count, s);  // the guess may be rough
 }
 
 size_t slider_crank_march(const slider_crank_motion *motion)
 {
     // The lanes of a strip are times of the motion, as if each were a variant at its own.
     const slider_crank_variants all = {
-        .t = motion->t, .p = { motion->p, 1, 0 }, .guess = motion->guess,
+        .t = motion->t, .p = { motion->p, 1, 0 }, .guess = motion->guess, .size = motion->size,
         .tolerance = motion->tolerance, .max_iterations = motion->max_iterations,
         .q = motion->q, .q_dot = motion->q_dot, .q_ddot = motion->q_ddot,
         .residual = motion->residual, .status = motion->status, .iterations = motion->iterations,

@@ -20,7 +20,6 @@ from kincompile.compare.states import (
     is_angular,
     random_states,
 )
-from kincompile.criteria import size_of
 from kincompile.errors import InputError
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
@@ -99,7 +98,8 @@ class Reference:
         self.defaults = default_parameters(self.system)
         self.columns = {name: k for k, name in enumerate(self.coordinates)}
         guess = np.array([item.guess for item in self.system.coordinates])
-        self.sizes = np.where(self.angular, 1.0, size_of(self.angular, guess) or 1.0)
+        size = np.max(np.abs(guess), where=~self.angular, initial=0.0) or 1.0
+        self.sizes = np.where(self.angular, 1.0, size)
         self._values: WeakKeyDictionary[States, Values] = WeakKeyDictionary()
         self.kept: dict[Hashable, Any] = {}
         self._evaluated: WeakKeyDictionary[States, dict[sympy.Expr, Array]] = WeakKeyDictionary()

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kincompile.criteria import size_of
 from kincompile.errors import InputError
 from kincompile.names import listed
 
@@ -117,7 +116,7 @@ def _spread_states(
     """Return random states about zero, or about the guess where the spread is less than 1."""
     angular = is_angular(system)
     guess = np.array([item.guess for item in system.coordinates])
-    size = size_of(angular, guess) or 1.0
+    size = np.max(np.abs(guess), where=~angular, initial=0.0) or 1.0
 
     def generic() -> Array:
         """Return numbers of size 0.4 to 1.6 and either sign."""

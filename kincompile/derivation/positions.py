@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import probe_of, size_of
+from kincompile.criteria import probe_of
 from kincompile.errors import KincompileError
 from kincompile.runtime.newton import NewtonResult, newton
+from kincompile.runtime.problem import problem
 from kincompile.runtime.solve import solve
 from kincompile.runtime.status import Status
 
@@ -60,7 +61,7 @@ def newton_table(
     The guess of the model is the start, unless it leads elsewhere or is so near that there is
     nothing to see: then the position, moved.
     """
-    scales = _scales(module, q)
+    scales = _scales(module, q, t)
     result = newton(module, t, guess, p)
     if _leads(result, q, scales) and result.iterations >= FEWEST:
         return result, "From the guess"
@@ -77,7 +78,7 @@ def _leads(result: NewtonResult, q: Array, scales: Array) -> bool:
     return result.status is Status.CONVERGED and bool(near.all())
 
 
-def _scales(module: ModuleType, q: Array) -> Array:
+def _scales(module: ModuleType, q: Array, t: float) -> Array:
     """Return the scale of each coordinate."""
-    angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES])
-    return np.where(angular, 1.0, size_of(angular, module.GUESS, q) or 1.0)
+    with np.errstate(all="ignore"):
+        return problem(module, module.DEFAULTS, q, t).reference

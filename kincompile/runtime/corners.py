@@ -54,10 +54,8 @@ def after_corners(inputs: Inputs, corners: Mask | None) -> Inputs:
     return replace(inputs, t=np.where(everywhere, inputs.t + _reach(inputs.t), inputs.t))
 
 
-def with_corners(solution: Solution, t: Array, corners: Mask | None) -> Solution:
+def with_corners(solution: Solution, t: Array, corners: Mask) -> Solution:
     """Return a solution without acceleration at its corners, at the times that were asked for."""
-    if corners is None:
-        return solution
     marked = corners & (solution.status == Status.CONVERGED)
     status, q_ddot = solution.status.copy(), solution.q_ddot.copy()
     status[marked], q_ddot[marked] = Status.CORNER, np.nan

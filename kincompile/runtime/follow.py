@@ -12,9 +12,9 @@ from kincompile.criteria import RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
 from kincompile.runtime.engine.engine import Point
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
-from kincompile.runtime.march import March, Outcome, State
+from kincompile.runtime.march import March, Outcome, State, distance
 from kincompile.runtime.newton import give_up, start
-from kincompile.runtime.problem import Dense, problem
+from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
 from kincompile.runtime.singular.events import branch_switch, locate, singular_start
 from kincompile.runtime.status import Status
 
@@ -29,10 +29,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.singular.events import Event, Passage
 
     Progress: TypeAlias = Callable[[int, int], object]
-
-LARGEST_CAREFUL = 1000
-"""Coordinates up to which a large mechanism is left to dense matrices where the stages fail: there
-a step takes a fraction of a second."""
 
 
 @dataclass(slots=True, eq=False)
@@ -117,10 +113,11 @@ def follow(inputs: Inputs, progress: Progress | None = None) -> tuple[Motion, Ou
     What ends a motion is found and noted; with `inputs.smooth` it goes on past a bifurcation.
     """
     motion = Motion.over(inputs)
-    if inputs.method is None and _march_compiled(inputs, motion):
-        return motion, Outcome(Status.CONVERGED, 0, None)
     way = _Way(inputs, motion, progress)
-    outcome = way.run(way.start())
+    outcome = way.start()
+    if inputs.method is None and way.march_compiled(outcome):
+        return motion, outcome
+    outcome = way.run(outcome)
     while outcome.status is not Status.CONVERGED:
         passage = way.explain(outcome)
         if passage is None or not inputs.smooth:
@@ -128,30 +125,6 @@ def follow(inputs: Inputs, progress: Progress | None = None) -> tuple[Motion, Ou
         outcome = way.run(way.go_through(passage))
     way.end()
     return motion, outcome
-
-
-def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
-    """Let a compiled module follow the motion; say whether all went well.
-
-    Where anything did not, the careful march finds out what it is, from the first time on.
-    """
-    march = inputs.code.march
-    if march is None:
-        return False
-    states = motion.q.T, motion.q_dot.T, motion.q_ddot.T
-    status, iterations = np.empty((2, inputs.t.size), dtype=np.intc)
-    if march(inputs, states, motion.residual, status, iterations) < inputs.t.size:
-        return False
-    # A large step of Newton's from the guess may have ended on another branch.
-    time = float(inputs.t[0])
-    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
-    guess, found = (equations.at(q, time) for q in (inputs.guess, motion.q[0].copy()))
-    if guess is None or found is None or equations.leaves_branch(guess, found):
-        return False
-    motion.is_folded = equations.is_folded(guess, found)
-    motion.status[:], motion.iterations[:] = status, iterations
-    motion.statistics["compiled"] = inputs.t.size
-    return True
 
 
 class _Way:
@@ -168,7 +141,7 @@ class _Way:
         inputs, time = self._inputs, float(self._times[0])
         self._march = self._march_at(inputs.guess, None)
         outcome = start(self._march, time, inputs)
-        if self._is_staged and (outcome.state is None or outcome.strays):
+        if self._is_staged and outcome.state is None:
             self._leave_stages(inputs.guess)
             outcome = start(self._march, time, inputs)
         self._put(outcome)
@@ -182,6 +155,25 @@ class _Way:
             # The guess may be rough: from here on the assembled mechanism gives the size.
             self._march = self._march_at(outcome.position.q, self._march.engine)
         return outcome
+
+    def march_compiled(self, outcome: Outcome) -> bool:
+        """Let a compiled module follow the motion from its start; say whether all went well.
+
+        Where anything did not, the careful march finds out what it is, from the first time on.
+        """
+        motion, inputs, march = self._motion, self._inputs, self._inputs.code.march
+        if march is None or outcome.status is not Status.CONVERGED or outcome.position is None:
+            return False
+        states = motion.q.T, motion.q_dot.T, motion.q_ddot.T
+        status, iterations = np.empty((2, inputs.t.size), dtype=np.intc)
+        start, scales = np.ascontiguousarray(outcome.position.q), self._march.scales
+        reached = march(inputs, start, *scales, states, motion.residual, status, iterations)
+        motion.put(0, outcome)
+        if reached < inputs.t.size:
+            return False
+        motion.status[1:], motion.iterations[1:] = status[1:], iterations[1:]
+        motion.statistics["compiled"] = inputs.t.size
+        return True
 
     def run(self, outcome: Outcome) -> Outcome:
         """Follow the motion as far as it goes."""
@@ -201,20 +193,30 @@ class _Way:
         """Find the event that ends the motion; return the way through it if there is one."""
         motion, equations, state = self._motion, self._march.equations, outcome.state
         t = float(self._times[self._index - 1])
-        if not self._may_be_dense:
+        if not self._may_be_dense or outcome.exhausted:
             return None
         if state is None:
             if outcome.status is Status.SINGULAR and outcome.position is not None:
                 motion.events += filter(None, [singular_start(equations, outcome.position, t)])
             return None
-        found = locate(self._march, state, t, abs(t - float(self._times[0])))
+        # A rounding error before it a state is too near to say what it is: the point before is not.
+        found = locate(self._march, state, t) or self._locate_from_point(t)
         if found is not None:
             motion.events.append(found[0])
             return found[1]
         if outcome.jumps and outcome.nearest is not None:
             q = outcome.nearest.q
-            motion.events.append(branch_switch(equations.code, state, t, q, equations.spread(q)))
+            motion.events.append(branch_switch(equations.code, state, t, q, equations.reference))
         return None
+
+    def _locate_from_point(self, t: float) -> tuple[Event, Passage | None] | None:
+        """Find the event that ends the motion from the last of the times that was reached."""
+        index = self._index - 2
+        if index < 0:
+            return None
+        q = np.ascontiguousarray(self._motion.q[index])
+        state = self._state(q, float(self._times[index])).state
+        return None if state is None else locate(self._march, state, t)
 
     def go_through(self, passage: Passage) -> Outcome:
         """Fill the points within the passage through a bifurcation, and take the next one."""
@@ -260,12 +262,12 @@ class _Way:
         )
 
     def _march_at(self, q: NDArray[np.float64], engine: Engine | None) -> March:
-        """Return the march of the mechanism, whose size comes from the guess and a position."""
+        """Return the march of the mechanism, whose scales are those at a position."""
         inputs, time = self._inputs, float(self._times[0])
-        equations = problem(
-            inputs.code.module, inputs.p, q, time, inputs.guess, staged=True, engine=engine
-        )
-        return March(equations, equations.engine, inputs.tolerance)
+        equations = problem(inputs.code.module, inputs.p, q, time, staged=True, engine=engine)
+        march = March(equations, equations.engine, inputs.tolerance)
+        march.alive = lambda: self._progress(self._index, len(self._times))
+        return march
 
     def _leave_stages(self, q: NDArray[np.float64]) -> None:
         """Solve dense matrices from here on: they have the last word."""
@@ -284,10 +286,14 @@ class _Way:
         t = float(self._times[self._index])
         outcome = march.advance(state, t, most)
         doubtful = outcome.state is None or outcome.state.sensitivity > TOO_NEAR
-        if self._is_staged and (doubtful or outcome.status is not Status.CONVERGED):
+        doubtful = doubtful or outcome.status is not Status.CONVERGED
+        if self._is_staged and doubtful and not outcome.exhausted:
             self._leave_stages(state.point.q)
             known = self._state(state.point.q, state.t)
-            return known if known.state is None else self._advance(known.state)
+            careful = known if known.state is None else self._advance(known.state)
+            spent = careful.iterations + outcome.iterations
+            self._motion.iterations[self._index - 1] = spent
+            return replace(careful, iterations=spent)
         if outcome.position is None and self._may_be_dense:
             outcome = give_up(march, outcome, t, self._inputs)
         self._put(outcome)
@@ -325,8 +331,8 @@ class _Way:
         motion, index = self._motion, self._index
         if motion.status[index - 1] == Status.CONVERGED and motion.statistics["marched"] == 0:
             return True
-        spread = self._march.equations.spread(state.point.q)
-        return bool(np.max(np.abs(motion.q[index] - state.point.q) / spread) <= SMALL_ERROR)
+        reference = self._march.equations.reference
+        return bool(distance(motion.q[index], state.point.q, reference) <= SMALL_ERROR)
 
     def _take_up(self, count: int) -> Outcome:
         """Take so many points of the grid; return the last as one to go on from."""

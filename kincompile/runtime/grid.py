@@ -105,10 +105,10 @@ def solve_grid(march: March, times: Array, first: State, result: GridResult) -> 
     """
     equations, code = march.equations, march.equations.code
     assert code.lanes is not None
-    spread = equations.spread(first.point.q)
+    reference = equations.reference
     floats = Planned(code, equations.p.tolist(), code.lanes.floats)
     state = (x.tolist() for x in (first.point.q, first.q_dot, first.q_ddot, first.determinants))
-    nodes = _coarse_march(floats, _Node(0, *state), times, spread.tolist())
+    nodes = _coarse_march(floats, _Node(0, *state), times, reference.tolist())
     reached = nodes[-1].index + 1
     _interpolate(nodes, times[:reached], result.q)
     signed = np.array([node.determinants for node in nodes])
@@ -117,7 +117,7 @@ def solve_grid(march: March, times: Array, first: State, result: GridResult) -> 
     parts = max(1, round(reached / BLOCK))
     edges = np.linspace(0, reached, parts + 1).astype(int).tolist()
     for start, stop in itertools.pairwise(edges):
-        _solve_block(batch, times[start:stop], result, slice(start, stop), smallest, spread)
+        _solve_block(batch, times[start:stop], result, slice(start, stop), smallest, reference)
     return len(nodes)
 
 
@@ -133,7 +133,7 @@ class _Node:
 
 
 def _coarse_march(
-    engine: Planned, first: _Node, times: Array, spread: Sequence[float]
+    engine: Planned, first: _Node, times: Array, reference: Sequence[float]
 ) -> list[_Node]:
     """Follow the motion over a time grid in as few steps as the prediction allows.
 
@@ -146,7 +146,7 @@ def _coarse_march(
         node = nodes[-1]
         index = min(node.index + stride, last)
         try:
-            step = _coarse_step(engine, node, index, times, spread)
+            step = _coarse_step(engine, node, index, times, reference)
         except (ArithmeticError, ValueError):
             step = None
         error = LARGEST_ERROR * 8 if step is None else step[1]
@@ -160,7 +160,7 @@ def _coarse_march(
 
 
 def _coarse_step(
-    engine: Planned, node: _Node, index: int, times: Array, spread: Sequence[float]
+    engine: Planned, node: _Node, index: int, times: Array, reference: Sequence[float]
 ) -> tuple[_Node, float] | None:
     """Return the point at `index` and the error of its prediction; None without convergence."""
     t = float(times[index])
@@ -174,7 +174,7 @@ def _coarse_step(
         point = engine.evaluate(q, t)
         correction = engine.solve(point, point.Phi)
         q = [x - d for x, d in zip(q, correction, strict=True)]
-        size = max([abs(d) / s for d, s in zip(correction, spread, strict=True)])
+        size = max([abs(d) / s for d, s in zip(correction, reference, strict=True)])
         if size <= LAST_COARSE_CORRECTION:
             break
     else:
@@ -185,8 +185,8 @@ def _coarse_step(
         return None
     if any(x * y <= 0 for x, y in zip(determinants, node.determinants, strict=True)):
         return None
-    error = max([abs(x - y) / s for x, y, s in zip(q, predicted, spread, strict=True)])
-    rates = zip(q_dot, node.q_dot, node.q_ddot, spread, strict=True)
+    error = max([abs(x - y) / s for x, y, s in zip(q, predicted, reference, strict=True)])
+    rates = zip(q_dot, node.q_dot, node.q_ddot, reference, strict=True)
     kink = abs(h) * max([abs(w - v - h * a) / s for w, v, a, s in rates])
     if kink > KINK_UNSEEN * (error + SMOOTH_UNSEEN):
         return None
@@ -230,14 +230,14 @@ def _hermite(s: Array) -> Array:
 
 
 def _solve_block(
-    march: March, t: Array, result: GridResult, block: slice, smallest: Array, spread: Array
+    march: March, t: Array, result: GridResult, block: slice, smallest: Array, reference: Array
 ) -> None:
     """Correct a block of interpolated positions twice, and solve for velocity and acceleration."""
     engine, rates = march.engine, (result.q_dot[:, block], result.q_ddot[:, block])
     assert isinstance(engine, Planned)
     found = march.correct_together(result.q[:, block], t, CORRECTIONS_ON_GRID)
     point = found.point
-    good = found.good & within(found.first, LARGEST_DISPLACEMENT * spread)
+    good = found.good & within(found.first, LARGEST_DISPLACEMENT * reference)
     for rows, lanes in zip(rates, engine.velocity_and_acceleration(point), strict=True):
         for row, lane in zip(rows, lanes, strict=True):
             row[:] = lane

@@ -11,6 +11,7 @@ step is halved, and doubled again once it succeeds.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -35,11 +36,14 @@ from kincompile.runtime.problem import Dense, column, unsolvable, within
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.engine.engine import Engine, Point
     from kincompile.runtime.problem import Problem
+
+SIGN_OF_LIFE = 256
+"""Sub-steps between two times after which progress is shown."""
 
 SAME_DETERMINANT = 0.5
 """Part of a determinant down to which Phi_q counts as no nearer to singular."""
@@ -92,6 +96,8 @@ class Outcome:
         Where the motion does not lead to that time: where Newton's method ends there.
     jumps : bool
         Whether the mechanism is assembled there: it could only jump to it.
+    exhausted : bool
+        Whether the sub-steps on the way were too many.
     strays : bool
         Whether it was assembled on another branch than its guess shows.
     is_folded : bool
@@ -104,6 +110,7 @@ class Outcome:
     position: Point | None = None
     nearest: Point | None = None
     jumps: bool = False
+    exhausted: bool = False
     strays: bool = False
     is_folded: bool = False
 
@@ -144,10 +151,17 @@ class March:
     """
 
     def __init__(self, equations: Problem, engine: Engine, tolerance: float) -> None:
-        self.equations, self.engine, self.tolerance = equations, engine, tolerance
+        self.equations, self.engine = equations, engine
+        self.tolerance = max(tolerance, equations.floor)
+        self.alive: Callable[[], object] = lambda: None
         self._residual = max(RESIDUAL_FACTOR * tolerance, ROUNDING)
         # Factors of Phi_q a rounding error away serve the rates; a dense matrix has none to save.
         self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """The size of the mechanism and the tolerance, for a compiled march."""
+        return self.equations.size, self.tolerance
 
     def correct(self, q: Array, t: float, most: int) -> Corrected:
         """Run Newton's method from a prediction.
@@ -184,9 +198,10 @@ class March:
             for row, lane in zip(q, change, strict=True):
                 row -= np.where(done, 0.0, lane) if done.any() else lane
             iterations += ~done
-            # Hardly one of a batch is done at once, and a mask takes as long as a correction.
-            done = done | (all_within(change, loose) if first is None else within(change, loose))
-            first = change if first is None else first
+            if first is None:  # what it leaves is seen by a second one only
+                first = change
+                continue
+            done = done | within(change, loose)
             if done.all():
                 break
         if not (done.all() and all_within(change, tight)):
@@ -200,14 +215,15 @@ class March:
         Phi_q is. Where no determinant has halved since that was last looked at, it is no nearer.
         """
         equations, engine = self.equations, self.engine
-        scale, sensitivity, probed = equations.scale(point.q), np.inf, None
+        sensitivity, probed = np.inf, None
         determinants = engine.determinants(point, point)
         if before is not None and not isinstance(engine, Dense):
             sensitivity, probed = before.sensitivity, before.probed
         if probed is None or not (np.abs(determinants) >= SAME_DETERMINANT * probed).all():
             probed = np.abs(determinants)
             rates = engine.rates(point, column(equations.magnitude * equations.probe, point.q))
-            sensitivity = (np.abs(rates.movement) / scale).max(axis=0)
+            reference = column(equations.reference, point.q)
+            sensitivity = (np.abs(rates.movement) / reference).max(axis=0)
         else:
             rates = engine.rates(point, None)
         finite = np.isfinite((rates.q_dot + rates.q_ddot).sum(axis=0))
@@ -232,17 +248,17 @@ class March:
         h = t - state.t
         return state.point.q + h * (state.q_dot + (h / 2) * state.q_ddot)
 
-    def error(self, state: State, q: Array, predicted: Array, spread: Array) -> tuple[Any, Any]:
+    def error(self, state: State, q: Array, predicted: Array) -> tuple[Any, Any]:
         """Return how far Newton ended from the prediction, and where that is near enough.
 
         Near enough to have stayed on the branch.
         """
-        error = distance(q, predicted, spread)
-        movement = distance(predicted, state.point.q, spread)
+        error = distance(q, predicted, self.equations.reference)
+        movement = distance(predicted, state.point.q, self.equations.reference)
         allowed = np.minimum(LARGE_ERROR, np.maximum(SMALL_ERROR, ALLOWED_PART * movement))
         return error, error <= allowed
 
-    def follows(self, state: State, following: State, error: Any, spread: Array) -> Checks:
+    def follows(self, state: State, following: State, error: Any) -> Checks:
         """Say where a state continues the motion from the one before it.
 
         Where a determinant has changed its sign, a singular configuration lies between the two.
@@ -251,7 +267,7 @@ class March:
         """
         h = following.t - state.t
         expected = state.q_dot + h * state.q_ddot
-        kink = abs(h) * distance(following.q_dot, expected, spread)
+        kink = abs(h) * distance(following.q_dot, expected, self.equations.reference)
         signs = np.sign(self.engine.determinants(following.point, state.point))
         same = (signs == np.sign(state.determinants)).all(axis=0)
         smooth = (following.sensitivity <= NEARLY_SINGULAR) | (kink <= KINK * error + SMOOTH)
@@ -260,16 +276,15 @@ class March:
     def step(self, state: State, t: float, most: int) -> Outcome:
         """Predict, correct, and accept the point at `t` only when it continues the motion."""
         predicted = self.predict(state, t)
-        spread = self.equations.spread(predicted)
         found = self.correct(predicted, t, most)
         point, iterations = found.point, int(found.iterations)
-        error, is_near = self.error(state, point.q, predicted, spread)
+        error, is_near = self.error(state, point.q, predicted)
         if not (found.good and is_near):
             return Outcome(Status.NOT_CONVERGED, iterations, None)
         following = self.state(point, state)
         if isinstance(following, Status):
             return Outcome(following, iterations, None, point)
-        for good, status in self.follows(state, following, error, spread):
+        for good, status in self.follows(state, following, error):
             if not good:
                 return Outcome(status, iterations, None)
         return Outcome(Status.CONVERGED, iterations, following, point)
@@ -277,13 +292,18 @@ class March:
     def step_together(self, state: State, t: float, most: int) -> tuple[State, Any, Any]:
         """Take a step with a batch; return the states, where they are good, and the iterations."""
         predicted = self.predict(state, t)
-        spread = self.equations.spread(predicted)
         found = self.correct_together(predicted.copy(), t, most)
         following, checks = self.complete(found.point, state)
-        error, near = self.error(state, found.point.q, predicted, spread)
-        checks += self.follows(state, following, error, spread)
+        error, near = self.error(state, found.point.q, predicted)
+        checks += self.follows(state, following, error)
         is_far = following.sensitivity <= TOO_NEAR
         return following, all_hold(found.good & near & is_far, checks), found.iterations
+
+    def time_of(self, state: State) -> float:
+        """Return the time in which something moves as far as its scale, infinite at rest."""
+        reference = self.equations.reference
+        speed, growth = (np.abs(x) / reference for x in (state.q_dot, state.q_ddot))
+        return float(1 / max(speed.max(), math.sqrt(growth.max()), 1e-300))
 
     def advance(self, state: State, t: float, most: int) -> Outcome:
         """Follow the motion from a good state to time `t`, in sub-steps where need be.
@@ -291,9 +311,11 @@ class March:
         Where it does not get there, the last good state on the way is in the outcome.
         """
         step, iterations = t - state.t, 0
-        smallest = abs(step) * SMALLEST_PART
+        smallest = min(abs(step), self.time_of(state)) * SMALLEST_PART
         status = Status.NOT_CONVERGED
-        for _ in range(MAX_SUBSTEPS):
+        for count in range(MAX_SUBSTEPS):
+            if count % SIGN_OF_LIFE == SIGN_OF_LIFE - 1:
+                self.alive()
             whole = abs(step) >= abs(t - state.t)
             outcome = self.step(state, t if whole else state.t + step, most)
             iterations += outcome.iterations
@@ -309,15 +331,17 @@ class March:
                 break
             else:
                 step /= 2
+        else:
+            return Outcome(Status.NOT_CONVERGED, iterations, state, exhausted=True)
         return Outcome(status, iterations, state)
 
 
-def distance(q: Array, other: Array, spread: Array) -> Any:
+def distance(q: Array, other: Array, reference: Array) -> Any:
     """Return how far positions are apart, in radians or sizes of the mechanism."""
     if q.ndim == 1:
-        return (np.abs(q - other) / spread).max()
+        return (np.abs(q - other) / reference).max()
     result = np.zeros(q.shape[1:])
-    for here, there, scale in zip(q, other, spread.ravel().tolist(), strict=True):
+    for here, there, scale in zip(q, other, reference.tolist(), strict=True):
         np.maximum(result, np.abs(here - there) / scale, out=result)
     return result
 

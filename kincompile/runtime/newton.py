@@ -19,11 +19,18 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, RESIDUAL_FACTOR, ROUNDING, TOLERANCE
+from kincompile.criteria import (
+    MAX_CORRECTIONS,
+    MAX_ITERATIONS,
+    RESIDUAL_FACTOR,
+    ROUNDING,
+    TOLERANCE,
+    TOO_NEAR,
+)
 from kincompile.errors import InputError
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.march import March, Outcome
-from kincompile.runtime.problem import Problem, norm, problem, unsolvable
+from kincompile.runtime.march import March, Outcome, distance
+from kincompile.runtime.problem import Problem, crawls, norm, problem, unsolvable
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -49,6 +56,12 @@ NUDGE, RESTARTS = 0.3, 4
 """How far the first restart is from the guess, in radians and sizes of the mechanism, and how many
 there are, each as much further away."""
 
+SAME = 1e-6
+"""Distance, in radians and sizes of the mechanism, up to which two positions are the same."""
+
+MOST_TURNED = 300
+"""Angles up to which each is turned back alone where they do not turn back together."""
+
 SUFFICIENT = 1e-4
 """Armijo's constant: the part of the decrease promised by the linear model that must come true."""
 
@@ -63,7 +76,8 @@ class NewtonResult:
     Attributes
     ----------
     q : ndarray, shape (n,)
-        The last iterate.
+        The last iterate, with angles that the equations leave free by whole turns nearest to the
+        guess.
     status : Status
         CONVERGED, or why not.
     iterates : ndarray, shape (k + 1, n)
@@ -73,7 +87,7 @@ class NewtonResult:
     residuals : ndarray, shape (k + 1,)
         Euclidean norm of Phi at each iterate.
     residual : float
-        Largest absolute value of Phi at the last iterate; NaN where it has none.
+        Largest absolute value of Phi there; NaN where it has none.
     iterations : int
         The number k of corrections.
     """
@@ -99,11 +113,14 @@ class Attempt:
         The guess and every position reached.
     corrections : list of float
         Euclidean norm of each correction.
+    turned : Point or None
+        The last position with angles turned back, where they were.
     """
 
     status: Status = Status.NOT_CONVERGED
     points: list[Point] = field(default_factory=list)
     corrections: list[float] = field(default_factory=list)
+    turned: Point | None = None
 
     @property
     def last(self) -> Point:
@@ -111,9 +128,9 @@ class Attempt:
         return self.points[-1]
 
     @property
-    def nearest(self) -> Point | None:
-        """The last position, if there is one."""
-        return self.points[-1] if self.points else None
+    def found(self) -> Point | None:
+        """Where it ended, angles turned back; None where it did not begin."""
+        return self.turned or (self.points[-1] if self.points else None)
 
 
 if TYPE_CHECKING:
@@ -164,7 +181,7 @@ def newton(
         raise InputError(f"newton works at one time, got {inputs.t.size}: use solve for a grid.")
     with np.errstate(all="ignore"):
         time = float(inputs.t[0])
-        equations = problem(module, inputs.p, inputs.guess, time, inputs.guess)
+        equations = problem(module, inputs.p, inputs.guess, time)
         attempt = assemble(equations, time, inputs.guess, inputs.tolerance, inputs.max_iterations)
     return _result(attempt, inputs.guess)
 
@@ -175,36 +192,26 @@ def start(march: March, t: float, inputs: Inputs) -> Outcome:
     attempt = assemble(march.equations, t, inputs.guess, *limits)
     iterations = len(attempt.corrections)
     if attempt.status is not Status.CONVERGED:
-        return Outcome(attempt.status, iterations, None, nearest=attempt.nearest)
-    point, guess = attempt.last, attempt.points[0]
-    if strays := march.equations.leaves_branch(guess, point):
-        near = _near_guess(march.equations, t, guess, point, inputs)
-        point, strays = near or point, near is None
-    given = march.equations.at(inputs.guess, t)  # the attempt may have begun elsewhere
-    folded = given is not None and march.equations.is_folded(given, point)
+        return Outcome(attempt.status, iterations, None, nearest=attempt.found)
+    found = attempt.turned or attempt.last
+    here = [march.equations.at(q, t) for q in (inputs.guess, found.q)]
+    guess, point = (known for known in here if known is not None)
+    left = march.equations.leaves_branch(guess, point)
+    folded = march.equations.is_folded(guess, point)
     state = march.state(point)
+    # Towards a singular position Newton's method creeps, and ends a rounding error before it.
+    if not isinstance(state, Status) and crawls(attempt.corrections):
+        state = Status.SINGULAR if state.sensitivity > TOO_NEAR else state
     if isinstance(state, Status):
-        return Outcome(state, iterations, None, point, strays=strays, is_folded=folded)
-    return Outcome(Status.CONVERGED, iterations, state, point, strays=strays, is_folded=folded)
-
-
-def _near_guess(
-    equations: Problem, t: float, guess: Point, found: Point, inputs: Inputs
-) -> Point | None:
-    """Give what small steps from the guess lead to, if it is nearer and on the guess's branch."""
-    limits = inputs.tolerance, inputs.max_iterations
-    careful = iterate(equations, t, guess.q, *limits, safeguarded_step)
-    if careful.status is not Status.CONVERGED:
-        return None
-    spread = equations.spread(found.q)
-    near, far = (np.max(np.abs(x.q - guess.q) / spread) for x in (careful.last, found))
-    is_better = near < far and not equations.leaves_branch(guess, careful.last)
-    return careful.last if is_better else None
+        return Outcome(state, iterations, None, point, strays=left, is_folded=folded)
+    return Outcome(Status.CONVERGED, iterations, state, point, strays=left, is_folded=folded)
 
 
 def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome:
     """Find out what is there at a time that the motion does not reach."""
     assert outcome.state is not None
+    if outcome.exhausted:
+        return outcome
     limits = inputs.tolerance, inputs.max_iterations
     attempt = assemble(march.equations, t, outcome.state.point.q, *limits)
     # What is wrong there, rather than on the way.
@@ -213,7 +220,7 @@ def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome
         outcome,
         status=outcome.status if jumps else attempt.status,
         iterations=outcome.iterations + len(attempt.corrections),
-        nearest=attempt.nearest,
+        nearest=attempt.found,
         jumps=jumps,
     )
 
@@ -221,19 +228,54 @@ def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome
 def assemble(
     equations: Problem, t: float, guess: Vector, tolerance: float, max_iterations: int
 ) -> Attempt:
-    """Find a position from a guess: plain Newton, and safeguarded where that fails."""
+    """Find a position from a guess: plain Newton, and safeguarded where that fails or strays.
+
+    What is not far from the guess comes first, then what is on the branch that it shows, then the
+    nearer. Angles that the equations leave free by whole turns are those nearest to the guess.
+    """
     plain = iterate(equations, t, guess, tolerance, max_iterations)
-    if plain.status is Status.CONVERGED or not plain.points:
+    found = plain.status is Status.CONVERGED
+    if not plain.points or (found and not equations.strays(plain.points[0], plain.last)):
         return plain
-    best = None
+    if (careful := equations.careful()) is not equations:
+        return assemble(careful, t, guess, tolerance, max_iterations)
+    attempts = [plain]
     # With all bodies on a line no equation tells which way to bend: so it is for a guess of zeros.
-    for start in (guess, *_restarts(equations, guess)):
-        careful = iterate(equations, t, start, tolerance, max_iterations, safeguarded_step)
-        if careful.status is Status.CONVERGED:
-            return careful
-        if best is None or _missed(equations, careful) < _missed(equations, best):
-            best = careful
-    return plain if best is None else best
+    for begin in (guess, *(() if found else _restarts(equations, guess))):
+        limits = tolerance, max_iterations
+        attempts.append(iterate(equations, t, begin, *limits, safeguarded_step))
+        if attempts[-1].status is Status.CONVERGED:
+            break
+    good = [attempt for attempt in attempts if attempt.status is Status.CONVERGED]
+    if not good:
+        return min(attempts[1:], key=lambda attempt: _missed(equations, attempt))
+    for attempt in good:
+        attempt.turned = unwound(equations, t, attempt.last, guess, tolerance)
+
+    def order(attempt: Attempt) -> tuple[bool, bool, float]:
+        point = attempt.turned or attempt.last
+        away = round(float(distance(point.q, guess, equations.reference)), 6)
+        is_far = bool(equations.is_far(point.q, guess))
+        # From a guess so rough no sign is to be trusted.
+        return is_far, not is_far and equations.leaves_branch(plain.points[0], point), away
+
+    return min(good, key=order)
+
+
+def unwound(equations: Problem, t: float, point: Point, guess: Vector, tolerance: float) -> Point:
+    """Turn angles by whole turns towards a guess, as far as the equations allow it."""
+    far = np.abs(point.q - guess) > math.pi
+    columns = np.flatnonzero((equations.angular | equations.code.may_turn) & far)
+    # Together first: angles that a gear or a driver connects turn together.
+    for some in (columns, *columns) if columns.size <= MOST_TURNED else (columns,):
+        q = point.q.copy()
+        q[some] -= math.tau * np.round((q - guess)[some] / math.tau)
+        if not np.array_equal(q, point.q):
+            turned = iterate(equations, t, q, tolerance, MAX_CORRECTIONS)
+            is_same = turned.status is Status.CONVERGED
+            if is_same and distance(turned.last.q, q, equations.reference) <= SAME:
+                point = turned.last
+    return point
 
 
 def _restarts(equations: Problem, guess: Vector) -> Iterator[Vector]:
@@ -247,8 +289,7 @@ def _missed(equations: Problem, attempt: Attempt) -> float:
     """Return by how much the equations are missed at the end of an attempt, relative to terms."""
     if not attempt.points:
         return math.inf
-    magnitude = equations.magnitude
-    return norm(attempt.last.Phi / np.where(magnitude > 0, magnitude, 1.0))
+    return norm(attempt.last.Phi * equations.weights())
 
 
 def iterate(
@@ -267,7 +308,6 @@ def iterate(
         attempt.status = Status.NOT_FINITE
         return attempt
     attempt.points.append(point)
-    crawls = False
     for _ in range(max_iterations):
         outcome = step(equations, t, attempt.last)
         if isinstance(outcome, Status):
@@ -276,12 +316,13 @@ def iterate(
         point, correction = outcome
         attempt.points.append(point)
         attempt.corrections.append(correction)
-        crawls = len(attempt.corrections) > 1 and correction > attempt.corrections[-2] / 4
-        if equations.has_converged(attempt.points[-2], point, tolerance, crawls):
+        if equations.has_converged(attempt.points[-2], point, tolerance, attempt.corrections):
             attempt.status = Status.CONVERGED
             break
     else:
-        if crawls and equations.holds(attempt.last, RESIDUAL_FACTOR * tolerance):
+        if crawls(attempt.corrections) and equations.holds(
+            attempt.last, RESIDUAL_FACTOR * tolerance
+        ):
             attempt.status = Status.SINGULAR
     return attempt
 
@@ -298,7 +339,7 @@ def plain_step(equations: Problem, t: float, point: Point) -> tuple[Point, float
 
 def safeguarded_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
     """Apply as much of the correction as keeps the angles near and lowers the residual."""
-    terms = equations.terms(point, equations.scale(point.q))
+    terms = equations.terms(point, equations.reference)
     weights = 1 / np.where(terms > 0, terms, 1.0)  # equations of different units count alike
     correction = _direction(equations, point, weights)
     if correction is None:
@@ -324,7 +365,7 @@ def _direction(equations: Problem, point: Point, weights: Vector) -> Vector | No
     if point.Phi_q.ndim == 1:  # large and sparse: a shortened step of Newton's has to do
         correction = equations.engine.solve(point, -point.Phi)
         return correction if np.isfinite(correction).all() else None
-    scale = equations.scale(point.q)
+    scale = equations.reference
     residual = weights * point.Phi
     bend = math.sqrt(BEND * min(1.0, norm(residual)))
     matrix = np.vstack((weights[:, np.newaxis] * point.Phi_q * scale, bend * np.eye(scale.size)))
@@ -340,19 +381,19 @@ def _direction(equations: Problem, point: Point, weights: Vector) -> Vector | No
 
 def _clamp(equations: Problem, point: Point, correction: Vector) -> float:
     """Give the part of a correction that moves angles and lengths no further than is sensible."""
-    limits = equations.spread(point.q) * np.where(equations.angular, LARGEST_ANGLE, 1.0)
+    limits = equations.reference * np.where(equations.angular, LARGEST_ANGLE, 1.0)
     return min(1.0, 1.0 / float(np.max(np.abs(correction) / limits, initial=0.0) or 1.0))
 
 
 def _result(attempt: Attempt, guess: Vector) -> NewtonResult:
     """Turn the record into arrays."""
-    points = attempt.points
+    points, found = attempt.points, attempt.found
     return NewtonResult(
-        q=points[-1].q if points else guess,
+        q=guess if found is None else found.q,
         status=attempt.status,
         iterates=np.array([point.q for point in points] or [guess]),
         corrections=np.array(attempt.corrections),
         residuals=np.array([norm(point.Phi) for point in points] or [np.nan]),
-        residual=float(np.max(np.abs(points[-1].Phi))) if points else math.nan,
+        residual=math.nan if found is None else float(np.max(np.abs(found.Phi))),
         iterations=len(attempt.corrections),
     )

@@ -9,15 +9,15 @@ get the same verdicts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.criteria import (
     AGREEMENT,
+    FAR,
     FOLDED,
-    NO_SIZE,
     RESIDUAL_FACTOR,
     ROUNDING,
     STEEP,
@@ -33,10 +33,14 @@ from kincompile.runtime.engine.stages import StagedSolver
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from types import ModuleType
 
     from kincompile.runtime.engine.engine import Engine
+
+LARGEST_CAREFUL = 1000
+"""Coordinates up to which a large mechanism is left to dense matrices where the stages fail: there
+a step takes a fraction of a second."""
 
 LARGEST_POWER = 700.0
 """Power of e beyond which no determinant is given: floating point ends at 709."""
@@ -56,12 +60,20 @@ class Problem:
         Parameters.
     angular : ndarray of bool, shape (n,)
         Which coordinates are angles.
+    size : float
+        The size of the mechanism.
     reference : ndarray, shape (n,)
         Scale of each coordinate: 1 rad for angles, the size of the mechanism for the others.
+    place : ndarray, shape (n,)
+        How far from zero each coordinate is at a guess, or in the assembled mechanism.
+    floor : float
+        Correction, in scales, below which there are only rounding errors of so far a place.
     probe : ndarray, shape (m,)
         Numbers of size 1/2 to 1 and either sign without a pattern.
     magnitude : ndarray, shape (m,)
         What the terms of each equation contribute at a generic position.
+    noise : ndarray, shape (m,)
+        What rounding errors of so large coordinates leave of each equation.
     limit : ndarray, shape (m,)
         What they contribute at most, wherever they are.
     """
@@ -70,9 +82,13 @@ class Problem:
     engine: Engine
     p: Array
     angular: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    size: float
     reference: Array
+    place: Array
+    floor: float
     probe: Array
     magnitude: Array
+    noise: Array | float = 0.0
     limit: Array | float = np.inf
 
     def at(self, q: Array, t: float) -> Point | None:
@@ -81,24 +97,12 @@ class Problem:
         return point if math.isfinite(point.Phi.sum()) else None
 
     def scale(self, q: Array) -> Array:
-        """Give the scale of each coordinate at a position."""
-        reference = column(self.reference, q)
-        return np.minimum(np.maximum(np.abs(q), reference), WILD * reference)
-
-    def spread(self, q: Array) -> Array:
-        """Give the distance that is large for each coordinate: 1 rad, or the size of the mechanism.
-
-        A mechanism that starts folded at the origin shows its size only later.
-        """
-        if q.ndim > 1:
-            return self.reference[:, np.newaxis]
-        lengths = self.code.lengths
-        size = (np.abs(q) * lengths).max(initial=0.0)
-        return np.asarray(np.maximum(self.reference, size * lengths))
+        """Give how large each coordinate is at a position, as far as it is not gone wild."""
+        return np.minimum(np.maximum(np.abs(q), self.reference), WILD * self.reference + self.place)
 
     def is_small(self, correction: Array, q: Array, tolerance: float) -> bool:
         """Say whether a correction that led to q is small, or all that floating point can give."""
-        allowed = tolerance * self.reference + ROUNDING * np.abs(q)
+        allowed = max(tolerance, self.floor) * self.reference + ROUNDING * np.abs(q)
         return bool((np.abs(correction) <= allowed).all())
 
     def leaves_branch(self, guess: Point, found: Point) -> bool:
@@ -106,21 +110,40 @@ class Problem:
         wanted = self.engine.signs(guess)
         return all(wanted) and self.engine.signs(found) != wanted
 
+    def careful(self) -> Problem:
+        """Give the same with dense matrices, unless they are too large."""
+        is_large = self.place.size > LARGEST_CAREFUL or isinstance(self.engine, Dense)
+        return self if is_large else replace(self, engine=Dense(self.code, self.p))
+
+    def is_far(self, q: Array, guess: Array) -> Any:
+        """Say whether an angle of a position, or of each of a batch, is far from a guess's."""
+        return (np.abs(q - guess)[self.code.may_turn] > FAR).any(axis=0)
+
+    def strays(self, guess: Point, found: Point) -> bool:
+        """Say whether a position found from a guess is not what the guess shows."""
+        return self.is_far(found.q, guess.q) or self.leaves_branch(guess, found)
+
     def is_folded(self, guess: Point, found: Point) -> bool:
         """Say whether a guess shows no branch: beside a position, a determinant is zero there."""
         here, there = (self.engine.determinants(point, point).tolist() for point in (guess, found))
         return any(abs(one) <= FOLDED * abs(two) for one, two in zip(here, there, strict=True))
 
-    def has_converged(self, before: Point, point: Point, tolerance: float, crawls: bool) -> bool:
+    def has_converged(
+        self, before: Point, point: Point, tolerance: float, corrections: list[float]
+    ) -> bool:
         """Say whether Newton's method is at its end: the last correction small, and Phi zero.
 
-        Near a singular configuration rounding alone keeps the corrections above any tolerance; then
-        they crawl, shrinking no faster than towards a double root, by halves.
+        Near a singular configuration rounding alone keeps the corrections above any tolerance: they
+        crawl.
         """
         small = self.is_small(point.q - before.q, point.q, tolerance)
         if small and self.holds(point, RESIDUAL_FACTOR * tolerance):
             return True
-        return (small or crawls) and bool(self.holds_to_rounding(point))
+        return (small or crawls(corrections)) and bool(self.holds_to_rounding(point))
+
+    def weights(self) -> Array:
+        """Give by what equations of different units are multiplied to count alike."""
+        return np.asarray(1 / np.where(self.magnitude > 0, self.magnitude, 1.0))
 
     def terms(self, point: Point, scale: Array) -> Array:
         """Give what the terms of each equation contribute at the scales of the coordinates.
@@ -146,8 +169,8 @@ class Problem:
         """
         if point.q.ndim == 1 and within(point.Phi, tolerance * self.magnitude):
             return True  # nearly always; the terms are never less, and cost a pass over Phi_q
-        terms = self.terms(point, self.reference)
-        return within(point.Phi, tolerance * terms)
+        noise = column(np.asarray(self.noise), point.q)
+        return within(point.Phi, tolerance * self.terms(point, self.reference) + noise)
 
     def holds_to_rounding(self, point: Point) -> Any:
         """Say where every equation holds as well as floating point permits."""
@@ -160,30 +183,36 @@ def problem(
     p: Array,
     q: Array,
     t: float,
-    guess: Array | None = None,
     *,
     staged: bool = False,
     engine: Engine | None = None,
 ) -> Problem:
-    """Set a module's parameters; a position and the guess give the size of the mechanism.
+    """Set a module's parameters; the equations at a guess or a position give the scales.
 
-    The guess is the module's where none is given. With `staged`, a module that has stages is solved
-    by them, without a dense matrix. An engine with these parameters may be given.
+    With `staged`, a module that has stages is solved by them, without a dense matrix. An engine
+    with these parameters may be given.
     """
     code = code_of(module)
-    m, angular = len(code.equations), code.angular
+    m, angular, pattern = len(code.equations), code.angular, code.pattern
     if engine is None:
         engine = Staged(code, p) if staged and code.stages else Dense(code, p)
-    equations = Problem(code, engine, p, angular, np.ones(q.size), probe_of(m), np.zeros(m))
-    size = size_of(angular, q, code.guess if guess is None else guess)
-    if not size and isinstance(engine, Dense) and (point := equations.at(q, t)) is not None:
-        size = _size_in_equations(point, angular)
-    if size > NO_SIZE:
-        equations.reference = np.where(angular, 1.0, size)
-    generic = equations.at(q + equations.reference * equations.probe[: q.size], t)
+
+    def entries(q: Array) -> tuple[Array, Array]:
+        point = engine.evaluate(q, t)
+        values = point.Phi_q
+        return point.Phi, values if values.ndim == 1 else values[pattern[:, 0], pattern[:, 1]]
+
+    size = size_of(entries, pattern, angular, q) or 1.0
+    reference = np.where(angular, 1.0, size)
+    place, probe = np.abs(q), probe_of(m)
+    floor = float(ROUNDING * (place[~angular] / size).max(initial=0.0))
+    equations = Problem(code, engine, p, angular, size, reference, place, floor, probe, np.zeros(m))
+    generic = equations.at(q + reference * equations.probe[: q.size], t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
-        equations.magnitude = terms = equations.terms(generic, equations.reference)
-        equations.limit = np.where(terms > 0, STEEP * terms, np.inf)
+        equations.magnitude = equations.terms(generic, reference)
+        here = equations.terms(generic, reference + equations.place)
+        equations.noise = ROUNDING * here
+        equations.limit = np.where(here > 0, STEEP * here, np.inf)
     return equations
 
 
@@ -201,20 +230,6 @@ def within(values: Array | Iterable[Array], limits: Array) -> Any:
 def column(values: Array, q: Array) -> Array:
     """Return a number for each coordinate or equation in the shape that fits positions."""
     return values if q.ndim == 1 else values[:, np.newaxis]
-
-
-def _size_in_equations(point: Point, angular: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
-    """Give the largest length that the equations show where all coordinates are zero.
-
-    Divided by the derivative with respect to a length, a residual is a distance still to go and
-    the derivative with respect to an angle is a lever arm.
-    """
-    slopes = np.abs(point.Phi_q)
-    along = np.max(slopes, axis=1, where=~angular, initial=0.0)
-    shown = np.abs(point.Phi) + np.max(slopes, axis=1, where=angular, initial=0.0)
-    rows = along > 0
-    size = float(np.max(shown[rows] / along[rows], initial=0.0))
-    return size if math.isfinite(size) else 0.0
 
 
 class Dense:
@@ -364,6 +379,11 @@ def solve_linear(matrix: Array, sides: Array) -> Array:
 def norm(vector: Array) -> float:
     """Return the Euclidean norm; three times as fast as `numpy.linalg.norm`."""
     return math.sqrt(vector @ vector)
+
+
+def crawls(corrections: Sequence[float]) -> bool:
+    """Say whether corrections shrink no faster than towards a double root, by halves."""
+    return len(corrections) > 1 and corrections[-1] > corrections[-2] / 4
 
 
 def unsolvable(point: Point) -> Status:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
+from kincompile.criteria import MAX_ITERATIONS, MAX_SUBSTEPS, TOLERANCE
 from kincompile.errors import (
     AssemblyWarning,
     BranchSwitchWarning,
@@ -171,13 +171,28 @@ def solve(
             solve_all = solve_in_turn if inputs.code.lanes is None else solve_variants
             solution = replace(solve_all(inputs, sets, progress), sweep=dict(inputs.sweep))
             start = _start_of_first(replace(inputs, p=sets[0]), solution)
+    solution = _finite(solution)
     if start:
         warnings.warn(start, AssemblyWarning, stacklevel=2)
         solution = replace(solution, message=f"{start} {solution.message}")
-    solution = with_corners(solution, times, corners)
+    if corners is not None:
+        solution = with_corners(solution, times, corners)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution
+
+
+def _finite(solution: Solution) -> Solution:
+    """Take no point for converged whose numbers are not all finite, whatever has found it."""
+    numbers = solution.q, solution.q_dot, solution.q_ddot
+    is_finite = np.isfinite(sum(values.sum(axis=-1) for values in numbers))
+    wrong = (solution.status == Status.CONVERGED) & ~is_finite
+    if not wrong.any():
+        return solution
+    status = np.where(wrong, Status.NOT_FINITE, solution.status)
+    text = f"{solution.name} failed: {wrong.sum()} points have numbers that are not finite."
+    message = f"{text} {Status.NOT_FINITE.sentence}"
+    return replace(solution, status=status, success=False, message=message)
 
 
 def _at_assembly(inputs: Inputs, guess: Values, number: int) -> Inputs:
@@ -201,7 +216,7 @@ def _start_of_first(inputs: Inputs, solution: Solution) -> str:
     if solution.status[0, 0] != Status.CONVERGED:
         return ""
     q, time = solution.q[0, 0].copy(), float(inputs.t[0])
-    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time)
     guess, found = (equations.at(position, time) for position in (inputs.guess, q))
     return unchosen(inputs, q, bool(guess and found and equations.is_folded(guess, found)))
 
@@ -285,7 +300,7 @@ def _asked(inputs: Inputs, outcome: Outcome) -> str:
 
 
 def _equations_at(inputs: Inputs, point: Point) -> Problem:
-    return problem(inputs.code.module, inputs.p, point.q, point.t, inputs.guess)
+    return problem(inputs.code.module, inputs.p, point.q, point.t)
 
 
 def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str:
@@ -295,6 +310,10 @@ def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str
     """
     if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
         return f"{CANNOT_BE} at this time: {asked}" if asked else NOT_ASSEMBLED
+    if outcome.exhausted:
+        return (
+            f"Between these two times {MAX_SUBSTEPS:,} steps were not enough: ask for more times."
+        )
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
     if events and outcome.state is not None:
         event, end = events[-1], outcome.state.t

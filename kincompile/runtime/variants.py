@@ -101,16 +101,16 @@ def solve_in_turn(inputs: Inputs, sets: Array, progress: Progress | None) -> Sol
 
 def _solve_chunk(inputs: Inputs, sets: Array, arrays: _Arrays, chunk: slice) -> None:
     """Solve some of the variants: compiled, where the module can, and with care those that fail."""
-    march = inputs.code.march_variants
+    march, together = inputs.code.march_variants, _Chunk(inputs, sets, arrays, chunk.start)
     if march is None:
-        _Chunk(inputs, sets, arrays, chunk.start).run()
+        together.run()
         return
     residual = np.empty((inputs.t.size, len(sets)))
     status, iterations = np.empty((2, *residual.shape), dtype=np.intc)
-    march(inputs, sets, arrays.motion[..., chunk], residual, status, iterations)
+    march(inputs, *together.scales, sets, arrays.motion[..., chunk], residual, status, iterations)
     arrays.residual[:, chunk] = residual
     arrays.status[:, chunk], arrays.iterations[:, chunk] = status, iterations
-    failed = np.flatnonzero(status.any(axis=0))
+    failed = np.flatnonzero(status.any(axis=0) | together.strays(arrays.motion[0, 0, :, chunk]))
     if failed.size:
         alone = _Arrays.over(inputs, failed.size)
         _Chunk(inputs, sets[failed], alone, 0).run()
@@ -128,8 +128,14 @@ class _Chunk:
         self._times: list[float] = inputs.t.tolist()
         self._alive = np.ones(len(sets), dtype=bool)
         engine = Planned(inputs.code, np.ascontiguousarray(sets.T))
-        nominal = problem(inputs.code.module, sets[0], inputs.guess, self._times[0], inputs.guess)
+        nominal = problem(inputs.code.module, sets[0], inputs.guess, self._times[0])
         self._march = March(nominal, engine, inputs.tolerance)
+        self.scales = self._march.scales
+
+    def strays(self, q: Array) -> Mask:
+        """Say which variants (n, B) were assembled so far from the guess that safeguards pay."""
+        found: Mask = self._march.equations.is_far(q, self._inputs.guess[:, np.newaxis])
+        return found
 
     def run(self) -> None:
         """Go through the grid with all variants."""
@@ -137,7 +143,8 @@ class _Chunk:
         guess = np.repeat(inputs.guess[:, np.newaxis], len(self._sets), axis=1)
         found = self._march.correct_together(guess, time, inputs.max_iterations)
         state, checks = self._march.complete(found.point)
-        good = all_hold(found.good, checks)
+        good = all_hold(found.good, checks) & ~self.strays(found.point.q)
+        good &= state.sensitivity <= TOO_NEAR
         self._record(0, state, good, found.iterations)
         for variant in np.flatnonzero(~good).tolist():
             alone = self._alone(variant, inputs.guess)
@@ -169,7 +176,7 @@ class _Chunk:
     def _alone(self, variant: int, q: Array) -> March:
         """Return the march of one variant."""
         inputs, time = self._inputs, self._times[0]
-        equations = problem(inputs.code.module, self._sets[variant], q, time, inputs.guess)
+        equations = problem(inputs.code.module, self._sets[variant], q, time)
         return March(equations, equations.engine, inputs.tolerance)
 
     def _record(self, index: int, state: State, good: Mask, iterations: Any) -> None:

@@ -156,7 +156,12 @@ class _Analysis:
         end: float,
     ) -> None:
         random = np.random.default_rng(SEED)
-        size = size_of(angular, guess) or 1.0
+
+        def entries(q: Array) -> tuple[Array, Array]:
+            Phi, Phi_q = evaluate(q[np.newaxis], np.zeros(1))
+            return Phi[0], Phi_q[0].reshape(-1)
+
+        size = size_of(entries, None, angular, guess) or 1.0
         self._evaluate = evaluate
         self._angular = angular
         self._scale = np.where(angular, 1.0, size)
@@ -168,9 +173,8 @@ class _Analysis:
         sizes = np.abs(Phi_q) @ self._scale
         terms = np.max(np.where(np.isfinite(sizes), sizes, 0.0), axis=0)
         self._terms = np.where(terms > 0, terms, 1.0)
-        m = terms.size
         self._drivers = list(drivers)
-        self._joints = [row for row in range(m) if row not in set(drivers)]
+        self._joints = [row for row in range(terms.size) if row not in set(drivers)]
 
     def undefined(self) -> list[int]:
         """Return the rows that are most seldom finite, where no state has all of them finite."""

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+import kincompile.compiler as compiler
 from kincompile import criteria
-from kincompile.compiler import emit
 from kincompile.errors import UnsupportedError
+from kincompile.runtime.problem import problem
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
@@ -17,7 +20,7 @@ if TYPE_CHECKING:
 MOST_COORDINATES = 60
 """Coordinates up to which the panel shows every entry of Phi_q."""
 
-CRITERIA = ("TOLERANCE", "RESIDUAL_FACTOR", "ROUNDING", "MAX_ITERATIONS", "NO_SIZE")
+CRITERIA = ("TOLERANCE", "RESIDUAL_FACTOR", "ROUNDING", "MAX_ITERATIONS")
 """The numbers of `criteria` that the method of the page uses."""
 
 
@@ -32,15 +35,18 @@ def newton_script(model: Mechanism | ConstraintSystem) -> str:
     if count > MOST_COORDINATES:
         return _without(f"{count} coordinates are too many to show Newton's method step by step.")
     try:
-        emitted = emit(model, "javascript")
+        emitted = compiler.emit(model, "javascript")
     except UnsupportedError as error:
         return _without(f"Newton's method cannot be shown: {error}")
     if emitted.unsolvable:
         return _without(f"Newton's method cannot be shown: {emitted.unsolvable}")
+    module = compiler.compile(model)
+    with np.errstate(all="ignore"):
+        size = problem(module, module.DEFAULTS, module.GUESS, 0.0).size
     # In a function of its own, so that no name of a mechanism meets one of the page.
     return (
         f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{emitted.source}"
-        "return module.exports;\n})();\n"
+        f"return {{ ...module.exports, SIZE: {size!r} }};\n}})();\n"
     )
 
 

@@ -119,7 +119,7 @@ class NewtonPanel {
   random() {
     const [left, right, low, high] = player.data.extent;
     const between = (a, b) => a + (b - a) * Math.random();
-    const scale = newton.scales(this.model, player.data.guess);
+    const scale = newton.scales(this.model);
     const guess = player.data.guess.map((value, k) => value + between(-scale[k], scale[k]));
     for (const { columns: [x, y, phi] } of player.data.drawing.frames) {
       guess[x] = between(left, right);

@@ -66,8 +66,8 @@ class Code:
         Of each body its name, the number of its first coordinate, and how many it has.
     angular : ndarray of bool, shape (n,)
         Which coordinates are angles.
-    lengths : ndarray, shape (n,)
-        Zero for angles, one for the others.
+    may_turn : ndarray of bool, shape (n,)
+        Which are angles, or may be: a free coordinate has no unit that says so.
     position, nu, gamma, Phi_q, nonzeros
         Functions of the contract; `nonzeros` is ``Phi_q_nonzeros``.
     redundant
@@ -98,7 +98,7 @@ class Code:
     pattern: NDArray[np.signedinteger[Any]]
     bodies: tuple[tuple[str, int, int], ...]
     angular: NDArray[np.bool_]
-    lengths: Array
+    may_turn: NDArray[np.bool_]
     position: Callable[..., tuple[Array, Array]]
     nu: Callable[..., Array]
     gamma: Callable[..., Array]
@@ -145,7 +145,7 @@ def attach(module: ModuleType) -> Code:
         pattern=names["PATTERN"],
         bodies=names.get("BODIES", ()),
         angular=angular,
-        lengths=np.where(angular, 0.0, 1.0),
+        may_turn=angular | _without_body(names, coordinates),
         position=names["position"],
         nu=names["nu"],
         gamma=names["gamma"],
@@ -173,6 +173,14 @@ def attach(module: ModuleType) -> Code:
     )
     names[PLACE] = code
     return code
+
+
+def _without_body(names: Mapping[str, Any], coordinates: Sequence[str]) -> NDArray[np.bool_]:
+    """Return which coordinates belong to no body and have no unit."""
+    free = np.array([names["UNITS"][name] == "" for name in coordinates], dtype=bool)
+    for _, first, count in names.get("BODIES", ()):
+        free[first : first + count] = False
+    return free
 
 
 def require_square(code: Code) -> None:

@@ -265,20 +265,24 @@ class _Functions:
 
         def march(
             inputs: Inputs,
+            guess: Array,
+            size: float,
+            tolerance: float,
             states: Sequence[Array],
             residual: Array,
             status: NDArray[np.intc],
             iterations: NDArray[np.intc],
         ) -> int:
-            """Follow the motion from the guess as long as every point converges.
+            """Follow the motion from a guess, for a size of the mechanism, while points converge.
 
             Fills position, velocity and acceleration, (n, N) each, and of every point the largest
             absolute value of Phi, the `Status` and the Newton iterations, (N,) each. Returns how
             many points converged, from the first one on.
             """
-            t, p, guess = inputs.t, inputs.p, inputs.guess
+            t, p = inputs.t, inputs.p
             motion = Motion(t.size, t.ctypes.data, p.ctypes.data, guess.ctypes.data)
-            motion.tolerance, motion.max_iterations = inputs.tolerance, inputs.max_iterations
+            motion.size, motion.tolerance = size, tolerance
+            motion.max_iterations = inputs.max_iterations
             motion.q, motion.q_dot, motion.q_ddot = (numbers_of_batch(state) for state in states)
             motion.residual, motion.status = residual.ctypes.data, status.ctypes.data
             motion.iterations = iterations.ctypes.data
@@ -293,6 +297,8 @@ class _Functions:
 
         def march_variants(
             inputs: Inputs,
+            size: float,
+            tolerance: float,
             sets: Array,
             states: Array,
             residual: Array,
@@ -307,7 +313,8 @@ class _Functions:
             """
             t, guess = inputs.t, inputs.guess
             motions = Variants(t.size, len(sets), t.ctypes.data, numbers_of_batch(sets.T))
-            motions.guess, motions.tolerance = guess.ctypes.data, inputs.tolerance
+            motions.guess, motions.size = guess.ctypes.data, size
+            motions.tolerance = tolerance
             motions.max_iterations = inputs.max_iterations
             motions.q, motions.q_dot, motions.q_ddot = (
                 numbers_of_batch(state[0]) for state in states

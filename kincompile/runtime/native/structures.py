@@ -49,6 +49,7 @@ class Motion(Structure):
     _fields_ = (
         ("count", c_size_t),
         *((name, c_void_p) for name in ("t", "p", "guess")),
+        ("size", c_double),
         ("tolerance", c_double),
         ("max_iterations", c_int),
         *((name, Numbers) for name in ("q", "q_dot", "q_ddot")),
@@ -65,6 +66,7 @@ class Variants(Structure):
         ("t", c_void_p),
         ("p", Numbers),
         ("guess", c_void_p),
+        ("size", c_double),
         ("tolerance", c_double),
         ("max_iterations", c_int),
         *((name, Numbers) for name in ("q", "q_dot", "q_ddot")),

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import RESIDUAL_FACTOR
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.newton import iterate, safeguarded_step
+from kincompile.runtime.newton import SAME, iterate, safeguarded_step, unwound
 from kincompile.runtime.problem import norm, problem
 from kincompile.runtime.status import Status
 
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.engine import Array as Vector
+    from kincompile.runtime.engine.engine import Point
     from kincompile.runtime.inputs import Inputs, Values
     from kincompile.runtime.problem import Problem
 
@@ -34,9 +34,6 @@ FIRST_STARTS, MOST_STARTS = 60, 400
 PATIENCE = 6
 """The search ends when it has tried this many times the starts after which the last way to assemble
 was found."""
-
-SAME = 1e-6
-"""Distance, in radians and sizes of the mechanism, up to which two positions are the same."""
 
 TOLERANCE, MAX_ITERATIONS = 1e-12, 40
 """Of Newton's method from each start."""
@@ -100,9 +97,9 @@ def assembled_positions(inputs: Inputs) -> Vector:
         found: list[Vector] = []
         last = 0
         for k, start in enumerate(_starts(equations, inputs.guess), 1):
-            q = _assembled(equations, time, start)
-            if q is not None:
-                q = _unwound(equations, time, q, inputs.guess)
+            point = _assembled(equations, time, start)
+            if point is not None:
+                q = unwound(equations, time, point, inputs.guess, TOLERANCE).q
                 if all(_distance(equations, q, other) > SAME for other in found):
                     found.append(q)
                     last = k
@@ -170,7 +167,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
 def _equations(inputs: Inputs) -> Problem:
     """Return the equations as a search judges them, with angles that have no unit among them."""
     time = float(inputs.t[0])
-    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time)
     equations.angular = equations.angular | _periodic(equations, time, inputs.guess)
     return equations
 
@@ -183,12 +180,13 @@ def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
     if np.max(np.abs(q[angles]), initial=0.0) < NOTICEABLE:
         return False
     time = float(inputs.t[0])
-    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time)
     mirrored = q.copy()
     mirrored[angles] = -q[angles]
-    other = _assembled(equations, time, mirrored)
-    if other is None or _distance(equations, q, other) <= SAME:
+    found = _assembled(equations, time, mirrored)
+    if found is None or _distance(equations, q, found.q) <= SAME:
         return False
+    other = found.q
     here, there = (
         np.abs(_difference(equations, x, inputs.guess))[angles].max() for x in (q, other)
     )
@@ -227,26 +225,13 @@ def _starts(equations: Problem, guess: Vector) -> Vector:
     return np.vstack((guess, guess + offsets * reach))
 
 
-def _assembled(equations: Problem, t: float, start: Vector) -> Vector | None:
+def _assembled(equations: Problem, t: float, start: Vector) -> Point | None:
     """Return where Newton's method ends, plain or safeguarded; None where it does not converge."""
     for step in (None, safeguarded_step):
         attempt = iterate(equations, t, start, TOLERANCE, MAX_ITERATIONS, step)
         if attempt.status is Status.CONVERGED:
-            return attempt.last.q
+            return attempt.last
     return None
-
-
-def _unwound(equations: Problem, t: float, q: Vector, guess: Vector) -> Vector:
-    """Turn angles by whole turns towards the guess, as far as the equations allow it."""
-    for column in np.flatnonzero(equations.angular).tolist():
-        turns = round((q[column] - guess[column]) / math.tau)
-        if turns:
-            turned = q.copy()
-            turned[column] -= turns * math.tau
-            point = equations.at(turned, t)
-            if point is not None and equations.holds(point, RESIDUAL_FACTOR * TOLERANCE):
-                q = turned
-    return q
 
 
 def _distance(equations: Problem, q: Vector, other: Vector) -> float:

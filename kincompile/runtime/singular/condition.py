@@ -45,9 +45,8 @@ def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
     with np.errstate(all="ignore"):
         first = found[0]
         equations = problem(module, p, np.ascontiguousarray(q[first]), float(t[first]))
-        columns = equations.spread(q[first])
-        magnitude = equations.magnitude
-        rows = 1 / np.where(magnitude > 0, magnitude, 1.0)
+        columns = equations.reference
+        rows = equations.weights()
         for start in range(0, found.size, BLOCK):
             part = found[start : start + BLOCK]
             if columns.size <= LARGEST_DENSE or rows.size > columns.size:

@@ -50,6 +50,9 @@ are accurate to ten digits."""
 OFFSETS = (-2.0, -1.0, 1.0, 2.0)
 """Where the curve is interpolated around a bifurcation, in that distance."""
 
+BESIDE = (0.0, -1e-8, 1e-8, -1e-6, 1e-6, -1e-5)
+"""Distances from a lock-up at which a place is looked for: its time is off by their square."""
+
 ROUGHLY = 1e-6
 """Imaginary part of a root, relative to its real part, that is a rounding error."""
 
@@ -117,9 +120,8 @@ class Curve:
 
     def __init__(self, equations: Problem, state: State, duration: float) -> None:
         self.equations = equations
-        spread = equations.spread(state.point.q)
-        self.scale = np.append(spread, duration)
-        terms = equations.terms(state.point, spread)
+        self.scale = np.append(equations.reference, duration)
+        terms = equations.terms(state.point, equations.reference)
         self._weights = 1 / np.where(terms > 0, terms, 1.0)
 
     def start(self, state: State, direction: float) -> CurvePoint | None:
@@ -180,8 +182,12 @@ class Curve:
         first = bracket.first
         if bracket.turns:
             at = _root(lambda length: self._forward(first, length), bracket.length)
-            place = self.step(first, at)
-            return None if place is None else (place, at)
+            # Where several movements become free at once no step ends; beside it t is the same.
+            for offset in BESIDE:
+                place = self.step(first, at + offset)
+                if place is not None:
+                    return place, at + offset
+            return None
         blocks = self._changed(first, bracket.second)
         at = _root(lambda length: self._least(first, length, blocks), bracket.length)
         before = self.step(first, at - AROUND)
@@ -277,7 +283,7 @@ def _root(function: Callable[[float], float | None], length: float) -> float:
         return low if at_low == 0 else high
     for k in range(ROOT_STEPS):
         middle = (low + high) / 2
-        if k % 3 < 2:
+        if k % 3 < 2 and at_high != at_low:  # of numbers like 1e-300 the halves may both vanish
             middle = (low * at_high - high * at_low) / (at_high - at_low)
         value = function(middle)
         if value is None:  # rounding errors at the singular point itself

@@ -116,9 +116,7 @@ _QUINTIC = np.array([
 """Coefficients of s^3, s^4, s^5 from q, h q_dot, h^2 q_ddot at both ends of the interval."""
 
 
-def locate(
-    march: March, state: State, latest: float, duration: float
-) -> tuple[Event, Passage | None] | None:
+def locate(march: March, state: State, latest: float) -> tuple[Event, Passage | None] | None:
     """Find the singular configuration that a motion cannot pass.
 
     Parameters
@@ -129,8 +127,6 @@ def locate(
         The last good point of the motion.
     latest
         The time that was not reached.
-    duration
-        A time that is long for the motion.
 
     Returns
     -------
@@ -139,7 +135,9 @@ def locate(
         on to that time, or nowhere.
     """
     equations = march.equations
-    curve = Curve(equations, state, duration)
+    # A time that belongs to the motion, whatever span was asked for.
+    speed = float(np.max(np.abs(state.q_dot) / equations.reference))
+    curve = Curve(equations, state, 1 / speed if speed > 0 else abs(latest - state.t))
     forward = math.copysign(1.0, latest - state.t)
     start = curve.start(state, forward)
     bracket = start and curve.next_singular(start, latest + LATE * (latest - state.t))
@@ -149,7 +147,7 @@ def locate(
     if singular is None:
         return None
     place, at = singular
-    if (place.t - latest) * forward > LATE * max(duration, abs(latest - state.t)):
+    if (place.t - latest) * forward > LATE * abs(latest - state.t):
         return None
     kind = LOCK_UP if bracket.turns else BIFURCATION
     event = _event(equations, kind, place.q, place.t, place.point.Phi_q)
@@ -174,15 +172,15 @@ def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
         return None
     if not (np.isfinite(nu).all() and np.isfinite(point.Phi_q).all()):
         return None
-    scaled = point.Phi_q * equations.spread(point.q)
-    basis, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
-    missing = basis[:, sizes <= IN_RANGE * sizes[0]].T @ nu
-    demanded = float(np.linalg.norm(missing)) > IN_RANGE * float(np.linalg.norm(nu))
+    weights = equations.weights()
+    basis, sizes, _ = np.linalg.svd(_scaled(equations, point.Phi_q), full_matrices=False)
+    missing = basis[:, sizes <= IN_RANGE * sizes[0]].T @ (weights * nu)
+    demanded = float(np.linalg.norm(missing)) > IN_RANGE * float(np.linalg.norm(weights * nu))
     kind = LOCK_UP if demanded else BIFURCATION
     return _event(equations, kind, point.q, t, point.Phi_q)
 
 
-def branch_switch(code: Code, state: State, t: float, q: Vector, spread: Vector) -> Event:
+def branch_switch(code: Code, state: State, t: float, q: Vector, reference: Vector) -> Event:
     """Return the event of a position that the mechanism could only jump to.
 
     Parameters
@@ -193,10 +191,10 @@ def branch_switch(code: Code, state: State, t: float, q: Vector, spread: Vector)
         The last good point of the motion.
     t, q
         The time that was not reached, and the position found there.
-    spread
-        The distance that is large for each coordinate.
+    reference
+        The scale of each coordinate.
     """
-    jump = (q - state.point.q) / spread
+    jump = (q - state.point.q) / reference
     bodies = involved(code, jump)
     return Event(
         BRANCH_SWITCH, state.t, bodies,
@@ -209,8 +207,7 @@ def branch_switch(code: Code, state: State, t: float, q: Vector, spread: Vector)
 
 def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:
     """Name what moves, and say what to do."""
-    spread = equations.spread(q)
-    _, sizes, directions = np.linalg.svd(Phi_q * spread)
+    _, sizes, directions = np.linalg.svd(_scaled(equations, Phi_q))
     null = directions[-1] / directions[-1][np.argmax(np.abs(directions[-1]))]
     code = equations.code
     # Equal loops become singular together: then several movements are free.
@@ -220,6 +217,11 @@ def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) ->
         kind, t, bodies, _message(kind, t, bodies), q,
         dict(zip(code.coordinates, null.tolist(), strict=True)),
     )  # fmt: skip
+
+
+def _scaled(equations: Problem, Phi_q: Vector) -> Vector:
+    """Return Phi_q in scales of equations and coordinates."""
+    return equations.weights()[:, np.newaxis] * Phi_q * equations.reference
 
 
 def _message(kind: str, t: float, bodies: Sequence[str]) -> str:

@@ -16,8 +16,9 @@ import numpy as np
 
 from kincompile.criteria import ASSEMBLED
 from kincompile.runtime.march import State
+from kincompile.runtime.newton import SAME
 from kincompile.runtime.problem import Dense
-from kincompile.runtime.singular.assemblies import MOST_COORDINATES, SAME
+from kincompile.runtime.singular.assemblies import MOST_COORDINATES
 from kincompile.runtime.singular.curve import Curve
 
 if TYPE_CHECKING:
@@ -221,7 +222,7 @@ def _with_the_others(equations: Problem, row: int, q: Array, t: float) -> Point 
             return None
         if (np.abs(point.Phi[rest]) <= ASSEMBLED * equations.magnitude[rest]).all():
             return point
-        scale = equations.spread(q)
+        scale = equations.reference
         change = np.linalg.lstsq(point.Phi_q[rest] * scale, point.Phi[rest], rcond=1e-9)[0]
         q = q - scale * change * min(1.0, 1.0 / float(np.max(np.abs(change)) or 1.0))
     return None

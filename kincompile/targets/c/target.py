@@ -31,7 +31,7 @@ LANES = 32
 """Points in a strip: enough for the widest registers, few enough for the nearest cache."""
 
 CRITERIA = (
-    "KINK", "MAX_CORRECTIONS", "MAX_SUBSTEPS", "NEARLY_SINGULAR", "NO_SIZE", "RESIDUAL_FACTOR",
+    "KINK", "MAX_CORRECTIONS", "MAX_SUBSTEPS", "NEARLY_SINGULAR", "RESIDUAL_FACTOR",
     "ROUNDING", "SMALL_ERROR", "SMALLEST_PART", "SMOOTH", "TOO_NEAR",
 )  # fmt: skip
 """The numbers of `criteria` that the march judges by."""

@@ -37,10 +37,9 @@ def checks(march, before, after, side):
         assert isinstance(state, State)
         states.append(state)
     predicted = march.predict(states[0], after)
-    spread = march.equations.spread(predicted)
-    error, near = march.error(states[0], states[1].point.q, predicted, spread)
+    error, near = march.error(states[0], states[1].point.q, predicted)
     assert near
-    return [bool(good) for good, _ in march.follows(*states, error, spread)]
+    return [bool(good) for good, _ in march.follows(*states, error)]
 
 
 def test_a_step_along_the_motion_is_accepted(march):

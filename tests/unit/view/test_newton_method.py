@@ -73,7 +73,9 @@ def test_that_iterates_are_those_of_the_runtime(tmp_path, example):
     found = run(tmp_path, newton_script(example.model), text)
     for guess, attempt in zip(starts, found, strict=True):
         q = np.array(guess)
-        expected = iterate(problem(module, module.DEFAULTS, q, t), t, q, 1e-10, 25)
+        # The page has the size of the mechanism from the model's guess.
+        equations = problem(module, module.DEFAULTS, module.GUESS, 0.0)
+        expected = iterate(equations, t, q, 1e-10, 25)
         assert attempt["status"] == STATUSES[expected.status.name]
         assert len(attempt["iterates"]) == len(expected.points)
         assert [item["correction"] for item in attempt["iterates"]][1:] == pytest.approx(

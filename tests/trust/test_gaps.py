@@ -1,0 +1,69 @@
+"""Times far apart, and grids of all kinds: efforts end, nothing false is said, events stay."""
+
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile import criteria
+
+from . import linkages
+
+FORMS: tuple[dict[str, str], ...] = ({}, {"form": "grouped"}, {"target": "c"})
+LOCKS = 10 * np.arccos(0.9)
+
+
+@pytest.fixture(scope="module")
+def pendulum():
+    m = kc.Mechanism("pendulum")
+    bob = m.body("bob", guess=(1, 0, 0))
+    m.add(kc.Revolute("pin", bob, (-1, 0), m.ground, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", bob, kc.t))
+    return kc.compile(m)
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+def test_a_gap_is_no_lock_up(form, quick_compiler):
+    x = sympy.Symbol("x")
+    wave = kc.ConstraintSystem("wave", [x], [x - sympy.sin(kc.t)], guess=(0,))
+    solution = kc.solve(kc.compile(wave, **form), [0, 1e6])
+    assert solution.status.tolist() == [0, 1]
+    assert solution.events == []
+    assert "steps were not enough: ask for more times" in solution.message
+
+
+def test_a_time_beyond_all_angles_is_a_status(pendulum):
+    solution = kc.solve(pendulum, [0, 1e200])
+    assert not solution.success
+    assert solution.events == []
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+def test_a_gap_of_many_turns_is_followed_and_counted(form, quick_compiler):
+    module = kc.compile(linkages.four_bar().mechanism, **form)
+    solution = kc.solve(module, [0, 100.0])
+    near = kc.solve(module, np.linspace(0, 100, 2001))
+    np.testing.assert_allclose(solution.q[1], near.q[-1], rtol=0, atol=1e-7)
+    assert 1000 < solution.iterations[1] < 10_000
+
+
+def test_a_gap_of_too_many_turns_ends_with_what_to_do_and_shows_progress(monkeypatch):
+    monkeypatch.setattr("kincompile.runtime.march.MAX_SUBSTEPS", 600)
+    assert criteria.MAX_SUBSTEPS == 10_000
+    seen = []
+    module = kc.compile(linkages.four_bar().mechanism)
+    solution = kc.solve(module, [0, 1e6], progress=lambda *count: seen.append(count))
+    assert solution.status.tolist() == [0, 1]
+    assert solution.events == []
+    assert "steps were not enough: ask for more times" in solution.message
+    assert len(seen) >= 4
+
+
+@pytest.mark.parametrize("method", ["grid", "march"])
+@pytest.mark.parametrize(("points", "end"), [(121, 6), (13, 6), (1000, 4.6), (300, 4.52), (7, 30)])
+def test_a_lock_up_is_an_event_on_every_grid(method, points, end):
+    module = kc.compile(linkages.peaucellier().mechanism)
+    solution = kc.solve(module, np.linspace(0, end, points), method=method)
+    (event,) = solution.events
+    assert event.kind == "lock-up"
+    assert event.t == pytest.approx(LOCKS, abs=1e-7)
