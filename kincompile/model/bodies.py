@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import sympy
 
 from kincompile.calculus.symbols import Frame
+from kincompile.html import Shown
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -52,8 +53,8 @@ PLANAR = BodyKind(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
+@dataclass(frozen=True, slots=True, repr=False)
+class Body(Shown):
     """A planar rigid body with coordinates x, y [length] of its origin and angle phi [rad].
 
     Made by `Mechanism.body`; the ground is `Mechanism.ground`. The corners of its outline, in its
@@ -65,6 +66,11 @@ class Body:
     outline: Sequence[Scalars] = ()
     is_ground: bool = field(default=False, kw_only=True)
     kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
+
+    def to_text(self) -> str:
+        """Return its name, coordinates and guess."""
+        names = ", ".join(self.coordinates)
+        return f"{self.name} with {names}, guess ({', '.join(map(str, self.guess))})"
 
     @property
     def coordinates(self) -> tuple[str, ...]:
