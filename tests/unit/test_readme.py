@@ -114,7 +114,7 @@ def failure_of(reader: Reader, block: re.Match[str]) -> str:
     try:
         reader.follow(block)
     except (Exception, SystemExit) as error:
-        line = README[: block.start()].count("\n") + 1
+        line = block.string[: block.start()].count("\n") + 1
         return f"line {line}: {type(error).__name__}: {error}"
     return ""
 
@@ -126,6 +126,13 @@ def test_that_the_readme_does_what_it_says(tmp_path):
     failures = [failure for block in blocks if (failure := failure_of(reader, block))]
     if failures:
         pytest.fail("\n\n".join(failures), pytrace=False)
+
+
+def test_that_the_page_of_the_checker_does_what_it_says(tmp_path):
+    reader = Reader(tmp_path)
+    page = (ROOT / "docs" / "checker.md").read_text(encoding="utf-8")
+    failures = [found for block in BLOCK.finditer(page) if (found := failure_of(reader, block))]
+    assert failures == []
 
 
 def test_that_every_block_is_of_a_known_kind():

@@ -132,3 +132,22 @@ def test_that_no_right_answer_is_called_wrong(step: int, joint_types: Models) ->
         told = item["model"], item["form"], report.to_text()
         assert report.equal, told
         assert item.get("convention") in {None, *(found.kind for found in report.conventions)}, told
+
+
+@pytest.mark.parametrize("step", [SOME, ALL], ids=["some", "all"])
+def test_that_every_single_fault_is_found_and_named(step: int, joint_types: Models) -> None:
+    corpus = answers("single_faults.toml", "answer")
+    assert len(corpus) >= 1000
+    assert {item["model"] for item in corpus} == set(joint_types)
+    named = []
+    for item in corpus[::step]:
+        model, reference = model_of(item["model"], joint_types)
+        rows = getattr(model, item["quantity"]).tolist()
+        for row, column, formula in item["entries"]:
+            rows[row][column] = formula
+        report = kc.compare(reference, **{item["quantity"]: rows}, strict=True)
+        assert not report.equal, item
+        kinds = {found.kind for entry in report.different for found in entry.diagnoses}
+        named.append((kinds == {item["fault"]}, item["fault"] in kinds or kinds == {"left zero"}))
+    assert np.mean([unique for unique, _ in named]) >= 0.92
+    assert np.mean([found for _, found in named]) >= 0.99
