@@ -23,5 +23,6 @@ if __name__ == "__main__":
     print(solution.message)
     camber = np.degrees(solution["phi_upright"] - solution["phi_upright"][0])
     print(f"camber from {camber.min():+.3f} to {camber.max():+.3f} degrees")
-    rise = solution["y_upright"] - solution["y_upright"][0]
-    print(f"while the lower ball joint moves from {rise.min():+.4f} to {rise.max():+.4f} m")
+    rise, track = (solution[name] - solution[name][0] for name in ("W.y", "P.x"))
+    print(f"while the wheel moves from {1e3 * rise.min():+.2f} to {1e3 * rise.max():+.2f} mm")
+    print(f"and the track changes from {1e3 * track.min():+.2f} to {1e3 * track.max():+.2f} mm")

@@ -22,6 +22,7 @@ if __name__ == "__main__":
     module = kc.compile(mechanism)
     solution = kc.solve(module, np.linspace(0, mechanism.end, mechanism.points))
     print(solution.message)
-    knee, leg = solution["x_leg"], np.degrees(solution["leg.phi"])
-    print(f"the leg swings from {leg.min():.3f} to {leg.max():.3f} degrees")
-    print(f"the hip E moves by {knee.max() - knee.min():.3f} mm along x")
+    x, y = solution["G.x"], solution["G.y"]
+    print(f"the foot steps {x.max() - x.min():.3f} mm and lifts {y.max() - y.min():.3f} mm")
+    down = y < y.min() + 2
+    print(f"for {100 * down.mean():.0f} % of the turn it is within 2 mm of the ground")

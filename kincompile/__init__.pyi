@@ -10,6 +10,7 @@ from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
 from kincompile.derivation.derivation import derivation as derivation
+from kincompile.errors import AssemblyWarning as AssemblyWarning
 from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
 from kincompile.errors import ContractError as ContractError
 from kincompile.errors import InputError as InputError
@@ -47,6 +48,7 @@ from kincompile.runtime.solve import solve as solve
 from kincompile.runtime.status import Status as Status
 from kincompile.verify.verify import verify as verify
 from kincompile.view.animation import animate as animate
+from kincompile.view.gallery import assembly_gallery as assembly_gallery
 from kincompile.view.gallery import gallery as gallery
 from kincompile.view.mechanism_plot import plot_mechanism as plot_mechanism
 from kincompile.view.page import page as page

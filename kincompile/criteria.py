@@ -75,6 +75,10 @@ SMALLEST_DETERMINANT = 1e-5
 """Determinant of a block, relative to the largest along the motion, below which a point that was
 not looked at closely is not trusted."""
 
+FOLDED = 1e-9
+"""Determinant of a block at the guess, beside that at the assembled position, up to which the guess
+shows no branch: bodies without a guess lie on one line."""
+
 # On the branch. Errors of a prediction are in radians and sizes of the mechanism
 
 SMALL_ERROR, LARGE_ERROR = 0.05, 0.5

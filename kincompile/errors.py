@@ -142,6 +142,10 @@ class SingularConfigurationWarning(KincompileWarning):
     """A motion that converged has points very near to a configuration where Phi_q is singular."""
 
 
+class AssemblyWarning(KincompileWarning):
+    """A mechanism can be assembled in several ways, and no guess chooses one."""
+
+
 class BranchSwitchWarning(KincompileWarning):
     """The solution may have changed from one assembly branch to another."""
 

@@ -24,7 +24,10 @@ from kincompile.cli.shared import INTERRUPTED, USAGE_OR_MODEL
 from kincompile.errors import InternalError, KincompileError
 from kincompile.names import escaped_lines
 
-COMMANDS = ("compare", "compile", "derive", "exercise", "inspect", "mark", "run", "schema", "view")
+COMMANDS = (
+    "assemblies", "compare", "compile", "derive", "exercise", "inspect", "mark", "run", "schema",
+    "view",
+)  # fmt: skip
 """The commands: each is the `command` of the file of its name."""
 
 TRACEBACK = "KINCOMPILE_TRACEBACK"

@@ -36,6 +36,12 @@ def motion_options(command: Callable[..., None]) -> Callable[..., None]:
             type=click.Choice(["smooth"]),
             help="Go on past a bifurcation, along the smooth branch.",
         ),
+        click.option(
+            "--assembly",
+            type=int,
+            metavar="N",
+            help="Start in the N-th of the ways that `kincompile assemblies` lists.",
+        ),
     )
     for option in reversed(options):
         command = option(command)

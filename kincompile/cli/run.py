@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from typing import TYPE_CHECKING, Any
+
 import click
+import numpy as np
 
 import kincompile as kc
 from kincompile.cli.motion import motion_options, time_grid
@@ -14,13 +18,50 @@ from kincompile.cli.shared import (
     read_model,
     require_output,
 )
+from kincompile.errors import InputError
+from kincompile.names import listed
 from kincompile.runtime.results.summary import summary
 from kincompile.runtime.results.write import require_known_suffix
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def _sweeps(
+    context: click.Context, option: click.Parameter, given: tuple[str, ...]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the values of parameters that are swept."""
+    del context, option
+    values, problems = {}, []
+    for sweep in given:
+        name, _, span = sweep.partition("=")
+        try:
+            first, last, count = span.split(":")
+            ends, size = (float(first), float(last)), int(count)
+        except ValueError:
+            ends, size = (math.nan, math.nan), 0
+        if size < 1 or not all(map(math.isfinite, ends)):
+            problems.append(
+                f"--sweep {sweep}: give NAME=FIRST:LAST:COUNT with numbers, such as a=0.2:0.6:5"
+            )
+        values[name.strip()] = np.linspace(*ends, max(size, 1))
+    if problems:
+        raise InputError(problems)
+    return values
 
 
 @click.command("run")
 @click.argument("model")
 @motion_options
+@click.option(
+    "--sweep",
+    "sweeps",
+    multiple=True,
+    metavar="NAME=FIRST:LAST:COUNT",
+    callback=_sweeps,
+    help="Solve for so many values of a parameter; several sweeps go in pairs.",
+)
+@click.option("--product", is_flag=True, help="Solve every combination of the sweeps.")
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
 @output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context
@@ -31,14 +72,18 @@ def command(
     points: int | None,
     values: dict[str, float],
     through: str | None,
+    assembly: int | None,
+    sweeps: dict[str, NDArray[np.float64]],
+    product: bool,
     analysis: str | None,
     output: str | None,
 ) -> None:
     """Solve the motion of MODEL over time and summarise it.
 
     Position, velocity and acceleration are solved at equally spaced times, from 0 to the end. The
-    summary goes to stdout, or to stderr where a file is written. Where the motion does not
-    converge, what was found is written nevertheless, and the exit code is 3.
+    summary goes to stdout, or to stderr where a file is written. With --sweep it has a part for
+    each parameter set, and a file their values. Where the motion does not converge, what was found
+    is written nevertheless, and the exit code is 3.
     """
     if output is not None:
         require_known_suffix(output)
@@ -48,10 +93,13 @@ def command(
         settings = kc.read_analysis(analysis)
         end = settings.end if end is None else end
         points = settings.points if points is None else points
+    if twice := values.keys() & sweeps.keys():
+        raise InputError(f"--set and --sweep both name {listed(sorted(twice))}: give one of them")
     times = time_grid(mechanism, end, points)
     module = kc.compile(mechanism)
     with progress_bar() as progress:
-        solution = kc.solve(module, times, values, through=through, progress=progress)
+        options: dict[str, Any] = {"through": through, "assembly": assembly, "product": product}
+        solution = kc.solve(module, times, values | sweeps, progress=progress, **options)
     if output is None:
         print_data(summary(solution) + "\n")
     else:

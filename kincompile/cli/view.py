@@ -27,6 +27,7 @@ def command(
     points: int | None,
     values: dict[str, float],
     through: str | None,
+    assembly: int | None,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
 
@@ -40,7 +41,7 @@ def command(
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
     read = [read_model(model) for model in models]
-    options: dict[str, Any] = {"p": values, "through": through}
+    options: dict[str, Any] = {"p": values, "through": through, "assembly": assembly}
     pages = [kc.page(model, t=time_grid(model, end, points), **options) for model in read]
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:

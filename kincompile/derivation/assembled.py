@@ -121,8 +121,7 @@ def _offsets(evaluation: Evaluation) -> Chapter:
         name = CrossReference(f"constraint-{item.name}", Verbatim(item.name))
         rows.append((name, str(count), str(first), row_range(first, count), str(first + 1)))
     note = text(
-        "The row offset of a constraint is the number of equations before it: the exclusive prefix "
-        "scan of the numbers of equations. "
+        "The row offset of a constraint is the number of equations before it. "
         f"{_column_rule(system.bodies)}"
     )
     header = ("constraint", "equations", "row offset", "rows from 0", "first row from 1")
@@ -163,7 +162,7 @@ def _mobility(evaluation: Evaluation) -> Chapter:
         ("equations of joints", "", f"\N{MINUS SIGN}{mobility.joint_equations}"),
         ("degrees of freedom", "", str(mobility.degrees_of_freedom)),
         ("equations of drivers", "", f"\N{MINUS SIGN}{mobility.driver_equations}"),
-        ("left undriven", "", str(mobility.undriven)),
+        ("not driven", "", str(mobility.undriven)),
     ]  # fmt: skip
     blocks: list[Block] = [table(("what", "count", "number"), rows)]
     if evaluation.problem:

@@ -1,10 +1,10 @@
 """Gamma as the book prints it: products multiplied out, like terms joined, rates factored.
 
 What is derived is right, but in the order in which the rules fired. Here it is multiplied out to
-terms `number * scalars * rates * core`, where a core is a vector or a scalar product of two vectors
-that are no sums; the turned vectors in it have one form (R A = B, R B = -A, u^T R v = -(R u)^T v);
-and the rates that stand with the same scalars and core are put together, as a square where they are
-one. Abbreviations such as d stay whole.
+terms `number * scalars * rates * vector`, in which no vector and no side of a scalar product is a
+sum; turned vectors have one form (R A = B, R B = -A, u^T R v = -(R u)^T v); and the rates that
+stand with the same scalars and vector are put together, as a square where they are one.
+Abbreviations such as d stay whole.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ if TYPE_CHECKING:
 Monomial: TypeAlias = tuple[tuple[Scalar, int], ...]
 """Scalars with their exponents."""
 
-Core: TypeAlias = Vector | Dot | None
-"""What cannot be multiplied out: a vector, a scalar product, or nothing."""
+Core: TypeAlias = Vector | None
+"""A vector that cannot be multiplied out; None in a scalar term."""
 
 Term: TypeAlias = tuple[Fraction, Monomial, Core]
 
@@ -185,7 +185,7 @@ def _difference(items: tuple[Vector, ...]) -> Term | None:
 
 
 def _atom(expression: Expression) -> Term:
-    if isinstance(expression, Vector | Dot):
+    if isinstance(expression, Vector):
         return Fraction(1), (), expression
     base, exponent = (
         (expression.base, expression.exponent) if isinstance(expression, Power) else (expression, 1)
@@ -198,14 +198,12 @@ def _multiplied(parts: list[list[Term]]) -> list[Term]:
 
 
 def _times(first: Term, second: Term) -> Term:
+    """Return the product of two terms, of which one at most is a vector."""
     core = first[2] if second[2] is None else second[2]
-    monomial = _joined(first[1], second[1])
-    if first[2] is not None and second[2] is not None:  # two scalar products
-        return first[0] * second[0], _joined(monomial, ((_scalar(first[2]), 1),)), second[2]
-    return first[0] * second[0], monomial, core
+    return first[0] * second[0], _joined(first[1], second[1]), core
 
 
-def _scalar(item: Core | Expression) -> Scalar:
+def _scalar(item: Expression) -> Scalar:
     assert isinstance(item, Scalar)
     return item
 
@@ -252,15 +250,14 @@ def _turned(vector: Vector) -> Term:
 def _dotted(first: Term, second: Term) -> Term:
     """Return the scalar product of two terms; of two turned vectors the left has the turn."""
     (left, turns), (right, more) = (_quarter_turns(_vector(term[2])) for term in (first, second))
-    number, monomial = first[0] * second[0], _joined(first[1], second[1])
     if isinstance(left, Rotated) and isinstance(right, Rotated):
-        sign, left = _with_turns(left, (turns - more) % 4)
-        return sign * number, monomial, Dot(left, right)
+        turns, more = (turns - more) % 4, 0
     (sign, left), (other, right) = _with_turns(left, turns), _with_turns(right, more)
-    return sign * other * number, monomial, Dot(left, right)
+    monomial = _joined(_joined(first[1], second[1]), ((Dot(left, right), 1),))
+    return sign * other * first[0] * second[0], monomial, None
 
 
-def _vector(item: Core | Expression) -> Vector:
+def _vector(item: Expression | None) -> Vector:
     assert isinstance(item, Vector)
     return item
 
@@ -270,13 +267,11 @@ def _power(base: Scalar, exponent: int) -> Scalar:
 
 
 def _part(others: Monomial, core: Core, rates: dict[Monomial, Fraction]) -> Expression:
-    """Return number, scalars and core with their polynomial in the rates."""
+    """Return number, scalars, scalar products, vector, with the polynomial in the rates."""
     number, factors = _factored(rates)
-    scalars = [_power(base, exponent) for base, exponent in others]
-    if isinstance(core, Vector):
-        return scaled(_product(number, (*scalars, *factors)), core)
-    dots = () if core is None else (core,)
-    return _product(number, (*scalars, *dots, *factors))
+    scalars = [_power(*item) for item in sorted(others, key=lambda x: isinstance(x[0], Dot))]
+    scalar = _product(number, (*scalars, *factors))
+    return scalar if core is None else scaled(scalar, core)
 
 
 def _product(number: Fraction, factors: tuple[Scalar, ...]) -> Scalar:

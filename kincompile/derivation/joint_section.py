@@ -143,8 +143,8 @@ class _JointSteps(Steps[RowBlock]):
                 label = Math(PartialDerivative(self.symbol("Phi", k), item.coordinate))
                 rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
         note = text(
-            "Every rule that fired while ", Math(PHI_Q), " was derived, from the inside out. "
-            "Whatever the coordinate does not occur in is constant."
+            "The rules that give ", Math(PHI_Q), ", the innermost first. A term in which the "
+            "coordinate does not occur is constant."
         )  # fmt: skip
         if not rows:
             note = text("Nothing but constants and coordinates themselves: no rule is needed.")
@@ -230,11 +230,16 @@ def _attribute_symbol(symbol: str, kind: Kind) -> Formula:
 def _attribute(joint: Joint, symbol: str) -> Formula:
     """Return an attribute as the user wrote it."""
     if symbol in joint.points:
-        return Matrix(tuple((sympy.sympify(value),) for value in joint.points[symbol]))
+        return column(tuple(_as_written(value) for value in joint.points[symbol]))
     if symbol in joint.profiles:
         return joint.profiles[symbol]
-    written: sympy.Expr = sympy.sympify(joint.scalars[symbol])
-    return written
+    return _as_written(joint.scalars[symbol])
+
+
+def _as_written(value: Scalar) -> Formula:
+    """Return a number in its digits, or an expression."""
+    expression: sympy.Expr = sympy.sympify(value)
+    return Decimal(float(expression), 12) if expression.is_Float else expression
 
 
 def _rule_lines(
@@ -248,9 +253,9 @@ def _rule_lines(
 
 
 def _fired(lines: list[tuple[Run | Runs, ...]]) -> list[Block]:
-    """Return the rules that fired as a table that can be folded away."""
+    """Return the rules used as a table that can be folded away."""
     header = ("for", "rule", "applied to", "gives")
-    return [table(header, lines, "The rules that fired")] if lines else []
+    return [table(header, lines, "The rules used")] if lines else []
 
 
 def _column(values: Sequence[Scalar], known: Mapping[str, float]) -> Matrix:

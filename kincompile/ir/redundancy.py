@@ -34,7 +34,7 @@ def rank_report(
     def evaluate(
         q: NDArray[np.float64], t: NDArray[np.float64]
     ) -> tuple[NDArray[Any], NDArray[Any]]:
-        Phi, Phi_q, _, _ = interpret(program, q, np.zeros_like(q), t)
+        Phi, Phi_q, *_ = interpret(program, q, np.zeros_like(q), t)
         return Phi, Phi_q
 
     return generic_rank(

@@ -67,7 +67,8 @@ class Sketch:
     def joints(self, **places: PointLike) -> None:
         """Draw joints: a place (x, y) by name [length], numbers or expressions of parameters.
 
-        A joint that several links have is a pin. Where lengths are given, a rough place will do.
+        A joint that several links have is a pin, one of a single link a point to be watched, with
+        columns ``G.x`` and ``G.y`` in a solution. Where lengths are given, a rough place will do.
         """
         for name, place in places.items():
             if name in self._drawn.joints:
@@ -264,7 +265,16 @@ class Sketch:
             )
         if problems:
             raise ModelError(list(dict.fromkeys(problems)))
+        self._name_points()
         return self._mechanism
+
+    def _name_points(self) -> None:
+        """Name the points of links: the joints that one moving link has alone."""
+        named = {item.name for item in self._mechanism.outputs}
+        for joint in self._drawn.joints:
+            holders = [link for link in self._drawn.links.values() if joint in link.places]
+            if len(holders) == 1 and not holders[0].body.is_ground and joint not in named:
+                self._mechanism.point(joint, holders[0].body, holders[0].places[joint])
 
     def __repr__(self) -> str:
         """Return name and sizes."""

@@ -53,6 +53,8 @@ class Motion:
         Points so near to a singular configuration that their rates are uncertain.
     note : str
         A remark for the message of the solution.
+    is_folded : bool
+        Whether the guess shows no branch.
     """
 
     q: Array
@@ -66,6 +68,7 @@ class Motion:
     passed: list[Event] = field(default_factory=list)
     near: list[int] = field(default_factory=list)
     note: str = ""
+    is_folded: bool = False
 
     @classmethod
     def over(cls, inputs: Inputs) -> Motion:
@@ -145,6 +148,7 @@ def _march_compiled(inputs: Inputs, motion: Motion) -> bool:
     guess, found = (equations.at(q, time) for q in (inputs.guess, motion.q[0].copy()))
     if guess is None or found is None or equations.leaves_branch(guess, found):
         return False
+    motion.is_folded = equations.is_folded(guess, found)
     motion.status[:], motion.iterations[:] = status, iterations
     motion.statistics["compiled"] = inputs.t.size
     return True
@@ -168,6 +172,7 @@ class _Way:
             self._leave_stages(inputs.guess)
             outcome = start(self._march, time, inputs)
         self._put(outcome)
+        self._motion.is_folded = outcome.is_folded
         if self._may_be_dense and outcome.strays:
             self._motion.note = (
                 f" The position at t = {time:.10g} is on another branch than the guess: "

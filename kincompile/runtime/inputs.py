@@ -6,21 +6,22 @@ import math
 import operator
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.names import listed, suggestion
+from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.engine.code import Code, code_of, require_square
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
 
     from numpy.typing import ArrayLike, NDArray
 
-    Values: TypeAlias = ArrayLike | Mapping[str, float] | None
+    Values: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | None
 
 
 SMALLEST_GRID = 32
@@ -51,6 +52,12 @@ class Inputs:
         Whether the points of a grid are solved together, rather than one after the other.
     smooth : bool
         Whether to go on past a bifurcation.
+    sets : ndarray, shape (B, k), or None
+        Values of the parameters in each of several sets.
+    sweep
+        The arrays that were given of them, by name.
+    without_guess
+        Bodies that have no guess.
     """
 
     code: Code
@@ -62,18 +69,64 @@ class Inputs:
     method: str | None = None
     on_grid: bool = False
     smooth: bool = False
+    sets: NDArray[np.float64] | None = None
+    sweep: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    without_guess: tuple[str, ...] = ()
 
 
-def read_variants(module: ModuleType, p: object) -> NDArray[np.float64] | None:
-    """Return parameter sets of shape (B, k) where `p` has the shape (B, 1, k), else None.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Variants:
+    """Parameter sets as they were given.
+
+    Attributes
+    ----------
+    common
+        Parameters of all sets, as `solve` takes those of one; of the first set, where they differ.
+    sets : ndarray, shape (B, k), or None
+        The sets, where an array of them was given.
+    sweep
+        NDArray[np.float64]s of values by the names of their parameters.
+    is_product
+        Whether every value of one goes with every value of the others; else they go in pairs.
+    problems
+        What is wrong with them.
+    """
+
+    common: Values = None
+    sets: NDArray[np.float64] | None = None
+    sweep: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    is_product: bool = False
+    problems: tuple[str, ...] = ()
+
+    def parameters(
+        self, names: Sequence[str], common: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Return the parameters of each set, shape (B, k); None where there is one set."""
+        if not self.sweep:
+            return self.sets
+        values = [array.ravel() for array in self._grid()]
+        result = np.tile(common, (values[0].size, 1))
+        for name, column in zip(self.sweep, values, strict=True):
+            result[:, names.index(name)] = column
+        return result
+
+    def _grid(self) -> Sequence[NDArray[np.float64]]:
+        arrays = tuple(self.sweep.values())
+        return np.meshgrid(*arrays, indexing="ij") if self.is_product else arrays
+
+
+def _read_variants(module: ModuleType, p: Values, product: bool) -> _Variants:
+    """Read parameters that may be those of several sets: see `solve`.
 
     Raises
     ------
     InputError
-        When a set has the wrong size or a value is not finite.
+        When an array of sets has the wrong size or a value is not finite.
     """
+    if isinstance(p, Mapping):
+        return _read_sweep(p, product)
     if not isinstance(p, np.ndarray) or p.ndim != 3:
-        return None
+        return _Variants(p)
     count, one, size = p.shape
     if one != 1 or size != len(module.PARAMETERS) or count == 0 or p.dtype.kind not in "iuf":
         raise InputError(
@@ -88,7 +141,33 @@ def read_variants(module: ModuleType, p: object) -> NDArray[np.float64] | None:
             f"parameter {module.PARAMETERS[which]!r} of variant {variant} is "
             f"{sets[variant, which]}: give a finite number."
         )
-    return sets
+    return _Variants(sets[0], sets)
+
+
+def _read_sweep(p: Mapping[str, Any], product: bool) -> _Variants:
+    """Read parameters by name, of which some have an array of values."""
+    problems: list[str] = []
+    common, sweep = dict(p), {}
+    for name, given in p.items():
+        if isinstance(given, str) or np.ndim(given) != 1:
+            continue
+        values = np.asarray(given)
+        if values.size == 0 or values.dtype.kind not in "iuf":
+            problems.append(f"parameter {name!r} has the values {given!r}: give real numbers.")
+            common.pop(name)
+            continue
+        sweep[name] = values.astype(np.float64)
+        bad = values[~np.isfinite(values)]
+        common[name] = bad[0] if bad.size else values[0]
+    sizes = {name: values.size for name, values in sweep.items()}
+    if len(set(sizes.values())) > 1 and not product:
+        counts = listed(f"{size} of {name!r}" for name, size in sizes.items())
+        problems.append(
+            f"the parameters have values of different numbers, {counts}: arrays are taken in "
+            "pairs, so give them one length, or product=True (--product) to solve every "
+            f"combination, {math.prod(sizes.values())} of them."
+        )
+    return _Variants(common, None, sweep, product, tuple(problems))
 
 
 def read_inputs(
@@ -100,8 +179,11 @@ def read_inputs(
     max_iterations: Any,
     method: str | None = None,
     through: str | None = None,
+    product: bool | None = None,
 ) -> Inputs:
     """Check all inputs of the solver and bring them into the form in which it uses them.
+
+    There may be several parameter sets unless `product` is None.
 
     Raises
     ------
@@ -111,10 +193,11 @@ def read_inputs(
         When the equations cannot determine the coordinates: what is wrong, and what to do.
     """
     _require_module(module)
-    problems: list[str] = []
+    given = _Variants(p) if product is None else _read_variants(module, p, product)
+    problems = list(given.problems)
     values = (
         _times(t, problems),
-        _values("parameter", module.PARAMETERS, module.DEFAULTS, p, problems),
+        _values("parameter", module.PARAMETERS, module.DEFAULTS, given.common, problems),
         _values("coordinate", module.COORDINATES, module.GUESS, guess, problems),
         _tolerance(tolerance, problems),
         _count(max_iterations, problems),
@@ -123,6 +206,8 @@ def read_inputs(
         problems.append(f"method is {method!r}: give 'grid', 'march', or nothing.")
     if through not in (None, "smooth"):
         problems.append(f"through is {through!r}: give 'smooth', or nothing.")
+    sweep = dict(given.sweep)
+    sets = None if problems else given.parameters(module.PARAMETERS, values[1])
     code = code_of(module)
     require_square(code)
     if method == "grid" and code.lanes is None:
@@ -135,7 +220,13 @@ def read_inputs(
     on_grid = method == "grid" or (
         method is None and values[0].size >= SMALLEST_GRID and code.lanes is not None
     )
-    return Inputs(code, *values, method, on_grid, through == "smooth")
+    # Where none is given it is zero.
+    without = [
+        body
+        for body, first, size in code.bodies
+        if guess is None and not code.guess[first : first + size].any()
+    ]
+    return Inputs(code, *values, method, on_grid, through == "smooth", sets, sweep, tuple(without))
 
 
 def _require_module(module: object) -> None:
@@ -203,7 +294,8 @@ def _overridden(
 ) -> NDArray[np.float64]:
     """Replace the defaults that a mapping names."""
     values = defaults.copy()
-    for name, value in given.items():
+    for key, value in given.items():
+        name = column_name(str(key)) if what == "coordinate" else key
         if name not in names:
             near = suggestion(str(name), names) or "."
             problems.append(f"there is no {what} {name!r}{near} The {what}s are {listed(names)}.")

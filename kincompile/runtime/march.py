@@ -94,6 +94,8 @@ class Outcome:
         Whether the mechanism is assembled there: it could only jump to it.
     strays : bool
         Whether it was assembled on another branch than its guess shows.
+    is_folded : bool
+        Whether the guess that it was assembled from shows no branch.
     """
 
     status: Status
@@ -103,6 +105,7 @@ class Outcome:
     nearest: Point | None = None
     jumps: bool = False
     strays: bool = False
+    is_folded: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

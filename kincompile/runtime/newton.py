@@ -192,10 +192,12 @@ def start(march: March, t: float, inputs: Inputs) -> Outcome:
     if strays := march.equations.leaves_branch(guess, point):
         near = _near_guess(march.equations, t, guess, point, inputs)
         point, strays = near or point, near is None
+    given = march.equations.at(inputs.guess, t)  # the attempt may have begun elsewhere
+    folded = given is not None and march.equations.is_folded(given, point)
     state = march.state(point)
     if isinstance(state, Status):
-        return Outcome(state, iterations, None, point, strays=strays)
-    return Outcome(Status.CONVERGED, iterations, state, point, strays=strays)
+        return Outcome(state, iterations, None, point, strays=strays, is_folded=folded)
+    return Outcome(Status.CONVERGED, iterations, state, point, strays=strays, is_folded=folded)
 
 
 def _near_guess(

@@ -16,6 +16,7 @@ import numpy as np
 
 from kincompile.criteria import (
     AGREEMENT,
+    FOLDED,
     NO_SIZE,
     RESIDUAL_FACTOR,
     ROUNDING,
@@ -104,6 +105,11 @@ class Problem:
         """Say whether a guess shows a branch, and a position found from it lies on another."""
         wanted = self.engine.signs(guess)
         return all(wanted) and self.engine.signs(found) != wanted
+
+    def is_folded(self, guess: Point, found: Point) -> bool:
+        """Say whether a guess shows no branch: beside a position, a determinant is zero there."""
+        here, there = (self.engine.determinants(point, point).tolist() for point in (guess, found))
+        return any(abs(one) <= FOLDED * abs(two) for one, two in zip(here, there, strict=True))
 
     def has_converged(self, before: Point, point: Point, tolerance: float, crawls: bool) -> bool:
         """Say whether Newton's method is at its end: the last correction small, and Phi zero.

@@ -14,16 +14,26 @@ What all of them stand on is one position with its scales: problem.Problem.
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.errors import BranchSwitchWarning, SingularConfigurationWarning, SolveError
+from kincompile.errors import (
+    AssemblyWarning,
+    BranchSwitchWarning,
+    InputError,
+    SingularConfigurationWarning,
+    SolveError,
+)
 from kincompile.names import listed
 from kincompile.runtime.follow import follow
-from kincompile.runtime.inputs import read_inputs, read_variants
+from kincompile.runtime.inputs import read_inputs
+from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
+from kincompile.runtime.singular.assemblies import assembly_guess, unchosen
+from kincompile.runtime.singular.reach import impossible, missed
 from kincompile.runtime.status import Status
 from kincompile.runtime.variants import solve_in_turn, solve_variants
 
@@ -38,6 +48,7 @@ if TYPE_CHECKING:
     from kincompile.runtime.follow import Motion, Progress
     from kincompile.runtime.inputs import Inputs, Values
     from kincompile.runtime.march import Outcome
+    from kincompile.runtime.problem import Problem
     from kincompile.runtime.singular.events import Event
 
 NAMED_EQUATIONS = 3
@@ -49,8 +60,10 @@ NAMED_BODIES = 6
 LOCATED = 1e-6
 """How exactly an event is located in time."""
 
+CANNOT_BE = "No position was found: the mechanism cannot be assembled"
+
 NOT_ASSEMBLED = (
-    "No position was found: the mechanism cannot be assembled at this time (change lengths, or "
+    f"{CANNOT_BE} at this time (change lengths, or "
     "what the drivers demand), or the guess is too far away (give one nearer to the assembled "
     "mechanism; kc.assemblies(module) looks for positions)."
 )
@@ -70,6 +83,8 @@ def solve(
     max_iterations: int = MAX_ITERATIONS,
     method: str | None = None,
     through: str | None = None,
+    assembly: int | None = None,
+    product: bool = False,
     throw: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
@@ -83,11 +98,13 @@ def solve(
     t : float or array_like, shape (N,)
         Times, rising or falling. One time gives a solution with N = 1.
     p : array_like, shape (k,), or mapping, or None
-        Parameters; a mapping from names to values overrides the module's DEFAULTS. An array of
-        shape (B, 1, k) holds B variants: all are solved, and the solution's arrays get a leading
-        axis of length B.
+        Parameters; a mapping from names to values overrides the module's DEFAULTS. Where a value is
+        an array, ``{"L": [0.2, 0.3, 0.4]}``, or `p` is one of shape (B, 1, k), B variants are
+        solved, and the solution's arrays get a leading axis of length B. Several arrays are taken
+        in pairs.
     guess : array_like, shape (n,), or mapping, or None
-        Where Newton starts at the first time; a mapping overrides the module's GUESS.
+        Where Newton starts at the first time; a mapping overrides the module's GUESS, with names as
+        in a solution: ``{"rod.phi": 1}``.
     tolerance : float
         Newton's correction at which to stop, relative to the scales of the coordinates: one radian
         for an angle, for a length the size of the mechanism. The same in every system of units.
@@ -100,6 +117,11 @@ def solve(
     through : {"smooth"}, optional
         Go on past a bifurcation, along the branch on which velocity and acceleration are
         continuous; a `BranchSwitchWarning` says when. Without it the motion ends there.
+    assembly : int, optional
+        Start in this one of the ways to assemble the mechanism at the first time, counted from 1 in
+        the order of `kc.assemblies`, instead of at a guess.
+    product : bool
+        Solve every combination of the arrays in `p`, the values of the last one running fastest.
     throw : bool
         Raise `SolveError` unless every point converged.
     progress : callable, optional
@@ -124,23 +146,58 @@ def solve(
     -----
     BranchSwitchWarning
         When the motion went through a bifurcation, with the time.
+    AssemblyWarning
+        When there are several ways to assemble the mechanism, and no guess chooses one.
     SingularConfigurationWarning
         When it converged at points so near to a singular configuration that their rates have lost
         digits, with the time. A motion that ends at one has a status and an event instead.
     """
-    sets = read_variants(module, p)
-    p = p if sets is None else None
-    inputs = read_inputs(module, t, p, guess, tolerance, max_iterations, method, through)
+    limits = (tolerance, max_iterations)
+    inputs = read_inputs(module, t, p, guess, *limits, method, through, product)
+    sets = inputs.sets
+    if assembly is not None:
+        inputs = _at_assembly(inputs, guess, assembly)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if sets is None:
-            solution = _solution(inputs, *follow(inputs, progress))
-        elif inputs.code.lanes is not None:
-            solution = solve_variants(inputs, sets, progress)
+            motion, outcome = follow(inputs, progress)
+            start = _start(inputs, motion)
+            solution = _solution(inputs, motion, outcome)
         else:
-            solution = solve_in_turn(inputs, sets, progress)
+            solve_all = solve_in_turn if inputs.code.lanes is None else solve_variants
+            solution = replace(solve_all(inputs, sets, progress), sweep=dict(inputs.sweep))
+            start = _start_of_first(replace(inputs, p=sets[0]), solution)
+    if start:
+        warnings.warn(start, AssemblyWarning, stacklevel=2)
+        solution = replace(solution, message=f"{start} {solution.message}")
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution
+
+
+def _at_assembly(inputs: Inputs, guess: Values, number: int) -> Inputs:
+    """Return inputs whose guess is one of the assemblies, of variants those of the first."""
+    if guess is not None:
+        raise InputError("guess and assembly are both given: give one of them.")
+    first = inputs if inputs.sets is None else replace(inputs, p=inputs.sets[0])
+    return replace(inputs, guess=assembly_guess(first, number), without_guess=())
+
+
+def _start(inputs: Inputs, motion: Motion) -> str:
+    """Say that a start does not choose between ways to assemble the mechanism, if it does not."""
+    may_be_open = motion.is_folded or inputs.without_guess
+    if not may_be_open or motion.status[0] != Status.CONVERGED:
+        return ""
+    return unchosen(inputs, motion.q[0].copy(), motion.is_folded)
+
+
+def _start_of_first(inputs: Inputs, solution: Solution) -> str:
+    """Say of variants what is said of the first."""
+    if solution.status[0, 0] != Status.CONVERGED:
+        return ""
+    q, time = solution.q[0, 0].copy(), float(inputs.t[0])
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
+    guess, found = (equations.at(position, time) for position in (inputs.guess, q))
+    return unchosen(inputs, q, bool(guess and found and equations.is_folded(guess, found)))
 
 
 def _solution(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
@@ -167,6 +224,7 @@ def _solution(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
         equations=code.equations,
         units=dict(code.units),
         parameters=dict(zip(code.parameters, inputs.p.tolist(), strict=True)),
+        sweep={},
         statistics=motion.statistics,
         events=motion.events,
         module=code.module,
@@ -192,12 +250,13 @@ def _verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
         largest = motion.residual.max()
         return f"{name}: {points} converged; the largest residual is {largest:.2g}.{passed}"
     index = int(np.argmax(motion.status != Status.CONVERGED))
+    asked = _asked(inputs, outcome)
     parts = [
         f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
         f" ({outcome.status.name}).",
         _before(outcome, index),
-        _why(outcome, events, times[index]),
-        _there(inputs.code, outcome),
+        _why(outcome, events, times[index], asked),
+        _there(inputs, outcome),
     ]
     return " ".join(part for part in parts if part)
 
@@ -211,37 +270,50 @@ def _before(outcome: Outcome, index: int) -> str:
     return f"{good}{'' if outcome.position else reached}."
 
 
-def _why(outcome: Outcome, events: Sequence[Event], t: float) -> str:
+def _asked(inputs: Inputs, outcome: Outcome) -> str:
+    """Say which drivers and distances ask for more than the mechanism can give, and how much."""
+    point = outcome.nearest
+    if point is None or outcome.jumps or outcome.status is not Status.NOT_CONVERGED:
+        return ""
+    return " ".join(impossible(_equations_at(inputs, point), point.q, point.t))
+
+
+def _equations_at(inputs: Inputs, point: Point) -> Problem:
+    return problem(inputs.code.module, inputs.p, point.q, point.t, inputs.guess)
+
+
+def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str:
     """Say why the motion ended, and what to do: by the event between its end and the failed time.
 
     Without one, what the status may mean is said in general, and the last event on the way.
     """
     if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
-        return NOT_ASSEMBLED
+        return f"{CANNOT_BE} at this time: {asked}" if asked else NOT_ASSEMBLED
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
-    if not events or outcome.state is None:
-        return general
-    event, end = events[-1], outcome.state.t
-    is_between = abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LOCATED
-    return event.message if is_between else general
+    if events and outcome.state is not None:
+        event, end = events[-1], outcome.state.t
+        if abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LOCATED:
+            general = event.message
+    return f"{general} {asked}".rstrip()
 
 
-def _there(code: Code, outcome: Outcome) -> str:
+def _there(inputs: Inputs, outcome: Outcome) -> str:
     """Name the equations that do not hold at the time of failure, or say what else is there."""
     if outcome.position is not None:
         return "The position there was found."
     if outcome.jumps:
         return "A position exists at that time, but the motion does not lead there continuously."
-    return "" if outcome.nearest is None else _unmet(code, outcome.nearest)
+    return "" if outcome.nearest is None else _unmet(inputs, outcome.nearest)
 
 
-def _unmet(code: Code, point: Point) -> str:
+def _unmet(inputs: Inputs, point: Point) -> str:
     """Say by how much which equations are missed at the best position, and where its bodies are."""
     sizes = np.abs(point.Phi)
     order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
     rows = [row for row in order.tolist() if sizes[row] > MET * sizes[order[0]]]
-    worst = ", ".join(f"{code.equations[row]} = {point.Phi[row]:.3g}" for row in rows)
-    places = listed(_places(code, point.q), most=NAMED_BODIES)
+    equations = _equations_at(inputs, point)
+    worst = ", ".join(missed(equations, point, row) for row in rows)
+    places = listed(_places(inputs.code, point.q), most=NAMED_BODIES)
     return (
         f"The equations with the largest residuals at the nearest position: {worst}. "
         f"There: {places}."

@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kincompile.errors import InputError
+import numpy as np
+
+from kincompile.compiler import compile as compile_model
+from kincompile.errors import InputError, KincompileWarning
+from kincompile.model.mechanism import system_of
 from kincompile.names import listed
+from kincompile.runtime.singular.assemblies import assemblies
+from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.page_data import as_json
+from kincompile.view.page_data import as_json, page_data
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
+    from types import ModuleType
 
+    from numpy.typing import NDArray
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.results.solution import Solution
     from kincompile.view.page import Page
 
 FRAMES = 120
@@ -42,20 +55,10 @@ class Gallery:
     def html(self) -> str:
         """The page that shows every mechanism in motion, and links to its own page."""
         cards = [
-            {
-                "file": f"{item.name}.html",
-                "name": escape(item.name),
-                "sizes": _sizes(item.data),
-                "data": as_json(_thinned(item.data)),
-            }
+            _card(item.data, item.name, _sizes(item.data), f"{item.name}.html")
             for item in self.pages
         ]
-        slots = {
-            "style": read("view/style.css") + read("view/gallery.css"),
-            "scripts": [read(f"view/{name}") for name in SCRIPTS],
-            "cards": cards,
-        }
-        return fill("view/gallery.html.jinja", slots)
+        return _filled("Mechanisms", cards)
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the pages and index.html to a folder, which is made, and return their paths.
@@ -95,6 +98,102 @@ def gallery(pages: Iterable[Page]) -> Gallery:
     return Gallery(found)
 
 
+@dataclass(frozen=True, slots=True)
+class AssemblyGallery:
+    """The ways to assemble a mechanism on one page, ready to be written.
+
+    Attributes
+    ----------
+    module
+        What the mechanism was compiled to.
+    positions : ndarray, shape (k, n)
+        The assemblies, in the order of `kc.assemblies`.
+    html
+        The whole page; it loads nothing else.
+    """
+
+    module: ModuleType
+    positions: NDArray[np.float64]
+    html: str
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page to a file, in one step, and return its path."""
+        return write_atomically(path, self.html)
+
+
+def assembly_gallery(
+    model: Mechanism | ConstraintSystem, t: float = 0.0, p: Mapping[str, float] | None = None
+) -> AssemblyGallery:
+    """Return a page that draws every assembly of a mechanism, and the motion from it.
+
+    Parameters
+    ----------
+    model
+        A mechanism, or a system of free equations.
+    t
+        The time of the assemblies; the motion from there lasts as long as that of the model.
+    p
+        Parameters by name; others have their defaults.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written; every problem is listed.
+    InputError
+        If the time or parameters cannot be used.
+    StructuralError
+        If the equations cannot determine the coordinates.
+    """
+    system = system_of(model)
+    module = compile_model(system)
+    positions = assemblies(module, t, p)
+    times = t + np.linspace(0, system.end, system.points)
+    cards = []
+    for number, guess in enumerate(positions, 1):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", KincompileWarning)  # each card says how it went
+            solution = solve(module, times, p, guess)
+        data = page_data(system, _moved(solution, guess), solution.message)
+        good = int(np.count_nonzero(solution.status == 0))
+        last = "the end" if solution.success else f"t = {times[max(good - 1, 0)]:g}"
+        cards.append(_card({**data, "rest": 0.0}, f"Assembly {number}", f"moves to {last}"))
+    title = f"Assemblies of {escape(system.name)} at t = {t:g}"
+    return AssemblyGallery(module, positions, _filled(title, cards))
+
+
+def _moved(solution: Solution, guess: NDArray[np.float64]) -> Solution:
+    """Return the points that were found, or the assembly alone where there are none."""
+    good = max(1, int(np.count_nonzero(solution.status == 0)))
+    q = solution.q[:good].copy()
+    if np.isnan(q[0]).any():
+        q[0] = guess
+    arrays = {name: getattr(solution, name)[:good] for name in ("t", "status", "residual")}
+    rates = {name: np.nan_to_num(getattr(solution, name)[:good]) for name in ("q_dot", "q_ddot")}
+    return replace(solution, q=q, **arrays, **rates)
+
+
+def _filled(title: str, cards: Sequence[Mapping[str, str]]) -> str:
+    """Return a page of cards."""
+    slots = {
+        "title": title,
+        "style": read("view/style.css") + read("view/gallery.css"),
+        "scripts": [read(f"view/{name}") for name in SCRIPTS],
+        "cards": cards,
+    }
+    return fill("view/gallery.html.jinja", slots)
+
+
+def _card(data: Mapping[str, Any], name: str, sizes: str, file: str = "") -> dict[str, str]:
+    """Return a card: its data, what is written on it, and the page it links to, if there is one."""
+    return {
+        "tag": "a" if file else "div",
+        "link": f' href="{escape(file)}"' if file else "",
+        "name": escape(name),
+        "sizes": sizes,
+        "data": as_json(_thinned(data)),
+    }
+
+
 def _sizes(data: Mapping[str, Any]) -> str:
     """Return the sizes of a mechanism in words."""
     bodies = len(data["drawing"]["bodies"])
@@ -106,5 +205,5 @@ def _thinned(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of a page's data that a small moving picture needs."""
     step = -(-len(data["arrays"]["t"]) // FRAMES)
     arrays = {name: data["arrays"][name][::step] for name in ("t", "q", "q_dot", "q_ddot")}
-    kept = ("coordinates", "guess", "drawing", "extent")
-    return {**{name: data[name] for name in kept}, "arrays": arrays}
+    kept = ("coordinates", "guess", "drawing", "extent", "rest")
+    return {**{name: data[name] for name in kept if name in data}, "arrays": arrays}

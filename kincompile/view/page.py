@@ -97,6 +97,7 @@ def page(
     t: ArrayLike | None = None,
     p: Mapping[str, float] | None = None,
     through: str | None = None,
+    assembly: int | None = None,
 ) -> Page:
     """Return a page that shows a mechanism, its motion and its numbers.
 
@@ -113,6 +114,8 @@ def page(
         Parameters to solve with, by name; others have their defaults.
     through : {"smooth"}, optional
         Go on past a bifurcation, as `kc.solve` does.
+    assembly : int, optional
+        Start in this one of the ways to assemble the mechanism, as `kc.solve` does.
 
     Raises
     ------
@@ -125,7 +128,7 @@ def page(
     system = system_of(model)
     if solution is None:
         times = np.linspace(0, system.end, system.points) if t is None else t
-        solution, message = _solved(system, times, p, through)
+        solution, message = _solved(system, times, p, through, assembly)
     else:
         _require_motion_of(system, solution)
         message = solution.message
@@ -164,10 +167,11 @@ def _solved(
     t: ArrayLike,
     p: Mapping[str, float] | None,
     through: str | None,
+    assembly: int | None,
 ) -> tuple[Solution | None, str]:
     """Compile and solve a system; return the solution, if there is one, and the message."""
     try:
-        solution = solve(compile_model(system), t, p, through=through)
+        solution = solve(compile_model(system), t, p, through=through, assembly=assembly)
     except StructuralError as error:
         return None, str(error)
     return solution, solution.message

@@ -144,5 +144,5 @@ def _at_guess(
     By the interpreter, which also takes systems that cannot be compiled.
     """
     with np.errstate(all="ignore"):
-        Phi, _, _, _ = interpret(lower(system), guess, np.zeros_like(guess), t, p)
+        Phi, *_ = interpret(lower(system), guess, np.zeros_like(guess), t, p)
     return [float(value) if np.isfinite(value) else None for value in residuals(Phi, shapes)]

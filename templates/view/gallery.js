@@ -2,7 +2,7 @@
 /* Every card's mechanism in motion, while it can be seen; at rest for those who ask for it. */
 
 const MARGIN = 10;
-const REST = 0.3;  // part of the motion that is shown at rest
+const REST = 0.3;  // part of the motion that is shown at rest, where the data name no other
 
 class Card {
   constructor(element) {
@@ -34,7 +34,7 @@ class Card {
 function startGallery() {
   const cards = [...document.querySelectorAll('.card')].map(element => new Card(element));
   const isStill = matchMedia('(prefers-reduced-motion: reduce)').matches;
-  const atRest = card => REST * card.motion.duration / card.motion.speed;
+  const atRest = card => (card.motion.data.rest ?? REST) * card.motion.duration / card.motion.speed;
   let palette = paletteNow();
   const drawAll = () => cards.forEach(card => card.draw(atRest(card), palette));
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {

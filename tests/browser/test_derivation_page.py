@@ -9,6 +9,7 @@ import kincompile as kc
 
 WIDTHS = (1280, 390)
 EXAMPLES = ("wrecker_boom", "cam_flat_follower", "problem_3_5_6")
+OTHERS = ("wrecker_boom.slides", "inverted_slider_crank.exercise")
 
 pytestmark = [
     pytest.mark.browser,
@@ -75,8 +76,13 @@ def open_page(
 
     def opened(name: str, width: int = 1280, scheme: str = "light") -> Any:
         path = folder / f"{name}.html"
-        if not path.exists():
-            kc.derivation(example_named(name).model, 0.5).write(path)
+        model = example_named(name.split(".")[0]).model
+        if name.endswith("exercise"):
+            path = folder / name / "students" / "01" / "exercise.html"
+        if not path.exists() and name.endswith("exercise"):
+            kc.exercise(model, 1, 3, signs=True).write(folder / name)
+        elif not path.exists():
+            kc.derivation(model, 0.5).write(path)
         return open_file(path, width, scheme)
 
     return opened
@@ -101,6 +107,41 @@ def test_that_the_page_says_nothing_and_asks_for_nothing(open_page: Any, name: s
     page.wait_for_load_state("networkidle")
     assert page.said == []
     assert [url for url in page.asked if not url.startswith("data:")] == [page.url]
+    page.close()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("other", OTHERS)
+def test_that_slides_and_exercises_are_readable(open_page: Any, other: str, width: int) -> None:
+    page = open_page(other, width)
+    page.evaluate("document.querySelectorAll('details').forEach(item => { item.open = true; })")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate(TOO_WIDE) == []
+    assert page.evaluate(EMPTY_MATH) == []
+    assert page.evaluate(MISSING_GLYPHS, "") == []
+    assert page.said == []
+    assert [url for url in page.asked if not url.startswith("data:")] == [page.url]
+    page.close()
+
+
+def test_that_formulas_have_the_font_of_the_page(open_page: Any) -> None:
+    page = open_page("wrecker_boom")
+    page.evaluate("async () => { await document.fonts.ready; }")
+    assert page.evaluate("[...document.fonts].map(font => font.status)") == ["loaded"]
+    page.close()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_that_brackets_are_as_tall_as_their_matrix(open_page: Any, width: int) -> None:
+    page = open_page("wrecker_boom", width)
+    parts = page.evaluate("""() => [...document.querySelectorAll('main mtable')]
+      .filter(table => table.closest('details:not([open])') === null)
+      .map(table => [table, table.previousElementSibling, table.nextElementSibling]
+        .map(part => part.getBoundingClientRect().height))""")
+    assert len(parts) > 50
+    for matrix, left, right in parts:
+        assert left == right
+        assert left > 0.85 * matrix
     page.close()
 
 

@@ -21,7 +21,10 @@ def meet(p, reach_p, q, reach_q, side):
 
 
 def watched(example, link, joint, p=None):
-    """Return the path of a joint, from the motion of a link and the place that the sketch says."""
+    """Return the path of a joint, from the motion of a link and the place that the sketch says.
+
+    It is that of the point of this name.
+    """
     sketch = runpy.run_path(str(example.path))["s"]
     values = {item.name: item.default for item in example.model.system().parameters} | (p or {})
     xi, eta = (
@@ -32,7 +35,10 @@ def watched(example, link, joint, p=None):
     solution = kc.solve(example.module, t, p)
     assert solution.success
     origin = solution[f"{link}.x"] + 1j * solution[f"{link}.y"]
-    return t, origin + np.exp(1j * solution[f"{link}.phi"]) * (xi + 1j * eta)
+    path = origin + np.exp(1j * solution[f"{link}.phi"]) * (xi + 1j * eta)
+    point = solution[f"{joint}.x"] + 1j * solution[f"{joint}.y"]
+    np.testing.assert_allclose(point, path, rtol=0, atol=1e-12 * np.abs(path).max())
+    return t, path
 
 
 def jansen_foot(t, a=38.0, b=41.5, c=39.3, d=40.1, e=55.8, f=39.4, g=36.7, h=65.7, i=49.0,

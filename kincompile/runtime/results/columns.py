@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
 from kincompile.names import column_name, listed, rate, suggestion
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     import xarray
     from numpy.typing import NDArray
@@ -50,6 +52,10 @@ def titled(name: str, unit: str) -> str:
 def rate_unit(unit: str, order: int) -> str:
     """Return the unit of a time derivative: of m, m/s and m/s^2; of none, none."""
     return f"{unit}{('', '/s', '/s^2')[order]}" if unit else ""
+
+
+def _units(unit: str) -> dict[str, str]:
+    return {"units": unit} if unit else {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +100,8 @@ class MotionTable:
     coordinates: tuple[str, ...]
     units: dict[str, str]
     events: list[Event]
+    parameters: dict[str, Any]
+    sweep: dict[str, NDArray[np.float64]]
 
     @property
     def observed(self) -> Observed:
@@ -153,29 +161,41 @@ class MotionTable:
         values = (self.q, self.q_dot, self.q_ddot)[order][..., k]
         return Column(rate(name, order), rate_unit(self.units.get(name, ""), order), values)
 
+    @property
+    def variants(self) -> dict[str, NDArray[Any]]:
+        """What the variants differ in, shape (B,): the parameters by name, or their numbers."""
+        apart = [name for name, values in self.parameters.items() if np.ptp(values) > 0]
+        names = list(self.sweep) or apart
+        return {name: self.parameters[name] for name in names} or {
+            "variant": np.arange(len(self.q))
+        }
+
     def to_pandas(self) -> pd.DataFrame:
         """Return the motion as a `pandas.DataFrame`, a row a time.
 
         Returns
         -------
         pandas.DataFrame
-            Index t; a column for each coordinate, rate and second rate, then status and residual.
+            Index t, of variants the parameters in which they differ, and t; a column for each
+            coordinate, rate and second rate, then status and residual.
             ``.attrs["units"]`` has the units by column.
 
         Raises
         ------
         UnsupportedError
             If pandas is not installed.
-        InputError
-            If the solution is one of variants, which a table cannot hold.
         """
         with package_of_extra("pandas", "tables"):
             import pandas as pd
-        self.require_one_motion("a table holds", "use to_xarray()")
         columns = self.columns()
-        data: dict[str, NDArray[Any]] = {column.name: column.values for column in columns}
-        data |= {"status": self.status, "residual": self.residual}
-        frame = pd.DataFrame(data, index=pd.Index(self.t, name="t"))
+        data: dict[str, NDArray[Any]] = {item.name: item.values.ravel() for item in columns}
+        data |= {"status": self.status.ravel(), "residual": self.residual.ravel()}
+        index: Any = pd.Index(self.t, name="t")
+        if self.q.ndim > 2:
+            axes = {name: np.repeat(axis, self.t.size) for name, axis in self.variants.items()}
+            times = np.tile(self.t, len(self.q))
+            index = pd.MultiIndex.from_arrays([*axes.values(), times], names=[*axes, "t"])
+        frame = pd.DataFrame(data, index=index)
         frame.attrs["units"] = {"t": TIME_UNIT, **{item.name: item.unit for item in columns}}
         return frame
 
@@ -186,7 +206,9 @@ class MotionTable:
         -------
         xarray.Dataset
             A variable for each coordinate, rate and second rate, status and residual, over the
-            dimension t, of variants over variant and t. Each has its unit in ``.attrs["units"]``.
+            dimension t. Of variants, a parameter with an array of values is a dimension of its
+            name; where several were taken in pairs the dimension is variant, and each is a
+            coordinate along it. Each has its unit in ``.attrs["units"]``.
 
         Raises
         ------
@@ -195,15 +217,31 @@ class MotionTable:
         """
         with package_of_extra("xarray", "tables"):
             import xarray
-        dimensions = ("variant", "t") if self.q.ndim > 2 else ("t",)
+        axes = self._axes()
+        dimensions = (*dict.fromkeys(dimension for dimension, _ in axes.values()), "t")
+        sizes = {dimension: values.size for dimension, values in axes.values()}
+        shape = (*sizes.values(), self.t.size)
         variables: dict[str, Any] = {
-            item.name: (dimensions, item.values, {"units": item.unit} if item.unit else {})
+            item.name: (dimensions, item.values.reshape(shape), _units(item.unit))
             for item in self.columns()
         }
-        variables |= {name: (dimensions, getattr(self, name)) for name in ("status", "residual")}
-        times = {"t": ("t", self.t, {"units": TIME_UNIT})}
+        for name in ("status", "residual"):
+            variables[name] = (dimensions, getattr(self, name).reshape(shape))
+        coords: dict[str, Any] = {
+            name: (dimension, values, _units(self.units.get(name, "")))
+            for name, (dimension, values) in axes.items()
+        }
+        coords["t"] = ("t", self.t, _units(TIME_UNIT))
         about = {"name": self.name, "message": self.message}
-        return xarray.Dataset(variables, coords=times, attrs=about)
+        return xarray.Dataset(variables, coords=coords, attrs=about)
+
+    def _axes(self) -> dict[str, tuple[str, NDArray[Any]]]:
+        """Return what the variants differ in: by name the dimension, and the values along it."""
+        if self.q.ndim == 2:
+            return {}
+        if self.sweep and len(self.q) == math.prod(values.size for values in self.sweep.values()):
+            return {name: (name, values) for name, values in self.sweep.items()}
+        return {name: ("variant", values) for name, values in self.variants.items()}
 
     def require_one_motion(self, what: str, remedy: str) -> None:
         """Check that the motion is not one of variants.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,6 +60,8 @@ class Solution(MotionTable):
         Unit of each coordinate and parameter, "" if none.
     parameters : dict
         Value of each parameter that was used; of variants one each, shape (B,).
+    sweep : dict
+        Of variants, the arrays of values that were given, by the names of their parameters.
     statistics : dict
         How it was found: ``coarse``, points of the coarse march of a grid; ``marched``, points that
         were followed one by one with a pivoted solve; of large mechanisms ``pivoted``, solves for
@@ -74,7 +76,6 @@ class Solution(MotionTable):
     iterations: NDArray[np.int64]
     success: bool
     equations: tuple[str, ...]
-    parameters: dict[str, Any]
     statistics: dict[str, int]
     module: ModuleType | None
     _observed: dict[str, Observed] = field(default_factory=dict)
@@ -130,6 +131,23 @@ class Solution(MotionTable):
             passed = [event.t for event in self.events if event.kind == BIFURCATION]
             return counted_signatures(self.q, self.t, passed)
         return self._at_points(signatures)
+
+    def variant(self, number: int) -> Solution:
+        """Return one of the variants, counted from 0, as a solution of its own.
+
+        Raises
+        ------
+        InputError
+            When there is none of this number.
+        """
+        if self.q.ndim == 2 or not -len(self.q) <= number < len(self.q):
+            count = f"{len(self.q)} variants, counted from 0" if self.q.ndim > 2 else "no variants"
+            raise InputError(f"this Solution of {self.name} has {count}: there is no {number!r}.")
+        names = ("q", "q_dot", "q_ddot", "status", "residual", "iterations")
+        arrays: dict[str, Any] = {name: getattr(self, name)[number] for name in names}
+        own = {name: float(values[number]) for name, values in self.parameters.items()}
+        good = not arrays["status"].any()
+        return replace(self, **arrays, parameters=own, sweep={}, success=good, _observed={})
 
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
         """Return a function of module, q, t and p for the motion, or for that of each variant."""

@@ -31,16 +31,28 @@ def summary(solution: Solution) -> str:
     Returns
     -------
     str
-        Per coordinate its unit, its least and largest value with their times, and the largest
-        absolute values of its first and second derivative [unit/s, unit/s^2]; then the points by
-        status, the Newton iterations and the largest residual.
+        Of variants a part for each, under the values of its parameters. Per coordinate its unit,
+        its least and largest value with their times, and the largest absolute values of its first
+        and second derivative [unit/s, unit/s^2]; then the points by status, the Newton iterations
+        and the largest residual.
     """
+    if solution.q.ndim > 2:
+        return "\n\n".join(_variant(solution, k) for k in range(len(solution.q)))
     own = solution.observed
     motion = solution.q, solution.q_dot, solution.q_ddot
     lines = _table("coordinate", solution, solution.coordinates, motion)
     if own.names:
         lines += ["", *_table("output", solution, own.names, (own.y, own.y_dot, own.y_ddot))]
     return "\n".join([*lines, "", _verdict(solution)])
+
+
+def _variant(solution: Solution, number: int) -> str:
+    """Return the summary of a variant, under the values of its parameters."""
+    values = ((name, axis[number]) for name, axis in solution.variants.items())
+    named = (
+        f"{name} = {value:g} {solution.units.get(name, '')}".rstrip() for name, value in values
+    )
+    return f"{', '.join(named)}\n{summary(solution.variant(number))}"
 
 
 def _table(

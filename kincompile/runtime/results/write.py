@@ -38,6 +38,7 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
     path : path-like
         ``.csv``: one row per point, with the columns t, the coordinates and outputs, their first
         and second derivatives, status, residual; the header has names and units: ``x_rod [m]``.
+        Of variants the parameters in which they differ come first.
         ``.npz``: the arrays and names of the solution for `numpy.load`. ``.json``: the same as
         text, null where a number was not found.
 
@@ -49,7 +50,7 @@ def write(solution: Solution, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        When the suffix is another, the file cannot be written, or variants are to be a .csv.
+        When the suffix is another, or the file cannot be written.
     """
     require_solution(solution)
     require_known_suffix(path)
@@ -70,12 +71,15 @@ def require_known_suffix(path: str | os.PathLike[str]) -> None:
 
 def _csv(solution: Solution) -> str:
     """Return the table; every number has as many digits as it takes to read it back exactly."""
-    solution.require_one_motion("a .csv holds", "write .npz or .json")
+    axes = solution.variants if solution.q.ndim > 2 else {}
     columns = solution.columns()
-    titles = [titled("t", TIME_UNIT), *(item.title for item in columns), "status", "residual"]
+    titles = [titled(name, solution.units.get(name, "")) for name in axes]
+    titles += [titled("t", TIME_UNIT), *(item.title for item in columns), "status", "residual"]
+    count, points = solution.status.size, solution.t.size
+    before = [*(np.repeat(axis, points) for axis in axes.values()), np.resize(solution.t, count)]
+    numbers = np.column_stack([*before, *(item.values.ravel() for item in columns)]).tolist()
+    ends = zip(solution.status.ravel().tolist(), solution.residual.ravel().tolist(), strict=True)
     lines = [",".join(titles)]
-    numbers = np.column_stack([solution.t, *(item.values for item in columns)]).tolist()
-    ends = zip(solution.status.tolist(), solution.residual.tolist(), strict=True)
     for row, (status, residual) in zip(numbers, ends, strict=True):
         lines.append(f"{','.join(map(repr, row))},{status},{residual!r}")
     return "\n".join(lines) + "\n"

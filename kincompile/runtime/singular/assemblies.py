@@ -9,18 +9,20 @@ import numpy as np
 
 from kincompile.criteria import RESIDUAL_FACTOR
 from kincompile.errors import InputError
+from kincompile.names import listed
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.newton import iterate, safeguarded_step
 from kincompile.runtime.problem import norm, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.engine import Array as Vector
-    from kincompile.runtime.inputs import Values
+    from kincompile.runtime.inputs import Inputs, Values
     from kincompile.runtime.problem import Problem
 
 SEED = 1989
@@ -38,6 +40,13 @@ SAME = 1e-6
 
 TOLERANCE, MAX_ITERATIONS = 1e-12, 40
 """Of Newton's method from each start."""
+
+MOST_COORDINATES = 60
+"""Coordinates up to which a start is looked at that chooses no assembly: a search takes seconds in
+larger mechanisms."""
+
+NOTICEABLE = 0.3
+"""Angle [rad] by which a body without a guess must turn before the other way is looked at."""
 
 
 def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
@@ -80,10 +89,14 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
         raise InputError(
             f"assemblies are those of one time, got {inputs.t.size}: call it for each."
         )
+    return assembled_positions(inputs)
+
+
+def assembled_positions(inputs: Inputs) -> Vector:
+    """Return what `assemblies` does, at the first time, for inputs that are checked."""
     time = float(inputs.t[0])
     with np.errstate(all="ignore"):
-        equations = problem(module, inputs.p, inputs.guess, time, inputs.guess)
-        equations.angular = equations.angular | _periodic(equations, time, inputs.guess)
+        equations = _equations(inputs)
         found: list[Vector] = []
         last = 0
         for k, start in enumerate(_starts(equations, inputs.guess), 1):
@@ -97,6 +110,94 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
                 break
         order = sorted(found, key=lambda q: _rank(equations, q, inputs.guess))
     return np.array(order).reshape(len(order), inputs.guess.size)
+
+
+def assembly_guess(inputs: Inputs, number: object) -> Vector:
+    """Return one of the assemblies at the first time, as a guess; they are counted from 1.
+
+    Raises
+    ------
+    InputError
+        When there is none of this number.
+    """
+    count = "no integer"
+    if isinstance(number, int | np.integer) and not isinstance(number, bool):
+        found = assembled_positions(inputs)
+        if 1 <= number <= len(found):
+            return np.asarray(found[number - 1])
+        count = f"{inputs.code.name} has {len(found)} assemblies"
+    raise InputError(
+        f"assembly is {number!r}: {count} at t = {inputs.t[0]:.10g}; they count from 1, and "
+        "kc.assemblies, kincompile assemblies, show them."
+    )
+
+
+def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
+    """Say that a start does not choose between ways to assemble, and how to; "" where it does.
+
+    Parameters
+    ----------
+    inputs
+        What was to be solved.
+    q : ndarray, shape (n,)
+        The position that was found at the first time.
+    is_folded
+        Whether a determinant is zero at the guess, so that it shows no branch.
+    """
+    without = inputs.without_guess
+    if q.size > MOST_COORDINATES or not (is_folded or _is_open(inputs, q, without)):
+        return ""
+    found = assembled_positions(inputs)
+    equations = _equations(inputs)
+    away = [_distance(equations, q, other) for other in found]
+    if len(found) < 2:
+        return ""
+    taken = int(np.argmin(away))
+    other = found[1 if taken == 0 else 0]
+    moved = np.abs(_difference(equations, q, other)) > SAME
+    owners = inputs.code.owners()
+    differing = dict.fromkeys(owners[inputs.code.coordinates[k]] for k in np.flatnonzero(moved))
+    missing = [body for body in differing if body in without]
+    cause = f"there is no guess of {listed(missing)}" if missing else "the guess lies folded"
+    return (
+        f"{inputs.code.name}: {cause}, so that nothing chooses between {len(found)} assemblies at "
+        f"t = {inputs.t[0]:.10g}, which differ in {listed(differing)}; this is number {taken + 1}. "
+        f"Take another with assembly={2 if taken == 0 else 1} (--assembly on the command line; "
+        "kincompile assemblies draws them), or give a guess nearer to it."
+    )
+
+
+def _equations(inputs: Inputs) -> Problem:
+    """Return the equations as a search judges them, with angles that have no unit among them."""
+    time = float(inputs.t[0])
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
+    equations.angular = equations.angular | _periodic(equations, time, inputs.guess)
+    return equations
+
+
+def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
+    """Say whether bodies without a guess, turned the other way, assemble as near to the guess."""
+    places = {body: range(first, first + count) for body, first, count in inputs.code.bodies}
+    columns = [column for body in without for column in places[body]]
+    angles = [column for column in columns if inputs.code.angular[column]]
+    if np.max(np.abs(q[angles]), initial=0.0) < NOTICEABLE:
+        return False
+    time = float(inputs.t[0])
+    equations = problem(inputs.code.module, inputs.p, inputs.guess, time, inputs.guess)
+    mirrored = q.copy()
+    mirrored[angles] = -q[angles]
+    other = _assembled(equations, time, mirrored)
+    if other is None or _distance(equations, q, other) <= SAME:
+        return False
+    here, there = (
+        np.abs(_difference(equations, x, inputs.guess))[angles].max() for x in (q, other)
+    )
+    return bool(there <= 2 * here and _differ(equations, q, other, columns))
+
+
+def _differ(equations: Problem, q: Vector, other: Vector, columns: Sequence[int]) -> bool:
+    """Say whether two positions differ in some of the coordinates."""
+    return bool((np.abs(_difference(equations, q, other))[columns] > SAME).any())
 
 
 def _periodic(equations: Problem, t: float, guess: Vector) -> NDArray[np.bool_]:

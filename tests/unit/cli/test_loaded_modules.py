@@ -23,6 +23,9 @@ EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2"
 RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
 
 NOT_LOADED = {
+    "assemblies MODEL": (
+        f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify"
+    ),
     "compile MODEL -o -": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} kincompile.runtime scipy",
     "compile MODEL -o - --target javascript": (
         f"{PAGES} {LARGE} {EXTRA} {RANK} kincompile.runtime kincompile.targets.numpy "

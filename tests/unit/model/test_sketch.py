@@ -47,6 +47,8 @@ def test_that_it_makes_the_mechanism_that_one_writes_by_hand():
     m.add(kc.Revolute("C", m.ground, (4, 0), rocker, (0, 0)))
     m.add(kc.Revolute("B", coupler, (b, 0), rocker, (c, 0)))
     m.add(kc.AbsoluteAngle("drive_crank", crank, 2 * kc.pi * kc.t))
+    m.point("P", coupler, s.place("coupler", "P"))
+    assert s.mechanism() is s.mechanism()
     assert s.mechanism().to_toml() == m.to_toml()
     assert kc.emit(s.mechanism()).source == kc.emit(m).source
 

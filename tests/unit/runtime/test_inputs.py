@@ -29,7 +29,7 @@ from kincompile.runtime.solve import solve
         ({"p": {"size": 1}}, r"no parameter 'size'\. The parameters are omega, phi_0"),
         ({"p": {3: 1}}, r"no parameter 3\."),
         ({"p": {"omega": "fast"}}, "parameter 'omega' is str: give real numbers"),
-        ({"p": {"omega": [1, 2]}}, r"parameter 'omega' has shape \(2,\): give one number"),
+        ({"p": {"omega": [[1, 2]]}}, r"parameter 'omega' has shape \(1, 2\): give one number"),
         ({"p": [1, 2, 3]}, r"parameter vector has shape \(3,\), expected \(2,\): .*omega, phi_0"),
         ({"p": np.array([1, object()])}, "the parameter vector is an array of object"),
         ({"guess": (1, 0)}, r"coordinate vector has shape \(2,\), expected \(3,\): .*x_rod"),
@@ -55,7 +55,7 @@ def test_all_that_is_wrong_is_said_at_once(pendulum):
             pendulum,
             "now",
             {"omega": np.nan, "rho": 1},
-            {"x_rod": "left", "phi_rod": np.inf},  # type: ignore[dict-item]  # what is refused
+            {"x_rod": "left", "phi_rod": np.inf},  # what is refused
             tolerance=-1,
             max_iterations=0,
         )

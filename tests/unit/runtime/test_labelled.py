@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from kincompile.errors import InputError, UnsupportedError
+from kincompile.errors import UnsupportedError
 from kincompile.runtime.results.columns import rate_unit
 from kincompile.runtime.solve import solve
 
@@ -54,10 +54,12 @@ def test_that_variants_are_a_dimension(variants):
     np.testing.assert_array_equal(data[name], variants[name])
 
 
-def test_that_variants_are_no_table(variants):
+def test_that_a_table_has_variants_one_below_the_other(variants):
     pytest.importorskip("pandas", reason="pandas is not installed")
-    with pytest.raises(InputError, match=r"these are 2 variants; use to_xarray\(\)"):
-        variants.to_pandas()
+    table = variants.to_pandas()
+    assert table.index.names[-1] == "t"
+    for name in variants.coordinates:
+        np.testing.assert_array_equal(table[name], variants[name].ravel())
 
 
 @pytest.mark.parametrize("package", ["pandas", "xarray"])

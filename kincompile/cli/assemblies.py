@@ -1,0 +1,76 @@
+"""`kincompile assemblies`: all ways to assemble a model, listed and drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+
+import kincompile as kc
+from kincompile.cli.shared import NOT_CONVERGED, output_option, print_data, read_model, set_option
+from kincompile.errors import InputError
+from kincompile.tables import table
+from kincompile.writing import require_writable
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""Differences, beside the largest number, that are those of rounding."""
+
+
+@click.command("assemblies")
+@click.argument("model")
+@click.option("--time", "at", type=float, default=0.0, metavar="T", help="Time of the assemblies.")
+@set_option("parameter")
+@output_option("Page to write, .html: each assembly and the motion from it.", required=False)
+@click.pass_context
+def command(
+    context: click.Context, model: str, at: float, values: dict[str, float], output: str | None
+) -> None:
+    """List the ways to assemble MODEL at a time, and draw them.
+
+    They count from 1, the nearest to the model's guess first: `run --assembly N` takes one. With -o
+    a page shows each in motion, as far as it goes, from that time on. The exit code is 3 where
+    there is none.
+    """
+    if output is not None:
+        if Path(output).suffix not in (".html", ".htm"):
+            raise InputError(f"cannot write {output}: end its name in .html")
+        require_writable(output)
+    read = read_model(model)
+    if output is None:
+        module = kc.compile(read)
+        found = kc.assemblies(module, at, values)
+    else:
+        drawn = kc.assembly_gallery(read, at, values)
+        module, found = drawn.module, drawn.positions
+    if not len(found):
+        click.echo(f"Error: {module.NAME} cannot be assembled at t = {at:g}", err=True)
+        context.exit(NOT_CONVERGED)
+    print_data("\n".join(_listed(module, found, at)) + "\n")
+    if output is not None:
+        click.echo(f"Wrote {drawn.write(output)}", err=True)
+
+
+def _listed(module: ModuleType, found: Array, t: float) -> list[str]:
+    """Return a table: a row a coordinate that differs, a column an assembly."""
+    least = ROUNDING * float(np.max(np.abs(found), initial=1.0))
+    apart = np.ptp(found, axis=0) if len(found) > 1 else np.full(found.shape[1], np.inf)
+    names = [module.COORDINATES[k] for k in np.flatnonzero(apart > least)]
+    rows = []
+    for name in names:
+        values = found[:, module.COORDINATES.index(name)]
+        shown = np.where(np.abs(values) > least, values, 0.0)
+        rows.append([name, module.UNITS[name], *(f"{value:.6g}" for value in shown)])
+    numbers = [str(k) for k in range(1, len(found) + 1)]
+    only = f"{module.NAME}: 1 assembly at t = {t:g}"
+    several = f"{module.NAME}: {len(found)} assemblies at t = {t:g}; the coordinates that differ"
+    heading = several if len(found) > 1 else only
+    return [heading, "", *table(("coordinate", "unit", *numbers), rows, right=numbers)]
