@@ -15,7 +15,7 @@ import numpy as np
 from kincompile.compare.agreement import ABSOLUTE
 from kincompile.compare.comparison import Diagnosis
 from kincompile.compare.entry_faults import entry_faults
-from kincompile.compare.fault import LEFT_ZERO, OTHER_FORM, Fault
+from kincompile.compare.fault import LEFT_ZERO, MISSING_TERM, OMISSIONS, OTHER_FORM, Fault
 from kincompile.compare.forms import known_forms
 from kincompile.compare.joint_faults import PARTS_OF_GAMMA, Index, JointFaults, NumericFault
 from kincompile.compare.reference import Subject
@@ -254,6 +254,8 @@ def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
     if LEFT_ZERO in by_kind and not any(map(np.any, by_kind[LEFT_ZERO].result.values())):
         # Zero was written. That a missing term would also give zero is no further explanation.
         by_kind = {LEFT_ZERO: by_kind[LEFT_ZERO]}
+    if OMISSIONS.intersection(by_kind):
+        by_kind.pop(MISSING_TERM, None)  # the same in other words, which say less
     return tuple(
         Diagnosis(fault.kind, f"{fault.text}.", fault.detail)
         for fault in list(by_kind.values())[:MOST_NAMED]

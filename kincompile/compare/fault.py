@@ -37,6 +37,11 @@ OTHER_FORM = "follows from another Phi"
 COUPLING = "coupling 2 w (r_j_dot - r_i_dot) missing"
 SQUARES = "w_j^2 - w_i^2 for (w_j - w_i)^2"
 
+OMISSIONS = frozenset(
+    {CROSS_TERM, QUADRATIC_TERM, PHI_TT, COUPLING, SECOND_DERIVATIVE, DRIVER_RATE}
+)
+"""What a missing term may be called by its place in the derivation."""
+
 Result = TypeVar("Result")
 
 
