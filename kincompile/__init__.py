@@ -42,7 +42,8 @@ def __getattr__(name: str) -> Any:
         import_module("kincompile.files.write_model")
         if "IPython" in sys.modules:
             import_module("kincompile.view.notebook")
-    value = globals()[name] = getattr(import_module(module), name)
+    home = import_module(module)
+    value = globals()[name] = getattr(home, name, None) or import_module(f"{module}.{name}")
     return value
 
 

@@ -13,6 +13,7 @@ from kincompile.derivation.derivation import derivation as derivation
 from kincompile.errors import AssemblyWarning as AssemblyWarning
 from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
 from kincompile.errors import ContractError as ContractError
+from kincompile.errors import CornerWarning as CornerWarning
 from kincompile.errors import InputError as InputError
 from kincompile.errors import InternalError as InternalError
 from kincompile.errors import KincompileError as KincompileError
@@ -29,10 +30,12 @@ from kincompile.files.file_format import model_schema as model_schema
 from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis
 from kincompile.files.files import read_model as read_model
+from kincompile.model import motion as motion
 from kincompile.model import outputs as outputs
 from kincompile.model.catalogue import *
 from kincompile.model.equation import Equation as Equation
 from kincompile.model.expressions import alpha as alpha
+from kincompile.model.expressions import deg as deg
 from kincompile.model.expressions import pi as pi
 from kincompile.model.expressions import t as t
 from kincompile.model.mechanism import Mechanism as Mechanism
@@ -46,6 +49,7 @@ from kincompile.runtime.singular.assemblies import assemblies as assemblies
 from kincompile.runtime.singular.events import Event as Event
 from kincompile.runtime.solve import solve as solve
 from kincompile.runtime.status import Status as Status
+from kincompile.runtime.times import times_at as times_at
 from kincompile.verify.verify import verify as verify
 from kincompile.view.animation import animate as animate
 from kincompile.view.gallery import assembly_gallery as assembly_gallery

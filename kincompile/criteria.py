@@ -97,6 +97,14 @@ number rounding errors decide."""
 KINK_UNSEEN, SMOOTH_UNSEEN = 16.0, 1e-6
 """The same where the sensitivity is not known: looser, as the step is divided by those who know."""
 
+# Corners of drivers
+
+CORNER = 1e-9
+"""Jump of a velocity, relative to the largest over the times, that is a corner of a driver."""
+
+SAME_TIME = 4 * float(np.finfo(np.float64).eps)
+"""How far, relative to the largest, a time may be from a corner and still be the corner's."""
+
 # Steps
 
 SMALLEST_PART = 2.0**-20

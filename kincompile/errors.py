@@ -150,5 +150,9 @@ class BranchSwitchWarning(KincompileWarning):
     """The solution may have changed from one assembly branch to another."""
 
 
+class CornerWarning(KincompileWarning):
+    """A driver has a corner at a time that was solved: there is no acceleration."""
+
+
 class RedundantConstraintWarning(KincompileWarning):
     """A constraint repeats what the others already demand."""

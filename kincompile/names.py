@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-RESERVED = frozenset({"t", "pi", "alpha"})
+RESERVED = frozenset({"t", "pi", "alpha", "deg"})
 """Names with a meaning of their own in every expression."""
 
 SYMBOLS = frozenset({"a parameter", "a coordinate"})
@@ -44,8 +44,8 @@ def name_problem(name: object, what: str) -> str | None:
         )
     if name in RESERVED and what in SYMBOLS:
         return (
-            f"{what} is named {name!r}, which is reserved (t is time, pi the number, alpha a cam's "
-            "angle); rename it"
+            f"{what} is named {name!r}, which is reserved (t is time, pi the number, deg a "
+            "degree, alpha a cam's angle); rename it"
         )
     return None
 

@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 import kincompile as kc
+from kincompile.cli.motion import set_values
 from kincompile.cli.shared import NOT_CONVERGED, output_option, print_data, read_model, set_option
 from kincompile.errors import InputError
 from kincompile.tables import table
@@ -32,7 +33,7 @@ ROUNDING = 1e-9
 @output_option("Page to write, .html: each assembly and the motion from it.", required=False)
 @click.pass_context
 def command(
-    context: click.Context, model: str, at: float, values: dict[str, float], output: str | None
+    context: click.Context, model: str, at: float, values: tuple[str, ...], output: str | None
 ) -> None:
     """List the ways to assemble MODEL at a time, and draw them.
 
@@ -45,11 +46,12 @@ def command(
             raise InputError(f"cannot write {output}: end its name in .html")
         require_writable(output)
     read = read_model(model)
+    numbers = set_values(read, values)
     if output is None:
         module = kc.compile(read)
-        found = kc.assemblies(module, at, values)
+        found = kc.assemblies(module, at, numbers)
     else:
-        drawn = kc.assembly_gallery(read, at, values)
+        drawn = kc.assembly_gallery(read, at, numbers)
         module, found = drawn.module, drawn.positions
     if not len(found):
         click.echo(f"Error: {module.NAME} cannot be assembled at t = {at:g}", err=True)

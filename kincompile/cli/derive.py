@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 import kincompile as kc
+from kincompile.cli.motion import set_values
 from kincompile.cli.shared import output_option, read_model, set_option
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
@@ -29,7 +30,7 @@ def command(
     model: str,
     output: str,
     at: float | None,
-    values: dict[str, float],
+    values: tuple[str, ...],
     constraint: str | None,
     levels: str,
 ) -> None:
@@ -42,9 +43,11 @@ def command(
     if not output.endswith(DERIVATIONS):
         raise InputError(f"{output}: a derivation is written as {', '.join(DERIVATIONS)}")
     require_writable(output)
-    state = values if at is None else {"t": at, **values}
+    read = read_model(model)
+    numbers = set_values(read, values)
+    state = numbers if at is None else {"t": at, **numbers}
     found = kc.derivation(
-        read_model(model),
+        read,
         state or None,
         constraint=constraint,
         levels=[level.strip() for level in levels.split(",") if level.strip()],

@@ -1,20 +1,21 @@
-"""The options of a motion: its times, and the values of parameters."""
+"""The options of a motion: its times, and the values of parameters.
+
+What they say is read by `values`, which needs SymPy: it is loaded when a command is called, and not
+for ``--help``.
+"""
 
 from __future__ import annotations
 
-import math
-import operator
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
 from kincompile.cli.shared import set_option
-from kincompile.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from kincompile.model.mechanism import Mechanism
@@ -24,11 +25,21 @@ if TYPE_CHECKING:
 def motion_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of a motion: its times, and the values of parameters."""
     options = (
-        click.option("--end", type=float, help="Last time.  [default: the model's own]"),
+        click.option("--start", default="0", metavar="T", help="First time.  [default: 0]"),
+        click.option(
+            "--end",
+            metavar="T",
+            help="Last time, such as 2 or 60/n with a parameter n.  [default: the model's own]",
+        ),
         click.option(
             "--points",
             type=click.IntRange(min=1),
-            help="Number of equally spaced times from 0 to the end.  [default: the model's own]",
+            help="Number of equally spaced times from start to end.  [default: the model's own]",
+        ),
+        click.option(
+            "--grid",
+            metavar="NAME=FIRST:LAST:STEP",
+            help="Times at which a coordinate has these values, such as crank.phi=0:360deg:1deg.",
         ),
         set_option("parameter"),
         click.option(
@@ -48,18 +59,23 @@ def motion_options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-def time_grid(
-    model: Mechanism | ConstraintSystem, end: float | None, points: int | None
+def set_values(model: Mechanism | ConstraintSystem, given: Sequence[str]) -> dict[str, float]:
+    """Return the numbers of the options ``--set``, by name."""
+    from kincompile.cli import values
+
+    return values.set_values(model, given)
+
+
+def motion_times(
+    model: Mechanism | ConstraintSystem,
+    start: str,
+    end: str | float | None,
+    points: int | None,
+    grid: str | None,
+    numbers: dict[str, float],
 ) -> NDArray[np.float64]:
-    """Return the time grid: the options before the model's own."""
-    try:
-        last = float(model.end if end is None else end)
-        count = operator.index(model.points if points is None else points)
-    except (TypeError, ValueError):
-        last, count = math.nan, 0
-    if not math.isfinite(last) or count < 1:
-        given = f"end = {model.end!r}, points = {model.points!r}" if end is None else f"--end {end}"
-        raise InputError(f"{given}: give a finite time, and at least one point")
-    if count == 1 and end:
-        raise InputError("one point is the time 0 alone: give --points 2 or more to reach the end")
-    return np.linspace(0.0, last, count)
+    """Return the times of a motion, shape (N,): equally spaced, or where a coordinate is."""
+    from kincompile.cli import values
+
+    times = values.time_grid(model, start, end, points, numbers)
+    return times if grid is None else values.times_on_grid(model, grid, times, numbers)

@@ -9,7 +9,7 @@ import click
 import numpy as np
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, time_grid
+from kincompile.cli.motion import motion_options, motion_times, set_values
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     NOT_CONVERGED,
@@ -63,24 +63,30 @@ def _sweeps(
 )
 @click.option("--product", is_flag=True, help="Solve every combination of the sweeps.")
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
+@click.option(
+    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show and write angles in degrees."
+)
 @output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context
 def command(
     context: click.Context,
     model: str,
-    end: float | None,
+    start: str,
+    end: str | float | None,
     points: int | None,
-    values: dict[str, float],
+    grid: str | None,
+    values: tuple[str, ...],
     through: str | None,
     assembly: int | None,
     sweeps: dict[str, NDArray[np.float64]],
     product: bool,
     analysis: str | None,
+    angle_unit: str,
     output: str | None,
 ) -> None:
     """Solve the motion of MODEL over time and summarise it.
 
-    Position, velocity and acceleration are solved at equally spaced times, from 0 to the end. The
+    Position, velocity and acceleration are solved at equally spaced times, from start to end. The
     summary goes to stdout, or to stderr where a file is written. With --sweep it has a part for
     each parameter set, and a file their values. Where the motion does not converge, what was found
     is written nevertheless, and the exit code is 3.
@@ -93,18 +99,19 @@ def command(
         settings = kc.read_analysis(analysis)
         end = settings.end if end is None else end
         points = settings.points if points is None else points
-    if twice := values.keys() & sweeps.keys():
+    numbers = set_values(mechanism, values)
+    if twice := numbers.keys() & sweeps.keys():
         raise InputError(f"--set and --sweep both name {listed(sorted(twice))}: give one of them")
-    times = time_grid(mechanism, end, points)
+    times = motion_times(mechanism, start, end, points, grid, numbers)
     module = kc.compile(mechanism)
     with progress_bar() as progress:
         options: dict[str, Any] = {"through": through, "assembly": assembly, "product": product}
-        solution = kc.solve(module, times, values | sweeps, progress=progress, **options)
+        solution = kc.solve(module, times, numbers | sweeps, progress=progress, **options)
     if output is None:
-        print_data(summary(solution) + "\n")
+        print_data(summary(solution, angle_unit) + "\n")
     else:
-        kc.write(solution, output)
-        click.echo(f"{summary(solution)}\nWrote {output}", err=True)
+        kc.write(solution, output, angle_unit=angle_unit)
+        click.echo(f"{summary(solution, angle_unit)}\nWrote {output}", err=True)
     if not solution.success:
         click.echo(f"Error: {solution.message}", err=True)
         context.exit(NOT_CONVERGED)

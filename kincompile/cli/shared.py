@@ -46,27 +46,8 @@ def output_option(text: str, *, required: bool = True) -> Callable[[Command], Co
 
 def set_option(what: str) -> Callable[[Command], Command]:
     """Return the option ``--set NAME=VALUE``, which gives values by name."""
-    text = f"Value of a {what}; may be given several times."
-    return click.option(
-        "--set", "values", multiple=True, metavar="NAME=VALUE", help=text, callback=_values
-    )
-
-
-def _values(
-    context: click.Context, option: click.Parameter, given: tuple[str, ...]
-) -> dict[str, float]:
-    """Return the parameters that are set; the last one counts where one is set twice."""
-    del context, option
-    values, problems = {}, []
-    for assignment in given:
-        name, _, text = assignment.partition("=")
-        try:
-            values[name.strip()] = float(text)
-        except ValueError:
-            problems.append(f"--set {assignment}: give NAME=VALUE with a number, such as a=0.25")
-    if problems:
-        raise InputError(problems)
-    return values
+    text = f"Value of a {what}, such as a=0.25 or phi=30deg; may be given several times."
+    return click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help=text)
 
 
 def print_data(text: str) -> None:

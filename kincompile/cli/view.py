@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, time_grid
+from kincompile.cli.motion import motion_options, motion_times, set_values
 from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
@@ -23,9 +23,11 @@ def command(
     context: click.Context,
     models: tuple[str, ...],
     output: str,
-    end: float | None,
+    start: str,
+    end: str | None,
     points: int | None,
-    values: dict[str, float],
+    grid: str | None,
+    values: tuple[str, ...],
     through: str | None,
     assembly: int | None,
 ) -> None:
@@ -41,8 +43,12 @@ def command(
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
     read = [read_model(model) for model in models]
-    options: dict[str, Any] = {"p": values, "through": through, "assembly": assembly}
-    pages = [kc.page(model, t=time_grid(model, end, points), **options) for model in read]
+    options: dict[str, Any] = {"through": through, "assembly": assembly}
+    pages = []
+    for model in read:
+        numbers = set_values(model, values)
+        times = motion_times(model, start, end, points, grid, numbers)
+        pages.append(kc.page(model, t=times, p=numbers, **options))
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:
         click.echo(f"Wrote {path}", err=True)

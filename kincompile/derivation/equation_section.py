@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import sympy
 
 from kincompile.derivation.document import Chapter, Display, Math, Verbatim, table, text
-from kincompile.derivation.formulas import Equated, PartialDerivative
+from kincompile.derivation.formulas import DerivativeSymbol, Equated
 from kincompile.derivation.steps import Steps
 from kincompile.derive.equations import EquationDerivatives, derive_equation
 
@@ -53,8 +53,8 @@ class _EquationSteps(Steps[EquationDerivatives]):
     def symbol(self, letter: str, k: int) -> Glyph:
         return self.evaluation.symbol(letter, self.rows.instance.first_row + k)
 
-    def _partial(self, k: int, name: str) -> PartialDerivative:
-        return PartialDerivative(self.symbol("Phi", k), sympy.Symbol(name))
+    def _partial(self, k: int, name: str) -> DerivativeSymbol:
+        return DerivativeSymbol(self.symbol("Phi", k), sympy.Symbol(name))
 
     def coordinates(self) -> Chapter:
         parameters = {item.name for item in self.evaluation.system.parameters}

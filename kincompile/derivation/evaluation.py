@@ -14,7 +14,7 @@ from kincompile.calculus.expressions import Symbol
 from kincompile.derivation.document import Display, Math
 from kincompile.derivation.emitted_lines import emitted_lines
 from kincompile.derivation.expanded import Writer
-from kincompile.derivation.formulas import Decimal, Equated, Glyph, PartialDerivative, size
+from kincompile.derivation.formulas import Decimal, DerivativeSymbol, Equated, Glyph, size
 from kincompile.derivation.positions import followed, generic_time, newton_table
 from kincompile.errors import InputError
 from kincompile.ir.inline import InlineProgram, inline
@@ -143,9 +143,9 @@ class Evaluation:
         values = self.shown[quantity]
         return float(values[entry.row, entry.column] if values.ndim == 2 else values[entry.row])
 
-    def partial(self, entry: Entry) -> PartialDerivative:
+    def partial(self, entry: Entry) -> DerivativeSymbol:
         """Return the symbol of an entry of Phi_q."""
-        return PartialDerivative(
+        return DerivativeSymbol(
             self.symbol("Phi", entry.row), Symbol(self.coordinates[entry.column])
         )
 

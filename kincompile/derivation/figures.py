@@ -22,7 +22,7 @@ from kincompile.model.matrices import SymbolicEnvironment
 from kincompile.model.resolve import Joint
 from kincompile.view.drawing import drawing
 from kincompile.view.geometry import Geometry
-from kincompile.view.marks import GROUND_FRAME, BodyPoint
+from kincompile.view.marks import GROUND_FRAME, FramePoint
 from kincompile.view.picture import Arrow, Picture, picture
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Figures:
         return [frames.get(body.name, GROUND_FRAME) for body in joint.bodies]
 
     def _place(self, frame: PlaneFrame, x: float = 0.0, y: float = 0.0) -> Array:
-        return BodyPoint(frame, (x, y)).at(self.evaluation.q)
+        return FramePoint(frame, (x, y)).at(self.evaluation.q)
 
     def _axes(self, frame: PlaneFrame, index: str) -> Iterator[Arrow]:
         """Yield the axes of a frame at its origin."""

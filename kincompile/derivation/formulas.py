@@ -55,7 +55,7 @@ class Sub:
 
 
 @dataclass(frozen=True, slots=True)
-class PartialDerivative:
+class DerivativeSymbol:
     """The derivative of one formula by another: partial, or total with d."""
 
     numerator: Formula
@@ -132,7 +132,7 @@ Formula: TypeAlias = (
     | Glyph
     | Joined
     | Sub
-    | PartialDerivative
+    | DerivativeSymbol
     | Transposed
     | Equated
     | Matrix

@@ -19,10 +19,10 @@ from kincompile.derivation.formulas import (
     PHI_T,
     ZERO_BLOCK,
     Decimal,
+    DerivativeSymbol,
     Equated,
     Glyph,
     Matrix,
-    PartialDerivative,
     Sub,
     column,
     decimals,
@@ -140,7 +140,7 @@ class _JointSteps(Steps[RowBlock]):
         rows = []
         for k, row in enumerate(partials(self.joint.template)):
             for item in row:
-                label = Math(PartialDerivative(self.symbol("Phi", k), item.coordinate))
+                label = Math(DerivativeSymbol(self.symbol("Phi", k), item.coordinate))
                 rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
         note = text(
             "The rules that give ", Math(PHI_Q), ", the innermost first. A term in which the "

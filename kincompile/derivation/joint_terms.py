@@ -29,10 +29,10 @@ from kincompile.derivation.document import Math
 from kincompile.derivation.formulas import (
     IDENTITY,
     ZERO_BLOCK,
+    DerivativeSymbol,
     Equated,
     Glyph,
     Joined,
-    PartialDerivative,
     Transposed,
 )
 from kincompile.derive.partials import partials
@@ -53,8 +53,8 @@ RULES: Mapping[Rule, Runs] = {
     Rule.SUM: ("sum rule",),
     Rule.PRODUCT: ("product rule",),
     Rule.CHAIN: ("chain rule",),
-    Rule.A_TO_B: (Math(Equated((PartialDerivative(_A, _PHI, "d"), _B))),),
-    Rule.B_TO_A: (Math(Equated((PartialDerivative(_B, _PHI, "d"), Joined(("-", _A))))),),
+    Rule.A_TO_B: (Math(Equated((DerivativeSymbol(_A, _PHI, "d"), _B))),),
+    Rule.B_TO_A: (Math(Equated((DerivativeSymbol(_B, _PHI, "d"), Joined(("-", _A))))),),
     Rule.DRIVER: ("driver, a function of ", Math(Symbol("t"))),
     Rule.PROFILE: ("profile, chain rule",),
 }

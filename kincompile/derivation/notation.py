@@ -33,11 +33,11 @@ from kincompile.derivation.formulas import (
     Call,
     Choice,
     Decimal,
+    DerivativeSymbol,
     Equated,
     Glyph,
     Joined,
     Matrix,
-    PartialDerivative,
     Quotient,
     Relation,
     Sub,
@@ -385,7 +385,7 @@ class Notation:
             return self._scripts(bare, index, self._index_text(expr.base.exponent))
         return self._scripts(self._print(expr.base), index, None)
 
-    def _print_PartialDerivative(self, expr: PartialDerivative) -> Printed:
+    def _print_DerivativeSymbol(self, expr: DerivativeSymbol) -> Printed:
         top = self._row([self._sign(expr.sign), self._print(expr.numerator)])
         return self._fraction(
             top, self._row([self._sign(expr.sign), self._print(expr.denominator)])

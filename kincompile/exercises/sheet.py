@@ -23,11 +23,11 @@ from kincompile.derivation.figures import Figures
 from kincompile.derivation.formulas import (
     VELOCITY_TERM,
     Call,
+    DerivativeSymbol,
     Equated,
     Glyph,
     Joined,
     Matrix,
-    PartialDerivative,
 )
 from kincompile.model.resolve import Joint
 from kincompile.names import rate
@@ -106,7 +106,7 @@ def _symbol(blank: Blank, system: ConstraintSystem) -> Formula:
     if blank.column is None:
         return Glyph("gamma", equation, bold=False)
     name = system.coordinates[blank.column].name
-    return PartialDerivative(Glyph("Phi", equation, bold=False), Symbol(name))
+    return DerivativeSymbol(Glyph("Phi", equation, bold=False), Symbol(name))
 
 
 def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> Chapter:

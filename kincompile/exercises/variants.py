@@ -95,7 +95,7 @@ def variants(mechanism: Mechanism, count: int, seed: int, choices: Choices) -> l
 def _drawn(mechanism: Mechanism, random: Random, choices: Choices) -> _Change:
     values = tuple(
         (item.name, _rounded((item.default or 0.0) * random.choice(FACTORS)))
-        for item in mechanism.parameters
+        for item in mechanism.system().parameters
     )
     bodies = [GROUND.name, *(body.name for body in mechanism.bodies)]
     has_lengths = choices.lengths or not mechanism.parameters
@@ -122,7 +122,7 @@ def _rounded(value: float) -> float:
 
 def _checked(mechanism: Mechanism, change: _Change) -> Mechanism | None:
     """Return a variant, None if it does not assemble or its motion is singular somewhere."""
-    made = _Builder(mechanism, change).mechanism()
+    made = _VariantBuilder(mechanism, change).mechanism()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -135,7 +135,7 @@ def _checked(mechanism: Mechanism, change: _Change) -> Mechanism | None:
     return made if is_regular and float(solution.condition.max()) < LARGEST_CONDITION else None
 
 
-class _Builder:
+class _VariantBuilder:
     """Builds the variant of a mechanism, constraint by constraint."""
 
     def __init__(self, mechanism: Mechanism, change: _Change) -> None:
@@ -146,7 +146,7 @@ class _Builder:
         self._made = Mechanism(
             mechanism.name,
             length_unit=mechanism.length_unit,
-            end=mechanism.end,
+            end=mechanism.end_given,
             points=mechanism.points,
         )
         self._bodies = {body.name: self._body(body) for body in mechanism.bodies}

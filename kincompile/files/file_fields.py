@@ -141,6 +141,14 @@ class FieldReader:
         self.problem(address, f"{shown(value)} is not a finite number that a double can hold")
         return 1.0
 
+    def constant(
+        self, value: Any, address: Address, names: Mapping[str, sympy.Expr]
+    ) -> float | sympy.Expr:
+        """Return a number, or a formula such as ``30*deg``; a number needs no quotes."""
+        if isinstance(value, str) and not _is_number(value):
+            return self.expression(value, address, names)
+        return self.number(value, address)
+
     def expression(
         self, value: Any, address: Address, names: Mapping[str, sympy.Expr]
     ) -> float | sympy.Expr:
@@ -169,3 +177,12 @@ class FieldReader:
             self.problem(address, f"expected {what}, not {shown(value)}")
             return [1.0] * count
         return [self.expression(item, (*address, k), names) for k, item in enumerate(value)]
+
+
+def _is_number(text: str) -> bool:
+    """Return whether a text is nothing but a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

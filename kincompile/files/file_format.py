@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.model.arguments import Kind
 from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.model.laws import RISES
 from kincompile.names import MOST_CHARACTERS
 
 if TYPE_CHECKING:
@@ -48,6 +49,9 @@ _POINT: dict[str, Any] = {
     "type": "array", "items": _EXPRESSION, "minItems": 2, "maxItems": 2,
 }  # fmt: skip
 _NUMBERS: dict[str, Any] = {"type": "array", "items": _NUMBER, "minItems": 6}
+_VALUES: dict[str, Any] = {"type": "array", "items": _EXPRESSION, "minItems": 3}
+_LAW: dict[str, Any] = {"enum": list(RISES)}
+_CORNERS: dict[str, Any] = {"type": "boolean"}
 
 
 def _list(name: str) -> dict[str, Any]:
@@ -69,14 +73,14 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "outputs": Field(_list("output"), is_required=False),
     },
     "analysis": {
-        "end": Field(_NUMBER, is_required=False),
+        "end": Field(_EXPRESSION, is_required=False),
         "points": Field(
             {"type": "integer", "minimum": 1, "maximum": MOST_POINTS}, is_required=False
         ),
     },
     "parameter": {
         "name": Field(_NAME),
-        "default": Field(_NUMBER),
+        "default": Field(_EXPRESSION),
         "unit": Field(_TEXT, is_required=False),
     },
     "body": {
@@ -96,15 +100,29 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "radii": Field(_NUMBERS),
         "smoothness": Field({"const": SMOOTHNESS}),
     },
+    "sequence": {
+        "points": Field({"type": "array", "items": _POINT, "minItems": 2}),
+        "law": Field({"anyOf": [_LAW, {"type": "array", "items": _LAW}]}, is_required=False),
+        "ramp": Field(_EXPRESSION, is_required=False),
+    },
+    "table": {
+        "times": Field(_VALUES),
+        "values": Field(_VALUES),
+        "velocities": Field({**_POINT}, is_required=False),
+    },
     "Equation": {
         "type": Field({"const": "Equation"}),
         "name": Field(_NAME),
         "expressions": Field({"type": "array", "items": _EXPRESSION, "minItems": 1}),
+        "corners": Field(_CORNERS, is_required=False),
     },
 }
 """Fields of the file itself, of its tables, and of a free equation."""
 
+_MOTIONS = [{"$ref": "#/$defs/sequence"}, {"$ref": "#/$defs/table"}]
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
+    Kind.VALUE: {"anyOf": [_EXPRESSION, *_MOTIONS]},
+    Kind.DISTANCE: {"anyOf": [_EXPRESSION, *_MOTIONS]},
     Kind.BODY: _NAME,
     Kind.POINT: _POINT,
     Kind.AXIS: _POINT,
@@ -113,10 +131,12 @@ _KINDS: Mapping[Kind, Mapping[str, Any]] = {
 
 
 def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
-    """Return the fields of a constraint type: its arguments, and a guess where it has contacts."""
+    """Return the fields of a constraint type: its arguments, and what drivers and cams have."""
     fields = {"type": Field({"const": constraint.__name__}), "name": Field(_NAME)}
     for name, item in constraint.arguments().items():
         fields[name] = Field(_KINDS.get(item.kind, _EXPRESSION))
+    if any(item.symbol == "C" for item in constraint.arguments().values()):
+        fields["corners"] = Field(_CORNERS, is_required=False)
     if constraint.contacts:
         guesses = {"type": "array", "items": _EXPRESSION, "minItems": len(constraint.contacts)}
         fields["guess"] = Field({"anyOf": [_EXPRESSION, guesses]}, is_required=False)

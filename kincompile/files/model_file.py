@@ -18,7 +18,7 @@ nothing in it is run. All problems are reported together, each with line and fie
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import sympy
 
@@ -32,6 +32,7 @@ from kincompile.files.file_format import (
     VERSION,
     constraint_fields,
 )
+from kincompile.model import motion
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.catalogue import CONSTRAINTS
@@ -98,12 +99,12 @@ class _ModelReader(FieldReader):
         if not self._is_model(data):
             return None
         self.has_fields((), data, FIELDS["model"])
+        name = self.name(data, (), "the model") or "model"
+        parameters = [self._parameter(*item) for item in self.rows(data, "parameters")]
         options = {
             "length_unit": self.unit(data.get("length_unit", "m"), ("length_unit",), "lengths"),
             **self._analysis(data.get("analysis", {})),
         }
-        name = self.name(data, (), "the model") or "model"
-        parameters = [self._parameter(*item) for item in self.rows(data, "parameters")]
         bodies = [self._body(*item) for item in self.rows(data, "bodies")]
         free = [self._coordinate(*item) for item in self.rows(data, "coordinates")]
         points = [self._point(*item) for item in self.rows(data, "points")]
@@ -170,7 +171,8 @@ class _ModelReader(FieldReader):
         self.has_fields(("analysis",), given, FIELDS["analysis"])
         found: Row = {}
         if "end" in given:
-            found["end"] = self.number(given["end"], ("analysis", "end"))
+            names = {name: symbol for name, symbol in self._names.items() if symbol != t}
+            found["end"] = self.constant(given["end"], ("analysis", "end"), names)
         points = given.get("points", 101)
         if type(points) is int and 1 <= points <= MOST_POINTS:
             return {**found, "points": points}
@@ -191,11 +193,12 @@ class _ModelReader(FieldReader):
     def _parameter(self, address: Address, row: Row) -> Parameter | None:
         complete = self.has_fields(address, row, FIELDS["parameter"])
         name = self.name(row, address, "a parameter")
-        default = self.number(row.get("default", 1.0), (*address, "default"))
+        default = self.constant(row.get("default", 1.0), (*address, "default"), {})
         unit = self.unit(row.get("unit", ""), (*address, "unit"), f"parameter {name!r}")
         if name:
             self._names[name] = sympy.Symbol(name)
             self.remember(f"parameter {name!r}", address)
+        default = cast("float", default)  # the checks of the system make a number of it
         return Parameter(name, default, unit) if self._is_free(name, address) and complete else None
 
     def _body(self, address: Address, row: Row) -> Body | None:
@@ -302,7 +305,9 @@ class _ModelReader(FieldReader):
         given, place = row.get("expressions", [1]), (*address, "expressions")
         count = max(1, len(given)) if isinstance(given, list) else 1
         return Equation(
-            name, *self.expressions(given, place, self._names, "a list of formulas", count)
+            name,
+            *self.expressions(given, place, self._names, "a list of formulas", count),
+            corners=self._corners(row, address),
         )
 
     def _joint(
@@ -321,7 +326,7 @@ class _ModelReader(FieldReader):
             return None
         if "guess" in row and "guess" in fields:
             arguments["guess"] = self._contact_guess(kind, row["guess"], (*address, "guess"))
-        return kind(name, **arguments)
+        return kind(name, **arguments, corners=self._corners(row, address))
 
     def _contact_guess(self, kind: type[Constraint], given: Any, address: Address) -> Any:
         if not isinstance(given, list):
@@ -337,6 +342,8 @@ class _ModelReader(FieldReader):
             return tuple(self.expressions(given, address, self._names, "[xi, eta]", 2))
         if item.kind is Kind.PROFILE:
             return self._profile(given, address)
+        if item.kind in (Kind.VALUE, Kind.DISTANCE) and isinstance(given, dict):
+            return self._motion(given, address)
         return self.expression(given, address, self._names)
 
     def _body_name(self, given: Any, address: Address) -> str:
@@ -361,6 +368,49 @@ class _ModelReader(FieldReader):
                 f"derivatives; write smoothness = {SMOOTHNESS}",
             )
         return tuple(self._numbers(given[key], (*address, key)) for key in ("angles", "radii"))
+
+    def _motion(self, given: Row, address: Address) -> Any:
+        """Return the value of a driver: a sequence of motions, or a table over time."""
+        before = len(self.problems)
+        kind = "table" if "times" in given or "values" in given else "sequence"
+        if not self.has_fields(address, given, FIELDS[kind]):
+            return 1.0
+        columns: dict[str, Any] = {
+            key: self._values(given[key], (*address, key), key)
+            for key in ("points", "times", "values", "velocities")
+            if key in given
+        }
+        if "ramp" in given:
+            columns["ramp"] = self.expression(given["ramp"], (*address, "ramp"), self._names)
+        if "law" in given:
+            columns["law"] = given["law"]
+        if len(self.problems) > before:
+            return 1.0
+        try:
+            return (motion.table if kind == "table" else motion.sequence)(**columns)
+        except ModelError as error:
+            for problem in error.problems:
+                self.problem(address, problem)
+            return 1.0
+
+    def _values(self, given: Any, address: Address, key: str) -> Any:
+        """Return a list of formulas, of points a list of pairs."""
+        if not isinstance(given, list):
+            self.problem(address, f"expected a list, not {shown(given)}")
+            return []
+        if key != "points":
+            return self.expressions(given, address, self._names, "a list", len(given))
+        return [
+            self.expressions(point, (*address, k), self._names, "[time, value]", 2)
+            for k, point in enumerate(given)
+        ]
+
+    def _corners(self, row: Row, address: Address) -> bool:
+        """Return whether a driver may have corners."""
+        given = row.get("corners", False)
+        if not isinstance(given, bool):
+            self.problem((*address, "corners"), f"expected true or false, not {shown(given)}")
+        return given is True
 
     def _numbers(self, given: Any, address: Address) -> list[float]:
         if not isinstance(given, list):

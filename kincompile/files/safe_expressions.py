@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
+from kincompile.model.expressions import NotAnExpressionError, as_expression, deg, evaluate
+from kincompile.model.laws import RISES
 from kincompile.model.points import rate
 from kincompile.names import listed, suggestion
 
@@ -52,10 +53,11 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., sympy.Expr], int]] = {
     "atan2": (sympy.atan2, 2), "ln": (sympy.log, 1),
     "arcsin": (sympy.asin, 1), "arccos": (sympy.acos, 1), "arctan": (sympy.atan, 1),
     "arctan2": (sympy.atan2, 2), "rate": (rate, 1),
+    **{law.__name__: (law, law.nargs.args[0]) for law in RISES.values()},
 }  # fmt: skip
 """Functions that may be called, each with its number of arguments."""
 
-CONSTANTS: Mapping[str, sympy.Expr] = {"pi": sympy.pi}
+CONSTANTS: Mapping[str, sympy.Expr] = {"pi": sympy.pi, "deg": deg}
 
 _OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
 _RELATIONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {

@@ -12,7 +12,8 @@ from kincompile.errors import ModelError
 from kincompile.files.file_format import SMOOTHNESS, VERSION
 from kincompile.model.arguments import Kind
 from kincompile.model.constraint import CamConstraint, Constraint
-from kincompile.model.expressions import as_expression, as_sympy
+from kincompile.model.expressions import as_expression, as_sympy, deg, t
+from kincompile.model.laws import TableLaw
 from kincompile.model.resolve import Joint
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from kincompile.model.bodies import Body, Coordinate, Parameter
+    from kincompile.model.expressions import Scalar
+    from kincompile.model.laws import MotionLaw
     from kincompile.model.resolve import FreeEquation
 
 
@@ -52,9 +55,14 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         "kincompile": VERSION,
         "name": system.name,
         "length_unit": system.length_unit,
-        "analysis": {"end": float(system.end), "points": int(system.points)},
+        "analysis": {"end": _end(system), "points": int(system.points)},
         **{name: rows for name, rows in sections.items() if rows},
     }
+
+
+def _end(system: ConstraintSystem) -> int | float | str:
+    given = system.end_given
+    return value(given) if isinstance(given, sympy.Expr) else float(given)
 
 
 def _parameter(item: Parameter) -> dict[str, Any]:
@@ -92,7 +100,7 @@ def _free_coordinates(system: ConstraintSystem) -> Iterable[Coordinate]:
 def _constraint(item: Joint | FreeEquation) -> dict[str, Any]:
     if not isinstance(item, Joint):
         expressions = [value(expression) for expression in item.expressions]
-        return {"type": "Equation", "name": item.name, "expressions": expressions}
+        return {"type": "Equation", "name": item.name, "expressions": expressions, **_corners(item)}
     written = item.written
     row: dict[str, Any] = {"type": type(written).__name__, "name": written.name}
     bodies = iter(item.bodies)
@@ -104,8 +112,19 @@ def _constraint(item: Joint | FreeEquation) -> dict[str, Any]:
         elif argument.kind is Kind.PROFILE:
             row[name] = _profile(written, name, item.profiles[argument.symbol])
         else:
-            row[name] = value(item.scalars[argument.symbol])
-    return row | _guess(written)
+            row[name] = _scalar(item.scalars[argument.symbol])
+    return row | _corners(item) | _guess(written)
+
+
+def _corners(item: Joint | FreeEquation) -> dict[str, Any]:
+    return {"corners": True} if item.corners else {}
+
+
+def _scalar(given: Scalar) -> Any:
+    """Return a value: a table over time as its columns, anything else as a number or formula."""
+    if isinstance(given, TableLaw) and given.args == (t,) and not given.order:
+        return dict(zip(("times", "values", "velocities"), map(list, given.given), strict=True))
+    return value(given)
 
 
 def _profile(written: Constraint, name: str, rho: sympy.Expr) -> Any:
@@ -135,7 +154,7 @@ def value(given: Any) -> int | float | str:
         return int(expression)
     if isinstance(expression, sympy.Float):
         return float(expression)
-    rare = expression.atoms(sympy.NumberSymbol) - {sympy.pi, sympy.E}
+    rare = expression.atoms(sympy.NumberSymbol) - {sympy.pi, sympy.E, deg}
     if rare:
         expression = expression.xreplace({symbol: sympy.Float(symbol) for symbol in rare})
     return str(_Printer().doprint(expression))  # type: ignore[no-untyped-call]
@@ -161,10 +180,18 @@ class _Printer(StrPrinter):
         arguments = sorted(expr.args, key=sympy.default_sort_key)
         return word.join(f"({self._print(item)})" for item in arguments)
 
+    def _print_MotionLaw(self, expr: MotionLaw) -> str:
+        if expr.order:
+            return str(self._print(expr.in_pieces()))
+        return str(self._print_Function(expr))  # type: ignore[no-untyped-call]
+
+    def _print_TableLaw(self, expr: sympy.Expr) -> str:
+        return self._print_PeriodicSpline(expr)
+
     def _print_PeriodicSpline(self, expr: sympy.Expr) -> str:
         raise ModelError(
             f"{expr} is a table within an expression, which a file cannot hold; give the table as "
-            "the profile itself"
+            "the profile, or the value, itself"
         )
 
 
@@ -189,7 +216,7 @@ def _toml(item: Any) -> str:
         return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in item.items()) + " }"
     if isinstance(item, list):
         return _listed(item)
-    return json.dumps(item, ensure_ascii=False) if isinstance(item, str) else repr(item)
+    return json.dumps(item, ensure_ascii=False) if isinstance(item, str | bool) else repr(item)
 
 
 def _listed(items: Sequence[Any]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import reduce
+from functools import cache, reduce
 from typing import TYPE_CHECKING, cast
 
 import sympy
@@ -11,6 +11,8 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanFunction
 
 from kincompile.errors import InternalError
+from kincompile.ir.graph import Graph, pruned
+from kincompile.model.laws import MotionLaw
 from kincompile.model.spline import PeriodicSpline
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
     from sympy.functions.elementary.piecewise import ExprCondPair
 
-    from kincompile.ir.graph import Graph
+    from kincompile.ir.graph import Node
     from kincompile.model.expressions import Scalar
 
 FUNCTIONS = {
@@ -136,6 +138,11 @@ class Converter:
         graph = self._graph
         if isinstance(value, PeriodicSpline):
             return graph.table(value.table_name, value.order, self.convert(value.args[0]))
+        if isinstance(value, MotionLaw):
+            law: type[MotionLaw] = type(value)
+            nodes, last = _law_code(law)
+            arguments = map(self.convert, value.args)
+            return graph.instantiate(nodes, dict(zip(("u", "ramp"), arguments, strict=False)))[last]
         if value.func in FUNCTIONS:
             return graph.call(FUNCTIONS[value.func], *(self.convert(item) for item in value.args))
         if value.func in QUOTIENTS:
@@ -144,3 +151,12 @@ class Converter:
             dividend = graph.call(above, inner) if above else graph.const(1)
             return graph.div(dividend, graph.call(below, inner))
         raise InternalError(f"{value} passed the checks but cannot be compiled")
+
+
+@cache
+def _law_code(law: type[MotionLaw]) -> tuple[list[Node], int]:
+    """Return the code of a motion law in its own symbols, and the node of its value."""
+    graph = Graph()
+    node = Converter(graph, graph.input).convert(law.written_out())
+    nodes, new = pruned(graph.nodes, [node])
+    return nodes, new[node]

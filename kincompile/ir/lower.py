@@ -24,14 +24,18 @@ from kincompile.ir.kernels import (
 )
 from kincompile.ir.program import Attribute, BodyFrame, Function, Input, Instance, Kernel, Program
 from kincompile.model.expressions import alpha, t
+from kincompile.model.laws import TableLaw
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.spline import PeriodicSpline, SplineTable
 from kincompile.names import rate
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
     from kincompile.model.expressions import Scalar
+    from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.system import ConstraintSystem
 
 
@@ -45,15 +49,14 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
     graph = Graph()
     binder = _Binder(graph, EquationShapes(columns) if share_equations else None)
     instances = []
-    tables: dict[str, SplineTable] = {}
     for first_row, constraint in zip(system.row_offsets, system.constraints, strict=True):
         try:
             kernel, names, bindings = binder.bound(constraint)
         except RecursionError:
             raise ModelError(_too_deep(constraint)) from None
-        tables.update(_tables(constraint))
         own = tuple(None if name is None else columns[name] for name in names)
         instances.append(Instance(kernel, constraint, first_row, own, bindings))
+    tables = _tables((*system.constraints, *system.outputs))
     bodies = tuple(
         binder.frame_of(body, own)
         for body, own in zip(system.bodies, system.body_columns, strict=True)
@@ -130,13 +133,20 @@ def _too_deep(constraint: Joint | FreeEquation) -> str:
     )
 
 
-def _tables(constraint: Joint | FreeEquation) -> dict[str, SplineTable]:
-    if isinstance(constraint, FreeEquation) or not constraint.profiles:
-        return {}
-    splines = (
-        item for profile in constraint.profiles.values() for item in profile.atoms(PeriodicSpline)
-    )
-    return {item.table_name: item.table for item in splines}
+def _tables(items: Iterable[Joint | FreeEquation | ResolvedOutput]) -> dict[str, SplineTable]:
+    """Return the splines of profiles, and of motions over time, by name in order of occurrence."""
+    values: list[Scalar] = []
+    for item in items:
+        if isinstance(item, Joint):
+            values += (*item.profiles.values(), *item.scalars.values())
+        else:
+            values += item.expressions if isinstance(item, FreeEquation) else [item.expression]
+    found: dict[str, SplineTable] = {}
+    for value in values:
+        if isinstance(value, sympy.Expr):
+            tables = sorted(value.atoms(PeriodicSpline, TableLaw), key=str)
+            found |= {table.table_name: table.table for table in tables}
+    return found
 
 
 class _Binder:

@@ -250,6 +250,11 @@ class Program:
         rows = {"equations", "coordinates"} | ({"outputs"} if self.observers else set())
         return over(rows)
 
+    @property
+    def corners(self) -> bool:
+        """Whether drivers may have corners."""
+        return any(instance.constraint.corners for instance in self.instances)
+
     def names_of(self, kind: Rows | Columns) -> tuple[str, ...]:
         """Return the names of what the rows or columns of a quantity belong to."""
         return tuple(item if isinstance(item, str) else item.name for item in self._owners(kind))

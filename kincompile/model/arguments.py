@@ -66,25 +66,28 @@ class Argument:
     on
         The symbol of the body whose frame a point or a direction is given in, ``"ground"`` for the
         fixed frame; "" for what belongs to no frame.
+    unit
+        ``"rad"`` of an angle, ``"length"`` of a length, "" of what is neither.
     """
 
     kind: Kind
     symbol: str
     text: str
     on: str = ""
+    unit: str = ""
 
 
 _DRIVEN = "a number or an expression of parameters; with `t` in it, a driver."
 
 
-def _declared(kind: Kind, symbol: str, text: str, on: str = "") -> Any:
+def _declared(kind: Kind, symbol: str, text: str, on: str = "", unit: str = "length") -> Any:
     """Return a field of a constraint type."""
-    return field(metadata={"argument": Argument(kind, symbol, text, on)})
+    return field(metadata={"argument": Argument(kind, symbol, text, on, unit)})
 
 
 def body(symbol: str) -> Any:
     """Declare a body; its symbol is the index of its coordinates, ``"i"`` or ``"j"``."""
-    return _declared(Kind.BODY, symbol, "Body, or its name{ground}.")
+    return _declared(Kind.BODY, symbol, "Body, or its name{ground}.", unit="")
 
 
 def point(symbol: str, on: str, what: str = "Point") -> Any:
@@ -96,12 +99,12 @@ def point(symbol: str, on: str, what: str = "Point") -> Any:
 def axis(symbol: str, on: str) -> Any:
     """Declare a direction in the frame of a body."""
     text = "Direction (xi, eta) in the frame of {on}, of any length but zero."
-    return _declared(Kind.AXIS, symbol, text, on)
+    return _declared(Kind.AXIS, symbol, text, on, unit="")
 
 
 def value(unit: str = "length") -> Any:
     """Declare the value C of a constraint, which may be a function of time."""
-    return _declared(Kind.VALUE, "C", f"C [{unit}], {_DRIVEN}")
+    return _declared(Kind.VALUE, "C", f"C [{unit}], {_DRIVEN}", unit=unit)
 
 
 def distance() -> Any:
@@ -117,7 +120,9 @@ def radius(symbol: str, what: str = "Pitch radius") -> Any:
 
 def angle(symbol: str, on: str, what: str) -> Any:
     """Declare a direction in the frame of a body, given by its angle."""
-    return _declared(Kind.SCALAR, symbol, f"Direction [rad] {what}, in the frame of {{on}}.", on)
+    return _declared(
+        Kind.SCALAR, symbol, f"Direction [rad] {what}, in the frame of {{on}}.", on, "rad"
+    )
 
 
 def profile(symbol: str) -> Any:

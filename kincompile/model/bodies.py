@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
@@ -10,10 +11,11 @@ import sympy
 
 from kincompile.calculus.symbols import Frame
 from kincompile.html import Shown
+from kincompile.model.expressions import NotAnExpressionError, as_expression, number_in
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from kincompile.model.expressions import Scalars
 
@@ -131,6 +133,17 @@ class Parameter:
     name: str
     default: float | None
     unit: str = ""
+
+
+def default_values(parameters: Iterable[Parameter]) -> dict[str, float]:
+    """Return the default values that are numbers, of parameters that nobody has checked yet."""
+    found = {}
+    for item in parameters:
+        with suppress(NotAnExpressionError):
+            value = number_in(as_expression(item.default), str(item.unit), {})
+            if value is not None:
+                found[str(item.name)] = value
+    return found
 
 
 @dataclass(frozen=True, slots=True)

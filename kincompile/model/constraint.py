@@ -39,6 +39,7 @@ class Constraint(Shown):
     """
 
     name: str
+    corners: bool = field(default=False, kw_only=True)
 
     source: ClassVar[str] = ""
     """Where the textbook has it."""
@@ -191,6 +192,7 @@ def _documentation(cls: type[Constraint]) -> str:
     if cls.contacts:
         contacts = _listed("contact parameter", cls.contacts_of("name"))
         entries["guess"] = f"Where Newton's method begins [rad], 0 if not given; the {contacts}."
+    entries["corners"] = "Of a driver, whether its velocity may jump; see docs/motion_laws.md."
     lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]
     for name, text in entries.items():
         lines += [name, textwrap.fill(text, 92, initial_indent="    ", subsequent_indent="    ")]

@@ -21,13 +21,17 @@ class Equation:
         Name of the equation; of several, the rows are called ``name.1``, ``name.2``, ...
     *expressions
         SymPy expressions, or `sympy.Eq`, in coordinates, parameters and `t`.
+    corners
+        Whether their slope over time may jump; see docs/motion_laws.md.
     """
 
     name: str
     expressions: tuple[Scalar | sympy.Eq, ...]
+    corners: bool = False
 
-    def __init__(self, name: str, *expressions: Scalar | sympy.Eq) -> None:
+    def __init__(self, name: str, *expressions: Scalar | sympy.Eq, corners: bool = False) -> None:
         object.__setattr__(self, "name", name)
+        object.__setattr__(self, "corners", corners)
         object.__setattr__(self, "expressions", expressions)
 
     @property

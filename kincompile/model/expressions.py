@@ -6,16 +6,19 @@ import math
 import sys
 from collections.abc import Sequence
 from numbers import Integral, Rational, Real
-from typing import TYPE_CHECKING, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
+import mpmath
 import numpy as np
 import sympy
 from numpy.typing import NDArray
 from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
+from sympy.core.singleton import Singleton
 from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
+from kincompile.model.laws import MotionLaw
 from kincompile.model.piecewise import gap_problem
 from kincompile.model.spline import PeriodicSpline
 from kincompile.names import listed, suggestion
@@ -27,6 +30,32 @@ t = sympy.Symbol("t")
 """Time. The same symbol as `sympy.physics.mechanics.dynamicsymbols._t`."""
 
 pi = sympy.pi
+
+
+class Degree(sympy.NumberSymbol, metaclass=Singleton):
+    """The degree, pi/180, as a number of its own: so a length can tell that it is in degrees."""
+
+    is_real = True
+    is_positive = True
+    is_irrational = True
+    is_number = True
+
+    def _as_mpf_val(self, prec: int) -> Any:
+        with mpmath.workprec(prec):
+            return (mpmath.pi / 180)._mpf_
+
+    def approximation_interval(self, number_cls: type) -> None:
+        """Return no bounds: SymPy compares by the value."""
+
+    def _sympystr(self, printer: Any) -> str:
+        return "deg"
+
+    def _latex(self, printer: Any) -> str:
+        return r"^{\circ}"
+
+
+deg: sympy.Expr = Degree()  # type: ignore[no-untyped-call]
+"""One degree, in the radians in which every angle is counted."""
 
 alpha = sympy.Symbol("alpha")
 """The polar angle of a cam profile rho(alpha)."""
@@ -142,8 +171,11 @@ def symbol_names(value: Scalar) -> set[str]:
 _ELEMENTARY = "write it with elementary functions"
 
 
-def smoothness_problem(value: Scalar) -> str | None:
-    """Return a message about a function that cannot be differentiated or emitted, or None."""
+def smoothness_problem(value: Scalar, *, corners: bool = False) -> str | None:
+    """Return a message about a function that cannot be differentiated or emitted, or None.
+
+    With `corners` the slope may jump from one time to the next.
+    """
     if not isinstance(value, sympy.Expr):
         return None
     if value.has(sympy.Derivative):
@@ -164,11 +196,11 @@ def smoothness_problem(value: Scalar) -> str | None:
             )
         if isinstance(node, AppliedUndef):
             return f"the function {node} is not defined; give it as an expression"
-        if isinstance(node, sympy.Function) and not isinstance(node, SMOOTH):
+        if isinstance(node, sympy.Function) and not isinstance(node, (*SMOOTH, MotionLaw)):
             return f"the function {node.func.__name__} is not supported; {_ELEMENTARY}"
         if not isinstance(node, _KNOWN):
             return f"{type(node).__name__} in {value} is not supported; {_ELEMENTARY}"
-    return gap_problem(value) if value.has(sympy.Piecewise) else None
+    return gap_problem(value, corners=corners) if value.has(sympy.Piecewise, MotionLaw) else None
 
 
 def _has_value_everywhere(node: sympy.Piecewise) -> bool:
@@ -190,6 +222,37 @@ def unknown_problem(value: Scalar, declared: Collection[str], what: str) -> str 
     )
 
 
+def in_radians(value: sympy.Expr) -> sympy.Expr:
+    """Return an expression with pi/180 for every degree."""
+    radians: sympy.Expr = value.xreplace({deg: pi / 180})
+    return radians
+
+
+def has_degrees(value: object) -> bool:
+    """Return whether a degree is part of a value, not of the argument of a function in it."""
+    if value is deg:
+        return True
+    if not isinstance(value, sympy.Basic) or not value.has(deg):
+        return False
+    parts = value.args
+    if isinstance(value, sympy.Piecewise):
+        parts = tuple(piece.expr for piece in cast("tuple[ExprCondPair, ...]", parts))
+    elif isinstance(value, sympy.Function):
+        return False
+    return any(has_degrees(part) for part in parts)
+
+
+def degrees_problem(value: object, unit: str) -> str | None:
+    """Return a message about degrees in what is no angle, or None."""
+    if not has_degrees(value) or not unit or str(unit).startswith(("rad", "deg")):
+        return None
+    what = "a length" if unit == "length" else f"in {unit}"
+    return (
+        f"{value} is in degrees, and this is no angle but {what}; write an arc as its radius times "
+        "the angle in radians, pi/180 for a degree"
+    )
+
+
 def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
     """Return the number an expression is at given values of its symbols; None where it is none."""
     if not isinstance(value, sympy.Expr):
@@ -198,12 +261,20 @@ def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
     if names - set(values):
         return None
     numbers = {sympy.Symbol(name): sympy.Float(values[name]) for name in names}
+    value = in_radians(value)
     try:
         number = value.xreplace(numbers).evalf()
         is_number = number.is_number and number.is_real and math.isfinite(float(number))
         return float(number) if is_number else None
     except OverflowError:  # exp(exp(exp(9)))
         return None
+
+
+def number_in(value: Scalar, unit: str, values: dict[str, float]) -> float | None:
+    """Return the number an expression is in a unit: what is counted in degrees stays in them."""
+    if isinstance(value, sympy.Expr) and unit.startswith("deg"):
+        value = cast("sympy.Expr", value.xreplace({deg: sympy.S.One}))
+    return evaluate(value, values)
 
 
 def depends_on(value: Scalar, names: Iterable[str]) -> bool:

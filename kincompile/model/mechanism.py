@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+import math
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import sympy
 
 from kincompile.errors import ModelError
-from kincompile.model.bodies import GROUND, Body, Parameter
+from kincompile.model.bodies import GROUND, Body, Parameter, default_values
 from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
+from kincompile.model.expressions import evaluate
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.outputs import Output
 from kincompile.model.points import BodyPoint
@@ -38,7 +40,8 @@ class Mechanism(MatrixViews, TextViews):
     length_unit
         Unit of lengths, for documentation.
     end, points
-        Default time grid of an analysis: `points` equally spaced times from 0 to `end`.
+        Default time grid of an analysis: `points` equally spaced times from 0 to `end`, a number or
+        an expression of parameters: ``60 / n`` is a revolution at n rpm.
 
     Attributes
     ----------
@@ -47,11 +50,11 @@ class Mechanism(MatrixViews, TextViews):
     """
 
     def __init__(
-        self, name: str, *, length_unit: str = "m", end: float = 1.0, points: int = 101
+        self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
     ) -> None:
         self.name = name
         self.length_unit = length_unit
-        self.end = end
+        self.end_given = end
         self.points = points
         self.ground = GROUND
         self.bodies: list[Body] = []
@@ -59,7 +62,20 @@ class Mechanism(MatrixViews, TextViews):
         self.constraints: list[Constraint | Equation] = []
         self.outputs: list[BodyPoint | Output] = []
 
-    def parameter(self, name: str, default: float | None = None, unit: str = "") -> sympy.Symbol:
+    @property
+    def end(self) -> float:
+        """The last time, a number at the default parameters; `end_given` is it as it was given."""
+        given = self.end_given
+        if isinstance(given, sympy.Expr):
+            found = evaluate(given, default_values(self.parameters))
+            return math.nan if found is None else found
+        return given
+
+    @end.setter
+    def end(self, given: Scalar) -> None:
+        self.end_given = given
+
+    def parameter(self, name: str, default: Scalar | None = None, unit: str = "") -> sympy.Symbol:
         """Declare a parameter and return its symbol, to be used in attributes and drivers.
 
         Parameters
@@ -67,11 +83,12 @@ class Mechanism(MatrixViews, TextViews):
         name
             Name of the parameter.
         default
-            Its value where none is given at run time.
+            Its value where none is given at run time; an angle may be ``30*kc.deg``.
         unit
             Its unit, for documentation.
         """
-        self.parameters.append(Parameter(name, default, unit))
+        # `system` makes a number of it.
+        self.parameters.append(Parameter(name, cast("float", default), unit))
         return sympy.Symbol(str(name))
 
     def body(self, name: str, guess: Scalars = (0, 0, 0), outline: Sequence[Scalars] = ()) -> Body:
@@ -159,7 +176,7 @@ class Mechanism(MatrixViews, TextViews):
             bodies=self.bodies,
             outputs=self.outputs,
             length_unit=self.length_unit,
-            end=self.end,
+            end=self.end_given,
             points=self.points,
         )
 

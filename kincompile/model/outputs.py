@@ -24,7 +24,7 @@ from kincompile.model.expressions import (
     t,
 )
 from kincompile.model.points import BodyPoint, rate
-from kincompile.model.resolve import body_named, checked_expression, checked_point
+from kincompile.model.resolve import body_named, checked_expression, checked_point, named_tables
 from kincompile.names import rate as rate_name
 from kincompile.names import unit_problem
 
@@ -84,6 +84,11 @@ class ResolvedOutput:
     @property
     def is_driver(self) -> bool:
         """An output drives nothing."""
+        return False
+
+    @property
+    def corners(self) -> bool:
+        """An output drives nothing, and so has no corners of its own."""
         return False
 
 
@@ -192,12 +197,14 @@ def resolve_output(output: Output, scope: Scope, length_unit: str) -> ResolvedOu
         given = as_expression(given)
     if isinstance(given, sympy.Expr) and given.has(rate):
         given = _written_out(given, where, scope)
-    value = checked_expression(given, where, scope.declared | scope.motion.keys(), scope)
+    declared = scope.declared | scope.motion.keys()
+    value = checked_expression(given, where, declared, scope, unit=unit)
     if value is None or len(scope.problems) > before:
         return None
     occurring = {scope.motion[name][0] for name in symbol_names(value) if name in scope.motion}
     columns = tuple(sorted(occurring, key=scope.places.__getitem__))
-    return ResolvedOutput(output.name, as_sympy(value), unit, columns, output)
+    value = named_tables(as_sympy(value), output.name)
+    return ResolvedOutput(output.name, value, unit, columns, output)
 
 
 def _written_out(given: sympy.Expr, where: str, scope: Scope) -> sympy.Expr:

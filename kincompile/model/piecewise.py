@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, cast
 import sympy
 from sympy.core.relational import Relational
 
+from kincompile.model.laws import MotionLaw
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -20,19 +22,24 @@ TOLERANCE = 1e-9
 """A gap relative to the values on both sides: breakpoints are often given as decimal numbers."""
 
 _REMEDY = "let the pieces meet with equal value and slope"
+_ALLOW = "corners=True"
 
 
-def gap_problem(value: sympy.Expr) -> str | None:
+def gap_problem(value: sympy.Expr, *, corners: bool = False) -> str | None:
     """Return a message about a jump or a corner between pieces, or None.
 
     Velocities and accelerations need the first derivative to be continuous. A breakpoint or a
-    difference that is not a plain number, since it depends on parameters, is not looked at.
+    difference that is not a plain number, since it depends on parameters, is not looked at. With
+    `corners` the slope may jump.
 
     Returns
     -------
     str or None
         The breakpoint and the numbers on both sides, or None where no gap is seen.
     """
+    problem = _law_problem(value, corners=corners)
+    if problem:
+        return problem
     for symbol, place, reach in _breakpoints(value):
         before, after = (_at(value, symbol, place + side * reach) for side in (-1, 1))
         jump = _numbers_that_differ(before, after, symbol, place)
@@ -41,13 +48,37 @@ def gap_problem(value: sympy.Expr) -> str | None:
                 f"the pieces do not meet at {symbol} = {_text(place)}: {jump[0]:g} before, "
                 f"{jump[1]:g} after; {_REMEDY}"
             )
+        if corners:
+            continue
         corner = _numbers_that_differ(before.diff(symbol), after.diff(symbol), symbol, place)
         if corner:
             return (
                 f"the pieces meet in a corner at {symbol} = {_text(place)}: the slope is "
-                f"{corner[0]:g} before, {corner[1]:g} after; {_REMEDY}"
+                f"{corner[0]:g} before, {corner[1]:g} after; {_REMEDY}, or keep it: {_ALLOW}"
             )
     return None
+
+
+def _law_problem(value: sympy.Expr, *, corners: bool) -> str | None:
+    """Return a message about a motion law that jumps or has corners, or None."""
+    laws = sorted(value.atoms(MotionLaw), key=str)
+    for smooth, what in ((-1, "jump"), (0, "corner")):
+        rough = [law for law in laws if min(law.continuity - law.order, 1) == smooth]
+        if rough and not (corners and smooth == 0):
+            ends = sorted({end for law in rough for end in _ends(law)}, key=sympy.default_sort_key)
+            places = ", ".join(map(_text, ends))
+            names = ", ".join(dict.fromkeys(law.func.__name__ for law in rough))
+            remedy = f", or keep them: {_ALLOW}" if smooth == 0 else ""
+            return f"the law {names} has {what}s at t = {places}; take a smoother one{remedy}"
+    return None
+
+
+def _ends(law: MotionLaw) -> Iterator[sympy.Expr]:
+    """Yield the times at which a law begins and ends, where its argument is linear in time."""
+    argument, time = cast("sympy.Expr", law.args[0]), sympy.Symbol("t")
+    slope, start = argument.diff(time), argument.subs(time, 0)
+    if slope and not slope.has(time):
+        yield from (sympy.simplify((place - start) / slope) for place in (0, 1))
 
 
 def _text(place: sympy.Expr) -> str:

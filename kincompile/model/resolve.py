@@ -16,17 +16,22 @@ import sympy
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.expressions import (
+    Degree,
     NotAnExpressionError,
     Scalar,
     alpha,
     as_expression,
     as_sympy,
+    degrees_problem,
     depends_on,
     evaluate,
+    in_radians,
     smoothness_problem,
     symbol_names,
+    t,
     unknown_problem,
 )
+from kincompile.model.laws import MotionLaw, TableLaw
 from kincompile.model.spline import PeriodicSpline, fit
 from kincompile.names import listed, rate, suggestion
 
@@ -34,6 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from kincompile.calculus.template import Template
+    from kincompile.model.arguments import Argument
     from kincompile.model.constraint import Constraint
     from kincompile.model.equation import Equation
 
@@ -88,6 +94,11 @@ class Joint:
         return _text(self.written)
 
     @property
+    def corners(self) -> bool:
+        """Whether the slope of its value may jump."""
+        return self.written.corners
+
+    @property
     def is_driver(self) -> bool:
         """Whether its value is a function of time."""
         return depends_on(self.scalars.get("C", 0), ("t",))
@@ -102,6 +113,7 @@ class FreeEquation:
     columns: tuple[str, ...]
     equation_names: tuple[str, ...]
     source: str = "free equation"
+    corners: bool = False
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -169,21 +181,28 @@ def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
     before = len(scope.problems)
     if not equation.expressions:
         scope.problems.append(f"Equation {equation.name!r} has no expression; give at least one")
+    corners = _corners(equation.corners, f"Equation {equation.name!r}", scope)
     expressions = []
     for name, given in zip(equation.equation_names, equation.expressions, strict=True):
         where = f"equation {name!r}"
-        value = checked_expression(given, where, scope.declared, scope)
+        value = checked_expression(given, where, scope.declared, scope, corners=corners)
         if value is not None and not depends_on(value, scope.coordinate_names):
             scope.problems.append(
                 f"{where} contains no coordinate, so it cannot constrain anything; coordinates "
                 f"are: {listed(scope.coordinates)}"
             )
-        expressions.append(as_sympy(0 if value is None else value))
+        expressions.append(named_tables(as_sympy(0 if value is None else value), name))
     if len(scope.problems) > before:
         return None
     occurring = set().union(*(symbol_names(expression) for expression in expressions))
     columns = tuple(sorted(occurring & scope.places.keys(), key=scope.places.__getitem__))
-    return FreeEquation(equation.name, tuple(expressions), columns, equation.equation_names)
+    return FreeEquation(
+        equation.name,
+        tuple(expressions),
+        columns,
+        equation.equation_names,
+        corners=corners,
+    )
 
 
 def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
@@ -194,6 +213,7 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
     title = _title(constraint)
+    corners = _corners(constraint.corners, title, scope)
     for name, item in constraint.arguments().items():
         given, where = getattr(constraint, name), f"{title}, {name}"
         if item.kind is Kind.BODY:
@@ -204,7 +224,12 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
             table_name = f"{item.symbol}_{constraint.name}"
             profiles[item.symbol] = _profile(given, table_name, where, scope)
         else:
-            scalars[item.symbol] = _scalar(given, item.kind, where, scope)
+            value = _scalar(given, item, where, scope, corners=corners)
+            scalars[item.symbol] = named_tables(value, constraint.name)
+    if "C" not in scalars and corners:
+        scope.problems.append(
+            f"{title}: it drives nothing, so it has no corners; leave corners out"
+        )
     known = [body for body in bodies if body is not None]
     if len(known) == len(bodies):
         _check_bodies(constraint, known, scope)
@@ -224,6 +249,13 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
 
 def _title(constraint: Constraint) -> str:
     return f"{type(constraint).__name__} {constraint.name!r}"
+
+
+def _corners(given: Any, title: str, scope: Scope) -> bool:
+    """Return whether corners are allowed."""
+    if not isinstance(given, bool):
+        scope.problems.append(f"{title}, corners: {given!r} is neither True nor False")
+    return given is True
 
 
 def body_named(given: Any, where: str, scope: Scope) -> Body | None:
@@ -256,9 +288,15 @@ def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> N
 
 
 def checked_expression(
-    given: Any, where: str, declared: Collection[str], scope: Scope
+    given: Any,
+    where: str,
+    declared: Collection[str],
+    scope: Scope,
+    *,
+    unit: str = "",
+    corners: bool = False,
 ) -> Scalar | None:
-    """Return a checked expression, or None where a problem was noted."""
+    """Return a checked expression, with radians for degrees; None where a problem was noted."""
     try:
         value = as_expression(given)
     except NotAnExpressionError as error:
@@ -266,7 +304,11 @@ def checked_expression(
         return None
     if not isinstance(value, sympy.Expr):
         return value
-    problem = smoothness_problem(value)
+    problem = smoothness_problem(value, corners=corners)
+    # Rare, so that large mechanisms pay for one look alone.
+    if problem is None and (laws := value.atoms(Degree, MotionLaw)):
+        problem = degrees_problem(value, unit) or _falling_problem(laws, scope)
+        value = in_radians(value)
     if problem is not None:
         scope.problems.append(f"{where}: {problem}")
         return None
@@ -277,9 +319,38 @@ def checked_expression(
     return value
 
 
-def _attribute(given: Any, where: str, scope: Scope) -> Scalar:
+def _falling_problem(laws: Set[sympy.Basic], scope: Scope) -> str | None:
+    """Return a message about a motion law whose argument falls with time, or None."""
+    for law in sorted((item for item in laws if isinstance(item, MotionLaw)), key=str):
+        argument = cast("sympy.Expr", law.args[0])
+        slope = evaluate(argument.diff(t), scope.defaults)
+        if slope is not None and slope <= 0 and argument.has(t):
+            return (
+                f"the times of {law} must rise, but at the default parameters its argument changes "
+                f"by {slope:g} per unit of time"
+            )
+    return None
+
+
+def named_tables(value: Any, name: str) -> Any:
+    """Return an expression whose tables over time are called after a constraint."""
+    if not isinstance(value, sympy.Expr) or not value.has(TableLaw):
+        return value
+    tables = sorted(value.atoms(TableLaw), key=lambda item: item.given)
+    numbers = {given: k for k, given in enumerate(dict.fromkeys(item.given for item in tables))}
+    stem = f"C_{name}".replace(".", "_")
+    named = {
+        item: item.called(f"{stem}_{numbers[item.given]}" if numbers[item.given] else stem)(
+            *item.args
+        )
+        for item in tables
+    }
+    return value.xreplace(named)
+
+
+def _attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar:
     """Return an attribute: a number or an expression of parameters."""
-    value = checked_expression(given, where, scope.declared, scope)
+    value = checked_expression(given, where, scope.declared, scope, unit=unit)
     if value is None:
         return 1
     if not isinstance(value, sympy.Expr):
@@ -294,16 +365,18 @@ def _attribute(given: Any, where: str, scope: Scope) -> Scalar:
     return value
 
 
-def _scalar(given: Any, kind: Kind, where: str, scope: Scope) -> Scalar:
+def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bool) -> Scalar:
+    kind, unit = item.kind, item.unit
     if kind in (Kind.SCALAR, Kind.RADIUS):
-        value = _attribute(given, where, scope)
+        value = _attribute(given, where, scope, unit)
         if kind is Kind.RADIUS and evaluate(value, scope.defaults) == 0:
             scope.problems.append(
                 f"{where}: the radius is zero; give the pitch radius "
                 "(negative for an internal gear)"
             )
         return value
-    value_or_none = checked_expression(given, where, scope.declared, scope)
+    declared = scope.declared
+    value_or_none = checked_expression(given, where, declared, scope, unit=unit, corners=corners)
     if value_or_none is None:
         return 1
     coordinates = sorted(symbol_names(value_or_none) & scope.coordinate_names)
@@ -338,7 +411,8 @@ def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
             "give two numbers, or expressions of parameters"
         )
         return 1, 1
-    point = _attribute(xi, where, scope), _attribute(eta, where, scope)
+    unit = "" if kind is Kind.AXIS else "length"
+    point = _attribute(xi, where, scope, unit), _attribute(eta, where, scope, unit)
     if kind is Kind.AXIS and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
         scope.problems.append(f"{where}: the axis has length zero; give a direction such as (1, 0)")
     return point
@@ -369,7 +443,7 @@ def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Exp
             "give an expression of kc.alpha, or two lists of equal length"
         )
         return sympy.S.One
-    value = checked_expression(given, where, {*scope.parameters, alpha.name}, scope)
+    value = checked_expression(given, where, {*scope.parameters, alpha.name}, scope, unit="length")
     rho: sympy.Expr = as_sympy(1 if value is None else value)
     return rho
 

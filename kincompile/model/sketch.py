@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import sympy
 
     from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+    from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Point
 
 Item = TypeVar("Item", bound=Constraint | Equation)
@@ -51,12 +52,12 @@ class Sketch:
     """
 
     def __init__(
-        self, name: str, *, length_unit: str = "m", end: float = 1.0, points: int = 101
+        self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
     ) -> None:
         self._mechanism = Mechanism(name, length_unit=length_unit, end=end, points=points)
         self._drawn = Drawn(self._mechanism)
 
-    def parameter(self, name: str, default: float | None = None, unit: str = "") -> sympy.Symbol:
+    def parameter(self, name: str, default: Scalar | None = None, unit: str = "") -> sympy.Symbol:
         """Declare a parameter and return its symbol, as `Mechanism.parameter` does."""
         return self._mechanism.parameter(name, default, unit)
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from kincompile.model.bodies import GROUND, Body
+from kincompile.model.bodies import GROUND, Body, default_values
 from kincompile.model.expressions import NotAnExpressionError, Scalar, as_expression
 from kincompile.model.link_shape import Outline, number, pairs_by_name
 from kincompile.names import listed, suggestion
@@ -132,8 +132,7 @@ class Drawn:
     @property
     def values(self) -> dict[str, float]:
         """Default values of the parameters declared so far."""
-        declared = self.mechanism.parameters
-        return {item.name: item.default for item in declared if item.default is not None}
+        return default_values(self.mechanism.parameters)
 
     def _scalar(self, given: Any, what: str) -> Scalar:
         """Return a number or an expression; note what is wrong with it, and go on with 1."""

@@ -108,6 +108,25 @@ def fit(angles: Any, radii: Any) -> SplineTable:
     return SplineTable(breaks, tuple(tuple(row) for row in pieces.c.T[keep].tolist()))
 
 
+def fit_between(times: Any, values: Any, velocities: Any) -> SplineTable:
+    """Interpolate values over time by a quintic spline without acceleration at its ends.
+
+    Parameters
+    ----------
+    times, values
+        Rising times and the value at each, shape (M,), M at least 2.
+    velocities
+        At the first time and at the last.
+    """
+    from scipy.interpolate import PPoly, make_interp_spline
+
+    ends = tuple([(1, velocity), (2, 0.0)] for velocity in velocities)
+    pieces = PPoly.from_spline(make_interp_spline(times, values, k=DEGREE, bc_type=ends))
+    keep = np.diff(pieces.x) > 0
+    breaks = (*pieces.x[:-1][keep].tolist(), times[-1])
+    return SplineTable(breaks, tuple(map(tuple, pieces.c.T[keep].tolist())))
+
+
 def _numbers(values: Any) -> np.ndarray:
     array = np.asarray(values)
     if array.dtype.kind == "c":

@@ -13,7 +13,13 @@ from kincompile.errors import ModelError
 from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter, body_columns
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.equation import Equation
-from kincompile.model.expressions import NotAnExpressionError, as_expression, evaluate
+from kincompile.model.expressions import (
+    NotAnExpressionError,
+    Scalar,
+    as_expression,
+    degrees_problem,
+    number_in,
+)
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.outputs import (
     Output,
@@ -63,6 +69,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         As written, with their arguments resolved: the rows of Phi_q.
     equations : tuple of str
         Names of the equations, in order.
+    end : float
+        The last time, at the default parameters; `end_given` is it as it was given.
     body_points : tuple of BodyPoint
         The named points.
     outputs : tuple of ResolvedOutput
@@ -75,8 +83,8 @@ class ConstraintSystem(MatrixViews, TextViews):
     """
 
     __slots__ = (
-        "bodies", "body_points", "constraints", "coordinates", "end", "equations", "length_unit",
-        "name", "outputs", "parameters", "points",
+        "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
+        "length_unit", "name", "outputs", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -89,6 +97,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     outputs: tuple[ResolvedOutput, ...]
     length_unit: str
     end: float
+    end_given: Scalar
     points: int
 
     def __init__(
@@ -102,7 +111,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         bodies: Iterable[Body] = (),
         outputs: Iterable[BodyPoint | Output] = (),
         length_unit: str = "m",
-        end: float = 1.0,
+        end: Scalar = 1.0,
         points: int = 101,
     ) -> None:
         problems: list[str] = []
@@ -116,6 +125,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             *_contact_coordinates(written, defaults, problems),
         ]
         _check_outlines(bodies, defaults, problems)
+        last: Any = _number(end, "end", defaults, problems) if isinstance(end, sympy.Expr) else end
         wanted = _items(outputs, "outputs", problems)
         body_points = tuple(item for item in wanted if isinstance(item, BodyPoint))
         named = (*outputs_of_points(body_points), *(x for x in wanted if isinstance(x, Output)))
@@ -147,7 +157,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
             "outputs": tuple(item for item in found_outputs if item is not None),
-            "length_unit": length_unit, "end": end, "points": points,
+            "length_unit": length_unit, "end": last, "end_given": end, "points": points,
         }  # fmt: skip
         for key, value in values.items():
             object.__setattr__(self, key, value)
@@ -240,13 +250,18 @@ def _name_of(item: Any) -> str:
     return str(item.func.__name__) if isinstance(item, sympy.Function) else str(item)
 
 
-def _number(given: Any, where: str, values: dict[str, float], problems: list[str]) -> float:
-    """Return a finite number from a number or an expression of parameters."""
+def _number(
+    given: Any, where: str, values: dict[str, float], problems: list[str], unit: str = ""
+) -> float:
+    """Return a finite number, angles in radians, from a number or an expression of parameters."""
     try:
-        number = evaluate(as_expression(given), values)
+        number = number_in(as_expression(given), unit, values)
     except NotAnExpressionError as error:
         problems.append(f"{where}: {error}; give a finite number")
         return 0.0
+    problem = degrees_problem(given, unit)
+    if problem:
+        problems.append(f"{where}: {problem}")
     if number is None:
         problems.append(
             f"{where}: {given} is not a number at the default parameters; give a finite number"
@@ -277,7 +292,8 @@ def _parameters(
                 f"parameter({item.name!r}, 1.0)"
             )
         else:
-            default = _number(default, f"parameter {item.name!r}", {}, problems)
+            unit = str(item.unit)
+            default = _number(default, f"parameter {item.name!r}", {}, problems, unit)
         checked.append(Parameter(item.name, default, item.unit))
     return tuple(checked)
 
@@ -297,8 +313,10 @@ def _body_coordinates(
             problems.append(f"body {body.name!r}: the guess {body.guess!r} is not ({expected})")
             guess = kind.ground
         for name, value, own in zip(body.coordinates, guess, kind.units, strict=True):
-            number = _number(value, f"guess of {name}", values, problems)
-            found.append(Coordinate(name, number, unit if own is None else own))
+            where, own_unit = f"guess of {name}", unit if own is None else own
+            found.append(
+                Coordinate(name, _number(value, where, values, problems, own_unit), own_unit)
+            )
     return found
 
 

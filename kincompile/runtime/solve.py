@@ -28,6 +28,7 @@ from kincompile.errors import (
     SolveError,
 )
 from kincompile.names import listed
+from kincompile.runtime.corners import after_corners, corners_of, with_corners
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.problem import problem
@@ -148,6 +149,8 @@ def solve(
         When the motion went through a bifurcation, with the time.
     AssemblyWarning
         When there are several ways to assemble the mechanism, and no guess chooses one.
+    CornerWarning
+        When a driver has a corner at one of the times, with the times.
     SingularConfigurationWarning
         When it converged at points so near to a singular configuration that their rates have lost
         digits, with the time. A motion that ends at one has a status and an event instead.
@@ -157,6 +160,8 @@ def solve(
     sets = inputs.sets
     if assembly is not None:
         inputs = _at_assembly(inputs, guess, assembly)
+    times, corners = inputs.t, corners_of(inputs, sets)
+    inputs = after_corners(inputs, corners)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if sets is None:
             motion, outcome = follow(inputs, progress)
@@ -169,6 +174,7 @@ def solve(
     if start:
         warnings.warn(start, AssemblyWarning, stacklevel=2)
         solution = replace(solution, message=f"{start} {solution.message}")
+    solution = with_corners(solution, times, corners)
     if throw and not solution.success:
         raise SolveError(solution.message, solution)
     return solution

@@ -43,4 +43,10 @@ class Status(IntEnum):
         "square root or logarithm of a negative number, or a driver that is not defined at this "
         "time.",
     )
+    CORNER = (
+        5,
+        "A driver has a corner here: position and velocity were found, the velocity after the "
+        "corner; there is no acceleration. Take a smooth motion law, or round the corner off, "
+        "where one is needed.",
+    )
     NOT_REACHED = 4, "Not tried, because an earlier point failed. Remove the cause of that failure."

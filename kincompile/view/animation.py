@@ -16,7 +16,7 @@ from kincompile.names import listed, suggestion
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.view.drawing import drawing
-from kincompile.view.marks import BodyPoint
+from kincompile.view.marks import FramePoint
 from kincompile.view.mechanism_plot import draw, move, require_bodies
 from kincompile.writing import require_writable, write_atomically
 
@@ -88,7 +88,7 @@ def animate(
         _require_writer(Path(path), animation.writers.is_available)
     system = _moving(solution, model)
     rows, interval = frame_rows(solution, seconds)
-    drawn = drawing(system, solution.parameters, solution.q[solution.status == 0])
+    drawn = drawing(system, solution.parameters, solution.q[solution.good])
     traced = _traced(drawn, trace)
     figure, ax = plt.subplots(layout="constrained")
     show = _first_frame(ax, system, drawn, solution, rows, traced)
@@ -110,10 +110,10 @@ def _first_frame(
     drawn: Drawing,
     solution: Solution,
     rows: NDArray[np.intp],
-    traced: Iterable[BodyPoint],
+    traced: Iterable[FramePoint],
 ) -> Callable[[int], None]:
     """Draw the first frame, and return what shows another one."""
-    positions = solution.q[solution.status == 0]
+    positions = solution.q[solution.good]
     artists = draw(ax, system, drawn, positions)
     for point in traced:
         ax.plot(*point.at(positions).T, color="0.5", linewidth=1, zorder=1)
@@ -137,7 +137,7 @@ def frame_rows(solution: Solution, seconds: float | None) -> tuple[NDArray[np.in
     interval : int
         Time from frame to frame [ms], a multiple of `TICK`.
     """
-    good = np.flatnonzero(solution.status == 0)
+    good = np.flatnonzero(solution.good)
     t = solution.t[good]
     duration = abs(float(t[-1] - t[0]))
     length = min(max(duration, SHORTEST), LONGEST) if seconds is None else float(seconds)
@@ -154,7 +154,7 @@ def _moving(solution: Solution, model: Mechanism | ConstraintSystem | None) -> C
     require_solution(solution)
     name = solution.name
     solution.require_one_motion("an animation shows", "solve with one of the parameter sets")
-    if not (solution.status == 0).any():
+    if not solution.good.any():
         raise InputError(f"{name} has no position that could be shown. {solution.message}")
     found = model_of(solution.module) if model is None else system_of(model)
     if found is None:
@@ -183,10 +183,10 @@ def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
     require_writable(path)
 
 
-def _traced(drawn: Drawing, names: Iterable[str]) -> list[BodyPoint]:
+def _traced(drawn: Drawing, names: Iterable[str]) -> list[FramePoint]:
     """Return the points to be traced."""
     frames = zip(drawn.bodies, drawn.frames, strict=True)
-    places = {body: BodyPoint(frame, (0.0, 0.0)) for body, frame in frames}
+    places = {body: FramePoint(frame, (0.0, 0.0)) for body, frame in frames}
     places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
     for name in (chosen := list(names)):
         if name not in places:

@@ -5,26 +5,26 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING
 
-from kincompile.view.marks import Link, Outline, moves_with
+from kincompile.view.marks import Hull, Polygon, moves_with
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from kincompile.model.bodies import Body
     from kincompile.view.geometry import Geometry
-    from kincompile.view.marks import BodyPoint, Mark, PlaneFrame, Point
+    from kincompile.view.marks import FramePoint, Mark, PlaneFrame, Point
 
 SAME_POINT = 1e-9
 """Distance, relative to the coordinates, up to which two points of a body are one."""
 
 
-def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Outline]:
+def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Polygon]:
     """Return the outlines of those bodies that have one.
 
     From back to front: the first body hides what slides in it.
     """
     found = [
-        Outline(geometry.frames[body.name], tuple(map(geometry.pair, body.outline)))
+        Polygon(geometry.frames[body.name], tuple(map(geometry.pair, body.outline)))
         for body in bodies
         if len(body.outline)
     ]
@@ -32,8 +32,8 @@ def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Outline]:
 
 
 def links(
-    frames: Iterable[PlaneFrame], attached: Iterable[BodyPoint], marks: Sequence[Mark]
-) -> list[Link]:
+    frames: Iterable[PlaneFrame], attached: Iterable[FramePoint], marks: Sequence[Mark]
+) -> list[Hull]:
     """Return the hulls of bodies without an outline; of one point only where no mark shows it.
 
     Parameters
@@ -45,7 +45,7 @@ def links(
     marks
         All other marks, outlines included.
     """
-    outlined = {mark.frame for mark in marks if isinstance(mark, Outline)}
+    outlined = {mark.frame for mark in marks if isinstance(mark, Polygon)}
     shown = {frame for mark in marks for frame in moves_with(mark)}
     found = []
     for frame in sorted(set(frames) - outlined):
@@ -53,7 +53,7 @@ def links(
         if len(points) < 2:
             points = _distinct([*points, (0.0, 0.0)])
         if len(points) > 1 or frame not in shown:
-            found.append(Link(frame, _hull(points)))
+            found.append(Hull(frame, _hull(points)))
     return found
 
 

@@ -15,8 +15,8 @@ from kincompile.view.geometry import Geometry, JointGeometry
 from kincompile.view.joint_shapes import marks_of
 from kincompile.view.marks import (
     GROUND_FRAME,
-    BodyPoint,
     Drive,
+    FramePoint,
     Mark,
     Pin,
     PlaneFrame,
@@ -62,7 +62,7 @@ class JointLabel:
 
     name: str
     kind: str
-    place: BodyPoint | None
+    place: FramePoint | None
     is_driver: bool
     rows: tuple[int, int]
 
@@ -164,7 +164,7 @@ def drawing(
 
 
 def _labels(
-    system: ConstraintSystem, places: Mapping[str, BodyPoint | None]
+    system: ConstraintSystem, places: Mapping[str, FramePoint | None]
 ) -> tuple[JointLabel, ...]:
     """Return the labels of the constraints, in order."""
     return tuple(
@@ -185,7 +185,7 @@ def _finite(q: ArrayLike) -> Array:
     return positions[np.isfinite(positions).all(axis=1)]
 
 
-def _pointed_at(marks: Iterable[Mark], attached: Iterable[BodyPoint]) -> BodyPoint | None:
+def _pointed_at(marks: Iterable[Mark], attached: Iterable[FramePoint]) -> FramePoint | None:
     """Return the place of a joint: its pin or drive, else its last moving point."""
     pins = [mark.second for mark in marks if isinstance(mark, Pin)]
     drives = [mark.place for mark in marks if isinstance(mark, Drive)]
@@ -245,7 +245,7 @@ def _uncovered(marks: Iterable[Mark], outlined: set[PlaneFrame]) -> list[Mark]:
     ]
 
 
-_DEPTHS = ("rail", "wheel", "contour", "outline", "link", "span", "slider", "pin", "drive")
+_DEPTHS = ("rail", "wheel", "contour", "polygon", "hull", "span", "slider", "pin", "drive")
 
 
 def _depth(mark: Mark) -> int:

@@ -154,7 +154,7 @@ def assembly_gallery(
             warnings.simplefilter("ignore", KincompileWarning)  # each card says how it went
             solution = solve(module, times, p, guess)
         data = page_data(system, _moved(solution, guess), solution.message)
-        good = int(np.count_nonzero(solution.status == 0))
+        good = int(np.count_nonzero(solution.good))
         last = "the end" if solution.success else f"t = {times[max(good - 1, 0)]:g}"
         cards.append(_card({**data, "rest": 0.0}, f"Assembly {number}", f"moves to {last}"))
     title = f"Assemblies of {escape(system.name)} at t = {t:g}"
@@ -163,7 +163,7 @@ def assembly_gallery(
 
 def _moved(solution: Solution, guess: NDArray[np.float64]) -> Solution:
     """Return the points that were found, or the assembly alone where there are none."""
-    good = max(1, int(np.count_nonzero(solution.status == 0)))
+    good = max(1, int(np.count_nonzero(solution.good)))
     q = solution.q[:good].copy()
     if np.isnan(q[0]).any():
         q[0] = guess

@@ -13,7 +13,7 @@ from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND
 from kincompile.model.expressions import alpha, as_expression, depends_on, evaluate
 from kincompile.model.joints import Revolute
-from kincompile.view.marks import GROUND_FRAME, BodyPoint, Contour, Pin, Rail, Span, Wheel
+from kincompile.view.marks import GROUND_FRAME, Contour, FramePoint, Pin, Rail, Span, Wheel
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -67,11 +67,11 @@ class Geometry:
         symbols = [item.symbol for item in arguments if item.kind is Kind.BODY]
         return self.frames.get(joint.bodies[symbols.index(owner)].name, GROUND_FRAME)
 
-    def point(self, joint: Joint, symbol: str) -> BodyPoint:
+    def point(self, joint: Joint, symbol: str) -> FramePoint:
         """Return a point of a joint, in the frame of its body."""
-        return BodyPoint(self.frame_of(joint, symbol), self.pair(joint.points[symbol]))
+        return FramePoint(self.frame_of(joint, symbol), self.pair(joint.points[symbol]))
 
-    def points(self, joints: Iterable[Joint]) -> list[BodyPoint]:
+    def points(self, joints: Iterable[Joint]) -> list[FramePoint]:
         """Return every point that joints hold; the pitch line of a rack is drawn as such."""
         return [
             self.point(joint, item.symbol)
@@ -81,11 +81,11 @@ class Geometry:
         ]
 
     @cached_property
-    def bearings(self) -> dict[PlaneFrame, BodyPoint]:
+    def bearings(self) -> dict[PlaneFrame, FramePoint]:
         """The point of each frame's first revolute joint, one with the ground first."""
         revolutes = [joint for joint in self.joints if isinstance(joint.written, Revolute)]
         revolutes.sort(key=lambda joint: not _is_on_ground(joint))
-        found: dict[PlaneFrame, BodyPoint] = {}
+        found: dict[PlaneFrame, FramePoint] = {}
         for point in self.points(revolutes):
             found.setdefault(point.frame, point)
         return found
@@ -129,7 +129,7 @@ class JointGeometry:
         """Whether its value is a function of time."""
         return self.joint.is_driver
 
-    def point(self, symbol: str) -> BodyPoint:
+    def point(self, symbol: str) -> FramePoint:
         """Return a point of the constraint, in the frame of its body."""
         return self.mechanism.point(self.joint, symbol)
 
@@ -147,13 +147,13 @@ class JointGeometry:
         """Return a scalar attribute, None where it is a function of time."""
         return None if depends_on(self.joint.scalars[symbol], ("t",)) else self.number(symbol)
 
-    def bearing(self) -> BodyPoint:
+    def bearing(self) -> FramePoint:
         """Return where the last moving body is held: a turning drive is drawn there."""
         frames = (self.mechanism.frames.get(body.name) for body in reversed(self.joint.bodies))
         frame = next(frame for frame in frames if frame is not None)
-        return self.mechanism.bearings.get(frame, BodyPoint(frame, (0.0, 0.0)))
+        return self.mechanism.bearings.get(frame, FramePoint(frame, (0.0, 0.0)))
 
-    def pin(self, first: BodyPoint, second: BodyPoint) -> Pin:
+    def pin(self, first: FramePoint, second: FramePoint) -> Pin:
         """Return the pin of two points, one on the ground first."""
         if second.frame == GROUND_FRAME:
             first, second = second, first
@@ -181,9 +181,9 @@ class JointGeometry:
 
     def rail(
         self,
-        base: BodyPoint,
+        base: FramePoint,
         axis: Point,
-        follower: BodyPoint,
+        follower: FramePoint,
         *,
         style: str = "guide",
         offset: float = 0.0,
@@ -215,9 +215,9 @@ def _is_on_ground(joint: Joint) -> bool:
     return any(body.is_ground for body in joint.bodies)
 
 
-def _along(q: Array, base: BodyPoint, axis: Point, follower: BodyPoint) -> Array:
+def _along(q: Array, base: FramePoint, axis: Point, follower: FramePoint) -> Array:
     """Return the distance of the follower along the axis, shape (N,)."""
     start = base.at(q)
-    tip = BodyPoint(base.frame, (base.point[0] + axis[0], base.point[1] + axis[1]))
+    tip = FramePoint(base.frame, (base.point[0] + axis[0], base.point[1] + axis[1]))
     apart, direction = follower.at(q) - start, tip.at(q) - start
     return np.asarray(np.sum(apart * direction, axis=-1), dtype=np.float64)

@@ -24,8 +24,8 @@ from kincompile.model.relative import Distance, RelativeAngle, RelativeX, Relati
 from kincompile.view.geometry import JointGeometry
 from kincompile.view.marks import (
     GROUND_FRAME,
-    BodyPoint,
     Drive,
+    FramePoint,
     Mark,
     Pin,
     Point,
@@ -101,7 +101,7 @@ def _absolute(axis: Point, across: Point) -> DrawJoint:
         place, value = joint.point("s_i"), joint.constant("C")
         if value is None:
             return [Drive(joint.name, place, axis)]
-        base = BodyPoint(GROUND_FRAME, (value * axis[0], value * axis[1]))
+        base = FramePoint(GROUND_FRAME, (value * axis[0], value * axis[1]))
         return [joint.rail(base, across, place), Pin(joint.name, place, place)]
 
     return drawing

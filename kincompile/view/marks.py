@@ -64,7 +64,7 @@ def in_ground(q: Array, frame: PlaneFrame, points: Array | Point) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class BodyPoint:
+class FramePoint:
     """A point fixed in a frame."""
 
     frame: PlaneFrame
@@ -76,7 +76,7 @@ class BodyPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class Hull:
     """A body as the convex hull of its joint points; two points are a bar, one is a dot."""
 
     frame: PlaneFrame
@@ -84,7 +84,7 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
-class Outline:
+class Polygon:
     """A body as the closed polygon that its author gave."""
 
     frame: PlaneFrame
@@ -96,8 +96,8 @@ class Pin:
     """Two points that a joint holds together; hatched where the first is on the ground."""
 
     joint: str
-    first: BodyPoint
-    second: BodyPoint
+    first: FramePoint
+    second: FramePoint
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ class Slider:
     """A slider: a block at a point, along an axis of unit length in the same frame."""
 
     joint: str
-    place: BodyPoint
+    place: FramePoint
     axis: Point
 
 
@@ -134,8 +134,8 @@ class Span:
     """
 
     joint: str
-    first: BodyPoint
-    second: BodyPoint
+    first: FramePoint
+    second: FramePoint
     style: str
 
 
@@ -144,7 +144,7 @@ class Wheel:
     """The pitch circle of a gear, with a tick in the direction `theta` [rad] that shows turning."""
 
     joint: str
-    place: BodyPoint
+    place: FramePoint
     radius: float
     theta: float
     is_internal: bool
@@ -165,11 +165,11 @@ class Drive:
     """A driver at a point: along `axis`, a direction of the ground, or turning where it is None."""
 
     joint: str
-    place: BodyPoint
+    place: FramePoint
     axis: Point | None
 
 
-Mark: TypeAlias = Link | Outline | Pin | Rail | Slider | Span | Wheel | Contour | Drive
+Mark: TypeAlias = Hull | Polygon | Pin | Rail | Slider | Span | Wheel | Contour | Drive
 
 
 def moves_with(mark: Mark) -> set[PlaneFrame]:
@@ -177,12 +177,12 @@ def moves_with(mark: Mark) -> set[PlaneFrame]:
     return {place.frame for place, _ in reach(mark)}
 
 
-def reach(mark: Mark) -> list[tuple[BodyPoint, float]]:
+def reach(mark: Mark) -> list[tuple[FramePoint, float]]:
     """Return the points of a mark, each with the distance that the mark reaches beyond it."""
     match mark:
         case Wheel():
             return [(mark.place, mark.radius)]
-        case Link() | Outline() | Contour():
+        case Hull() | Polygon() | Contour():
             points = mark.points
         case Rail():
             points = (mark.start, mark.end)
@@ -190,4 +190,4 @@ def reach(mark: Mark) -> list[tuple[BodyPoint, float]]:
             return [(mark.first, 0.0), (mark.second, 0.0)]
         case Slider() | Drive():
             return [(mark.place, 0.0)]
-    return [(BodyPoint(mark.frame, point), 0.0) for point in points]
+    return [(FramePoint(mark.frame, point), 0.0) for point in points]

@@ -13,14 +13,14 @@ import numpy as np
 
 from kincompile.view.marks import (
     GROUND_FRAME,
-    BodyPoint,
     Contour,
     Drive,
-    Link,
+    FramePoint,
+    Hull,
     Mark,
-    Outline,
     Pin,
     PlaneFrame,
+    Polygon,
     Rail,
     Slider,
     Span,
@@ -125,8 +125,8 @@ class Polyline:
     look: str
     frame: PlaneFrame
     points: Array
-    start: BodyPoint | None = None
-    end: BodyPoint | None = None
+    start: FramePoint | None = None
+    end: FramePoint | None = None
     is_area: bool = False
 
     def at(self, q: Array) -> Array:
@@ -150,9 +150,9 @@ def polylines(drawn: Drawing) -> list[Polyline]:
 def of_mark(mark: Mark, size: float) -> Iterable[Polyline]:
     """Return the lines and areas of a mark, in a drawing with marks of a size."""
     match mark:
-        case Link():
+        case Hull():
             return _link(mark, size)
-        case Outline():
+        case Polygon():
             return [Polyline("body", mark.frame, _array(mark.points), is_area=True)]
         case Pin():
             return _pin(mark, size)
@@ -179,7 +179,7 @@ def _left_of(direction: Array) -> Array:
     return np.array((-direction[1], direction[0]))
 
 
-def _link(mark: Link, size: float) -> list[Polyline]:
+def _link(mark: Hull, size: float) -> list[Polyline]:
     """Draw a bar between two points, an area between more, a disc at one."""
     points = _array(mark.points)
     if len(points) == 1:

@@ -219,12 +219,12 @@ function drawTeeth(pen, [x, y], mark, angle, strong) {
 }
 
 const DRAW = {
-  link(pen, mark) {
+  hull(pen, mark) {
     const points = mark.points.map(point => pen.at(mark.frame, point));
     pen.plate(points, 2.1 * pen.unit, pen.colours(mark.frame), points.length > 2);
   },
 
-  outline(pen, mark) {
+  polygon(pen, mark) {
     pen.path(mark.points.map(point => pen.at(mark.frame, point)), true);
     const [strong, tint] = pen.colours(mark.frame);
     pen.fill(tint);

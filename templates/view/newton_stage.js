@@ -135,7 +135,7 @@ class NewtonStage {
     const [x, y] = view.toScreen(inWorld(q, frame, [0, 0]));
     const [knobX, knobY] = [x + KNOB * Math.cos(phi), y - KNOB * Math.sin(phi)];
     const hull = player.data.drawing.marks.find(
-      mark => mark.kind === 'link' && mark.frame.index === frame.index);
+      mark => mark.kind === 'hull' && mark.frame.index === frame.index);
     const corners = hull ? hull.points.map(point => view.toScreen(inWorld(q, frame, point))) : [];
     link.setAttribute('points', corners.join(' '));
     for (const circle of atOrigin) setAttributes(circle, { cx: x, cy: y });

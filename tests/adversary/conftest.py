@@ -21,7 +21,7 @@ def record(request, tmp_path):
     def record(*, tried, wrong, gave_up=0, slowest=None):
         seconds = time.process_time() - started
         counts = {
-            "test": request.node.nodeid, "tried": tried, "wrong": wrong, "gave_up": gave_up,
+            "test": request.node.name, "tried": tried, "wrong": int(wrong), "gave_up": int(gave_up),
             "slowest": seconds / max(tried, 1) if slowest is None else slowest, "total": seconds,
         }  # fmt: skip
         name = "".join(c if c.isalnum() else "_" for c in request.node.name)

@@ -156,10 +156,10 @@ def verdict(path, mutant, system):
         return True, None
 
 
-CASES = [("four_bar", "inline", 8), ("slider_crank", "inline", 8), ("four_bar", "grouped", 8)]
+CASES = [("four_bar", "inline", 8), ("slider_crank", "inline", 8), ("four_bar", "grouped", 12)]
 EVERY = [
     *((name, "inline", 1) for name in ("four_bar", "slider_crank", "inverted_slider_crank")),
-    *(("stephenson", "inline", 1), ("cam_flat_follower", "inline", 3)),
+    *(("stephenson", "inline", 2), ("cam_flat_follower", "inline", 4)),
     *(("four_bar", "grouped", 1), ("coupled", "grouped", 2)),
 ]
 

@@ -94,7 +94,11 @@ CASES = {
     "points fraction": (GOOD, "run M --points 2.5", ["'--points': '2.5' is not"]),
     "end nan": (GOOD, "run M --end nan", ["--end nan: give a finite time"]),
     "end infinite": (GOOD, "run M --end inf", ["--end inf: give a finite time"]),
-    "end text": (GOOD, "run M --end late", ["'--end': 'late' is not a valid float"]),
+    "end text": (
+        GOOD,
+        "run M --end late",
+        ["--end late: give a time, such as 0.25 or 30deg: there is no 'late'"],
+    ),
     "one point": (GOOD, "run M --end 2 --points 1", ["one point is the time 0 alone"]),
     "own points": (GOOD.replace("3)", "0)"), "run M", ["points = 0: give", "at least one point"]),
     "own end": (GOOD.replace("points=3", "end='x'"), "run M", ["end = 'x', points = 101: give"]),

@@ -23,6 +23,7 @@ FIGURES = {
     "shaper": "the ram's stroke is 0.311110 m",
     "double_wishbone": "camber from -0.012 to +0.549 degrees",
     "cam_by_table": "highest: 60.000 mm at a cam angle of 270 degrees",
+    "swing_and_dwell": "the arm's largest speed is 1.760 times the mean of its swing",
     "slot_follower": "back at 152.95, where it was: 152.95",
 }
 

@@ -26,6 +26,7 @@ import kincompile as kc
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.expressions import SMOOTH
+from kincompile.model.laws import RISES, MotionLaw
 from kincompile.model.spline import PeriodicSpline
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.py"))
@@ -89,6 +90,7 @@ class Case:
         """Evaluate a SymPy matrix in every state; a single column loses its last axis."""
         names = [item.name for item in self.model.system().parameters]
         symbols = [*self.model.q, *self.model.q_dot, kc.t, *map(sympy.Symbol, names)]
+        matrix = matrix.replace(lambda e: isinstance(e, MotionLaw), lambda e: e.in_pieces())
         # A symbol may have the name of a function.
         dummies = [sympy.Dummy() for _ in symbols]
         matrix = matrix.xreplace(dict(zip(symbols, dummies, strict=True)))
@@ -203,6 +205,31 @@ def awkward() -> Case:
     return Case.of(m, np.random.default_rng(2).uniform(1, 2, (STATES, len(names))))
 
 
+def laws() -> Case:
+    """Return all motion laws, their first derivatives and a table, at times on all their pieces."""
+    names = ("T", "h", "T_0")
+    duration, h, begin = sympy.symbols(names)
+    rises = [
+        law((kc.t - begin) / duration, *((sympy.Rational(2, 5),) if law.nargs == {2} else ()))
+        for law in RISES.values()
+    ]
+    table = kc.motion.table([0.1, 0.4, 0.5, 0.9], [1, 2, -1, 0.5], velocities=(0.7, -0.3))
+    values = [*(h * rise for rise in rises), *(rise.diff(kc.t) for rise in rises[:-2]), table]
+    system = kc.ConstraintSystem(
+        "laws",
+        [f"u{k}" for k in range(len(values))],
+        [
+            kc.Equation(f"e{k}", sympy.Symbol(f"u{k}") - value, corners=True)
+            for k, value in enumerate(values)
+        ],
+        parameters=dict(zip(names, (0.8, 1.5, 0.1), strict=True)),
+    )
+    times = [-0.1, 0.1, 0.2, *np.linspace(0.0, 1.2, 60)]
+    return Case.of(
+        system, np.random.default_rng(2).uniform(-1, 1, (len(times), len(values))), times
+    )
+
+
 def domain() -> Case:
     """Return an arm whose driver has no value at the state, which is before the time 0."""
     m = kc.Mechanism("domain")
@@ -239,6 +266,7 @@ OWN: dict[str, Callable[[], Case]] = {
     "top": strange,
     "struct": awkward,
     "domain": domain,
+    "laws": laws,
     "repeated": repeated,
     "undriven": partial(slider, "undriven"),
     "driven_twice": partial(slider, "driven_twice", crank=kc.t**2, rod=3 * kc.t + 1),
@@ -289,7 +317,7 @@ def interpreted(cases: dict[str, Case], folder: Path) -> Results:
         program = lower(case.model.system())
         states = zip(case.q, case.q_dot, case.t, case.p, strict=True)
         with np.errstate(all="ignore"):
-            rows = [interpret(program, *state) for state in states]
+            rows = [interpret(program, *state)[: len(QUANTITIES)] for state in states]
         found[name] = dict(zip(QUANTITIES, map(np.array, zip(*rows, strict=True)), strict=True))
     return found
 

@@ -44,8 +44,15 @@ BOTH_SIDES = {
 # Modules that may import kincompile inside a function. The lazy table of public names is what the
 # package promises: `import kincompile` loads nothing, a name loads its module. The table of targets
 # loads the modules of the one that is emitted, the command line the command that is called, and the
-# compiler the stages that a model needs.
-DEFERRED = {PACKAGE, "kincompile.cli", "kincompile.compiler", "kincompile.targets.registry"}
+# compiler the stages that a model needs. The options of a motion are formulas: to read them takes
+# SymPy, and to print a help does not.
+DEFERRED = {
+    PACKAGE,
+    "kincompile.cli",
+    "kincompile.cli.motion",
+    "kincompile.compiler",
+    "kincompile.targets.registry",
+}
 
 Sources = Mapping[str, str]  # module name -> source
 

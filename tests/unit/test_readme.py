@@ -119,10 +119,11 @@ def failure_of(reader: Reader, block: re.Match[str]) -> str:
     return ""
 
 
-def test_that_the_readme_does_what_it_says(tmp_path):
+@pytest.mark.parametrize(("page", "least"), [("README.md", 15), ("docs/motion_laws.md", 8)])
+def test_that_a_page_does_what_it_says(page, least, tmp_path):
     reader = Reader(tmp_path)
-    blocks = list(BLOCK.finditer(README))
-    assert len(blocks) > 15
+    blocks = list(BLOCK.finditer((ROOT / page).read_text(encoding="utf-8")))
+    assert len(blocks) > least
     failures = [failure for block in blocks if (failure := failure_of(reader, block))]
     if failures:
         pytest.fail("\n\n".join(failures), pytrace=False)

@@ -71,6 +71,8 @@ class Code:
         Names of the equations that repeat others, and agree with them.
     unsolvable
         Why the equations cannot determine the coordinates; "" where they can, or nobody says.
+    corners
+        Whether its drivers may have corners.
     lanes : LaneFunctions or None
         With the planned solve, where the module has one.
     stages
@@ -101,6 +103,7 @@ class Code:
     nonzeros: Callable[..., Array]
     redundant: tuple[str, ...]
     unsolvable: str
+    corners: bool
     lanes: LaneFunctions | None
     stages: tuple[Any, ...]
     evaluate: Callable[..., tuple[Array, Array]] | None
@@ -147,6 +150,7 @@ def attach(module: ModuleType) -> Code:
         nonzeros=names["Phi_q_nonzeros"],
         redundant=names.get("REDUNDANT", ()),
         unsolvable=names.get("UNSOLVABLE", ""),
+        corners=names.get("CORNERS", False),
         lanes=LaneFunctions(
             position=lanes["position"],
             nu=lanes["nu"],

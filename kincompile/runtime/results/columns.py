@@ -10,6 +10,7 @@ import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
 from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 TIME_UNIT = "s"
 """Unit of t, in which every driver and every rate is written."""
+
+ANGLE_UNITS = {"rad": 1.0, "deg": 180 / np.pi}
+"""What angles are shown in, with the factor from radians."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,10 +42,38 @@ class Column:
     unit: str
     values: NDArray[np.float64]
 
+    def shown(self, angle_unit: str) -> Column:
+        """Return the column as it is shown: in degrees, where angles are and it is one."""
+        unit, factor = shown_unit(self.unit, angle_unit)
+        return self if factor == 1 else Column(self.name, unit, self.values * factor)
+
     @property
     def title(self) -> str:
         """Name and unit, for instance ``x_rod [m]``."""
         return titled(self.name, self.unit)
+
+
+def shown_unit(unit: str, angle_unit: str) -> tuple[str, float]:
+    """Return the unit in which numbers are shown, and the factor to it from their own.
+
+    Parameters
+    ----------
+    unit
+        Their own, as in ``rad/s``.
+    angle_unit
+        ``"rad"`` or ``"deg"``: what angles and their rates are shown in. All else stays.
+
+    Raises
+    ------
+    InputError
+        If there is no such unit of angles.
+    """
+    if angle_unit not in ANGLE_UNITS:
+        raise InputError(f"angle_unit is {angle_unit!r}: angles are shown in 'rad' or in 'deg'.")
+    name, slash, per = unit.partition("/")
+    if name != "rad":
+        return unit, 1.0
+    return f"{angle_unit}{slash}{per}", ANGLE_UNITS[angle_unit]
 
 
 def titled(name: str, unit: str) -> str:
@@ -170,8 +202,8 @@ class MotionTable:
             "variant": np.arange(len(self.q))
         }
 
-    def to_pandas(self) -> pd.DataFrame:
-        """Return the motion as a `pandas.DataFrame`, a row a time.
+    def to_pandas(self, angle_unit: str = "rad") -> pd.DataFrame:
+        """Return the motion as a `pandas.DataFrame`, a row a time; angles in `angle_unit`.
 
         Returns
         -------
@@ -187,7 +219,7 @@ class MotionTable:
         """
         with package_of_extra("pandas", "tables"):
             import pandas as pd
-        columns = self.columns()
+        columns = [item.shown(angle_unit) for item in self.columns()]
         data: dict[str, NDArray[Any]] = {item.name: item.values.ravel() for item in columns}
         data |= {"status": self.status.ravel(), "residual": self.residual.ravel()}
         index: Any = pd.Index(self.t, name="t")
@@ -199,8 +231,8 @@ class MotionTable:
         frame.attrs["units"] = {"t": TIME_UNIT, **{item.name: item.unit for item in columns}}
         return frame
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the motion as an `xarray.Dataset`.
+    def to_xarray(self, angle_unit: str = "rad") -> xarray.Dataset:
+        """Return the motion as an `xarray.Dataset`; angles in `angle_unit`, ``"rad"`` or ``"deg"``.
 
         Returns
         -------
@@ -223,7 +255,7 @@ class MotionTable:
         shape = (*sizes.values(), self.t.size)
         variables: dict[str, Any] = {
             item.name: (dimensions, item.values.reshape(shape), _units(item.unit))
-            for item in self.columns()
+            for item in (column.shown(angle_unit) for column in self.columns())
         }
         for name in ("status", "residual"):
             variables[name] = (dimensions, getattr(self, name).reshape(shape))
@@ -242,6 +274,11 @@ class MotionTable:
         if self.sweep and len(self.q) == math.prod(values.size for values in self.sweep.values()):
             return {name: (name, values) for name, values in self.sweep.items()}
         return {name: ("variant", values) for name, values in self.variants.items()}
+
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """Where position and velocity were found, shape (N,): at corners of drivers too."""
+        return np.asarray((self.status == Status.CONVERGED) | (self.status == Status.CORNER))
 
     def require_one_motion(self, what: str, remedy: str) -> None:
         """Check that the motion is not one of variants.

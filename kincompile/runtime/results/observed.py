@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import probe_of
 from kincompile.runtime.results.columns import Observed
 
 if TYPE_CHECKING:
@@ -22,11 +23,23 @@ def observed(module: ModuleType, motion: tuple[Array, Array, Array], t: Array, p
     shape = (*motion[0].shape[:-1], len(names))
     results = np.full((3, *shape), np.nan)
     if names:
-        found = np.isfinite(sum(part.sum(axis=-1) for part in motion))
-        times = np.broadcast_to(t, found.shape)[found]
         sets = np.asarray(p, dtype=np.float64)
         if sets.ndim > 1:
-            sets = np.broadcast_to(sets[:, np.newaxis], (*found.shape, sets.shape[-1]))[found]
-        if times.size:
-            results[:, found] = module.observe(*(part[found] for part in motion), times, sets)
+            sets = np.broadcast_to(sets[:, np.newaxis], (*shape[:-1], sets.shape[-1]))
+
+        def observe(at: NDArray[np.bool_], q_ddot: Array) -> NDArray[Any]:
+            times, own = np.broadcast_to(t, at.shape)[at], sets[at] if sets.ndim > 1 else sets
+            return np.array(module.observe(motion[0][at], motion[1][at], q_ddot, times, own))
+
+        position, complete = (
+            np.isfinite(sum(part.sum(axis=-1) for part in parts)) for parts in (motion[:2], motion)
+        )
+        if complete.any():
+            results[:, complete] = observe(complete, motion[2][complete])
+        corner = position & ~complete
+        if corner.any():
+            # Without an acceleration an output has what no acceleration changes.
+            probe = np.broadcast_to(probe_of(motion[0].shape[-1]), motion[0][corner].shape)
+            some, other = observe(corner, probe), observe(corner, probe**2)
+            results[:, corner] = np.where(some == other, some, np.nan)
     return Observed(names, {name: module.UNITS[name] for name in names}, *results)

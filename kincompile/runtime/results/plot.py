@@ -38,11 +38,13 @@ GAP, EVENT = "0.88", "tab:red"
 """Colours of the times without a solution, and of events."""
 
 
-def plot_columns(solution: MotionTable, names: Sequence[str], ax: Axes | None) -> Axes:
+def plot_columns(
+    solution: MotionTable, names: Sequence[str], ax: Axes | None, angle_unit: str
+) -> Axes:
     """Draw columns of a solution over time, as `Solution.plot` describes."""
     with package_of_extra("matplotlib", "plot"):
         from matplotlib import pyplot as plt
-    panels = _by_unit(solution, names)
+    panels = _by_unit(solution, names, angle_unit)
     if ax is not None:
         _draw_panel(ax, solution, [column for panel in panels for column in panel])
         return ax
@@ -64,11 +66,11 @@ def _size_of(panels: Panels) -> tuple[float, float]:
     return 7.2, 1.2 + 2.4 * len(panels)
 
 
-def _by_unit(solution: MotionTable, names: Sequence[str]) -> Panels:
+def _by_unit(solution: MotionTable, names: Sequence[str], angle_unit: str = "rad") -> Panels:
     """Return the named columns in their order, grouped by unit; all coordinates without a name."""
     panels: dict[str, list[Column]] = {}
     for name in names or solution.coordinates:
-        column = solution.column(name)
+        column = solution.column(name).shown(angle_unit)
         panels.setdefault(column.unit, []).append(column)
     return list(panels.values())
 
@@ -87,7 +89,7 @@ def _draw_panels(figure: Figure, solution: MotionTable, panels: Panels) -> Axes:
 def _draw_panel(ax: Axes, solution: MotionTable, columns: Sequence[Column]) -> None:
     """Draw columns into one plot, with units, events, and the times without a solution."""
     units = list(dict.fromkeys(column.unit for column in columns))
-    good = solution.status == 0
+    good = solution.good
     # A line needs two points; one that stands alone is drawn as a dot.
     marker = "" if solution.t.size > 1 else "o"
     for k, column in enumerate(columns):

@@ -146,8 +146,8 @@ class Solution(MotionTable):
         names = ("q", "q_dot", "q_ddot", "status", "residual", "iterations")
         arrays: dict[str, Any] = {name: getattr(self, name)[number] for name in names}
         own = {name: float(values[number]) for name, values in self.parameters.items()}
-        good = not arrays["status"].any()
-        return replace(self, **arrays, parameters=own, sweep={}, success=good, _observed={})
+        one = replace(self, **arrays, parameters=own, sweep={}, _observed={})
+        return replace(one, success=bool(one.good.all()))
 
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
         """Return a function of module, q, t and p for the motion, or for that of each variant."""
@@ -171,7 +171,7 @@ class Solution(MotionTable):
         for item, value in zip(fields(self), state, strict=True):
             object.__setattr__(self, item.name, value)
 
-    def plot(self, *names: str, ax: Axes | None = None) -> Axes:
+    def plot(self, *names: str, ax: Axes | None = None, angle_unit: str = "rad") -> Axes:
         """Draw columns over time: coordinates, rates, second rates; events and gaps are marked.
 
         Parameters
@@ -181,6 +181,8 @@ class Solution(MotionTable):
         ax : matplotlib.axes.Axes, optional
             Draws all of them into this plot. Without it there is a new figure with a panel for
             each unit, so that metres and radians do not share an axis.
+        angle_unit : {"rad", "deg"}
+            What angles and their rates are drawn in.
 
         Returns
         -------
@@ -194,7 +196,7 @@ class Solution(MotionTable):
         UnsupportedError
             When matplotlib is not installed.
         """
-        return plot_columns(self, names, ax)
+        return plot_columns(self, names, ax, angle_unit)
 
     def _repr_html_(self) -> str:
         return solution_html(self) + (picture_html(self) or plot_html(self))
@@ -211,7 +213,7 @@ class Solution(MotionTable):
         """Return the outcome in a few words."""
         if self.success:
             return f"converged, largest residual {np.max(self.residual):.1e}"
-        good = np.count_nonzero(self.status == 0)
+        good = np.count_nonzero(self.good)
         return f"failed, {good} of {self.status.size} points converged; see .message"
 
 

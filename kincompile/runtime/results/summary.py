@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.status import Status
 from kincompile.tables import counted, table
 
@@ -20,13 +21,15 @@ NOISE = 1e-12
 _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 
 
-def summary(solution: Solution) -> str:
+def summary(solution: Solution, angle_unit: str = "rad") -> str:
     """Return the extremes of every coordinate and output, and a line on how the solving went.
 
     Parameters
     ----------
     solution
         A solution, complete or partial; points that were not found do not count.
+    angle_unit
+        ``"rad"`` or ``"deg"``.
 
     Returns
     -------
@@ -37,33 +40,39 @@ def summary(solution: Solution) -> str:
         and the largest residual.
     """
     if solution.q.ndim > 2:
-        return "\n\n".join(_variant(solution, k) for k in range(len(solution.q)))
+        return "\n\n".join(_variant(solution, k, angle_unit) for k in range(len(solution.q)))
     own = solution.observed
     motion = solution.q, solution.q_dot, solution.q_ddot
-    lines = _table("coordinate", solution, solution.coordinates, motion)
+    lines = _table("coordinate", solution, solution.coordinates, motion, angle_unit)
     if own.names:
-        lines += ["", *_table("output", solution, own.names, (own.y, own.y_dot, own.y_ddot))]
+        motion = own.y, own.y_dot, own.y_ddot
+        lines += ["", *_table("output", solution, own.names, motion, angle_unit)]
     return "\n".join([*lines, "", _verdict(solution)])
 
 
-def _variant(solution: Solution, number: int) -> str:
+def _variant(solution: Solution, number: int, angle_unit: str) -> str:
     """Return the summary of a variant, under the values of its parameters."""
     values = ((name, axis[number]) for name, axis in solution.variants.items())
     named = (
         f"{name} = {value:g} {solution.units.get(name, '')}".rstrip() for name, value in values
     )
-    return f"{', '.join(named)}\n{summary(solution.variant(number))}"
+    return f"{', '.join(named)}\n{summary(solution.variant(number), angle_unit)}"
 
 
 def _table(
-    kind: str, solution: Solution, names: tuple[str, ...], motion: tuple[NDArray[np.float64], ...]
+    kind: str,
+    solution: Solution,
+    names: tuple[str, ...],
+    motion: tuple[NDArray[np.float64], ...],
+    angle_unit: str,
 ) -> list[str]:
     """Return the lines of the table of coordinates or outputs."""
     shown = [_without_noise(values).T for values in motion]
-    rows = [
-        [name, solution.units[name], *_extremes(solution.t, q), _largest(q_dot), _largest(q_ddot)]
-        for name, q, q_dot, q_ddot in zip(names, *shown, strict=True)
-    ]
+    rows = []
+    for name, q, q_dot, q_ddot in zip(names, *shown, strict=True):
+        unit, factor = shown_unit(solution.units[name], angle_unit)
+        rates = _largest(factor * q_dot), _largest(factor * q_ddot)
+        rows.append([name, unit, *_extremes(solution.t, factor * q), *rates])
     header = (kind, "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
     return table(header, rows, right=_NUMBERS)
 
@@ -114,5 +123,5 @@ def _verdict(solution: Solution) -> str:
 
 def _largest_residual(solution: Solution) -> str:
     """Return the largest residual of the converged points; failures are in `.message`."""
-    found = solution.residual[solution.status == Status.CONVERGED]
+    found = solution.residual[solution.good]
     return f"{found.max():.1e}" if found.size else "-"

@@ -96,6 +96,7 @@ def files(
     text = indented(line for lines in functions.values() for line in lines)
     units = {item.name: item.unit for item in program.coordinates}
     units |= {item.name: item.unit for item in program.parameters}
+    units |= {item.name: item.unit for item in program.outputs}
     data = {
         **constants(code, 2, "[{}, {}]"),
         "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),

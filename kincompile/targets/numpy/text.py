@@ -38,6 +38,11 @@ def solvability_text(program: Program) -> str:
             "# why the equations cannot determine the coordinates: there is no motion to solve for",
             f"UNSOLVABLE = (\n{indented(sentence)}\n)",
         ]
+    if program.corners:
+        lines += [
+            "# drivers may have corners: there nu and gamma are those after the corner",
+            "CORNERS = True",
+        ]
     return "\n".join(lines)
 
 

@@ -159,8 +159,9 @@ def test_that_every_single_fault_is_found_and_named(step: int, joint_types: Mode
         assert not report.equal, item
         kinds = {name.kind for entry in report.different for name in entry.diagnoses}
         meant = MEANT.get(item["fault"], {item["fault"]})
-        unique.append(bool(kinds) and kinds <= meant)
+        # Entries that are all zero have one name, whatever led to them.
+        unique.append(bool(kinds) and (kinds <= meant or kinds == {"left zero"}))
         found.append(not kinds.isdisjoint({*meant, "left zero"}))
     # The rest has two names: xi and eta swapped can be sine and cosine swapped, in numbers.
-    assert np.mean(unique) >= 0.88
+    assert np.mean(unique) >= 0.92
     assert np.mean(found) >= 0.98

@@ -15,10 +15,10 @@ from kincompile.derivation.formulas import (
     Call,
     Choice,
     Decimal,
+    DerivativeSymbol,
     Equated,
     Glyph,
     Matrix,
-    PartialDerivative,
     Relation,
 )
 from kincompile.derivation.joint_terms import abbreviations
@@ -116,13 +116,13 @@ def test_that_vectors_are_bold_and_names_upright_in_mathml() -> None:
 
 
 def test_that_a_derivative_has_its_sign_above_and_below() -> None:
-    formula = PartialDerivative(Glyph("Phi"), Symbol("phi"))
+    formula = DerivativeSymbol(Glyph("Phi"), Symbol("phi"))
     element = ET.fromstring(MathMLPrinter().math(formula))
     above, below = element.findall("./mfrac/mrow")
     for part in (above, below):
         assert part[0].text == "\N{PARTIAL DIFFERENTIAL}"
     assert tex(formula) == "\\frac{\\partial \\boldsymbol{\\Phi}}{\\partial \\phi}"
-    assert tex(PartialDerivative(Glyph("A"), Symbol("phi"), "d")) == "\\frac{d {A}}{d \\phi}"
+    assert tex(DerivativeSymbol(Glyph("A"), Symbol("phi"), "d")) == "\\frac{d {A}}{d \\phi}"
 
 
 def test_that_functions_of_sympy_are_upright() -> None:

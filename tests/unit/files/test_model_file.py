@@ -204,6 +204,55 @@ def test_that_all_problems_are_told_at_once():
     ]
 
 
+MOTIONS = {
+    "sequence": '{ points = [[0, 0], ["1", "60*deg"], [2, "pi/3"]], law = "cycloidal" }',
+    "laws": '{ points = [[0, 0], [1, "60*deg"], [2, "pi/3"]], law = ["cycloidal", "linear"] }',
+    "formula": '"60*deg*modified_sine(t)"',
+    "table": '{ times = [0, 1, 2], values = [0, "60*deg", "pi/3"], velocities = [0, 0] }',
+}
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_that_a_motion_is_data_and_is_written_back(name, tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(ARM.replace('"2*t"', MOTIONS[name]), encoding="utf-8")
+    module = kc.compile(kc.read(path))
+    angles = kc.solve(module, [0.0, 1.0, 2.0])["phi_arm"]
+    assert angles == pytest.approx(np.array([0, np.pi / 3, np.pi / 3]), abs=1e-14)
+    again = tmp_path / "again.toml"
+    again.write_text(kc.read(path).to_toml(), encoding="utf-8")
+    assert kc.compile(kc.read(again)).FINGERPRINT == module.FINGERPRINT
+
+
+NO_MOTIONS = {
+    "{ points = [[0, 0], [1, 1]], law = 3 }": "motion sequence: law: 3 is not a list",
+    "{ points = [[0, 0], [2, 1], [1, 0]] }": "motion sequence: times must rise, but 1 follows 2",
+    "{ points = [[0, 0], [1]] }": "points, entry 2: expected [time, value], not a list of 1",
+    "{ points = 3 }": "points: expected a list, not 3",
+    "{ points = [[0, 0], [1, 1]], laws = 3 }": "laws: there is no such field; did you mean 'law'",
+    "{ times = [0, 1], values = [0, 1] }": "motion table: a table of 2 rows is no curve",
+    "{ times = [0, 1, 2] }": "no values; fields are: times, values, velocities",
+    '{ times = [0, 1, 2], values = [0, 1, "t"] }': "values, entry 3: t is not a number",
+    "{ }": "no points; fields are: points, law, ramp",
+}
+
+
+@pytest.mark.parametrize("given", NO_MOTIONS)
+def test_that_a_motion_that_is_none_is_said(given):
+    (problem,) = problems(ARM.replace('"2*t"', given))
+    assert problem.startswith("model.toml, line 24: constraint 'motor', angle")
+    assert NO_MOTIONS[given] in problem
+
+
+def test_that_degrees_of_lengths_are_told_with_their_lines():
+    text = ARM.replace('[1, 0, "pi/4"]', '["20*deg", 0, "20*deg"]').replace("1.0,", '"3*deg",')
+    found = problems(text.replace('"-length"', '"-length*deg"'))
+    assert [problem.split(":")[0] for problem in found] == [
+        f"model.toml, line {line}" for line in (4, 6, 16)
+    ]
+    assert all("is in degrees, and this is no angle" in problem for problem in found)
+
+
 def test_that_very_many_problems_are_cut():
     rows = ", ".join('{ name = "1" }' for _ in range(200))
     found = problems(f"kincompile = 1\nname = 'a'\nconstraints = []\nbodies = [{rows}]\n")

@@ -204,7 +204,7 @@ def test_that_every_example_can_be_differentiated_by_its_parameters(example: Any
     at: dict[str, Any] = {"t": 0.3}
     for item in program.coordinates:
         at[item.name] = item.guess + 0.1 * random.normal()
-        at[f"{item.name}_dot"] = random.normal()
+        at[f"{item.name}_dot"], at[f"{item.name}_ddot"] = random.normal(size=2)
     at |= {item.name: 1.01 * (item.default or 0.0) + 0.001 for item in program.parameters}
     outputs = [
         entry.node

@@ -77,7 +77,7 @@ def test_that_times_and_parameters_can_be_chosen():
     positions = arrays["q"].reshape(2, 3)
     np.testing.assert_allclose(positions[:, 0], 2 * np.cos([0, 1]), atol=1e-12)
     assert data["parameters"] == [{"name": "length", "value": 2.0, "unit": "m"}]
-    (link,) = (mark for mark in data["drawing"]["marks"] if mark["kind"] == "link")
+    (link,) = (mark for mark in data["drawing"]["marks"] if mark["kind"] == "hull")
     assert link["points"] == [[-2, 0], [0, 0]]
 
 

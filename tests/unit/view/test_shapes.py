@@ -17,13 +17,13 @@ from kincompile.view.drawing import drawing
 from kincompile.view.joint_shapes import DRAWINGS
 from kincompile.view.marks import (
     GROUND_FRAME,
-    BodyPoint,
     Contour,
     Drive,
-    Link,
-    Outline,
+    FramePoint,
+    Hull,
     Pin,
     PlaneFrame,
+    Polygon,
     Rail,
     Slider,
     Span,
@@ -38,7 +38,7 @@ FRAMES = {GROUND: GROUND_FRAME} | {
 
 def at(body, point):
     """Return a point of a body, or of the ground."""
-    return BodyPoint(FRAMES[body], point)
+    return FramePoint(FRAMES[body], point)
 
 
 def two_bodies(joint, *more, i_guess=(0, 0, 0), j_guess=(2, 1, 0.5)):
@@ -186,7 +186,7 @@ def test_that_a_rack_goes_from_p_to_q_and_as_far_as_the_pinion_rolls():
     )
     (rack,) = marks(m, Rail)
     assert (rack.start, rack.end, rack.style) == ((0, 0), (7, 0), "rack")
-    assert [link.frame for link in marks(m, Link)] == []  # the rack is its body
+    assert [link.frame for link in marks(m, Hull)] == []  # the rack is its body
 
 
 def test_that_a_cam_has_the_radius_of_its_profile():
@@ -220,20 +220,20 @@ def test_that_a_body_is_the_hull_of_its_joint_points():
         for k, at in enumerate(corners[1:])
     ]
     m = two_bodies(lambda m, i, j, a: kc.AbsoluteX("x", i, corners[0], kc.t), *more)
-    hull = next(link for link in marks(m, Link) if link.frame == FRAMES[0])
+    hull = next(link for link in marks(m, Hull) if link.frame == FRAMES[0])
     assert set(hull.points) == {(0, 0), (2, 0), (0, 2)}
 
 
 def test_that_a_body_of_one_joint_goes_to_its_origin():
     m = two_bodies(lambda m, i, j, a: kc.Revolute("A", m.ground, (0, 0), i, (-1, 0)))
-    first, second = marks(m, Link)
+    first, second = marks(m, Hull)
     assert (first.frame, first.points) == (FRAMES[0], ((-1, 0), (0, 0)))
     assert (second.frame, second.points) == (FRAMES[1], ((0, 0),))  # no joint at all: a dot
 
 
 def test_that_a_frame_is_wherever_in_q_its_columns_are():
     q = np.array([9.0, np.pi / 2, 2.0, 9.0, 1.0])
-    place = BodyPoint(PlaneFrame(0, (4, 2, 1)), (3, 4)).at(q)
+    place = FramePoint(PlaneFrame(0, (4, 2, 1)), (3, 4)).at(q)
     np.testing.assert_allclose(place, (1 - 4, 2 + 3), atol=1e-12)
 
 
@@ -280,7 +280,7 @@ def test_that_a_drawing_is_plain_data(example):
     data = json.loads(json.dumps(drawing(example.model).to_json(), allow_nan=False))
     kinds = {mark["kind"] for mark in data["marks"]}
     assert kinds <= {
-        "link", "outline", "pin", "rail", "slider", "span", "wheel", "contour", "drive",
+        "hull", "polygon", "pin", "rail", "slider", "span", "wheel", "contour", "drive",
     }  # fmt: skip
     assert data["bodies"] == [body.name for body in example.model.system().bodies]
 
@@ -294,6 +294,6 @@ def test_that_an_outline_takes_the_place_of_the_link_and_hides_what_slides_in_it
     m.add(kc.TranslationalDistance("reach", outer, (0, 0), (1, 0), inner, (1, 0), kc.t))
     drawn = drawing(m, {"a": 3.0})
     assert drawn.marks == (
-        Outline(FRAMES[1], ((0, 0), (1, 0), (0, 1))),
-        Outline(FRAMES[0], ((0, 0), (3, 0), (3, 1), (0, 1))),
+        Polygon(FRAMES[1], ((0, 0), (1, 0), (0, 1))),
+        Polygon(FRAMES[0], ((0, 0), (3, 0), (3, 1), (0, 1))),
     )

@@ -1,0 +1,217 @@
+"""What people write a motion with: `kc.motion.sequence`, `.table`, `.law`; and cams for it.
+
+A motion is a SymPy expression, for the value of a driver, an equation or the law of a cam.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+from kincompile.errors import ModelError
+from kincompile.model.cam_profile import flat_cam, oscillating_cam, roller_cam
+from kincompile.model.expressions import (
+    NotAnExpressionError,
+    as_expression,
+    as_sympy,
+    in_radians,
+    t,
+)
+from kincompile.model.laws import RISES, Rise, TableLaw, constant_velocity
+from kincompile.model.spline import fit_between
+from kincompile.names import listed, suggestion
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.model.expressions import Scalar
+
+__all__ = ["flat_cam", "law", "oscillating_cam", "roller_cam", "sequence", "table"]
+
+RAMP = sympy.Rational(1, 4)
+"""The share of a rise that each ramp of the law "constant velocity" takes, unless told."""
+
+
+def law(title: str) -> type[Rise]:
+    """Return a normalised law s(u), a SymPy function that rises from 0 to 1 while u does.
+
+    Parameters
+    ----------
+    title
+        ``"polynomial 3-4-5"``, ``"polynomial 4-5-6-7"``, ``"cycloidal"``, ``"simple harmonic"``,
+        ``"modified sine"``, ``"modified trapezoid"``, ``"constant velocity"``, a function of u and
+        of the share of its ramps, or ``"linear"``, which has corners.
+
+    Raises
+    ------
+    ModelError
+        If there is no such law.
+    """
+    problem = _law_problem(title)
+    if problem:
+        raise ModelError(problem)
+    return RISES[title]
+
+
+def sequence(
+    points: Sequence[tuple[Scalar, Scalar]],
+    law: str | Sequence[str] = "modified sine",
+    *,
+    ramp: Scalar = RAMP,
+) -> sympy.Expr:
+    """Return a motion that rests at given values and goes from one to the next by a law.
+
+    Parameters
+    ----------
+    points
+        Pairs (time, value), in order of rising time: numbers, or expressions of parameters. Two
+        equal values in turn are a dwell. Before the first and after the last the value is held.
+    law
+        The law of all motions, or a list with one for each step from point to point.
+    ramp
+        Of the law "constant velocity": the share of a step that is spent accelerating, and again
+        decelerating, up to 1/2.
+
+    Returns
+    -------
+    sympy.Expr
+        An expression of `t`; ``.subs(kc.t, ...)`` makes it one of an angle.
+
+    Raises
+    ------
+    ModelError
+        With everything that is wrong with the points and the laws.
+    """
+    problems: list[str] = []
+    rows = _rows(points, problems)
+    laws = _laws(law, len(rows) - 1, problems)
+    share = _number(ramp, "ramp", problems)
+    if share.is_number and not 0 < share <= sympy.S.Half:
+        problems.append(f"ramp is {share}: each of the two ramps takes more than 0, up to 1/2")
+    _check_times([time for time, _ in rows], problems)
+    if len(rows) < 2 and not problems:
+        problems.append(f"a sequence needs two points (time, value) or more, not {len(rows)}")
+    if problems:
+        raise ModelError([f"motion sequence: {problem}" for problem in problems])
+    motion = rows[0][1]
+    for (begin, start), (end, stop), rise in zip(rows, rows[1:], laws, strict=False):
+        shape = (share,) if rise is constant_velocity else ()
+        if in_radians(stop - start) != 0:
+            motion += (stop - start) * rise((t - begin) / (end - begin), *shape)
+    return motion
+
+
+def table(
+    times: Sequence[float], values: Sequence[float], *, velocities: Sequence[float] = (0, 0)
+) -> sympy.Expr:
+    """Return a motion through a table of values: a quintic spline, with four smooth derivatives.
+
+    Parameters
+    ----------
+    times, values
+        Rising times and the value at each, three rows or more, numbers.
+    velocities
+        At the first time and at the last; the motion goes on with them before and after, without
+        acceleration. Without, it begins and ends at rest.
+
+    Raises
+    ------
+    ModelError
+        With everything that is wrong with the table.
+    """
+    problems: list[str] = []
+    columns = [
+        tuple(
+            float(_constant(item, f"{name}, entry {k}", problems))
+            for k, item in enumerate(_items(given, name, problems), 1)
+        )
+        for name, given in (("times", times), ("values", values), ("velocities", velocities))
+    ]
+    rows, ends = columns[0], columns[2]
+    if len(rows) != len(columns[1]):
+        problems.append(f"there are {len(rows)} times and {len(columns[1])} values")
+    if len(rows) < 3:
+        problems.append(
+            f"a table of {len(rows)} rows is no curve; give three rows or more, or take a "
+            "sequence with a law"
+        )
+    if len(ends) != 2:
+        problems.append(f"velocities are two, at the first time and at the last, not {len(ends)}")
+    _check_times([sympy.Float(time) for time in rows], problems)
+    if problems:
+        raise ModelError([f"motion table: {problem}" for problem in problems])
+    spline = fit_between(*columns)
+    motion: sympy.Expr = TableLaw.of(tuple(columns), spline, "motion_table")(t)
+    return motion
+
+
+def _items(given: Any, what: str, problems: list[str]) -> list[Any]:
+    """Return the members of a list, a tuple or an array; none of anything else."""
+    if isinstance(given, list | tuple | np.ndarray):
+        return list(given)
+    problems.append(f"{what}: {given!r} is not a list")
+    return []
+
+
+def _rows(points: Any, problems: list[str]) -> list[tuple[sympy.Expr, sympy.Expr]]:
+    """Return the points that are pairs, as expressions."""
+    rows = []
+    for k, point in enumerate(_items(points, "points", problems), 1):
+        if not isinstance(point, list | tuple | np.ndarray) or len(point) != 2:
+            problems.append(f"point {k}, {point!r}, is not a pair (time, value)")
+            continue
+        time, value = (_number(item, f"point {k}", problems) for item in point)
+        rows.append((time, value))
+    return rows
+
+
+def _number(given: Any, where: str, problems: list[str]) -> sympy.Expr:
+    try:
+        return as_sympy(as_expression(given))
+    except NotAnExpressionError as error:
+        problems.append(f"{where}: {error}; give a number or an expression of parameters")
+        return sympy.S.Zero
+
+
+def _constant(given: Any, where: str, problems: list[str]) -> sympy.Expr:
+    value = _number(given, where, problems).evalf()
+    if value.is_Number:
+        return value
+    problems.append(f"{where}: {given} is not a number, and a table holds numbers")
+    return sympy.S.Zero
+
+
+def _laws(given: Any, steps: int, problems: list[str]) -> list[type[Rise]]:
+    """Return the law of each step."""
+    if isinstance(given, str):
+        titles = [given] * max(steps, 1)
+    else:
+        titles = _items(given, "law", problems)
+        if titles and len(titles) != steps:
+            problems.append(f"there are {len(titles)} laws for {steps} steps from point to point")
+    wrong = list(dict.fromkeys(filter(None, map(_law_problem, titles))))
+    problems += wrong
+    return [] if wrong else [RISES[title] for title in titles]
+
+
+def _law_problem(title: Any) -> str | None:
+    """Return a message about a law that does not exist, or None."""
+    if isinstance(title, str) and title in RISES:
+        return None
+    near = suggestion(title, RISES) if isinstance(title, str) else ""
+    return f"there is no law {title!r}{near}; laws are: {listed(RISES)}"
+
+
+def _check_times(times: Sequence[sympy.Expr], problems: list[str]) -> None:
+    """Check that times that are numbers rise."""
+    for before, after in pairwise(times):
+        step = after - before
+        if step.is_number and not step > 0:
+            problems.append(f"times must rise, but {_text(after)} follows {_text(before)}")
+
+
+def _text(value: sympy.Expr) -> str:
+    return f"{float(value):g}" if isinstance(value, sympy.Float) else str(value)

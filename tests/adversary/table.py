@@ -1,0 +1,83 @@
+"""The table of docs/adversary.md: what the exhaustive tests of this folder tried, in counts."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "adversary.md"
+BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
+HEADER = ("what is tried", "tried", "wrong", "gave up", "slowest")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: what it says, and the tests whose counts it adds."""
+
+    text: str
+    tests: tuple[str, ...]
+
+
+ROWS = (
+    Row("random chains by grid and by march, all points against their closed form",
+        ("test_many_random_chains[methods]",)),
+    Row("random chains in four places: scaled 1e-9 to 1e9, turned, moved; equal statuses",
+        ("test_many_random_chains[placements]",)),
+    Row("random chains in the grouped form", ("test_many_random_chains[grouped]",)),
+    Row("random chains as three variants of their parameters, at different rates",
+        ("test_many_random_chains[variants]",)),
+    Row("random chains in compiled C, against NumPy and their closed form",
+        ("test_many_random_chains[c]",)),
+    Row("bad starts of four chains, up to half a turn and two sizes off, in NumPy",
+        ("test_two_thousand_bad_starts",)),
+    Row("bad starts, the iterates of the page's JavaScript against NumPy's",
+        ("test_two_hundred_bad_starts_on_the_page",)),
+    Row("words of Python, C, JavaScript and Octave as names, in NumPy", ("test_all_names[numpy]",)),
+    Row("the same in C, as far as a compiler's warnings", ("test_all_names[c]",)),
+    Row("the same in JavaScript", ("test_all_names[javascript]",)),
+    Row("the same in Octave", ("test_all_names[octave]",)),
+    Row("random files up to a megabyte, read within 10 s and 1.5 GB",
+        ("test_many_random_files[2]", "test_many_random_files[3]")),
+    Row("single signs of emitted code turned; those that `kc.verify` passes change no number",
+        ("test_that_every_turned_sign_is_found",)),
+    Row("entries of derivatives of random mechanisms, against complex steps of SymPy's Phi",
+        ("test_the_derivatives_of_many_mechanisms",)),
+    Row("the same in JavaScript", ("test_the_derivatives_in_javascript",)),
+)  # fmt: skip
+
+
+def line(cells: tuple[str, ...]) -> str:
+    """Return a line of a Markdown table."""
+    return f"| {' | '.join(cells)} |\n"
+
+
+def table_of(folder: Path) -> str:
+    """Return the table of the counts that the tests have left in a folder."""
+    counts = [
+        json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))
+    ]
+    text = line(HEADER) + line(("---",) * len(HEADER))
+    for row in ROWS:
+        own = [item for item in counts if item["test"].startswith(row.tests)]
+        if not own:
+            raise LookupError(f"no counts of {', '.join(row.tests)}: did the tests fail?")
+        sums = [f"{sum(item[name] for item in own):,}" for name in ("tried", "wrong", "gave_up")]
+        text += line((row.text, *sums, seconds(max(item["slowest"] for item in own))))
+    return text
+
+
+def seconds(value: float) -> str:
+    """Return a time with two digits."""
+    return f"{value:.2g} s" if value >= 1e-3 else "under 1 ms"
+
+
+def table_in(document: str) -> str:
+    """Return the table that a document has."""
+    return document.partition(BEGIN)[2].partition(END)[0]
+
+
+def with_table(document: str, table: str) -> str:
+    """Return a document with another table in the place of its own."""
+    before, _, rest = document.partition(BEGIN)
+    return before + BEGIN + table + END + rest.partition(END)[2]
