@@ -56,8 +56,9 @@ class Constraint(Shown):
 
     def to_text(self) -> str:
         """Return its name and arguments, bodies by name."""
-        given = [getattr(self, item.name) for item in fields(self)[1:]]
-        written = (str(getattr(item, "name", item)) for item in given if item is not None)
+        given = [(getattr(self, item.name), item.default) for item in fields(self)[1:]]
+        kept = [value for value, default in given if value is not default]
+        written = (str(getattr(item, "name", item)) for item in kept)
         return f"{self.name}: {', '.join(written)}"
 
     def __repr__(self) -> str:
