@@ -17,6 +17,34 @@ def picture_html(shown: object) -> str:
     return ""
 
 
+class Shown:
+    """A value with a report: one line among others, the whole of it where it is printed or shown.
+
+    A subclass has `to_text`, and `headline` where the first line of that is no title.
+    """
+
+    __slots__ = ()
+
+    def to_text(self) -> str:
+        """Return the report."""
+        raise NotImplementedError
+
+    def headline(self) -> str:
+        """Return what a list of such values shows of this one."""
+        return self.to_text().strip().partition("\n")[0].rstrip(".")
+
+    def __repr__(self) -> str:
+        """Return one line."""
+        return f"<{type(self).__name__}: {self.headline()}>"
+
+    def __str__(self) -> str:
+        """Return the report."""
+        return self.to_text()
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.to_text())}</pre>"
+
+
 def table_html(name: str, title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a name, a title and a table as HTML; all text is escaped."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)

@@ -500,7 +500,7 @@ class _Comparer:
         is_accepted = self._is_accepted(spot)
         reference, form_row = self._reference, system_row
         form = self._matching.form(system_row)
-        if form is not None and form.formulas is not None:
+        if form is not None and form.formulas is not None and not is_accepted:
             reference, form_row = form.formulas, form.rows.index(system_row)
         return ComparedEntry(
             name,

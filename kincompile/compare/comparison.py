@@ -159,7 +159,7 @@ class Convention:
     rows: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Comparison:
     """All entries of a comparison with their verdicts.
 

@@ -15,12 +15,13 @@ import numpy as np
 from kincompile.compare.agreement import ABSOLUTE
 from kincompile.compare.comparison import Diagnosis
 from kincompile.compare.entry_faults import entry_faults
-from kincompile.compare.fault import LEFT_ZERO, OTHER_FORM, Fault
+from kincompile.compare.fault import LEFT_ZERO, MISSING_TERM, OMISSIONS, OTHER_FORM, Fault
 from kincompile.compare.forms import known_forms
-from kincompile.compare.joint_faults import Index, JointFaults, NumericFault
+from kincompile.compare.joint_faults import PARTS_OF_GAMMA, Index, JointFaults, NumericFault
 from kincompile.compare.reference import Subject
 from kincompile.compare.states import Array
-from kincompile.model.resolve import Joint
+from kincompile.derive.equations import derive_equation
+from kincompile.model.resolve import FreeEquation, Joint
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -117,7 +118,11 @@ class Diagnostician:
         joint = block.constraint if form is None else form.joint
         key = (block.rows, quantity, form)
         if key not in self._catalogues:
-            faults = [] if not isinstance(joint, Joint) else self._faults_of(joint, block, quantity)
+            faults: Iterable[NumericFault] = ()
+            if isinstance(joint, Joint):
+                faults = self._faults_of(joint, block, quantity)
+            elif isinstance(joint, FreeEquation) and quantity == "gamma":
+                faults = self._missing_in_equations(joint, block)
             self._catalogues[key] = [*faults, *self._other_forms(block, quantity, form)]
         return self._catalogues[key]
 
@@ -133,6 +138,18 @@ class Diagnostician:
             }
             if result:  # a fault in the columns of the ground alone does not show
                 yield replace(fault, result=result)
+
+    def _missing_in_equations(
+        self, equation: FreeEquation, block: ConstraintBlock
+    ) -> Iterator[NumericFault]:
+        """Yield gamma of free equations without one of its three parts."""
+        for row, Phi in zip(block.rows, equation.expressions, strict=True):
+            terms = derive_equation(Phi, equation.columns).gamma_terms
+            values, _ = self._reference.evaluate(terms, self._states)
+            for k, (kind, text) in enumerate(PARTS_OF_GAMMA):
+                rest = np.delete(values, k, axis=1).sum(axis=1)
+                if np.any(values[:, k]) and np.any(rest):
+                    yield Fault(kind, text, {(row, 0): rest})
 
     def _other_forms(
         self, block: ConstraintBlock, quantity: str, form: Form | None
@@ -237,6 +254,8 @@ def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
     if LEFT_ZERO in by_kind and not any(map(np.any, by_kind[LEFT_ZERO].result.values())):
         # Zero was written. That a missing term would also give zero is no further explanation.
         by_kind = {LEFT_ZERO: by_kind[LEFT_ZERO]}
+    if OMISSIONS.intersection(by_kind):
+        by_kind.pop(MISSING_TERM, None)  # the same in other words, which say less
     return tuple(
         Diagnosis(fault.kind, f"{fault.text}.", fault.detail)
         for fault in list(by_kind.values())[:MOST_NAMED]

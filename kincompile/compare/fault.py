@@ -27,6 +27,7 @@ MISSING_RATE = "velocity factor missing"
 SECOND_DERIVATIVE = "driver's second derivative forgotten"
 DRIVER_RATE = "driver's rate forgotten"
 BLOCKS = "body blocks swapped"
+ROWS = "rows swapped"
 X_AND_Y = "x and y columns swapped"
 CROSS_TERM = "cross term 2 Phi_qt q_dot missing"
 QUADRATIC_TERM = "(Phi_q q_dot)_q q_dot missing"
@@ -35,6 +36,11 @@ WITH_RATES = "rates where none belong"
 OTHER_FORM = "follows from another Phi"
 COUPLING = "coupling 2 w (r_j_dot - r_i_dot) missing"
 SQUARES = "w_j^2 - w_i^2 for (w_j - w_i)^2"
+
+OMISSIONS = frozenset(
+    {CROSS_TERM, QUADRATIC_TERM, PHI_TT, COUPLING, SECOND_DERIVATIVE, DRIVER_RATE}
+)
+"""What a missing term may be called by its place in the derivation."""
 
 Result = TypeVar("Result")
 

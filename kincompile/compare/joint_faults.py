@@ -21,6 +21,8 @@ from kincompile.calculus.expressions import (
     ZERO,
     ZERO_VECTOR,
     Expression,
+    Number,
+    Power,
     Rotated,
     Scalar,
     Sum,
@@ -36,16 +38,21 @@ from kincompile.calculus.rotations import PlaneRotation
 from kincompile.compare.agreement import agrees
 from kincompile.compare.collected import CollectedTerm, collected, is_rate, perfect_square
 from kincompile.compare.fault import (
+    A_FOR_B,
     BLOCKS,
     COUPLING,
     CROSS_TERM,
     FACTOR,
+    MISSING_SQUARE,
     MISSING_TERM,
     MIXED_ANGLES,
     MIXED_POINTS,
     PHI_TT,
     QUADRATIC_TERM,
+    ROWS,
+    SINE_COSINE,
     SQUARES,
+    TRANSPOSED,
     X_AND_Y,
     Fault,
     whole_faults,
@@ -63,6 +70,12 @@ if TYPE_CHECKING:
     from kincompile.model.resolve import Joint
 
 HALF = Fraction(1, 2)
+PARTS_OF_GAMMA = (
+    (QUADRATIC_TERM, "-(Phi_q q_dot)_q q_dot is missing"),
+    (CROSS_TERM, "-2 Phi_qt q_dot is missing"),
+    (PHI_TT, "-Phi_tt is missing"),
+)
+"""The parts of gamma in order, and the faults of leaving them out."""
 _ANY = VectorSymbol("any")
 """Stands for the vector that a rotation turns, whichever it is."""
 
@@ -110,6 +123,9 @@ class JointFaults:
             yield from self._if_different(fault.kind, fault.text, values)
         if self._quantity == "Phi_q":
             yield from self._exchanged_columns()
+        elif len(self._right) == 1 and self._right[0, 0].shape[1] == 2:
+            swapped = {(0, 0): self._right[0, 0][:, ::-1]}
+            yield from self._if_different(ROWS, "its two rows are swapped", swapped)
 
     def _if_different(
         self, kind: str, text: str, values: Mapping[Index, Array]
@@ -158,8 +174,10 @@ class JointFaults:
         for b in blocks:
             own = {place: item for place, item in self._parts.items() if place[0] == b}
             yield from _faults_everywhere(own, self._symbols)
+            yield from _same_slips(own, self._symbols)
         if len(blocks) > 1:
             yield from _faults_everywhere(self._parts, self._symbols)
+            yield from _same_slips(self._parts, self._symbols)
         if self._quantity == "Phi_q" and len(self._joint.bodies) == 2:
             yield from self._exchanged_blocks()
 
@@ -171,7 +189,7 @@ class JointFaults:
         yield from whole_faults(
             self._quantity, name, lambda factor: times(factor, expression) if factor else zero
         )
-        yield from one_place(expression, self._symbols)
+        yield from one_place(_joined(expression), self._symbols)
         if isinstance(expression, Scalar):
             terms = collected(expression)
             if len(terms) > 1 or len(terms[0].factors if terms else ()) > 1:
@@ -223,6 +241,38 @@ def _faults_everywhere(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]
     yield from _exchanged_names(parts, symbols)
 
 
+def _same_slips(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
+    """Yield the formulas with the same slip for every body."""
+
+    def slip(kind: str, node: Expression) -> Expression | None:
+        if kind == MISSING_SQUARE:
+            is_square = isinstance(node, Power) and node.exponent == 2 and is_rate(node)
+            return node.base if isinstance(node, Power) and is_square else None
+        if not isinstance(node, Rotated):
+            return None
+        return next((item.result for item in swaps(node, symbols) if item.kind == kind), None)
+
+    texts = {
+        A_FOR_B: "A stands where B belongs, or B where A, for every body",
+        TRANSPOSED: "the rotations of all bodies are transposed",
+        SINE_COSINE: "sine and cosine are swapped for every body",
+        MISSING_SQUARE: "w stands where w^2 belongs, for every body",
+    }
+    for kind, text in texts.items():
+        yield Fault(kind, text, _changed(parts, partial(slip, kind)))
+
+
+def _joined(expression: Expression) -> Expression:
+    """Return a sum with equal terms joined, as it is written: one slip is in both of them."""
+    if not isinstance(expression, Sum):
+        return expression
+    numbers: dict[tuple[Scalar, ...], Fraction] = {}
+    for term in expression.terms:
+        number, factors = split_coefficient(term)
+        numbers[tuple(factors)] = numbers.get(tuple(factors), Fraction(0)) + number
+    return Sum(tuple(product_of((Number(n), *rest)) for rest, n in numbers.items() if n))
+
+
 def _changed(parts: Parts, change: Callable[[Expression], Expression | None]) -> Parts:
     return {place: everywhere(item, change) for place, item in parts.items()}
 
@@ -259,12 +309,7 @@ def _exchanged_names(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
 
 def _missing_parts_of_gamma(block: RowBlock) -> Iterator[Fault[Expression]]:
     """Yield gamma without one of its three parts, or with the cross term taken once."""
-    names = (
-        (QUADRATIC_TERM, "-(Phi_q q_dot)_q q_dot is missing"),
-        (CROSS_TERM, "-2 Phi_qt q_dot is missing"),
-        (PHI_TT, "-Phi_tt is missing"),
-    )
-    for k, (kind, text) in enumerate(names):
+    for k, (kind, text) in enumerate(PARTS_OF_GAMMA):
         rest = (*block.gamma_terms[:k], *block.gamma_terms[k + 1 :])
         # Without its only term gamma is left zero, which has a name already.
         if any(term not in (ZERO, ZERO_VECTOR) for term in rest):

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 Columns = tuple[int | None, ...]
 _MOST_PERMUTED = 5  # 120 orders; with more bodies only the reversed order is tried
+MOVED = "the bodies have another order"
 _WITH_GROUND = "columns of the ground are present (they are not checked)"
 
 
@@ -80,6 +81,8 @@ def other_layouts(reference: Reference, usual: Layout, row_count: int) -> Iterat
     seen = {usual.columns}
     for order in _orders(bodies):
         for words, columns in _arrangements(order, is_moved=list(order) != bodies):
+            if row_count == 1 and words == [MOVED]:
+                continue  # one row alone cannot tell an order from blocks that are swapped
             for placed in _with_ground((*columns, *rest), ground):
                 if placed not in seen:
                     seen.add(placed)
@@ -115,7 +118,7 @@ def _arrangements(
     order: tuple[Columns, ...], is_moved: bool
 ) -> Iterator[tuple[list[str], list[int | None]]]:
     """Yield the ways to write the coordinates of bodies in a given order, each with its name."""
-    words = ["the bodies have another order"] if is_moved else []
+    words = [MOVED] if is_moved else []
     yield words, [column for triple in order for column in triple]
     angle_first = [column for x, y, phi in order for column in (phi, x, y)]
     yield [*words, "each body has its angle first"], angle_first

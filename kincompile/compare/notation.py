@@ -124,12 +124,23 @@ def real(expression: sympy.Expr) -> sympy.Expr:
     symbols = sorted(expression.free_symbols - {IMAGINARY}, key=str)
     reals = {symbol: sympy.Dummy(str(symbol), real=True) for symbol in symbols}
     whole = expression.xreplace({**reals, IMAGINARY: sympy.I})
-    part, rest = whole.as_real_imag()
+    part, rest = whole.replace(_is_turn, _cosine_and_sine).as_real_imag()
     numbers = np.random.default_rng(1).uniform(0.4, 1.6, len(reals))
     at = dict(zip(reals.values(), map(sympy.Float, numbers), strict=True))
     size, off = (abs(complex(item.xreplace(at).evalf())) for item in (part, rest))
-    if not off <= 1e-9 * (1 + size):
+    if part.has(sympy.I) or not off <= 1e-9 * (1 + size):
         raise NotAnExpressionError(f"{expression} is not real")
     back = {other: symbol for symbol, other in reals.items()}
     found: sympy.Expr = part.xreplace(back)
+    return found
+
+
+def _is_turn(node: sympy.Basic) -> bool:
+    return isinstance(node, sympy.exp) and node.has(sympy.I)
+
+
+def _cosine_and_sine(turn: sympy.Expr) -> sympy.Expr:
+    """Return exp(a + ib) as exp(a) (cos(b) + i sin(b)), of which conjugate terms cancel."""
+    size, angle = turn.as_base_exp()[1].as_real_imag()
+    found: sympy.Expr = sympy.exp(size) * (sympy.cos(angle) + sympy.I * sympy.sin(angle))
     return found

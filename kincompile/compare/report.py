@@ -12,6 +12,7 @@ from kincompile.compare.renderings import (
     as_page,
     as_text,
 )
+from kincompile.html import Shown, framed_html
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 FORMAT = 1
 
 
-class Report(Comparison):
+class Report(Shown, Comparison):
     """The outcome of a comparison, which writes itself.
 
     Every form takes `reveal`: whether to show the right formulas and values. They are left out, or
@@ -51,8 +52,13 @@ class Report(Comparison):
         """Return the report as one HTML page that needs nothing else."""
         return as_page(self, reveal)
 
+    def headline(self) -> str:
+        """Return the model and the verdict."""
+        return f"{self.title}, {self.verdict.value}"
+
     def _repr_html_(self) -> str:
-        return self.to_html()
+        # In a frame, so that the page's style leaves the notebook alone.
+        return framed_html(self.to_html(), f"{self.title}: comparison", "32rem")
 
     def to_text(self, reveal: bool = False) -> str:
         """Return the report as plain text."""

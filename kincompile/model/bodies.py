@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import sympy
 
 from kincompile.calculus.symbols import Frame
+from kincompile.html import Shown
 from kincompile.model.expressions import NotAnExpressionError, as_expression, number_in
 from kincompile.names import rate
 
@@ -54,8 +55,8 @@ PLANAR = BodyKind(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
+@dataclass(frozen=True, slots=True, repr=False)
+class Body(Shown):
     """A planar rigid body with coordinates x, y [length] of its origin and angle phi [rad].
 
     Made by `Mechanism.body`; the ground is `Mechanism.ground`. The corners of its outline, in its
@@ -67,6 +68,11 @@ class Body:
     outline: Sequence[Scalars] = ()
     is_ground: bool = field(default=False, kw_only=True)
     kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
+
+    def to_text(self) -> str:
+        """Return its name, coordinates and guess."""
+        names = ", ".join(self.coordinates)
+        return f"{self.name} with {names}, guess ({', '.join(map(str, self.guess))})"
 
     @property
     def coordinates(self) -> tuple[str, ...]:

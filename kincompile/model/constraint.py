@@ -12,6 +12,7 @@ import sympy
 
 from kincompile.calculus.symbols import Contact  # noqa: TC001 - type hints are there at run time
 from kincompile.calculus.template import Template
+from kincompile.html import Shown
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
 from kincompile.model.bodies import GROUND, PLANAR, BodyKind
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 Type = TypeVar("Type", bound="Constraint")
 
 
-@dataclass(frozen=True)
-class Constraint:
+@dataclass(frozen=True, repr=False)
+class Constraint(Shown):
     """A joint, or a driver where its value is a function of `t`. Every type is a subclass.
 
     A subclass declares its attributes as fields, in the book's order, and its Phi in vectors.
@@ -52,6 +53,17 @@ class Constraint:
     """Pairs: where this one of two equations depends on others, the type that keeps the other."""
     replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"
     """The advice to take the simpler type, in words."""
+
+    def to_text(self) -> str:
+        """Return its name and arguments, bodies by name."""
+        given = [(getattr(self, item.name), item.default) for item in fields(self)[1:]]
+        kept = [value for value, default in given if value is not default]
+        written = (str(getattr(item, "name", item)) for item in kept)
+        return f"{self.name}: {', '.join(written)}"
+
+    def __repr__(self) -> str:
+        """Return type, name and arguments."""
+        return f"<{type(self).__name__} {self.to_text()}>"
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -146,7 +158,7 @@ class Constraint:
 )  # fmt: skip
 def constraint_type(cls: type[Type]) -> type[Type]:
     """Make a class a constraint type: a frozen dataclass whose docstring has its arguments."""
-    made = dataclass(frozen=True)(cls)
+    made = dataclass(frozen=True, repr=False)(cls)
     made.__doc__ = _documentation(made)
     _take_points(made)
     return made

@@ -28,10 +28,12 @@ from kincompile.criteria import (
     TOO_NEAR,
 )
 from kincompile.errors import InputError
+from kincompile.html import Shown
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.march import March, Outcome, distance
 from kincompile.runtime.problem import Problem, crawls, norm, problem, unsolvable
 from kincompile.runtime.status import Status
+from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -69,8 +71,8 @@ SHORTEST_STEP = 2.0**-20
 """A step shortened to this part without a decrease is at a minimum of the residual."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NewtonResult:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class NewtonResult(Shown):
     """The way of Newton's method from a guess to a position.
 
     Attributes
@@ -99,6 +101,16 @@ class NewtonResult:
     residuals: NDArray[np.float64]
     residual: float
     iterations: int
+
+    def to_text(self) -> str:
+        """Return the outcome, and the norms of Phi and of the correction in each iteration."""
+        rows = [
+            [str(k), f"{residual:.3g}", f"{self.corrections[k]:.3g}" if k < self.iterations else ""]
+            for k, residual in enumerate(self.residuals)
+        ]
+        outcome = f"{self.status.name} after {counted(self.iterations, 'iteration')}"
+        lines = table(("k", "|Phi|", "|correction|"), rows, ("k", "|Phi|", "|correction|"))
+        return "\n".join([f"{outcome}, residual {self.residual:.3g}", *indented(lines)])
 
 
 @dataclass(slots=True, eq=False)

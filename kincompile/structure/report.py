@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kincompile.html import Shown
 from kincompile.model.resolve import Joint
 from kincompile.structure.blocks import parts_of
 from kincompile.structure.counting import counting_problem, unmatched
@@ -21,13 +22,9 @@ if TYPE_CHECKING:
     from kincompile.structure.rank import RankReport
 
 
-@dataclass(frozen=True, slots=True)
-class Inspection(Findings):
+@dataclass(frozen=True, slots=True, repr=False)
+class Inspection(Shown, Findings):
     """What `kc.inspect` finds, with its text; see `Findings` for what it holds."""
-
-    def __str__(self) -> str:
-        """Return the text."""
-        return self.to_text()
 
     def to_text(self) -> str:
         """Return everything as plain text tables; rows and columns count from 0."""

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from kincompile.html import Shown
+from kincompile.names import listed
+from kincompile.tables import indented
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -23,8 +26,8 @@ if TYPE_CHECKING:
     from kincompile.targets.printer import Dialect, Printer
 
 
-@dataclass(frozen=True, slots=True)
-class Emitted:
+@dataclass(frozen=True, slots=True, repr=False)
+class Emitted(Shown):
     """The files of one target.
 
     Attributes
@@ -44,6 +47,17 @@ class Emitted:
     files: Mapping[str, str]
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     unsolvable: str = ""
+
+    def to_text(self) -> str:
+        """Return which files there are."""
+        sizes = [f"{name}, {text.count(chr(10))} lines" for name, text in self.files.items()]
+        lines = [*sizes, *([f"{self.name}.npz"] if self.arrays else [])]
+        lines += [f"no motion to solve for: {self.unsolvable}"] if self.unsolvable else []
+        return "\n".join([self.headline(), *indented([*lines, ".source is the main file's text"])])
+
+    def headline(self) -> str:
+        """Return the name and its files."""
+        return f"{self.name} as {listed([*self.files, *self.companions[len(self.files) - 1 :]])}"
 
     @property
     def source(self) -> str:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import kincompile.compiler as compiler
 from kincompile.errors import RedundantConstraintWarning
+from kincompile.html import Shown
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.origins import model_of
@@ -102,8 +103,8 @@ class Check:
         return f"{self.quantity} of {self.equation}{by}"
 
 
-@dataclass(frozen=True, slots=True)
-class Verification:
+@dataclass(frozen=True, slots=True, repr=False)
+class Verification(Shown):
     """The outcome of `kc.verify`.
 
     Attributes
@@ -173,9 +174,9 @@ class Verification:
             )
         return f"{generic} generic and {assembled} assembled states: {verdict}"
 
-    def __str__(self) -> str:
-        """Return the text."""
-        return self.to_text()
+    def headline(self) -> str:
+        """Return the name and the verdict."""
+        return f"{self.name}, {self._verdict()}"
 
 
 def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:

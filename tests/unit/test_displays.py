@@ -88,3 +88,29 @@ def test_that_a_derivation_shows_itself_in_a_frame(example_named: Any) -> None:
     frame = parsed(html).find("iframe")
     assert frame is not None
     assert frame.attrib["srcdoc"].startswith("<!DOCTYPE html>")
+
+
+def test_that_everything_public_is_short_in_a_list_and_whole_in_print(example_named: Any) -> None:
+    model, module = example_named("four_bar").model, example_named("four_bar").module
+    folding = example_named("problem_3_5_6")
+    event = kc.solve(folding.module, np.linspace(0, 6, 61)).events[0]
+    shown = {
+        "<Report: four_bar, equal>": kc.compare(model, nu=model.nu),
+        "<Inspection: ": kc.inspect(model),
+        "<Verification: four_bar, 6 generic and ": kc.verify(module),
+        "<NewtonResult: CONVERGED after ": kc.newton(module, 0.0, module.GUESS),
+        "<Emitted: four_bar as four_bar.py>": kc.emit(model),
+        "<lock-up at t = ": event,
+        "<Body: crank with x_crank, y_crank, phi_crank, guess (": model.bodies[0],
+        "<Revolute B: crank, (a/2, 0), coupler, (-b/2, 0)>": model.constraints[1],
+    }
+    for start, item in shown.items():
+        assert repr(item).startswith(start)
+        assert len(repr(item)) < 250
+        assert len(repr(item)) - 2 <= len(str(item)) + 40
+        assert "<" + "dataclass" not in str(item)
+        parsed(item._repr_html_())
+    assert str(kc.verify(module)).startswith("Verification of four_bar")
+    assert "|correction|" in str(kc.newton(module, 0.0, module.GUESS))
+    assert "Verdict: equal." in str(kc.compare(model, nu=model.nu))
+    assert str(event) == event.message

@@ -129,6 +129,13 @@ def test_that_a_page_does_what_it_says(page, least, tmp_path):
         pytest.fail("\n\n".join(failures), pytrace=False)
 
 
+def test_that_the_page_of_the_checker_does_what_it_says(tmp_path):
+    reader = Reader(tmp_path)
+    page = (ROOT / "docs" / "checker.md").read_text(encoding="utf-8")
+    failures = [found for block in BLOCK.finditer(page) if (found := failure_of(reader, block))]
+    assert failures == []
+
+
 def test_that_every_block_is_of_a_known_kind():
     assert README.count("\n```") == 2 * len(list(BLOCK.finditer(README)))
     assert {block["language"] for block in BLOCK.finditer(README)} == KINDS

@@ -126,7 +126,7 @@ def driver_ranges(solution: MotionTable, module: ModuleType, p: Array) -> tuple[
     if describe is None or not is_square or not np.isfinite(solution.q_ddot[0]).all():
         return ()
     with np.errstate(all="ignore"):
-        equations = problem(module, p, q, t, q)
+        equations = problem(module, p, q, t)
         return tuple(_range(equations, driver, q, t) for driver in describe(t, p))
 
 
@@ -137,7 +137,7 @@ def _range(equations: Problem, driver: Driver, q: Array, t: float) -> DriverRang
 
 def _limit(equations: Problem, driver: Driver, q: Array, t: float, sign: float) -> Limit:
     """Follow the driver one way, up to the first singular configuration."""
-    reach = ROUND if driver.unit == "rad" else SIZES * float(np.max(equations.spread(q)))
+    reach = ROUND if driver.unit == "rad" else SIZES * float(np.max(equations.reference))
     point = equations.at(q, t)
     assert point is not None  # it was solved
     curve, state = freed_curve(equations, driver.row, point, t)

@@ -187,7 +187,7 @@ class _Motion:
         self._known: dict[float, Array] = dict(zip(self.t.tolist(), on_grid, strict=True))
         self._states: dict[int, State | None] = {}
         start = self._position(0)
-        equations = problem(self._module, self._p, start, self.t[0], start, staged=True)
+        equations = problem(self._module, self._p, start, self.t[0], staged=True)
         self._march = March(equations, equations.engine, TOLERANCE)
         self._scales = self._largest()
 

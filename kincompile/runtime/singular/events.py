@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.html import Shown
 from kincompile.names import listed
 from kincompile.runtime.march import March, State
 from kincompile.runtime.singular.curve import Bracket, Curve
@@ -43,8 +44,8 @@ IN_RANGE = 1e-6
 """Part of nu that the equations cannot give, below which a singular point is no lock-up."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Event:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Event(Shown):
     """Something that happens to the motion as a whole.
 
     Attributes
@@ -71,6 +72,10 @@ class Event:
     message: str
     q: Vector
     null_vector: dict[str, float]
+
+    def to_text(self) -> str:
+        """Return what happens, and what to do."""
+        return self.message
 
     def __repr__(self) -> str:
         """Give kind, time and bodies."""
