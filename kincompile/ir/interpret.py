@@ -177,7 +177,9 @@ def _apply(
         case "call", [name, *arguments]:
             function = FUNCTIONS.get(name) or getattr(np, name)
             return function(*(values[k] for k in arguments))
-        case "compare" | "logic", [name, a, b]:
+        case "compare", [name, a, b]:  # of complex steps the real parts
+            return BINARY[name](np.real(values[a]), np.real(values[b]))
+        case "logic", [name, a, b]:
             return BINARY[name](values[a], values[b])
         case "select", [condition, a, b]:
             return np.where(values[condition], values[a], values[b])

@@ -69,7 +69,7 @@ def test_the_statuses_are_those_of_the_runtime(example_named):
     header = list(example_named("four_bar").files("c").values())[1]
     found = dict(re.findall(r"FOUR_BAR_(\w+) = (\d),  +//", header))
     assert {name: int(value) for name, value in found.items()} == {
-        status.name: int(status) for status in Status
+        status.name: int(status) for status in Status if status is not Status.CORNER
     }
 
 
