@@ -126,7 +126,17 @@ def quick_compiler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
             os.environ[name] = value
 
 
-@pytest.fixture(scope="session", params=EXAMPLES, ids=lambda path: path.stem)
+MORE = {"double_wishbone", "jansen", "klann", "shaper", "swing_and_dwell"}
+"""Examples that only the exhaustive run has: their joints and drivers are those of the others."""
+
+
+def marked(path: Path) -> object:
+    """Return an example as a parameter."""
+    marks = [pytest.mark.slow] if path.stem in MORE else []
+    return pytest.param(path, marks=marks, id=path.stem)
+
+
+@pytest.fixture(scope="session", params=map(marked, EXAMPLES))
 def example(request: pytest.FixtureRequest) -> Example:
     """Each of the examples in turn."""
     return load_example(request.param)

@@ -294,7 +294,16 @@ def case_named(example_named) -> Callable[[str], Case]:
 NAMES = [*(path.stem for path in EXAMPLES), *OWN]
 
 
-@pytest.fixture(params=[name for name in NAMES if name != "domain"])
+MORE = ("double_wishbone", "jansen", "klann", "shaper", "swing_and_dwell")
+"""Examples that only the exhaustive run has."""
+
+
+def marked_name(name: str) -> Any:
+    """Return a case as a parameter."""
+    return pytest.param(name, marks=[pytest.mark.slow] if name in MORE else [])
+
+
+@pytest.fixture(params=[marked_name(name) for name in NAMES if name != "domain"])
 def name(request) -> str:
     """Return the name of each case in turn, but for the one without a value."""
     return str(request.param)
@@ -511,7 +520,9 @@ def results_of(request, case_named, tmp_path_factory) -> Callable[[str], Results
             pytest.skip(reason)
         if target == "c":
             request.getfixturevalue("quick_compiler")
-        cases = {name: case_named(name) for name in NAMES}
+        is_quick = request.config.option.markexpr == "not slow"
+        names = [name for name in NAMES if not (is_quick and name in MORE)]
+        cases = {name: case_named(name) for name in names}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", kc.RedundantConstraintWarning)
             results: Results = RUNNERS[target](cases, tmp_path_factory.mktemp(target))

@@ -140,7 +140,8 @@ def test_that_no_right_answer_is_called_wrong(step: int, joint_types: Models) ->
         assert item.get("convention") in {None, *(found.kind for found in report.conventions)}, told
 
 
-@pytest.mark.parametrize("step", [SOME, ALL], ids=["some", "all"])
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [ALL], ids=["all"])
 def test_that_every_single_fault_is_found_and_named(step: int, joint_types: Models) -> None:
     corpus = answers("single_faults.toml", "answer")
     assert len(corpus) >= 1000

@@ -187,6 +187,7 @@ def test_the_second_time_the_compiler_is_not_needed(compiler, cache, tmp_path):
     assert_intact(cache, 1)
 
 
+@pytest.mark.slow
 def test_another_mechanism_has_a_library_of_its_own(cache):
     one, other = kc.compile(tiny(), target="c"), kc.compile(tiny(angle=3.0), target="c")
     q = np.zeros(3)
@@ -195,6 +196,7 @@ def test_another_mechanism_has_a_library_of_its_own(cache):
     assert_intact(cache, 2)
 
 
+@pytest.mark.slow
 def test_another_compiler_or_other_flags_build_anew(monkeypatch, cache, quick_compiler):
     kc.compile(tiny(), target="c")
     monkeypatch.setenv("CC", f"{quick_compiler} -DOTHER=1")
@@ -202,6 +204,7 @@ def test_another_compiler_or_other_flags_build_anew(monkeypatch, cache, quick_co
     assert_intact(cache, 2)
 
 
+@pytest.mark.slow
 def test_another_processor_builds_anew(monkeypatch, cache):
     kc.compile(tiny(), target="c")
     monkeypatch.setattr(c_library, "_processor", lambda: "flags: something else")
@@ -264,6 +267,7 @@ def test_a_cache_that_cannot_be_written_to_is_no_obstacle(cache):
     assert list(cache.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_cache_in_which_a_folder_is_in_the_way_is_no_obstacle(cache):
     kc.compile(tiny(), target="c")
     library = next(cache.glob("*.so"))
@@ -318,6 +322,7 @@ def loaded(monkeypatch):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ending", "mode"), [(".so", 0o602), (".sha256", 0o620)])
 def test_a_file_that_others_may_write_is_built_again(cache, loaded, mode, ending):
     kc.compile(tiny(), target="c")
@@ -331,6 +336,7 @@ def test_a_file_that_others_may_write_is_built_again(cache, loaded, mode, ending
     assert loaded[-1] == library
 
 
+@pytest.mark.slow
 def test_a_file_that_is_a_link_is_replaced_and_not_loaded(cache, loaded, tmp_path):
     kc.compile(tiny(), target="c")
     library = next(cache.glob("*.so"))
@@ -344,6 +350,7 @@ def test_a_file_that_is_a_link_is_replaced_and_not_loaded(cache, loaded, tmp_pat
     assert (tmp_path / "elsewhere.so").read_bytes() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "fault"),
     [("native", "writable"), ("kincompile", "writable"), ("native", "link"),
@@ -385,6 +392,7 @@ def run_compile(*before: str) -> str:
     ).stdout.strip()
 
 
+@pytest.mark.slow
 def test_processes_that_fill_the_cache_at_once_all_get_it_right(cache, start_process):
     processes = [start_process(compile_command(3)) for _ in range(4)]
     results = [process.communicate(timeout=120) for process in processes]
@@ -392,6 +400,7 @@ def test_processes_that_fill_the_cache_at_once_all_get_it_right(cache, start_pro
     assert_intact(cache, 1)
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_while_it_builds_leaves_nothing_to_load(
     compiler, cache, start_process
 ):

@@ -274,6 +274,7 @@ def test_that_variants_are_solved_one_after_the_other(example_named):
     assert found.message == known.message
 
 
+@pytest.mark.slow
 def test_that_a_large_mechanism_stays_numpys_where_c_is_asked_for(caplog):
     with caplog.at_level("INFO", logger="kincompile"):
         module = kc.compile(loops(40, "angle"), target="c")
