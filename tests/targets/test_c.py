@@ -31,6 +31,7 @@ def compare(model, q, t=0.0, tolerance=1e-13):
 
 
 @pytest.mark.parametrize("level", ["-O0", "-O2"])
+@pytest.mark.slow
 def test_strict_compilers_have_nothing_to_say(example, quick_compiler, tmp_path, level):
     for name, text in example.files("c").items():
         (tmp_path / name).write_text(text)

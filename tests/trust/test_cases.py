@@ -171,6 +171,7 @@ def test_that_assemblies_take_parameters(example_named):
         kc.assemblies(module, [0.0, 1.0])
 
 
+@pytest.mark.slow
 def test_that_another_branch_than_the_guess_is_told(example_named, compiled_for):
     """Where det Phi_q of the guess and of the position differ in sign, and no small steps help."""
     example = example_named("four_bar")

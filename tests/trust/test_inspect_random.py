@@ -50,6 +50,7 @@ def rank_by_numpy(model, q):
 
 
 @pytest.mark.parametrize("seed", range(30))
+@pytest.mark.slow
 def test_a_random_linkage(seed):
     model = random_linkage(seed)
     found = kc.inspect(model)

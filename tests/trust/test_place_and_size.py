@@ -31,6 +31,7 @@ def told(lengths, method, points, world, target="numpy"):
 
 @pytest.mark.parametrize("kind", LENGTHS)
 @pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.slow
 def test_no_place_no_unit_and_no_grid_is_judged_otherwise(kind, world):
     statuses, events, _ = told(LENGTHS[kind], "march", 90, {})
     assert [event[0] for event in events] == ([] if kind == "turning" else ["lock-up"])

@@ -222,6 +222,7 @@ def check_many(linkage, count, seed):
     assert 0.8 * possible < assembled <= possible
 
 
+@pytest.mark.slow
 def test_random_linkages_from_random_guesses(linkage):
     check_many(linkage, 60, seed=1)
 
@@ -262,6 +263,7 @@ def check_motion(linkage, p, t, guess):
 
 
 @pytest.mark.parametrize("count", [8, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_that_random_motions_end_alike_by_both_methods(linkage, count):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", kc.SingularConfigurationWarning)
@@ -276,6 +278,7 @@ def same_modulo_turns(q, other):
 
 
 @pytest.mark.parametrize("count", [6, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_the_number_of_assemblies_by_intersecting_circles(linkage, count):
     random = np.random.default_rng(count)
     for _ in range(count):

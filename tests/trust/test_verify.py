@@ -94,6 +94,7 @@ def test_that_the_grouped_form_passes(example):
     assert kc.verify(kc.compile(example.model, form="grouped")).passed
 
 
+@pytest.mark.slow
 def test_that_compiled_c_passes(example, quick_compiler):
     assert kc.verify(example.native).passed
 

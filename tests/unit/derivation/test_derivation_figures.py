@@ -78,6 +78,7 @@ def test_that_a_figure_is_an_image_with_its_symbols() -> None:
         assert 0 < float(item.get("y", -1)) < height
 
 
+@pytest.mark.slow
 def test_that_each_joint_has_a_figure_and_the_mechanism_one(gallery: Any, sections_of: Any) -> None:
     derivation = kc.derivation(gallery)
     count = sum(

@@ -59,6 +59,7 @@ def derivation(request: pytest.FixtureRequest, gallery: Any, example_named: Any)
     return kc.derivation(gallery if name == "gallery" else example_named(name).model)
 
 
+@pytest.mark.slow
 def test_that_the_page_is_one_file_and_its_links_lead_somewhere(derivation: Any) -> None:
     text = derivation.to_html()
     page = Page(text)

@@ -104,6 +104,7 @@ def test_that_an_unknown_choice_is_refused(gallery: Any, options: Any, message: 
         kc.derivation(gallery, **options)
 
 
+@pytest.mark.slow
 def test_that_links_lead_somewhere_at_every_level(gallery: Any) -> None:
     for level in ("vector", "expanded", "numeric"):
         text = kc.derivation(gallery, levels=(level,)).to_html()
@@ -118,6 +119,7 @@ def test_that_only_a_prescribed_angle_is_folded_away(gallery: Any, sections_of: 
     assert derivation.to_html().count("<details><summary><h3>") == 2
 
 
+@pytest.mark.slow
 def test_that_every_entry_has_a_line_with_code_and_number(gallery: Any, sections_of: Any) -> None:
     derivation = kc.derivation(gallery)
     lines = derivation.source.splitlines()

@@ -75,6 +75,7 @@ def test_that_the_ready_exercises_have_every_type_of_constraint() -> None:
 
 
 @pytest.mark.parametrize("name", ready())
+@pytest.mark.slow
 def test_that_variants_of_a_ready_exercise_assemble_and_differ(name: str) -> None:
     made = kc.exercise(read(name), 2, 5, signs=True, lengths=True)
     texts = set()
@@ -211,6 +212,7 @@ def test_that_the_same_seed_gives_the_same_bytes_and_another_other_ones() -> Non
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_that_bytes_do_not_depend_on_the_order_of_sets(tmp_path: Path) -> None:
     program = (
         "import sys, hashlib, kincompile as kc\n"
@@ -256,6 +258,7 @@ def test_that_a_kit_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: 
         (lambda: kc.exercise(prescribed()), "no joint whose Phi_q or gamma varies"),
     ],
 )
+@pytest.mark.slow
 def test_that_a_model_that_makes_no_exercise_is_refused(make: Any, message: str) -> None:
     with pytest.raises(kc.InputError, match=message):
         make()

@@ -84,6 +84,7 @@ def cases() -> list[Any]:
 
 
 @pytest.mark.parametrize(("speed", "kind", "number"), cases())
+@pytest.mark.slow
 def test_that_a_hostile_file_is_refused_in_bounded_time_and_memory(
     tmp_path_factory: pytest.TempPathFactory, speed: str, kind: str, number: int
 ) -> None:

@@ -20,6 +20,7 @@ def nested(inner: Any, depth: int) -> Any:
 
 
 @pytest.mark.parametrize("form", ["inline", "grouped"])
+@pytest.mark.slow
 def test_that_a_long_sum_compiles(form: str) -> None:
     series = sympy.Add(*(sympy.sin(k * kc.t) / k**2 for k in range(1, TERMS)))
     module = kc.compile(kc.ConstraintSystem("long", "x", [x - series]), form=form)

@@ -75,6 +75,7 @@ def test_the_published_peaks(title, target):
 @pytest.mark.parametrize(
     "title", ["modified sine", "modified trapezoid", "constant velocity", "cycloidal"]
 )
+@pytest.mark.slow
 def test_that_a_law_is_the_integral_of_its_published_acceleration(title):
     at = np.linspace(0, 1, 80001)
     velocity = cumulative_simpson(sines(title, at), x=at, initial=0)

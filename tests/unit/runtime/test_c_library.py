@@ -243,6 +243,7 @@ def in_the_slow_run(damage):
 @pytest.mark.parametrize(
     "damage", [damage_middle, *map(in_the_slow_run, (damage_nothing, damage_end, damage_all))]
 )
+@pytest.mark.slow
 def test_what_does_not_agree_with_its_checksum_is_built_again(cache, damage):
     # In processes of their own: a library in use must not be written to.
     assert run_compile() == "[-1.0, 0.0, -0.5]"

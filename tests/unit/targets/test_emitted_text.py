@@ -65,6 +65,7 @@ def test_that_it_runs_where_kincompile_is_not_installed(
 
 
 @pytest.mark.parametrize("seed", ["0", "1", "42"])
+@pytest.mark.slow
 def test_that_the_bytes_do_not_depend_on_the_hash_seed(source: str, seed: str) -> None:
     """This process has a seed of its own, or none."""
     model = Path(__file__).with_name("conftest.py")
