@@ -199,6 +199,7 @@ def test_that_another_model_is_refused(motion, example_named):
 
 
 def test_that_what_cannot_be_shown_is_refused(arm, motion, example_named):
+    plt.close("all")  # of other tests
     module = kc.compile(arm)
     nothing = kc.solve(example_named("problem_3_5_6").module, [0.0, 0.1])
     with pytest.raises(kc.InputError, match="has no bodies"):
