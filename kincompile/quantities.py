@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 FORMAT = 3
 """The format of emitted modules, as docs/architecture.md has it."""
@@ -102,12 +102,12 @@ WHOLE = ("position", "observe")
 """Those of them that are code of their own, in place of code for each of their quantities."""
 
 
-def over(rows: Collection[str]) -> tuple[Quantity, ...]:
-    """Return the quantities of a mechanism that has these kinds of rows, in order."""
-    return tuple(item for item in QUANTITIES if item.rows in rows)
+def quantities_of(*, has_outputs: bool) -> tuple[Quantity, ...]:
+    """Return the quantities of a mechanism, in order: those of outputs where it has any."""
+    return tuple(item for item in QUANTITIES if has_outputs or item.rows != "outputs")
 
 
-OF_EQUATIONS = over({"equations"})
+OF_EQUATIONS = tuple(item for item in QUANTITIES if item.rows == "equations")
 """Those whose rows are the equations, which a hand-derived formula is compared with."""
 
 

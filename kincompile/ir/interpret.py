@@ -49,7 +49,7 @@ def interpret(
     t
         Time, a scalar or of shape (...).
     p
-        Parameters, shape (k,); the defaults where None.
+        Parameters, shape (k,), or (k, ...) with one set for each point; the defaults where None.
     q_ddot
         Second rates, for outputs, shape (..., n); zero where None.
 
@@ -61,16 +61,7 @@ def interpret(
     """
     q, q_dot = np.asarray(q), np.asarray(q_dot)
     q_ddot = 0 * q if q_ddot is None else np.asarray(q_ddot)
-    defaults = [item.default for item in program.parameters]
-    inputs: dict[str, Any] = {"t": t}
-    inputs.update(
-        zip((item.name for item in program.parameters), defaults if p is None else p, strict=True)
-    )
-    for column, item in enumerate(program.coordinates):
-        inputs[item.name] = q[..., column]
-        inputs[rate(item.name)] = q_dot[..., column]
-        inputs[rate(item.name, 2)] = q_ddot[..., column]
-    values = run(program.values, inputs, program.tables)
+    values = run(program.values, _inputs(program, (q, q_dot, q_ddot), t, p), program.tables)
 
     shape = q.shape[:-1]
     dtype = np.result_type(q, q_dot, q_ddot, t, float)
@@ -94,6 +85,17 @@ def interpret(
                 else:
                     array[at] = entries
     return tuple(found)
+
+
+def _inputs(program: Program, states: Sequence[Array], t: Any, p: Any) -> dict[str, Any]:
+    """Return the values of the inputs by name; `states` are q, q_dot and q_ddot."""
+    values = [item.default for item in program.parameters] if p is None else p
+    names = (item.name for item in program.parameters)
+    inputs = {"t": t, **dict(zip(names, values, strict=True))}
+    for order, state in enumerate(states):
+        for column, item in enumerate(program.coordinates):
+            inputs[rate(item.name, order)] = state[..., column]
+    return inputs
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 
-from kincompile.quantities import over
+from kincompile.quantities import quantities_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -247,8 +247,7 @@ class Program:
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """The quantities that there are: those of outputs only where there are outputs."""
-        rows = {"equations", "coordinates"} | ({"outputs"} if self.observers else set())
-        return over(rows)
+        return quantities_of(has_outputs=bool(self.observers))
 
     @property
     def corners(self) -> bool:

@@ -40,8 +40,7 @@ _CONSTANTS: dict[str, type] = {
 
 def present_in(module: ModuleType) -> tuple[Quantity, ...]:
     """Return the quantities of a module: those of outputs where it has any."""
-    rows = {"equations", "coordinates"} | ({"outputs"} if hasattr(module, "OUTPUTS") else set())
-    return quantities.over(rows)
+    return quantities.quantities_of(has_outputs=hasattr(module, "OUTPUTS"))
 
 
 def functions(module: ModuleType) -> tuple[str, ...]:

@@ -59,10 +59,10 @@ def complex_step(Phi: Function, q: Array, t: float, along: Array, time: float) -
 def second_complex_step(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:
     """Return the second derivative of Phi along one line, by differences of complex steps."""
 
-    def slope(h: float) -> Array:
+    def rate(h: float) -> Array:
         return complex_step(Phi, q + h * along[0], t + h * time, along, time)
 
-    return _slope(slope, SHORT)
+    return slope(rate, SHORT)
 
 
 def differences(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:
@@ -71,7 +71,7 @@ def differences(Phi: Function, q: Array, t: float, along: Array, time: float) ->
     def at(s: float) -> Array:
         return np.asarray(Phi(q + s * along, t + s * time))
 
-    return _smooth(Phi(q, t), lambda h: _slope(at, h))
+    return _smooth(Phi(q, t), lambda h: slope(at, h))
 
 
 def second_differences(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:
@@ -95,7 +95,7 @@ def _smooth(here: Array, difference: Callable[[float], Array]) -> Array:
     return np.where(np.abs(found - closer) <= ROUGH * size, found, np.nan)
 
 
-def _slope(function: Callable[[float], Array], h: float) -> Array:
+def slope(function: Callable[[float], Array], h: float) -> Array:
     """Return the derivative of a function at 0 by central differences of fourth order."""
     near, far = function(h) - function(-h), function(2 * h) - function(-2 * h)
     return np.asarray((8 * near - far) / (12 * h))

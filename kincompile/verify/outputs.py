@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
+from kincompile.verify.oracles import DIFFERENCE, slope
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
@@ -19,12 +20,6 @@ if TYPE_CHECKING:
     from kincompile.verify.samples import Samples
 
     Array = NDArray[np.float64]
-
-STEP = 1e-3
-"""Step of the differences, relative to the scales of coordinates and time."""
-
-WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
-"""Steps and weights of the central difference of sixth order."""
 
 LIMIT = 1e-7
 """Largest error, relative to the size of the derivative along the scales."""
@@ -42,30 +37,31 @@ def errors_of_outputs(
     module, reference = samples.module, samples.reference
     second = np.roll(samples.q_dot, 1, axis=0)
 
+    states = samples.q, samples.q_dot, second, samples.t, samples.p
+
     def at(s: float, quantity: str) -> Array:
         """Return a quantity a time s later."""
         q = samples.q + s * samples.q_dot + s * s / 2 * second
         rates = samples.q_dot + s * second
-        return _of(module, quantity, q, rates, second, samples.t + s, samples.p)
+        return np.asarray(getattr(module, quantity)(q, rates, second, samples.t + s, samples.p))
 
     def aside(s: float, column: int) -> Array:
         """Return the outputs beside the states in one coordinate."""
         q = samples.q + s * reference[column] * np.eye(reference.size)[column]
-        return _of(module, "outputs", q, samples.q_dot, second, samples.t, samples.p)
+        return np.asarray(module.outputs(q, *states[1:]))
 
     compared = {"outputs_dot": "outputs", "outputs_ddot": "outputs_dot"}
     errors_of = {
-        name: _relative(at(0.0, name), _difference(partial(at, quantity=of)), may_lack=True)
+        name: _relative(at(0.0, name), slope(partial(at, quantity=of), DIFFERENCE), may_lack=True)
         for name, of in compared.items()
     }
     if model is not None:
-        states = samples.q, samples.q_dot, second, samples.t, samples.p
-        errors_of["outputs"] = _relative(at(0.0, "outputs"), _of_model(model, *states))
+        errors_of["outputs"] = _relative(module.outputs(*states), _of_model(model, *states))
     for quantity, found in errors_of.items():
         for name, error in zip(module.OUTPUTS, found, strict=True):
             yield quantity, name, "", error
-    by = [_difference(partial(aside, column=k)) for k in range(reference.size)]
-    jacobian = _of(module, "outputs_q", samples.q, samples.q_dot, second, samples.t, samples.p)
+    by = [slope(partial(aside, column=k), DIFFERENCE) for k in range(reference.size)]
+    jacobian = module.outputs_q(*states)
     errors = np.array([
         _relative(jacobian[..., k] * reference[k], rough) for k, rough in enumerate(by)
     ])  # fmt: skip
@@ -74,25 +70,13 @@ def errors_of_outputs(
         yield "outputs_q", name, module.COORDINATES[worst], float(own[worst])
 
 
-def _of(module: Any, quantity: str, *state: Any) -> Array:
-    """Return a quantity of the outputs at all states, the rows of points and of batches alike."""
-    found: Array = getattr(module, quantity)(*state)
-    return found
-
-
-def _of_model(model: ConstraintSystem, q: Array, q_dot: Array, *rest: Array) -> Array:
+def _of_model(
+    model: ConstraintSystem, q: Array, q_dot: Array, q_ddot: Array, t: Array, p: Array
+) -> Array:
     """Return the outputs by the interpreter."""
-    program, (q_ddot, t, p) = lower(model), rest
+    program = lower(model)
     place = [item.name for item in program.quantities].index("outputs")
-    states = zip(q, q_dot, t.tolist(), p, q_ddot, strict=True)
-    return np.array([interpret(program, *state)[place] for state in states])
-
-
-def _difference(at: Callable[[float], Array]) -> Array:
-    """Return the derivative at zero, by central differences of sixth order."""
-    parts = (weight * (at(k * STEP) - at(-k * STEP)) for k, weight in WEIGHTS)
-    found: Array = sum(parts, np.zeros(1)) / STEP
-    return found
+    return interpret(program, q, q_dot, t, p.T, q_ddot)[place]
 
 
 def _relative(found: Array, rough: Array, *, may_lack: bool = False) -> list[float]:

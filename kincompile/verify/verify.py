@@ -25,7 +25,7 @@ from kincompile.html import Shown
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.origins import model_of
-from kincompile.quantities import OF_EQUATIONS, over
+from kincompile.quantities import OF_EQUATIONS, QUANTITIES
 from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.engine.code import code_of, require_square
 from kincompile.tables import indented, table
@@ -62,7 +62,7 @@ THE_MODEL = "the model"
 SOLVE, DETERMINANTS, ALL_BLOCKS = "solve", "determinants", "all blocks"
 """What else is compared: the planned solve, equation by equation, and the determinants it gives."""
 
-OF_OUTPUTS = tuple(item.name for item in over({"outputs"}))
+OF_OUTPUTS = tuple(item.name for item in QUANTITIES if item.rows == "outputs")
 
 LARGEST = 8
 """How many of the largest errors of each quantity stand for all."""

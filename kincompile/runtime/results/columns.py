@@ -172,8 +172,8 @@ class MotionTable:
         stems = ((wanted.removesuffix(rate("", order)), order) for order in range(3))
         known = [(stem, order) for stem, order in stems if rate(stem, order) == wanted]
         for stem, order in known:
-            if stem in self.names:
-                return self._column(self.names.index(stem), order)
+            if stem in self.coordinates or stem in self.observed.names:
+                return self._column(stem, order)
         for stem, order in known:  # what nobody asked for is compiled now, so it comes last
             if wanted != name and stem in self.joints.names:
                 return self.joints.column(stem, order)
@@ -186,13 +186,13 @@ class MotionTable:
 
     def columns(self) -> list[Column]:
         """Return the coordinates and outputs, then their rates, then their second rates."""
-        return [self._column(k, order) for order in range(3) for k in range(len(self.names))]
+        names = self.names
+        return [self._column(name, order) for order in range(3) for name in names]
 
-    def _column(self, k: int, order: int) -> Column:
-        name = self.names[k]
-        if k >= len(self.coordinates):
+    def _column(self, name: str, order: int) -> Column:
+        if name not in self.coordinates:
             return self.observed.column(name, order)
-        values = (self.q, self.q_dot, self.q_ddot)[order][..., k]
+        values = (self.q, self.q_dot, self.q_ddot)[order][..., self.coordinates.index(name)]
         return Column(rate(name, order), rate_unit(self.units.get(name, ""), order), values)
 
     @property

@@ -238,6 +238,7 @@ def _data(
         "m": len(program.equations),
         "nonzeros": nonzeros,
         "k": len(program.parameters),
+        "has_outputs": bool(program.outputs),
         "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
         "output_units": indented(
             wrapped(f'"{item.name}": "{item.unit}"' for item in program.outputs)

@@ -119,6 +119,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "coordinates": tuple_text(f'"{name}"' for name in names),
         "equations": tuple_text(f'"{name}"' for name in program.equations),
         "solvability": solvability_text(program),
+        "has_outputs": bool(program.outputs),
         "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
