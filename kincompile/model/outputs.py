@@ -29,7 +29,7 @@ from kincompile.names import rate as rate_name
 from kincompile.names import unit_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint, Scope
@@ -187,7 +187,15 @@ def resolve_point(point: BodyPoint, scope: Scope) -> None:
     checked_point(point.local, Kind.POINT, where, scope)
 
 
-def resolve_output(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput | None:
+def resolved_outputs(
+    given: Iterable[Output], scope: Scope, length_unit: str
+) -> tuple[ResolvedOutput, ...]:
+    """Return the valid outputs, resolved."""
+    found = (_resolved(item, scope, length_unit) for item in given)
+    return tuple(item for item in found if item is not None)
+
+
+def _resolved(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput | None:
     """Check an output against the names that exist; write out every `rate` in it."""
     where, before = f"output {output.name!r}", len(scope.problems)
     unit = length_unit if output.unit is None else output.unit

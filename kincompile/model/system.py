@@ -26,8 +26,8 @@ from kincompile.model.outputs import (
     ResolvedOutput,
     outputs_of_points,
     point_of,
-    resolve_output,
     resolve_point,
+    resolved_outputs,
 )
 from kincompile.model.points import BodyPoint
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
@@ -130,37 +130,25 @@ class ConstraintSystem(MatrixViews, TextViews):
         body_points = tuple(item for item in wanted if isinstance(item, BodyPoint))
         named = (*outputs_of_points(body_points), *(x for x in wanted if isinstance(x, Output)))
         _check_names(name, bodies, found, declared, written, named, problems)
-        scope = Scope(
-            {body.name: body for body in bodies},
-            [item.name for item in found],
-            {item.name: item for item in declared},
-            problems,
-        )
-        resolved = [
-            resolve_equation(item, scope)
-            if isinstance(item, Equation)
-            else resolve_joint(item, scope)
-            for item in written
-        ]
+        scope = _scope(bodies, found, declared, problems)
+        constraints = _resolved(written, scope)
         for point in body_points:
             resolve_point(point, scope)
-        found_outputs = [resolve_output(item, scope, length_unit) for item in named]
+        found_outputs = resolved_outputs(named, scope, length_unit)
         if not written:
             problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
         if not found and not bodies:
             problems.append(f"{name!r} has no coordinates; add a body, or name coordinates")
         if problems:
             raise ModelError(list(dict.fromkeys(problems)))
-        constraints = tuple(item for item in resolved if item is not None)
         names = tuple(name for item in constraints for name in item.equation_names)
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
-            "outputs": tuple(item for item in found_outputs if item is not None),
-            "length_unit": length_unit, "end": last, "end_given": end, "points": points,
+            "outputs": found_outputs, "length_unit": length_unit, "end": last, "end_given": end,
+            "points": points,
         }  # fmt: skip
-        for key, value in values.items():
-            object.__setattr__(self, key, value)
+        _fill(self, values)
 
     def __setattr__(self, key: str, value: object) -> None:
         raise AttributeError(f"a ConstraintSystem is frozen; make a new one to change {key!r}")
@@ -171,18 +159,11 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
         """Return the same system with these points as its outputs, and no others."""
-        names = [item.name for item in self.coordinates]
-        scope = Scope(
-            {body.name: body for body in self.bodies},
-            names,
-            {item.name: item for item in self.parameters},
-        )
-        found = [resolve_output(x, scope, self.length_unit) for x in outputs_of_points(points)]
-        other = ConstraintSystem.__new__(ConstraintSystem)
+        scope = _scope(self.bodies, self.coordinates, self.parameters, [])
+        outputs = resolved_outputs(outputs_of_points(points), scope, self.length_unit)
         values = {key: getattr(self, key) for key in self.__slots__}
-        values |= {"body_points": tuple(points), "outputs": tuple(filter(None, found))}
-        for key, value in values.items():
-            object.__setattr__(other, key, value)
+        other = ConstraintSystem.__new__(ConstraintSystem)
+        _fill(other, {**values, "body_points": tuple(points), "outputs": outputs})
         return other
 
     def joint_points(self) -> tuple[BodyPoint, ...]:
@@ -213,6 +194,38 @@ class ConstraintSystem(MatrixViews, TextViews):
         """Return name and sizes."""
         sizes = f"{len(self.coordinates)} coordinates, {len(self.equations)} equations"
         return f"<ConstraintSystem {self.name!r}: {sizes}>"
+
+
+def _fill(system: ConstraintSystem, values: Mapping[str, Any]) -> None:
+    """Set the attributes of a system, once."""
+    for key, value in values.items():
+        object.__setattr__(system, key, value)
+
+
+def _scope(
+    bodies: Iterable[Body],
+    coordinates: Iterable[Coordinate],
+    parameters: Iterable[Parameter],
+    problems: list[str],
+) -> Scope:
+    """Return the names that may be used in a system."""
+    return Scope(
+        {body.name: body for body in bodies},
+        [item.name for item in coordinates],
+        {item.name: item for item in parameters},
+        problems,
+    )
+
+
+def _resolved(
+    written: list[Constraint | Equation], scope: Scope
+) -> tuple[Joint | FreeEquation, ...]:
+    """Return the valid constraints, resolved."""
+    found = (
+        resolve_equation(item, scope) if isinstance(item, Equation) else resolve_joint(item, scope)
+        for item in written
+    )
+    return tuple(item for item in found if item is not None)
 
 
 def _written(equations: Iterable[Any], problems: list[str]) -> list[Constraint | Equation]:
