@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import kincompile as kc
+from tests.pendulum import pendulum
 
 READ = """
 import os, resource, runpy, sys
@@ -109,14 +110,6 @@ def read(path: Path) -> object:
     if path.suffix == ".txt":
         return kc.compare_file(pendulum(), path)
     return kc.read_analysis(path) if path.suffix == ".acf" else kc.read_model(path)
-
-
-def pendulum() -> kc.Mechanism:
-    m = kc.Mechanism("pendulum")
-    bob = m.body("bob", guess=(1, 0, 0))
-    m.add(kc.Revolute("pin", bob, (-1, 0), m.ground, (0, 0)))
-    m.add(kc.AbsoluteAngle("motor", bob, kc.t**2))
-    return m
 
 
 def test_that_a_hand_file_is_no_link_and_a_model_may_be_one(tmp_path: Path) -> None:
