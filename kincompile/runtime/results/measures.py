@@ -26,6 +26,7 @@ from kincompile.runtime.march import March, State
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
+from kincompile.runtime.results.plot import runs
 from kincompile.tables import table
 
 if TYPE_CHECKING:
@@ -302,12 +303,11 @@ def _rests(t: Array, signs: Array) -> list[float]:
 
     Where it goes on as it came it has no dead point, unless it dwells there.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], signs == 0, [False])).astype(int)))
     found = []
-    for start, stop in edges.reshape(-1, 2).tolist():
-        before, after = signs[max(start - 1, 0)], signs[min(stop, t.size - 1)]
-        if stop - start > 1 or before * after <= 0:
-            found.append(float(t[start]))
+    for first, last in runs(signs == 0):
+        before, after = signs[max(first - 1, 0)], signs[min(last + 1, t.size - 1)]
+        if last > first or before * after <= 0:
+            found.append(float(t[first]))
     return found
 
 
