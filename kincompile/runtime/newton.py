@@ -31,7 +31,7 @@ from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.march import March, Outcome, distance
-from kincompile.runtime.problem import Problem, crawls, norm, problem, unsolvable
+from kincompile.runtime.problem import Problem, crawls, norm, problem, unsolvable, weights_of
 from kincompile.runtime.status import Status
 from kincompile.tables import counted, indented, table
 
@@ -351,8 +351,7 @@ def plain_step(equations: Problem, t: float, point: Point) -> tuple[Point, float
 
 def safeguarded_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
     """Apply as much of the correction as keeps the angles near and lowers the residual."""
-    terms = equations.terms(point, equations.reference)
-    weights = 1 / np.where(terms > 0, terms, 1.0)  # equations of different units count alike
+    weights = weights_of(equations.terms(point, equations.reference))
     correction = _direction(equations, point, weights)
     if correction is None:
         return Status.NOT_FINITE
