@@ -169,7 +169,6 @@ def solve(
         else:
             solve_all = solve_in_turn if inputs.code.lanes is None else solve_variants
             solution = solve_all(inputs, inputs.sets, progress)
-            solution = replace(solution, sweep=dict(inputs.sweep))
             start = _start_of_first(inputs, solution)
     solution = _finite(solution)
     if start:
