@@ -89,7 +89,8 @@ def shape(link: Outline) -> dict[str, Point]:
         used |= {frozenset((placed[0], other)) for other in placed[1:]}
     if surplus := [pair for pair in link.lengths if pair not in used]:
         raise ShapeError(
-            f"the lengths {_pairs(link, surplus)} are more than fix its shape; leave them out"
+            f"the lengths {listed_pairs(surplus, link.joints)} are more than fix its shape; leave "
+            "them out"
         )
     return found
 
@@ -134,8 +135,8 @@ def _next(link: Outline, missing: Sequence[str], found: Iterable[str]) -> tuple[
     joint = missing[0]
     given = [pair for pair in link.lengths if joint in pair]
     raise ShapeError(
-        f"{joint} has only {_pairs(link, given)}: give its lengths to two other joints, or none, "
-        f"or its place in the frame of the link, {joint}=(xi, eta)"
+        f"{joint} has only {listed_pairs(given, link.joints)}: give its lengths to two other "
+        f"joints, or none, or its place in the frame of the link, {joint}=(xi, eta)"
     )
 
 
@@ -214,9 +215,9 @@ def _no_triangle(
     )
 
 
-def _pairs(link: Outline, pairs: Iterable[Pair]) -> str:
-    """Name pairs of joints, in the order of the link."""
-    return listed(" ".join(sorted(pair, key=link.joints.index)) for pair in pairs)
+def listed_pairs(pairs: Iterable[Pair], joints: Sequence[str]) -> str:
+    """Name pairs of joints, in the order of their link."""
+    return listed(" ".join(sorted(pair, key=joints.index)) for pair in pairs)
 
 
 def pairs_by_name(joints: Sequence[str]) -> dict[str, list[Pair]]:

@@ -21,6 +21,7 @@ from kincompile.model.expressions import (
     t,
 )
 from kincompile.model.laws import RISES, Rise, TableLaw, constant_velocity
+from kincompile.model.piecewise import number_text
 from kincompile.model.spline import fit_between
 from kincompile.names import listed, suggestion
 
@@ -210,8 +211,5 @@ def _check_times(times: Sequence[sympy.Expr], problems: list[str]) -> None:
     for before, after in pairwise(times):
         step = after - before
         if step.is_number and not step > 0:
-            problems.append(f"times must rise, but {_text(after)} follows {_text(before)}")
-
-
-def _text(value: sympy.Expr) -> str:
-    return f"{float(value):g}" if isinstance(value, sympy.Float) else str(value)
+            late, early = number_text(after), number_text(before)
+            problems.append(f"times must rise, but {late} follows {early}")

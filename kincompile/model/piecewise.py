@@ -45,7 +45,7 @@ def gap_problem(value: sympy.Expr, *, corners: bool = False) -> str | None:
         jump = _numbers_that_differ(before, after, symbol, place)
         if jump:
             return (
-                f"the pieces do not meet at {symbol} = {_text(place)}: {jump[0]:g} before, "
+                f"the pieces do not meet at {symbol} = {number_text(place)}: {jump[0]:g} before, "
                 f"{jump[1]:g} after; {_REMEDY}"
             )
         if corners:
@@ -53,7 +53,7 @@ def gap_problem(value: sympy.Expr, *, corners: bool = False) -> str | None:
         corner = _numbers_that_differ(before.diff(symbol), after.diff(symbol), symbol, place)
         if corner:
             return (
-                f"the pieces meet in a corner at {symbol} = {_text(place)}: the slope is "
+                f"the pieces meet in a corner at {symbol} = {number_text(place)}: the slope is "
                 f"{corner[0]:g} before, {corner[1]:g} after; {_REMEDY}, or keep it: {_ALLOW}"
             )
     return None
@@ -66,7 +66,7 @@ def _law_problem(value: sympy.Expr, *, corners: bool) -> str | None:
         rough = [law for law in laws if min(law.continuity - law.order, 1) == smooth]
         if rough and not (corners and smooth == 0):
             ends = sorted({end for law in rough for end in _ends(law)}, key=sympy.default_sort_key)
-            places = ", ".join(map(_text, ends))
+            places = ", ".join(map(number_text, ends))
             names = ", ".join(dict.fromkeys(law.func.__name__ for law in rough))
             remedy = f", or keep them: {_ALLOW}" if smooth == 0 else ""
             return f"the law {names} has {what}s at t = {places}; take a smoother one{remedy}"
@@ -81,7 +81,8 @@ def _ends(law: MotionLaw) -> Iterator[sympy.Expr]:
         yield from (sympy.simplify((place - start) / slope) for place in (0, 1))
 
 
-def _text(place: sympy.Expr) -> str:
+def number_text(place: sympy.Expr) -> str:
+    """Return a place as a message shows it: a decimal number short, anything else as it is."""
     return f"{float(place):g}" if isinstance(place, sympy.Float) else str(place)
 
 

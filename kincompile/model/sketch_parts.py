@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.model.bodies import GROUND, Body, default_values
 from kincompile.model.expressions import NotAnExpressionError, Scalar, as_expression
-from kincompile.model.link_shape import Outline, number, pairs_by_name
+from kincompile.model.link_shape import Outline, listed_pairs, number, pairs_by_name
 from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
@@ -222,7 +222,7 @@ class Drawn:
 def _not_a_length(key: str, joints: Sequence[str], meant: Sequence[frozenset[str]]) -> str:
     """Say why a name is not that of a length or a joint of the link."""
     if len(meant) > 1:
-        both = listed(" ".join(sorted(pair, key=joints.index)) for pair in meant)
+        both = listed_pairs(meant, joints)
         return f"this may be {both}; write the two joints with _ between them"
     if key in joints:
         return f"{joints[0]} and {joints[1]} carry the frame of the link; give their distance"

@@ -20,7 +20,6 @@ from kincompile.runtime.status import Status
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Code
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.results.solution import Solution
 
@@ -34,15 +33,17 @@ ENTRIES = 1_000_000
 """Entries of nu that are evaluated at a time."""
 
 
-def corners_of(inputs: Inputs, sets: Array | None) -> Mask | None:
+def corners_of(inputs: Inputs) -> Mask | None:
     """Return at which times a driver has a corner, shape (N,), of B variants (B, N).
 
     None where there are none, or the model allows none.
     """
     if not inputs.code.corners:
         return None
-    by_set = [_corners(inputs.code, inputs.t, inputs.guess, p) for p in _sets(inputs, sets)]
-    found = np.array(by_set) if sets is not None else by_set[0]
+    if inputs.sets is None:
+        found = _corners(inputs, inputs.p)
+    else:
+        found = np.array([_corners(inputs, p) for p in inputs.sets])
     return found if found.any() else None
 
 
@@ -68,12 +69,9 @@ def with_corners(solution: Solution, t: Array, corners: Mask) -> Solution:
     return replace(solution, t=t, status=status, q_ddot=q_ddot, message=solution.message + note)
 
 
-def _sets(inputs: Inputs, sets: Array | None) -> Array:
-    return inputs.p[np.newaxis] if sets is None else sets
-
-
-def _corners(code: Code, t: Array, q: Array, p: Array) -> Mask:
+def _corners(inputs: Inputs, p: Array) -> Mask:
     """Return where nu jumps, with one parameter set."""
+    code, t, q = inputs.code, inputs.t, inputs.guess
     largest = np.zeros(len(code.equations))
     jumps, reach = [], _reach(t)
     size = max(1, ENTRIES // largest.size)

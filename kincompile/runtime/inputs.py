@@ -39,7 +39,7 @@ class Inputs:
     t : ndarray, shape (N,)
         The time grid, finite and monotone.
     p : ndarray, shape (k,)
-        A value for each parameter.
+        A value for each parameter; of several sets the first.
     guess : ndarray, shape (n,)
         Where Newton starts.
     tolerance : float
@@ -85,7 +85,7 @@ class _Variants:
     sets : ndarray, shape (B, k), or None
         The sets, where an array of them was given.
     sweep
-        NDArray[np.float64]s of values by the names of their parameters.
+        Arrays of values by the names of their parameters.
     is_product
         Whether every value of one goes with every value of the others; else they go in pairs.
     problems

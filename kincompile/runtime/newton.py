@@ -31,7 +31,7 @@ from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.march import March, Outcome, distance
-from kincompile.runtime.problem import Problem, crawls, norm, problem, unsolvable
+from kincompile.runtime.problem import Problem, crawls, norm, problem, unsolvable, weights_of
 from kincompile.runtime.status import Status
 from kincompile.tables import counted, indented, table
 
@@ -136,13 +136,13 @@ class Attempt:
 
     @property
     def last(self) -> Point:
-        """The last position; there is one unless the guess itself could not be evaluated."""
-        return self.points[-1]
+        """The last position, angles turned back; there is one unless the guess has no values."""
+        return self.turned or self.points[-1]
 
     @property
     def found(self) -> Point | None:
-        """Where it ended, angles turned back; None where it did not begin."""
-        return self.turned or (self.points[-1] if self.points else None)
+        """The last position; None where there is none."""
+        return self.last if self.points else None
 
 
 if TYPE_CHECKING:
@@ -205,8 +205,7 @@ def start(march: March, t: float, inputs: Inputs) -> Outcome:
     iterations = len(attempt.corrections)
     if attempt.status is not Status.CONVERGED:
         return Outcome(attempt.status, iterations, None, nearest=attempt.found)
-    found = attempt.turned or attempt.last
-    here = [march.equations.at(q, t) for q in (inputs.guess, found.q)]
+    here = [march.equations.at(q, t) for q in (inputs.guess, attempt.last.q)]
     guess, point = (known for known in here if known is not None)
     left = march.equations.leaves_branch(guess, point)
     folded = march.equations.is_folded(guess, point)
@@ -265,7 +264,7 @@ def assemble(
         attempt.turned = unwound(equations, t, attempt.last, guess, tolerance)
 
     def order(attempt: Attempt) -> tuple[bool, bool, float]:
-        point = attempt.turned or attempt.last
+        point = attempt.last
         away = round(float(distance(point.q, guess, equations.reference)), 6)
         is_far = bool(equations.is_far(point.q, guess))
         # From a guess so rough no sign is to be trusted.
@@ -351,8 +350,7 @@ def plain_step(equations: Problem, t: float, point: Point) -> tuple[Point, float
 
 def safeguarded_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
     """Apply as much of the correction as keeps the angles near and lowers the residual."""
-    terms = equations.terms(point, equations.reference)
-    weights = 1 / np.where(terms > 0, terms, 1.0)  # equations of different units count alike
+    weights = weights_of(equations.terms(point, equations.reference))
     correction = _direction(equations, point, weights)
     if correction is None:
         return Status.NOT_FINITE

@@ -143,7 +143,7 @@ class Problem:
 
     def weights(self) -> Array:
         """Give by what equations of different units are multiplied to count alike."""
-        return np.asarray(1 / np.where(self.magnitude > 0, self.magnitude, 1.0))
+        return weights_of(self.magnitude)
 
     def terms(self, point: Point, scale: Array) -> Array:
         """Give what the terms of each equation contribute at the scales of the coordinates.
@@ -214,6 +214,11 @@ def problem(
         equations.noise = ROUNDING * here
         equations.limit = np.where(here > 0, STEEP * here, np.inf)
     return equations
+
+
+def weights_of(terms: Array) -> Array:
+    """Return by what equations are multiplied whose terms contribute so much, to count alike."""
+    return np.asarray(1 / np.where(terms > 0, terms, 1.0))
 
 
 def within(values: Array | Iterable[Array], limits: Array) -> Any:

@@ -157,20 +157,19 @@ def solve(
     """
     limits = (tolerance, max_iterations)
     inputs = read_inputs(module, t, p, guess, *limits, method, through, product)
-    sets = inputs.sets
     if assembly is not None:
         inputs = _at_assembly(inputs, guess, assembly)
-    times, corners = inputs.t, corners_of(inputs, sets)
+    times, corners = inputs.t, corners_of(inputs)
     inputs = after_corners(inputs, corners)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
-        if sets is None:
+        if inputs.sets is None:
             motion, outcome = follow(inputs, progress)
             start = _start(inputs, motion)
             solution = _solution(inputs, motion, outcome)
         else:
             solve_all = solve_in_turn if inputs.code.lanes is None else solve_variants
-            solution = replace(solve_all(inputs, sets, progress), sweep=dict(inputs.sweep))
-            start = _start_of_first(replace(inputs, p=sets[0]), solution)
+            solution = solve_all(inputs, inputs.sets, progress)
+            start = _start_of_first(inputs, solution)
     solution = _finite(solution)
     if start:
         warnings.warn(start, AssemblyWarning, stacklevel=2)
@@ -199,8 +198,7 @@ def _at_assembly(inputs: Inputs, guess: Values, number: int) -> Inputs:
     """Return inputs whose guess is one of the assemblies, of variants those of the first."""
     if guess is not None:
         raise InputError("guess and assembly are both given: give one of them.")
-    first = inputs if inputs.sets is None else replace(inputs, p=inputs.sets[0])
-    return replace(inputs, guess=assembly_guess(first, number), without_guess=())
+    return replace(inputs, guess=assembly_guess(inputs, number), without_guess=())
 
 
 def _start(inputs: Inputs, motion: Motion) -> str:

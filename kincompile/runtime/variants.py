@@ -244,7 +244,7 @@ def _solution(inputs: Inputs, sets: Array, arrays: _Arrays) -> Solution:
         equations=module.EQUATIONS,
         units=dict(module.UNITS),
         parameters=dict(zip(module.PARAMETERS, sets.T, strict=True)),
-        sweep={},
+        sweep=dict(inputs.sweep),
         statistics={"coarse": 0, "marched": 0},
         events=[],
         module=module,

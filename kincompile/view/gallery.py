@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,8 @@ from kincompile.names import listed
 from kincompile.runtime.singular.assemblies import assemblies
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.page_data import as_json, page_data
+from kincompile.view.drawing import drawing
+from kincompile.view.page_data import as_json
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -153,23 +154,31 @@ def assembly_gallery(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", KincompileWarning)  # each card says how it went
             solution = solve(module, times, p, guess)
-        data = page_data(system, _moved(solution, guess), solution.message)
-        good = int(np.count_nonzero(solution.good))
-        last = "the end" if solution.success else f"t = {times[max(good - 1, 0)]:g}"
-        cards.append(_card({**data, "rest": 0.0}, f"Assembly {number}", f"moves to {last}"))
+        data = _moving(system, solution, guess)
+        last = "the end" if solution.success else f"t = {data['arrays']['t'][-1]:g}"
+        cards.append(_card(data, f"Assembly {number}", f"moves to {last}"))
     title = f"Assemblies of {escape(system.name)} at t = {t:g}"
     return AssemblyGallery(module, positions, _filled(title, cards))
 
 
-def _moved(solution: Solution, guess: NDArray[np.float64]) -> Solution:
-    """Return the points that were found, or the assembly alone where there are none."""
+def _moving(
+    system: ConstraintSystem, solution: Solution, assembly: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Return what a card shows: the points that were found, or the assembly alone without any."""
     good = max(1, int(np.count_nonzero(solution.good)))
     q = solution.q[:good].copy()
     if np.isnan(q[0]).any():
-        q[0] = guess
-    arrays = {name: getattr(solution, name)[:good] for name in ("t", "status", "residual")}
+        q[0] = assembly
     rates = {name: np.nan_to_num(getattr(solution, name)[:good]) for name in ("q_dot", "q_ddot")}
-    return replace(solution, q=q, **arrays, **rates)
+    shapes = drawing(system, solution.parameters, q)
+    return {
+        "coordinates": [{"name": item.name, "unit": item.unit} for item in system.coordinates],
+        "guess": [item.guess for item in system.coordinates],
+        "drawing": shapes.to_json(),
+        "extent": shapes.extent(q),
+        "rest": 0.0,
+        "arrays": {"t": solution.t[:good], "q": q, **rates},
+    }
 
 
 def _filled(title: str, cards: Sequence[Mapping[str, str]]) -> str:

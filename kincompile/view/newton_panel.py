@@ -14,6 +14,8 @@ from kincompile.runtime.problem import problem
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
@@ -29,8 +31,11 @@ def newton_method() -> str:
     return fill("view/newton.js.jinja", {name: getattr(criteria, name) for name in CRITERIA})
 
 
-def newton_script(model: Mechanism | ConstraintSystem) -> str:
-    """Return the script that declares `emitted`: the functions, or `reason`, why there are none."""
+def newton_script(model: Mechanism | ConstraintSystem, module: ModuleType | None = None) -> str:
+    """Return the script that declares `emitted`: the functions, or `reason`, why there are none.
+
+    The module is what the model was compiled to, if it was.
+    """
     count = len(model.system().coordinates)
     if count > MOST_COORDINATES:
         return _without(f"{count} coordinates are too many to show Newton's method step by step.")
@@ -40,7 +45,8 @@ def newton_script(model: Mechanism | ConstraintSystem) -> str:
         return _without(f"Newton's method cannot be shown: {error}")
     if emitted.unsolvable:
         return _without(f"Newton's method cannot be shown: {emitted.unsolvable}")
-    module = compiler.compile(model)
+    if module is None:
+        module = compiler.compile(model)
     with np.errstate(all="ignore"):
         size = problem(module, module.DEFAULTS, module.GUESS, 0.0).size
     # In a function of its own, so that no name of a mechanism meets one of the page.

@@ -23,6 +23,7 @@ from kincompile.writing import write_atomically
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
+    from types import ModuleType
 
     from numpy.typing import ArrayLike
 
@@ -126,9 +127,11 @@ def page(
         several variants.
     """
     system = system_of(model)
+    module = None
     if solution is None:
+        module = compile_model(system)
         times = np.linspace(0, system.end, system.points) if t is None else t
-        solution, message = _solved(system, times, p, through, assembly)
+        solution, message = _solved(module, times, p, through, assembly)
     else:
         _require_motion_of(system, solution)
         message = solution.message
@@ -138,7 +141,7 @@ def page(
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "licence": read("view/vendor/uplot.LICENSE.txt"),
         "scripts": [
-            newton_script(system),
+            newton_script(system, module),
             newton_method(),
             *(read(f"view/{name}") for name in SCRIPTS),
         ],
@@ -163,15 +166,15 @@ def _require_motion_of(system: ConstraintSystem, solution: Solution) -> None:
 
 
 def _solved(
-    system: ConstraintSystem,
+    module: ModuleType,
     t: ArrayLike,
     p: Mapping[str, float] | None,
     through: str | None,
     assembly: int | None,
 ) -> tuple[Solution | None, str]:
-    """Compile and solve a system; return the solution, if there is one, and the message."""
+    """Solve a compiled system; return the solution, if there is one, and the message."""
     try:
-        solution = solve(compile_model(system), t, p, through=through, assembly=assembly)
+        solution = solve(module, t, p, through=through, assembly=assembly)
     except StructuralError as error:
         return None, str(error)
     return solution, solution.message

@@ -262,7 +262,7 @@ def check_motion(linkage, p, t, guess):
     assert np.all(march.branch[good] == march.branch[0])
 
 
-@pytest.mark.parametrize("count", [8, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [8, 60])
 @pytest.mark.slow
 def test_that_random_motions_end_alike_by_both_methods(linkage, count):
     with warnings.catch_warnings():
@@ -277,7 +277,7 @@ def same_modulo_turns(q, other):
     return np.max(np.abs(difference), axis=-1) < 1e-6
 
 
-@pytest.mark.parametrize("count", [6, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [6, 12])
 @pytest.mark.slow
 def test_the_number_of_assemblies_by_intersecting_circles(linkage, count):
     random = np.random.default_rng(count)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,7 @@ from kincompile.runtime.march import March, State
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
+from kincompile.runtime.results.plot import runs
 from kincompile.tables import table
 
 if TYPE_CHECKING:
@@ -59,8 +61,8 @@ ROOT_STEPS = 60
 APART = 1e-5
 """Distance of the times that give a rate where none is emitted, as a part of the span."""
 
-GAUSS = np.polynomial.legendre.leggauss(8)
-"""Places and weights for the integral over a step at whose ends a rate does not exist."""
+GAUSS_PLACES = 8
+"""Places for the integral over a step at whose ends a rate does not exist."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,12 +303,11 @@ def _rests(t: Array, signs: Array) -> list[float]:
 
     Where it goes on as it came it has no dead point, unless it dwells there.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], signs == 0, [False])).astype(int)))
     found = []
-    for start, stop in edges.reshape(-1, 2).tolist():
-        before, after = signs[max(start - 1, 0)], signs[min(stop, t.size - 1)]
-        if stop - start > 1 or before * after <= 0:
-            found.append(float(t[start]))
+    for first, last in runs(signs == 0):
+        before, after = signs[max(first - 1, 0)], signs[min(last + 1, t.size - 1)]
+        if last > first or before * after <= 0:
+            found.append(float(t[first]))
     return found
 
 
@@ -437,11 +438,18 @@ def _integrals(t: Array, f: Array, f_dot: Array, f_ddot: Array) -> Array:
 def _by_gauss(motion: _Motion, k: int, edges: list[float]) -> Array:
     """Return the integrals of an output and of its square over pieces of a step."""
     total = np.zeros(2)
+    places, weights = _gauss()
     for low, high in itertools.pairwise(edges):
         half = (high - low) / 2
-        y = np.array([motion.value(low + half * (1 + x), k) for x in GAUSS[0].tolist()])
-        total += half * np.array([GAUSS[1] @ y, GAUSS[1] @ y**2])
+        y = np.array([motion.value(low + half * (1 + x), k) for x in places.tolist()])
+        total += half * np.array([weights @ y, weights @ y**2])
     return total
+
+
+@cache
+def _gauss() -> tuple[Array, Array]:
+    """Return places and weights in [-1, 1]; NumPy loads its polynomials for them."""
+    return np.polynomial.legendre.leggauss(GAUSS_PLACES)
 
 
 def _derivative(t: Array, values: Array) -> Array:

@@ -233,14 +233,14 @@ def _mark_gaps(ax: Axes, t: NDArray[np.float64], good: NDArray[np.bool_]) -> Non
     if good.all():
         return
     label = f"no solution: {np.count_nonzero(~good)} of {good.size} points"
-    for first, last in _runs(np.any(~good.reshape(-1, t.size), axis=0)):
+    for first, last in runs(np.any(~good.reshape(-1, t.size), axis=0)):
         ax.axvspan(t[max(first - 1, 0)], t[last], color=GAP, zorder=0, label=label)
         label = "_"  # names the first of the spans only
     if label != "_":  # variants of which some go on at all times
         ax.plot([], [], " ", label=label)
 
 
-def _runs(flags: NDArray[np.bool_]) -> Iterable[tuple[int, int]]:
+def runs(flags: NDArray[np.bool_]) -> Iterable[tuple[int, int]]:
     """Return the first and the last index of each run of set flags."""
     steps = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     return [(int(first), int(stop) - 1) for first, stop in steps.reshape(-1, 2)]

@@ -100,7 +100,7 @@ def assembled_positions(inputs: Inputs) -> Vector:
             point = _assembled(equations, time, start)
             if point is not None:
                 q = unwound(equations, time, point, inputs.guess, TOLERANCE).q
-                if all(_distance(equations, q, other) > SAME for other in found):
+                if all(distance_modulo_turns(equations, q, other) > SAME for other in found):
                     found.append(q)
                     last = k
             if k >= max(FIRST_STARTS, PATIENCE * last):
@@ -146,7 +146,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
         return ""
     found = assembled_positions(inputs)
     equations = _equations(inputs)
-    away = [_distance(equations, q, other) for other in found]
+    away = [distance_modulo_turns(equations, q, other) for other in found]
     if len(found) < 2:
         return ""
     taken = int(np.argmin(away))
@@ -184,7 +184,7 @@ def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
     mirrored = q.copy()
     mirrored[angles] = -q[angles]
     found = _assembled(equations, time, mirrored)
-    if found is None or _distance(equations, q, found.q) <= SAME:
+    if found is None or distance_modulo_turns(equations, q, found.q) <= SAME:
         return False
     other = found.q
     here, there = (
@@ -234,7 +234,7 @@ def _assembled(equations: Problem, t: float, start: Vector) -> Point | None:
     return None
 
 
-def _distance(equations: Problem, q: Vector, other: Vector) -> float:
+def distance_modulo_turns(equations: Problem, q: Vector, other: Vector) -> float:
     """Return how far two positions are apart, angles modulo a turn."""
     return float(np.max(np.abs(_difference(equations, q, other)), initial=0.0))
 

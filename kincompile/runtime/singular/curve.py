@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.runtime.problem import solve_linear
+from kincompile.runtime.problem import solve_linear, weights_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -121,8 +121,7 @@ class Curve:
     def __init__(self, equations: Problem, state: State, duration: float) -> None:
         self.equations = equations
         self.scale = np.append(equations.reference, duration)
-        terms = equations.terms(state.point, equations.reference)
-        self._weights = 1 / np.where(terms > 0, terms, 1.0)
+        self._weights = weights_of(equations.terms(state.point, equations.reference))
 
     def start(self, state: State, direction: float) -> CurvePoint | None:
         """Return a point of the motion as one of the curve, looking forward or back in time."""

@@ -18,7 +18,7 @@ from kincompile.criteria import ASSEMBLED
 from kincompile.runtime.march import State
 from kincompile.runtime.newton import SAME
 from kincompile.runtime.problem import Dense
-from kincompile.runtime.singular.assemblies import MOST_COORDINATES
+from kincompile.runtime.singular.assemblies import MOST_COORDINATES, distance_modulo_turns
 from kincompile.runtime.singular.curve import Curve
 
 if TYPE_CHECKING:
@@ -203,7 +203,7 @@ def _span(equations: Problem, row: int, q: Array, t: float) -> tuple[float, floa
     least, most = here, here
     for direction in (math.copysign(1.0, -here), math.copysign(1.0, here)):
         ends, is_closed = _extremes(curve, state, direction)
-        least, most = min(least, *ends, least), max(most, *ends, most)
+        least, most = min([least, *ends]), max([most, *ends])
         if least <= 0 <= most or is_closed:
             return least, most
         if direction > 0:
@@ -260,18 +260,11 @@ def _extremes(curve: Curve, state: State, direction: float) -> tuple[list[float]
         if bracket is None:
             return [item.t for item in found], False
         if bracket.turns and (turn := curve.singular_point(bracket)) is not None:
-            if any(_is_same(curve, turn[0], other) for other in found):
+            away = (distance_modulo_turns(curve.equations, turn[0].q, other.q) for other in found)
+            if any(distance <= math.sqrt(SAME) for distance in away):
                 return [item.t for item in found], True
             found.append(turn[0])
             if (turn[0].t > 0) != (state.t > 0):
                 return [item.t for item in found], True  # what is asked for lies between
         place = bracket.second
     return [item.t for item in found], False
-
-
-def _is_same(curve: Curve, place: CurvePoint, other: CurvePoint) -> bool:
-    """Say whether two extremes are one, up to whole turns."""
-    away = (place.q - other.q) / curve.scale[:-1]
-    turned = np.remainder(away + math.pi, math.tau) - math.pi
-    away = np.where(curve.equations.angular, turned, away)
-    return bool(np.max(np.abs(away)) <= math.sqrt(SAME))

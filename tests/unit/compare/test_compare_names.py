@@ -8,15 +8,7 @@ import sympy
 import kincompile as kc
 from kincompile.compare.notation import plain
 from kincompile.errors import InputError
-
-
-def pendulum() -> kc.Mechanism:
-    m = kc.Mechanism("pendulum")
-    bob = m.body("bob", guess=(1, 0, 0))
-    m.add(kc.Revolute("pin", bob, (-1, 0), m.ground, (0, 0)))
-    m.add(kc.AbsoluteAngle("motor", bob, kc.t**2))
-    return m
-
+from tests.pendulum import pendulum
 
 MODEL = pendulum()
 

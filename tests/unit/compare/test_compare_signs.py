@@ -10,6 +10,7 @@ import sympy
 import kincompile as kc
 from kincompile.compare.reference import Reference
 from kincompile.compare.report import Report
+from tests.pendulum import pendulum
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
@@ -109,14 +110,6 @@ def test_that_an_opposite_sign_may_be_stated(
         assert f'state {name} = "{stated}" in [conventions]' in report.to_text()
         usual = right(joint)[name]
         assert not kc.compare(reference, **{name: usual}, conventions={name: stated}).equal
-
-
-def pendulum() -> kc.Mechanism:
-    m = kc.Mechanism("pendulum")
-    bob = m.body("bob", guess=(1, 0, 0))
-    m.add(kc.Revolute("pin", bob, (-1, 0), m.ground, (0, 0)))
-    m.add(kc.AbsoluteAngle("motor", bob, kc.t**2))
-    return m
 
 
 @pytest.mark.parametrize("suffix", [".txt", ".toml", ".json"])

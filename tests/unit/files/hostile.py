@@ -88,18 +88,3 @@ HAND_FILES: dict[str, Case] = {
     "dotted key": ("toml", lambda: "a" + ".a" * 40000 + " = 1", "has more than 4 parts"),
     "deep JSON": ("json", lambda: "[" * 10**5, "nested too deeply"),
 }  # fmt: skip
-
-QUICK = (
-    "dotted key",
-    "dotted table",
-    "deep tables",
-    "unclosed texts",
-    "JSON objects",
-    "acf lists",
-    "doubled product",
-    "deep aliases",
-    "many cells",
-    "unclosed text",
-    "deep JSON",
-)
-"""What is read in each run of the tests; the others are large."""

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import kincompile as kc
+from tests.pendulum import pendulum
 
 READ = """
 import os, resource, runpy, sys
@@ -33,9 +34,7 @@ def read(path):
 
 
 for kind in ("MODELS", "HAND_FILES"):
-    for number, (name, (ending, content, message)) in enumerate(hostile[kind].items()):
-        if (name in hostile["QUICK"]) != (sys.argv[2] == "quick"):
-            continue
+    for number, (ending, content, message) in enumerate(hostile[kind].values()):
         path = Path(f"{kind}_{number}.{ending}")
         path.write_text(content(), encoding="utf-8")
         # A process for each, so that none has the memory of another.
@@ -60,36 +59,33 @@ CASES: dict[str, Any] = runpy.run_path(str(HOSTILE))
 
 
 @cache
-def told(speed: str, folder: Path) -> Path:
-    """Read the quick or the other hostile files, each in a process of bounded time and memory."""
-    folder = folder / f"hostile_{speed}"
+def told(folder: Path) -> Path:
+    """Read the hostile files, each in a process of bounded time and memory."""
+    folder = folder / "hostile"
     folder.mkdir()
     script = READ.replace("SECONDS", str(SECONDS)).replace("BYTES", str(BYTES))
-    command = [sys.executable, "-c", script, str(HOSTILE), speed]
+    command = [sys.executable, "-c", script, str(HOSTILE)]
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     subprocess.run(command, cwd=folder, env=environment, check=True, timeout=570)
     return folder
 
 
 def cases() -> list[Any]:
-    """Return the cases; those that take long have the mark of the exhaustive run."""
-    found = []
-    for kind in ("MODELS", "HAND_FILES"):
-        for number, name in enumerate(CASES[kind]):
-            speed = "quick" if name in CASES["QUICK"] else "slow"
-            marks = [] if speed == "quick" else [pytest.mark.slow]
-            case = pytest.param(speed, kind, number, marks=marks, id=f"{kind}: {name}")
-            found.append(case)
-    return found
+    """Return kind and number of each case."""
+    return [
+        pytest.param(kind, number, id=f"{kind}: {name}")
+        for kind in ("MODELS", "HAND_FILES")
+        for number, name in enumerate(CASES[kind])
+    ]
 
 
-@pytest.mark.parametrize(("speed", "kind", "number"), cases())
+@pytest.mark.parametrize(("kind", "number"), cases())
 @pytest.mark.slow
 def test_that_a_hostile_file_is_refused_in_bounded_time_and_memory(
-    tmp_path_factory: pytest.TempPathFactory, speed: str, kind: str, number: int
+    tmp_path_factory: pytest.TempPathFactory, kind: str, number: int
 ) -> None:
     message = list(CASES[kind].values())[number][2]
-    answer = told(speed, tmp_path_factory.getbasetemp()) / f"{kind}_{number}.told"
+    answer = told(tmp_path_factory.getbasetemp()) / f"{kind}_{number}.told"
     assert answer.exists(), f"more than {SECONDS} s"
     found = answer.read_text(encoding="utf-8")
     assert any(part in found for part in message.split("|")), found[:2000]
@@ -114,14 +110,6 @@ def read(path: Path) -> object:
     if path.suffix == ".txt":
         return kc.compare_file(pendulum(), path)
     return kc.read_analysis(path) if path.suffix == ".acf" else kc.read_model(path)
-
-
-def pendulum() -> kc.Mechanism:
-    m = kc.Mechanism("pendulum")
-    bob = m.body("bob", guess=(1, 0, 0))
-    m.add(kc.Revolute("pin", bob, (-1, 0), m.ground, (0, 0)))
-    m.add(kc.AbsoluteAngle("motor", bob, kc.t**2))
-    return m
 
 
 def test_that_a_hand_file_is_no_link_and_a_model_may_be_one(tmp_path: Path) -> None:

@@ -236,13 +236,7 @@ def damage_all(library: Path) -> None:
     library.with_suffix(".sha256").write_text(digest)
 
 
-def in_the_slow_run(damage):
-    return pytest.param(damage, marks=pytest.mark.slow)
-
-
-@pytest.mark.parametrize(
-    "damage", [damage_middle, *map(in_the_slow_run, (damage_nothing, damage_end, damage_all))]
-)
+@pytest.mark.parametrize("damage", [damage_nothing, damage_end, damage_middle, damage_all])
 @pytest.mark.slow
 def test_what_does_not_agree_with_its_checksum_is_built_again(cache, damage):
     # In processes of their own: a library in use must not be written to.
