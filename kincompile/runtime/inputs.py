@@ -220,14 +220,8 @@ def read_inputs(
     on_grid = method == "grid" or (
         method is None and values[0].size >= SMALLEST_GRID and code.lanes is not None
     )
-    without = () if guess is not None else _without_guess(code)
+    without = () if guess is not None else code.without_guess()
     return Inputs(code, *values, method, on_grid, through == "smooth", sets, sweep, without)
-
-
-def _without_guess(code: Code) -> tuple[str, ...]:
-    """Return the bodies whose guess is zero throughout, as it is where none is given."""
-    given = np.concatenate(((0,), np.cumsum(code.guess != 0))).tolist()
-    return tuple(body for body, first, size in code.bodies if given[first] == given[first + size])
 
 
 def _require_module(module: object) -> None:
