@@ -16,7 +16,7 @@ from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.newton_panel import newton_method, newton_script
+from kincompile.view.live import solver_script
 from kincompile.view.page_data import as_json, page_data
 from kincompile.writing import write_atomically
 
@@ -35,10 +35,10 @@ STYLES = ("style.css", "newton.css")
 
 SCRIPTS = (
     "player.js", "units.js", "draw.js", "stage.js", "poles.js", "tools.js", "tip.js", "columns.js",
-    "plots.js", "tables.js", "showing.js", "newton_tables.js", "newton_stage.js", "newton_panel.js",
-    "start.js",
+    "plots.js", "tables.js", "showing.js", "newton.js", "newton_tables.js", "newton_stage.js",
+    "newton_panel.js", "start.js",
 )  # fmt: skip
-"""Scripts, in order: each uses those before it, and the method of Newton's panel."""
+"""Scripts, in order: each uses those before it, and the emitted module."""
 
 FRAME_HEIGHT = "720px"
 """Height of a page inside a notebook."""
@@ -128,7 +128,6 @@ def page(
         several variants.
     """
     system = system_of(model)
-    module = None
     if solution is None:
         module = compile_model(system)
         times = np.linspace(0, system.end, system.points) if t is None else t
@@ -141,8 +140,7 @@ def page(
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "scripts": [
-            newton_script(system, module),
-            newton_method(),
+            solver_script(system),
             *(read(f"view/{name}") for name in SCRIPTS),
         ],
         "data": as_json(shown),

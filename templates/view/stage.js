@@ -14,6 +14,7 @@
 const NEAR = 16;  // pixels within which a point is meant, twice that with a finger
 const PLACES = 1000;  // points of a traced path
 const DOTS = 24;  // equal times that are marked on it
+const APART = 10;  // pixels between them, on the mean
 const ARROW = 0.2;  // part of the canvas that the longest velocity and acceleration take
 const CLOSEST = 200;  // largest zoom
 const CLICK = 4;  // pixels that a pointer may move in a click
@@ -99,8 +100,11 @@ class Stage {
     pen.path(line.map(place => place && view.toScreen(place)));
     pen.stroke(palette.paper, 4);
     pen.stroke(colour, 2);
-    for (const place of dots) {
-      pen.circle(view.toScreen(place), 3);
+    // As many as have room, at equal times all the same.
+    const length = dots.reduce((sum, place, k) => (k ? sum + towards(dots[k - 1], place)[2] : 0), 0) * view.scale;
+    const stride = [1, 2, 3, 4, 6, 8, 12].find(each => length * each > APART * dots.length) ?? 24;
+    for (let k = 0; k < dots.length; k += stride) {
+      pen.circle(view.toScreen(dots[k]), 3);
       pen.fill(palette.paper);
       pen.stroke(colour, 1.5);
     }
