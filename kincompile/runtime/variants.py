@@ -16,7 +16,7 @@ from kincompile.criteria import MAX_CORRECTIONS, SETTLED, TOO_NEAR
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.follow import follow
 from kincompile.runtime.march import March, Outcome, State, all_hold, largest
-from kincompile.runtime.newton import assemble, give_up, start
+from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
@@ -75,11 +75,11 @@ def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> So
     Solution
         With arrays q, q_dot, q_ddot of shape (B, N, n) and a status per variant and point.
     """
-    count, begin = len(sets), _begin(inputs, sets[0])
-    arrays = _Arrays.over(inputs, count)
+    count = len(sets)
+    arrays, begin = _Arrays.over(inputs, count), _first_position(inputs, sets[0])
     for first in range(0, count, CHUNK):
         chunk = slice(first, min(first + CHUNK, count))
-        _solve_chunk(inputs, sets[chunk], arrays, chunk, begin)
+        _solve_chunk(inputs, begin, sets[chunk], arrays, chunk)
         if progress:
             progress(chunk.stop, count)
     return _solution(inputs, sets, arrays)
@@ -99,31 +99,34 @@ def solve_in_turn(inputs: Inputs, sets: Array, progress: Progress | None) -> Sol
     return _solution(inputs, sets, arrays)
 
 
-def _begin(inputs: Inputs, p: Array) -> Array:
-    """Return where all variants start: the first one, assembled with care; else the guess."""
+def _first_position(inputs: Inputs, p: Array) -> Array:
+    """Return where all start: the first variant's position, or the guess where it has none.
+
+    It was found with care, and others lie beside it.
+    """
     time = float(inputs.t[0])
     equations = problem(inputs.code.module, p, inputs.guess, time)
-    limits = inputs.tolerance, inputs.max_iterations
-    attempt = assemble(equations, time, inputs.guess, *limits)
-    return attempt.last.q if attempt.status is Status.CONVERGED else inputs.guess
+    march = March(equations, equations.engine, inputs.tolerance)
+    found = start(march, time, replace(inputs, p=p)).state
+    return inputs.guess if found is None else found.point.q
 
 
-def _solve_chunk(inputs: Inputs, sets: Array, arrays: _Arrays, chunk: slice, begin: Array) -> None:
+def _solve_chunk(inputs: Inputs, begin: Array, sets: Array, arrays: _Arrays, chunk: slice) -> None:
     """Solve some of the variants: compiled, where the module can, and with care those that fail."""
-    march, together = inputs.code.march_variants, _Chunk(inputs, sets, arrays, chunk.start, begin)
+    march, together = inputs.code.march_variants, _Chunk(inputs, begin, sets, arrays, chunk.start)
     if march is None:
         together.run()
         return
     residual = np.empty((inputs.t.size, len(sets)))
     status, iterations = np.empty((2, *residual.shape), dtype=np.intc)
-    near = replace(inputs, guess=begin)
-    march(near, *together.scales, sets, arrays.motion[..., chunk], residual, status, iterations)
+    near, motion = replace(inputs, guess=begin), arrays.motion[..., chunk]
+    march(near, *together.scales, sets, motion, residual, status, iterations)
     arrays.residual[:, chunk] = residual
     arrays.status[:, chunk], arrays.iterations[:, chunk] = status, iterations
     failed = np.flatnonzero(status.any(axis=0) | together.strays(arrays.motion[0, 0, :, chunk]))
     if failed.size:
         alone = _Arrays.over(inputs, failed.size)
-        _Chunk(inputs, sets[failed], alone, 0, begin).run()
+        _Chunk(inputs, begin, sets[failed], alone, 0).run()
         arrays.motion[..., chunk.start + failed] = alone.motion
         arrays.status[:, chunk.start + failed] = alone.status
         arrays.residual[:, chunk.start + failed] = alone.residual
@@ -134,34 +137,35 @@ class _Chunk:
     """Variants that are solved together, and alone for the steps that are out of the ordinary."""
 
     def __init__(
-        self, inputs: Inputs, sets: Array, arrays: _Arrays, first: int, begin: Array
+        self, inputs: Inputs, begin: Array, sets: Array, arrays: _Arrays, first: int
     ) -> None:
         self._inputs, self._sets, self._arrays, self._first = inputs, sets, arrays, first
-        self._begin = begin
+        self._begin = begin[:, np.newaxis]
         self._times: list[float] = inputs.t.tolist()
         self._alive = np.ones(len(sets), dtype=bool)
         engine = Planned(inputs.code, np.ascontiguousarray(sets.T))
-        nominal = problem(inputs.code.module, sets[0], begin, self._times[0])
+        nominal = problem(inputs.code.module, sets[0], inputs.guess, self._times[0])
         self._march = March(nominal, engine, inputs.tolerance)
         self.scales = self._march.scales
 
     def strays(self, q: Array) -> Mask:
-        """Say which variants (n, B) may be assembled in another way than the first one is."""
-        equations, begin = self._march.equations, self._begin[:, np.newaxis]
+        """Say which variants (n, B) may have been assembled in another way than the first one."""
+        equations, begin = self._march.equations, self._begin
         found: Mask = equations.is_far(q, begin)
         unsettled = np.flatnonzero(~found & (equations.away(q, begin) > SETTLED))
-        p = np.ascontiguousarray(self._sets[np.append(unsettled, 0)].T)
-        engine = Planned(self._inputs.code, p)
-        point = engine.evaluate(np.column_stack((q[:, unsettled], begin)), self._times[0])
-        signs = np.sign(engine.determinants(point))
-        found[unsettled] = (signs[:, :-1] != signs[:, -1:]).any(axis=0)
+        if unsettled.size:
+            p = np.ascontiguousarray(self._sets[np.append(unsettled, 0)].T)
+            engine = Planned(self._inputs.code, p)
+            point = engine.evaluate(np.column_stack((q[:, unsettled], begin)), self._times[0])
+            signs = np.sign(engine.determinants(point))
+            found[unsettled] = (signs[:, :-1] != signs[:, -1:]).any(axis=0)
         return found
 
     def run(self) -> None:
         """Go through the grid with all variants."""
         inputs, time = self._inputs, self._times[0]
-        guess = np.repeat(self._begin[:, np.newaxis], len(self._sets), axis=1)
-        found = self._march.correct_together(guess, time, inputs.max_iterations)
+        begin = np.repeat(self._begin, len(self._sets), axis=1)
+        found = self._march.correct_together(begin, time, inputs.max_iterations)
         state, checks = self._march.complete(found.point)
         good = all_hold(found.good, checks) & ~self.strays(found.point.q)
         good &= state.sensitivity <= TOO_NEAR
