@@ -49,6 +49,24 @@ MAX_CORRECTIONS = 6
 
 # Assembled
 
+NEAR_ANGLE, NEAR_PART = math.pi / 6, 0.1
+"""A guess is near an assembly where angles are no further off than the first, and lengths than this
+part of the size of the mechanism: then no other assembly may come before it."""
+
+SETTLED = 0.5
+"""Part of that distance up to which an assembly is not asked whether another one is nearer."""
+
+ASTRAY = 5.0
+"""Distance from a guess, in those up to which it is near, beyond which steps went astray: half the
+size of the mechanism."""
+
+AS_NEAR = 1.1
+"""How much further from a guess an assembly may be, and still be named as one that is as near."""
+
+MIRRORED = 2.0
+"""How much further than the first assembly another one may seem to be, and still be looked at: what
+tells of it is of first order."""
+
 FAR = math.pi / 4
 """Angle between a guess and a position beyond which small steps from the guess may well lead to a
 nearer one. Of 3000 guesses within 30 degrees and a tenth of a length of an assembly Newton's own
@@ -239,6 +257,12 @@ def size_of(
         # Nothing is so small beside its place but the distance from a pole.
         size = size if 10 * step < size < np.inf else farthest
     return size
+
+
+def rounded(values: Any) -> NDArray[np.float64]:
+    """Return scales with seven digits: all forms of a module then judge by the same numbers."""
+    parts, exponents = np.frexp(values)
+    return np.asarray(np.ldexp(np.round(parts * 2.0**24) / 2.0**24, exponents))
 
 
 SMALL_PART, CONSTANT = 1e-8, 1e-12

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kincompile.criteria import RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
+from kincompile.names import listed
 from kincompile.runtime.engine.engine import Point
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
@@ -16,7 +17,7 @@ from kincompile.runtime.march import March, Outcome, State, distance
 from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
-from kincompile.runtime.singular.events import branch_switch, locate, singular_start
+from kincompile.runtime.singular.events import branch_switch, involved, locate, singular_start
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -147,15 +148,24 @@ class _Way:
             outcome = start(self._march, time, inputs)
         self._put(outcome)
         self._motion.is_folded = outcome.is_folded
-        if self._may_be_dense and outcome.strays:
-            self._motion.note = (
-                f" The position at t = {time:.10g} is on another branch than the guess: "
-                "kc.assemblies gives all of them, and each serves as a guess."
-            )
+        if self._may_be_dense and (outcome.strays or outcome.other):
+            self._motion.note = self._doubt(outcome, time)
         if outcome.position is not None:
             # The guess may be rough: from here on the assembled mechanism gives the size.
             self._march = self._march_at(outcome.position.q, self._march.engine)
         return outcome
+
+    def _doubt(self, outcome: Outcome, time: float) -> str:
+        """Say that the position found from the guess may not be the one that is meant."""
+        said = f"The position at t = {time:.10g} is on another branch than the guess"
+        if outcome.other is not None and outcome.position is not None:
+            away = outcome.other.q - outcome.position.q
+            bodies = involved(self._inputs.code, away / self._march.equations.reference)
+            said = (
+                f"Another position at t = {time:.10g}, with {listed(bodies)} elsewhere, is as near "
+                "to the guess"
+            )
+        return f" {said}: kc.assemblies gives all of them, and each serves as a guess."
 
     def march_compiled(self, outcome: Outcome) -> bool:
         """Let a compiled module follow the motion from its start; say whether all went well.

@@ -102,6 +102,8 @@ class Outcome:
         Whether it was assembled on another branch than its guess shows.
     is_folded : bool
         Whether the guess that it was assembled from shows no branch.
+    other : Point or None
+        Another assembly that is as near to that guess.
     """
 
     status: Status
@@ -113,6 +115,7 @@ class Outcome:
     exhausted: bool = False
     strays: bool = False
     is_folded: bool = False
+    other: Point | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,10 +5,11 @@ r"""Newton's method for :math:`\Phi(q, t) = 0` at one time, as in the textbook.
 It stops when the correction is small; that correction has been applied (Haug, Computer-Aided
 Kinematics and Dynamics of Mechanical Systems, chapter 4). The equations must then hold too.
 
-Iterates that converge by themselves are never disturbed. Only when they do not, a second attempt
-starts again from the same guess with safeguards: the correction is bent towards the gradient of the
-residual (Levenberg, Marquardt), cut to half a radian and to the size of the mechanism, and then
-shortened until the residual falls (Armijo).
+Iterates that converge by themselves, and near the guess, are never disturbed. When they do not, a
+second attempt starts again from the same guess with safeguards: the correction is bent towards the
+gradient of the residual (Levenberg, Marquardt), cut to half a radian and to the size of the
+mechanism, and then shortened until the residual falls (Armijo). Where what was found is not near,
+the assembly on the other side of the nearest singular position is looked at too.
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kincompile.criteria import (
+    AS_NEAR,
     BEND,
     LARGEST_ANGLE,
     MAX_CORRECTIONS,
     MAX_ITERATIONS,
+    MIRRORED,
     MOST_TURNED,
     NUDGE,
     RESIDUAL_FACTOR,
@@ -44,7 +47,7 @@ from kincompile.runtime.status import Status
 from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -67,7 +70,7 @@ class NewtonResult(Shown):
     status : Status
         CONVERGED, or why not.
     iterates : ndarray, shape (k + 1, n)
-        The guess and the positions after each correction.
+        The guess, or where another attempt began, and the positions after each correction.
     corrections : ndarray, shape (k,)
         Euclidean norm of each correction.
     residuals : ndarray, shape (k + 1,)
@@ -111,12 +114,15 @@ class Attempt:
         Euclidean norm of each correction.
     turned : Point or None
         The last position with angles turned back, where they were.
+    other : Point or None
+        Another assembly that is as near to the guess, where one was met.
     """
 
     status: Status = Status.NOT_CONVERGED
     points: list[Point] = field(default_factory=list)
     corrections: list[float] = field(default_factory=list)
     turned: Point | None = None
+    other: Point | None = None
 
     @property
     def last(self) -> Point:
@@ -197,9 +203,13 @@ def start(march: March, t: float, inputs: Inputs) -> Outcome:
     # Towards a singular position Newton's method creeps, and ends a rounding error before it.
     if not isinstance(state, Status) and crawls(attempt.corrections):
         state = Status.SINGULAR if state.sensitivity > TOO_NEAR else state
+    found = Outcome(
+        Status.CONVERGED, iterations, None, point,
+        strays=left, is_folded=folded, other=attempt.other,
+    )  # fmt: skip
     if isinstance(state, Status):
-        return Outcome(state, iterations, None, point, strays=left, is_folded=folded)
-    return Outcome(Status.CONVERGED, iterations, state, point, strays=left, is_folded=folded)
+        return replace(found, status=state)
+    return replace(found, state=state)
 
 
 def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome:
@@ -225,36 +235,68 @@ def assemble(
 ) -> Attempt:
     """Find a position from a guess: plain Newton, and safeguarded where that fails or strays.
 
-    What is not far from the guess comes first, then what is on the branch that it shows, then the
-    nearer. Angles that the equations leave free by whole turns are those nearest to the guess.
+    What is near the guess comes first, the nearest of it; then what is not far, then what is on the
+    branch that the guess shows, then the nearer. Angles that the equations leave free by whole
+    turns are those nearest to the guess.
     """
-    plain = iterate(equations, t, guess, tolerance, max_iterations)
+    limits = tolerance, max_iterations
+    plain = iterate(equations, t, guess, *limits)
     found = plain.status is Status.CONVERGED
-    if not plain.points or (found and not equations.strays(plain.points[0], plain.last)):
+    if not plain.points or (found and equations.is_settled(plain.points)):
         return plain
     if (careful := equations.careful()) is not equations:
-        return assemble(careful, t, guess, tolerance, max_iterations)
-    attempts = [plain]
-    # With all bodies on a line no equation tells which way to bend: so it is for a guess of zeros.
-    for begin in (guess, *(() if found else _restarts(equations, guess))):
-        limits = tolerance, max_iterations
-        attempts.append(iterate(equations, t, begin, *limits, safeguarded_step))
-        if attempts[-1].status is Status.CONVERGED:
-            break
-    good = [attempt for attempt in attempts if attempt.status is Status.CONVERGED]
-    if not good:
-        return min(attempts[1:], key=lambda attempt: _missed(equations, attempt))
-    for attempt in good:
-        attempt.turned = unwound(equations, t, attempt.last, guess, tolerance)
+        return assemble(careful, t, guess, *limits)
+    good = [plain]
+    if not found or equations.strays(plain.points[0], plain.last):
+        attempts = [plain]
+        # With all bodies on a line no equation tells which way to bend: so it is for zeros.
+        for begin in (guess, *(() if found else _restarts(equations, guess))):
+            attempts.append(iterate(equations, t, begin, *limits, safeguarded_step))
+            if attempts[-1].status is Status.CONVERGED:
+                break
+        good = _ordered(equations, plain.points[0], attempts, tolerance)
+        if not good:
+            return min(attempts[1:], key=lambda attempt: _missed(equations, attempt))
+    mirrored = equations.other_side(good[0].last)
+    away = equations.away(good[0].last.q, guess)
+    if equations.away(mirrored, guess) <= MIRRORED * max(1.0, away):
+        beyond = iterate(equations, t, mirrored, *limits)
+        if equations.away(beyond.last.q, guess) <= min(AS_NEAR * max(1.0, away), MIRRORED):
+            good = _ordered(equations, plain.points[0], [*good, beyond], tolerance)
+    if len(good) > 1:
+        good[0].other = _as_near(equations, guess, good)
+    return good[0]
 
-    def order(attempt: Attempt) -> tuple[bool, bool, float]:
+
+def _ordered(
+    equations: Problem, guess: Point, attempts: Sequence[Attempt], tolerance: float
+) -> list[Attempt]:
+    """Return the attempts that converged, angles turned back; first what a guess means."""
+
+    def order(attempt: Attempt) -> tuple[float, bool, bool, float]:
         point = attempt.last
-        away = round(float(distance(point.q, guess, equations.reference)), 6)
-        is_far = bool(equations.is_far(point.q, guess))
+        away = round(float(equations.away(point.q, guess.q)), 6)
+        is_far = bool(equations.is_far(point.q, guess.q))
         # From a guess so rough no sign is to be trusted.
-        return is_far, not is_far and equations.leaves_branch(plain.points[0], point), away
+        leaves = not is_far and equations.leaves_branch(guess, point)
+        far = round(float(distance(point.q, guess.q, equations.reference)), 6)
+        return min(away, 1.0), is_far, leaves, far
 
-    return min(good, key=order)
+    good = [attempt for attempt in attempts if attempt.status is Status.CONVERGED]
+    for attempt in good:
+        attempt.turned = unwound(equations, guess.t, attempt.last, guess.q, tolerance)
+    return sorted(good, key=order)
+
+
+def _as_near(equations: Problem, guess: Vector, good: Sequence[Attempt]) -> Point | None:
+    """Return another assembly than the first one that is as near to the guess, if one was met."""
+    first, *rest = (attempt.last for attempt in good)
+    reach = AS_NEAR * equations.away(first.q, guess)
+    for other in rest:
+        is_same = distance(other.q, first.q, equations.reference) <= SAME_POSITION
+        if not is_same and equations.away(other.q, guess) <= reach:
+            return other
+    return None
 
 
 def unwound(equations: Problem, t: float, point: Point, guess: Vector, tolerance: float) -> Point:

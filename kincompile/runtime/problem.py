@@ -16,13 +16,18 @@ import numpy as np
 
 from kincompile.criteria import (
     AGREEMENT,
+    ASTRAY,
     FAR,
     FOLDED,
+    NEAR_ANGLE,
+    NEAR_PART,
     RESIDUAL_FACTOR,
     ROUNDING,
+    SETTLED,
     STEEP,
     WILD,
     probe_of,
+    rounded,
     size_of,
 )
 from kincompile.runtime.engine.code import Array, Code, code_of
@@ -41,6 +46,16 @@ if TYPE_CHECKING:
 LARGEST_CAREFUL = 1000
 """Coordinates up to which a large mechanism is left to dense matrices where the stages fail: there
 a step takes a fraction of a second."""
+
+THROWN = 10.0
+"""Distance from a guess, in those up to which it is near, beyond which an iterate is thrown far."""
+
+MOST_MIRRORED = 300
+"""Coordinates up to which the assembly on the other side of a singular position is looked for:
+beyond, singular values take a tenth of a second."""
+
+MIRROR_STEP = 1e-5
+"""Step of the difference that shows how a singular value changes, in distances of a near guess."""
 
 LARGEST_POWER = 700.0
 """Power of e beyond which no determinant is given: floating point ends at 709."""
@@ -111,9 +126,24 @@ class Problem:
         return all(wanted) and self.engine.signs(found) != wanted
 
     def careful(self) -> Problem:
-        """Give the same with dense matrices, unless they are too large."""
-        is_large = self.place.size > LARGEST_CAREFUL or isinstance(self.engine, Dense)
-        return self if is_large else replace(self, engine=Dense(self.code, self.p))
+        """Give the same with dense matrices and code in Python, unless they are too large.
+
+        Where Newton's method throws an iterate far, the last digit decides where it ends: so it has
+        to be the same in all forms of a module.
+        """
+        is_careful = isinstance(self.engine, Dense) and self.engine.is_written
+        if is_careful or self.place.size > LARGEST_CAREFUL:
+            return self
+        return replace(self, engine=Dense(self.code, self.p, is_written=True))
+
+    @property
+    def near(self) -> Array:
+        """How far each coordinate of a guess may be from an assembly that it is near."""
+        return self.reference * np.where(self.angular, NEAR_ANGLE, NEAR_PART)
+
+    def away(self, q: Array, guess: Array) -> Any:
+        """Give how far a position, or each of a batch, is from a guess; up to 1.0 it is near."""
+        return (np.abs(q - guess) / column(self.near, q)).max(axis=0)
 
     def is_far(self, q: Array, guess: Array) -> Any:
         """Say whether an angle of a position, or of each of a batch, is far from a guess's."""
@@ -121,7 +151,38 @@ class Problem:
 
     def strays(self, guess: Point, found: Point) -> bool:
         """Say whether a position found from a guess is not what the guess shows."""
-        return self.is_far(found.q, guess.q) or self.leaves_branch(guess, found)
+        is_far = self.is_far(found.q, guess.q) or self.away(found.q, guess.q) > ASTRAY
+        return bool(is_far) or self.leaves_branch(guess, found)
+
+    def is_settled(self, way: Sequence[Point]) -> bool:
+        """Say whether a way led from a guess to an assembly so near that no nearer one is sought.
+
+        In compiled code it must not have gone far: where it ends then, rounding would decide.
+        """
+        guess = way[0].q
+        if not self.away(way[-1].q, guess) <= SETTLED:
+            return False
+        return self.careful() is self or all(self.away(at.q, guess) <= THROWN for at in way)
+
+    def other_side(self, point: Point) -> Array:
+        r"""Give about where a mechanism can be assembled beyond the nearest singular position.
+
+        Two ways to assemble a dyad lie on both sides of the position in which it is stretched,
+        along the movement that is free there. So the smallest singular value
+        :math:`\sigma = u^T \Phi_q v` of one falls along :math:`v`, to zero half way to the other.
+        NaN where the mechanism is too large, or nothing bends.
+        """
+        if point.q.size > MOST_MIRRORED:
+            return np.full_like(point.q, np.nan)
+        rows, scale = self.weights()[:, np.newaxis], self.near
+        here = rows * point.Phi_q * scale
+        if not np.isfinite(here).all():  # LAPACK would say so on the terminal
+            return np.full_like(point.q, np.nan)
+        left, sizes, right = np.linalg.svd(here, full_matrices=False)
+        u, size, v = left[:, -1], sizes[-1], right[-1]
+        moved = self.engine.evaluate(point.q + MIRROR_STEP * scale * v, point.t)
+        bend = u @ (rows * moved.Phi_q * scale - here) @ v / MIRROR_STEP
+        return np.asarray(point.q - 2 * size / bend * scale * v)
 
     def is_folded(self, guess: Point, found: Point) -> bool:
         """Say whether a guess shows no branch: beside a position, a determinant is zero there."""
@@ -202,14 +263,14 @@ def problem(
         values = point.Phi_q
         return point.Phi, values if values.ndim == 1 else values[pattern[:, 0], pattern[:, 1]]
 
-    size = size_of(entries, pattern, angular, q) or 1.0
+    size = float(rounded(size_of(entries, pattern, angular, q))) or 1.0
     reference = np.where(angular, 1.0, size)
     place, probe = np.abs(q), probe_of(m)
     floor = float(ROUNDING * (place[~angular] / size).max(initial=0.0))
     equations = Problem(code, engine, p, angular, size, reference, place, floor, probe, np.zeros(m))
     generic = equations.at(q + reference * equations.probe[: q.size], t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
-        equations.magnitude = equations.terms(generic, reference)
+        equations.magnitude = rounded(equations.terms(generic, reference))
         here = equations.terms(generic, reference + equations.place)
         equations.noise = ROUNDING * here
         equations.limit = np.where(here > 0, STEEP * here, np.inf)
@@ -251,16 +312,20 @@ class Dense:
         A module.
     p : ndarray, shape (k,)
         Parameters.
+    is_written
+        Whether Phi and Phi_q are evaluated by code in Python also where the module is compiled.
     """
 
-    def __init__(self, code: Code, p: Array) -> None:
+    def __init__(self, code: Code, p: Array, *, is_written: bool = False) -> None:
         self.code, self._p = code, p
+        self._position = code.written if is_written else code.position
+        self.is_written = self._position is code.written
         self._stages = StagedSolver(code) if code.stages else None
 
     def evaluate(self, q: Array, t: float) -> Point:
         """Evaluate Phi and Phi_q at one point."""
         try:
-            return Point(q, t, *self.code.position(q, t, self._p))
+            return Point(q, t, *self._position(q, t, self._p))
         except (ArithmeticError, ValueError):  # of math.sqrt, log, or 1/0; NaN or infinity in q
             m = len(self.code.equations)
             return Point(q, t, np.full(m, np.nan), np.full((m, q.size), np.nan))

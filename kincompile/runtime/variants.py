@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import MAX_CORRECTIONS, TOO_NEAR
+from kincompile.criteria import MAX_CORRECTIONS, SETTLED, TOO_NEAR
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.follow import follow
 from kincompile.runtime.march import March, Outcome, State, all_hold, largest
@@ -149,8 +149,16 @@ class _Chunk:
         self.scales = self._march.scales
 
     def strays(self, q: Array) -> Mask:
-        """Say which variants (n, B) were assembled so far from the start that safeguards pay."""
-        found: Mask = self._march.equations.is_far(q, self._begin)
+        """Say which variants (n, B) may have been assembled in another way than the first one."""
+        equations, begin = self._march.equations, self._begin
+        found: Mask = equations.is_far(q, begin)
+        unsettled = np.flatnonzero(~found & (equations.away(q, begin) > SETTLED))
+        if unsettled.size:
+            p = np.ascontiguousarray(self._sets[np.append(unsettled, 0)].T)
+            engine = Planned(self._inputs.code, p)
+            point = engine.evaluate(np.column_stack((q[:, unsettled], begin)), self._times[0])
+            signs = np.sign(engine.determinants(point))
+            found[unsettled] = (signs[:, :-1] != signs[:, -1:]).any(axis=0)
         return found
 
     def run(self) -> None:

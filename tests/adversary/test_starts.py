@@ -50,35 +50,31 @@ def bad_starts(case, random, count):
 
 
 def solved(module, guess):
-    """Return status and position from a guess."""
+    """Return status and position from a guess, and what is said of it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", kc.SingularConfigurationWarning)
         solution = kc.solve(module, 0.0, guess=guess)
-    return int(solution.status[0]), solution.q[0]
+    return int(solution.status[0]), solution.q[0], solution.message
 
 
 def compare(count, record):
-    """Solve bad starts by NumPy and by C: what is found is an assembly, and nearly always the same.
-
-    Where an iterate is thrown far, rounding decides between assemblies that are about as near: 3 of
-    1200 starts.
-    """
+    """Solve bad starts by NumPy and by C: what is found is an assembly, and the same in both."""
     tried = gave_up = other = 0
     for case, random in cases():
         modules = [kc.compile(case.model, target=target) for target in ("numpy", "c")]
         is_geared = "gear" in case.chain.kinds  # whose wheel has more ways to lie
         for guess in bad_starts(case, random, count // len(STRUCTURES)):
             found = [solved(module, guess) for module in modules]
-            (status, q), (of_c, q_of_c) = found
+            (status, q, _), (of_c, q_of_c, _) = found
             tried, gave_up = tried + 1, gave_up + (status != kc.Status.CONVERGED)
             other += status != of_c or not np.allclose(q, q_of_c, 1e-9, 1e-9, equal_nan=True)
-            for code, position in found:
+            for code, position, _ in found:
                 if code == kc.Status.CONVERGED and not is_geared:
                     turns = np.max(np.abs(position - guess)[2::3]) / (2 * np.pi)
                     assert turns < 1.01, f"{turns:.1f} turns from the guess"
                     assert start_of(case, position) is not None, "no assembly of the closed form"
     record(tried=tried, wrong=other, gave_up=gave_up)
-    assert other <= 0.005 * tried
+    assert other == 0
 
 
 def test_a_few_bad_starts_in_c(quick_compiler, record):
@@ -143,25 +139,28 @@ def linkages():
 
 
 def come_home(count, record):
-    """Start near an assembly of random linkages; return the share that reaches it."""
+    """Start near an assembly of random linkages; return the share that reaches it.
+
+    What does not reach it fails, or says that another assembly is as near.
+    """
     reached = other = 0
     for case, random in itertools.islice(linkages(), count):
         away = random.uniform(-1, 1, case.guess.size) * NEAR[0]
         away.reshape(-1, 3)[:, :2] *= case.at.scale * NEAR[1] / NEAR[0]
-        status, q = solved(kc.compile(case.model), case.guess + away)
+        status, q, said = solved(kc.compile(case.model), case.guess + away)
         is_home = reach(q[np.newaxis], case.guess[np.newaxis], case.at.scale)[0] < 1e-6
         reached += is_home
-        other += status == kc.Status.CONVERGED and not is_home
+        is_told = status != kc.Status.CONVERGED or "is as near to the guess" in said
+        other += not (is_home or is_told)
     record(tried=count, wrong=other, gave_up=count - reached - other)
-    return reached / count, other
+    assert other == 0
+    return reached / count
 
 
 def test_a_few_near_starts(record):
-    share, _ = come_home(30, record)
-    assert share >= 0.93
+    assert come_home(40, record) >= 0.99
 
 
 @pytest.mark.slow
 def test_that_near_starts_come_home(record):
-    share, _ = come_home(400, record)
-    assert share >= 0.96  # 99 % are wanted: sliders end on their other side, as near as the first
+    assert come_home(1000, record) >= 0.99

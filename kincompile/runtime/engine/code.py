@@ -23,6 +23,9 @@ PLACE = "_code"
 JOINT_POINTS = "_joint_points"
 """Where a module keeps the function that compiles the points of its joints, on request."""
 
+WRITTEN = "_written_position"
+"""Where a compiled module keeps the `position` that was emitted in Python."""
+
 DRIVERS = "_drivers"
 """Where a module keeps the function that describes its drivers at a time and parameters."""
 
@@ -70,6 +73,8 @@ class Code:
         Which are angles, or may be: a free coordinate has no unit that says so.
     position, nu, gamma, Phi_q, nonzeros
         Functions of the contract; `nonzeros` is ``Phi_q_nonzeros``.
+    written
+        `position` as it was emitted in Python, where compiled code has taken its place.
     redundant
         Names of the equations that repeat others, and agree with them.
     unsolvable
@@ -104,6 +109,7 @@ class Code:
     gamma: Callable[..., Array]
     Phi_q: Callable[..., Array]
     nonzeros: Callable[..., Array]
+    written: Callable[..., tuple[Array, Array]]
     redundant: tuple[str, ...]
     unsolvable: str
     corners: bool
@@ -157,6 +163,7 @@ def attach(module: ModuleType) -> Code:
         gamma=names["gamma"],
         Phi_q=names["Phi_q"],
         nonzeros=names["Phi_q_nonzeros"],
+        written=names.get(WRITTEN, names["position"]),
         redundant=names.get("REDUNDANT", ()),
         unsolvable=names.get("UNSOLVABLE", ""),
         corners=names.get("CORNERS", False),

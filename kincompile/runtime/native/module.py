@@ -17,7 +17,7 @@ import numpy as np
 from kincompile import quantities
 from kincompile.errors import InputError
 from kincompile.runtime.contract import present_in
-from kincompile.runtime.engine.code import attach
+from kincompile.runtime.engine.code import WRITTEN, attach
 from kincompile.runtime.memory import LINE, empty
 from kincompile.runtime.native.library import library
 from kincompile.runtime.native.points import (
@@ -89,6 +89,7 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     for name, function in compiled.items():
         function.__name__, function.__module__ = name, module.__name__
         function.__doc__ = function.__doc__ or names[name].__doc__
+    names[WRITTEN] = module.position
     names.update(compiled)
     attach(module)
     return module
