@@ -77,11 +77,17 @@ class Plot {
 
   redraw() {
     if (this.chart) this.chart.destroy();
-    const item = this.items.find(({ label }) => label === this.choice.value);
-    const order = timesFall() ? x => x.reverse() : x => x;  // uPlot wants rising times
-    const series = [order(Array.from(player.t)), order(item.values())];
-    this.chart = new uPlot(this.options(item), series, this.holder);
+    this.chart = new uPlot(this.options(this.item), this.series(), this.holder);
     this.chart.over.append(this.cursor);
+  }
+
+  get item() {
+    return this.items.find(({ label }) => label === this.choice.value);
+  }
+
+  series() {
+    const order = timesFall() ? x => x.reverse() : x => x;  // uPlot wants rising times
+    return [order(Array.from(player.t)), order(this.item.values())];
   }
 
   options(item) {
@@ -260,6 +266,11 @@ const plots = {
 
   redraw() {
     for (const plot of this.list) plot.redraw();
+  },
+
+  /* Show another motion at the same times. */
+  refill() {
+    for (const plot of this.list) plot.chart.setData(plot.series());
   },
 };
 

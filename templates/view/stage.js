@@ -146,6 +146,19 @@ class Stage {
     player.refresh();
   }
 
+  /* Keep the numbers of what is at the pointer, and trace its path; the same again lets it go. */
+  click(event) {
+    const point = this.near([event.offsetX, event.offsetY], event.pointerType === 'touch' ? 2 * NEAR : NEAR);
+    this.hovered = null;
+    if (point === null || point === this.selected) {
+      this.traced.delete(this.selected);
+      this.select(null);
+    } else {
+      this.traced.add(point);
+      this.select(point);
+    }
+  }
+
   listen() {
     const { canvas } = this;
     const at = event => [event.offsetX, event.offsetY];
@@ -156,16 +169,7 @@ class Stage {
     };
     const reach = event => (event.pointerType === 'touch' ? 2 * NEAR : NEAR);
     canvas.addEventListener('pointerdown', event => {
-      if (handled('down', event)) return;
-      const point = this.near(at(event), reach(event));
-      this.hovered = null;
-      if (point === null || point === this.selected) {
-        this.traced.delete(this.selected);
-        this.select(null);
-      } else {
-        this.traced.add(point);
-        this.select(point);
-      }
+      if (!handled('down', event)) this.click(event);
     });
     canvas.addEventListener('pointermove', event => {
       if (handled('move', event) || event.pointerType === 'touch') return;

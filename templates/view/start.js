@@ -6,7 +6,7 @@ const hasBodies = player.data.drawing.bodies.length > 0;
 
 /* ---- what the solver says ---- */
 
-function showMessages() {
+function showSizes() {
   const { data } = player;
   const counted = (count, one, several) => `${count} ${count === 1 ? one : several}`;
   const sizes = [
@@ -16,10 +16,14 @@ function showMessages() {
     counted(player.count, 'time', 'times'),
   ];
   byId('summary').textContent = (hasBodies ? sizes : sizes.slice(1)).join(', ');
-  if (!data.success) {
-    byId('message').hidden = false;
-    byId('message').textContent = data.message;
-  }
+}
+
+function showVerdict() {
+  const { data } = player;
+  // While sliders are pulled, the verdict is below them: nothing above them must move.
+  byId('message').hidden = data.success || live.isChanged;
+  byId('message').textContent = data.message;
+  byId('events').replaceChildren();
   for (const event of data.events) {
     const item = document.createElement('li'), button = document.createElement('button');
     const short = `${event.kind} at t = ${+event.t.toPrecision(6)}: ${event.bodies.join(', ')}`;
@@ -43,13 +47,15 @@ function showNote(state) {
   const shown = state.isFound ? '' : ' Shown is the last position that was found.';
   note.textContent = hasMotion()
     ? `t = ${+state.time.toPrecision(6)}: ${sentences[status[state.index]]}${shown}`
-    : 'Shown is the start guess. Constraints that it violates are red.';
+    : state.isFound ? 'Shown is the position at the start.'
+      : 'Shown is the start guess. Constraints that it violates are red.';
 }
 
 /* ---- time ---- */
 
 /* Events, and times at which something was not found, on the time axis. */
 function markTimeline() {
+  byId('marks').replaceChildren();
   if (!(player.duration > 0)) return;
   const part = time => 100 * Math.abs(time - player.t[0]) / player.duration;
   const mark = (className, from, to, title) => {
@@ -113,7 +119,7 @@ function connectKeys() {
   document.addEventListener('keydown', event => {
     const { target } = event;
     // Keys belong to a field that is filled in, a list that is open, a button that is pressed.
-    const isField = target.matches('select, textarea, input:not([type=range], [type=checkbox])');
+    const isField = target.matches('select, textarea, input:not(#time, [type=checkbox])');
     const isPressed = event.key === ' ' && target.matches('button, [type=checkbox]');
     const isTab = target.matches('[role=tab]');
     const isTaken = isField || isPressed || isTab || event.ctrlKey || event.altKey || event.metaKey;
@@ -177,6 +183,7 @@ const panels = {
   plots: () => plots.show(),
   numbers: () => numbers.update(player.state),
   points: () => points.update(player.state),
+  measures: () => measures.show(),
   newton: () => {},  // follows the player by itself
 };
 let shownPanel = 'plots';
@@ -241,7 +248,8 @@ function start() {
   byId('pointing').hidden = !hasBodies;
   byId('tab-points').hidden = !hasBodies;
   byId('names').parentElement.hidden = !hasBodies;
-  showMessages();
+  showSizes();
+  showVerdict();
   markTimeline();
   connectTransport();
   connectKeys();
@@ -249,12 +257,22 @@ function start() {
   connectTheme();
   plots.build(byId('panel-plots'));
   numbers.build(byId('panel-numbers'));
+  byId('tab-measures').hidden = !player.data.outputs.length || 'reason' in emitted;
+  measures.build(byId('panel-measures'));
   if (hasBodies) {
     points.build(byId('panel-points'));
+    stage.pointer = new Grab();
     stage.listen();
     traceLongest();
   }
   newtonPanel(byId('panel-newton'));
+  stage.overlays.push((ctx, view, palette) => live.drawGhost(ctx, view, palette));
+  live.onSolved(() => {
+    showVerdict();
+    markTimeline();
+    plots.refill();
+    if (shownPanel === 'measures') measures.show();
+  });
   player.onChange(showState);
   new ResizeObserver(() => {
     stage.resize();
@@ -264,6 +282,7 @@ function start() {
   setInterval(showRate, 1000);
   showPanel('plots');
   showTheme();
+  live.build(byId('live'));
 }
 
 start();
