@@ -198,9 +198,10 @@ class _ModelReader(FieldReader):
         if name:
             self._names[name] = sympy.Symbol(name)
             self.remember(f"parameter {name!r}", address)
-        limits = None
+        limits, known = None, len(self.problems)
         if "range" in row:
             limits = self.expressions(row["range"], (*address, "range"), {}, "[least, greatest]", 2)
+            limits = limits if len(self.problems) == known else None
         # The checks of the system make numbers of them.
         item = Parameter(name, cast("float", default), unit, cast("Any", limits))
         return item if self._is_free(name, address) and complete else None

@@ -136,7 +136,8 @@ class Parameter:
     name: str
     default: float | None
     unit: str = ""
-    range: tuple[float, float] | None = None
+    # Not of the code, whose fingerprint is that of what is shown here.
+    range: tuple[float, float] | None = field(default=None, repr=False)
 
 
 def default_values(parameters: Iterable[Parameter]) -> dict[str, float]:

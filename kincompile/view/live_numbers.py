@@ -44,45 +44,48 @@ class LiveNumber(float):
         found.graph, found.node = graph, node
         return found
 
-    def _combined(self, operation: str, first: float, second: float) -> LiveNumber:
-        """Return the result of an operation of the graph and of floats."""
-        value = OPERATIONS[operation](float(first), float(second))
+    def _combined(self, operation: str, first: Any, second: Any) -> Any:
+        """Return the result of an operation; with an array it is one that knows nothing."""
+        known = [float(x) if isinstance(x, LiveNumber) else x for x in (first, second)]
+        value = OPERATIONS[operation](*known)
+        if not isinstance(value, float):
+            return value
         nodes = node_of(self.graph, first), node_of(self.graph, second)
         return LiveNumber.of(value, self.graph, getattr(self.graph, operation)(*nodes))
 
-    def __add__(self, other: float) -> LiveNumber:
+    def __add__(self, other: Any) -> Any:
         """Add."""
         return self._combined("add", self, other)
 
-    def __radd__(self, other: float) -> LiveNumber:
+    def __radd__(self, other: Any) -> Any:
         """Add to another one."""
         return self._combined("add", other, self)
 
-    def __sub__(self, other: float) -> LiveNumber:
+    def __sub__(self, other: Any) -> Any:
         """Subtract."""
         return self._combined("sub", self, other)
 
-    def __rsub__(self, other: float) -> LiveNumber:
+    def __rsub__(self, other: Any) -> Any:
         """Subtract from another one."""
         return self._combined("sub", other, self)
 
-    def __mul__(self, other: float) -> LiveNumber:
+    def __mul__(self, other: Any) -> Any:
         """Multiply."""
         return self._combined("mul", self, other)
 
-    def __rmul__(self, other: float) -> LiveNumber:
+    def __rmul__(self, other: Any) -> Any:
         """Multiply another one."""
         return self._combined("mul", other, self)
 
-    def __truediv__(self, other: float) -> LiveNumber:
+    def __truediv__(self, other: Any) -> Any:
         """Divide."""
         return self._combined("div", self, other)
 
-    def __abs__(self) -> LiveNumber:
+    def __abs__(self) -> Any:
         """Return the size."""
         return length_of(self, 0.0)
 
-    def __neg__(self) -> LiveNumber:
+    def __neg__(self) -> Any:
         """Change the sign."""
         return self._combined("sub", 0.0, self)
 

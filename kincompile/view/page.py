@@ -16,8 +16,8 @@ from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.live import geometry_script, solver_script
 from kincompile.view.page_data import as_json, page_data
+from kincompile.view.page_scripts import geometry_script, solver_script
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -147,6 +147,7 @@ def page(
             geometry_script(system, shown["drawing"]),
             *(read(f"view/{name}") for name in SCRIPTS),
         ],
+        "still": shown.pop("still"),
         "data": as_json(shown),
     }
     return Page(system.name, fill("view/page.html.jinja", slots), shown)

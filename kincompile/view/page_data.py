@@ -14,6 +14,8 @@ from kincompile.runtime.singular.events import SENTENCES
 from kincompile.runtime.solve import WORDS
 from kincompile.runtime.status import Status
 from kincompile.view.drawing import drawing
+from kincompile.view.picture import picture
+from kincompile.view.svg import svg_element
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,7 +45,7 @@ def page_data(
     *,
     starts_there: bool = False,
 ) -> dict[str, Any]:
-    """Return the data that a page shows, as plain values and arrays.
+    """Return the data that a page shows, as plain values and arrays, and a still picture.
 
     Parameters
     ----------
@@ -89,9 +91,16 @@ def page_data(
         "sentences": {item.value: f"{item.name}: {item.sentence}" for item in Status},
         "events": events,
         "drawing": shapes.to_json(),
+        "still": _still(system.name, shapes, np.vstack((q, guess))),
         "extent": shapes.extent(np.vstack((q, guess)) if np.isnan(q).all() else q),
         "arrays": arrays,
     }
+
+
+def _still(name: str, shapes: Drawing, q: Array) -> str:
+    """Return the first position that was found as SVG; nothing where there are no bodies."""
+    found = q[np.isfinite(q).all(axis=1)][0]
+    return svg_element(picture(shapes, found, f"{name} at the start")) if shapes.bodies else ""
 
 
 def _parameter(item: Parameter, value: float) -> dict[str, Any]:

@@ -222,7 +222,7 @@ const live = {
     panel.append(title);
     if (emitted.reason) {
       const reason = document.createElement('p');
-      reason.textContent = `${emitted.reason} They have the values of the motion shown: ${parameters
+      reason.textContent = `This page cannot solve for other values: ${emitted.reason} Those of the motion shown: ${parameters
         .map(({ name, value, unit }) => `${name} = ${numberText(value)} ${unit}`.trim()).join(', ')}.`;
       panel.append(reason);
       return;

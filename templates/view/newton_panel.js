@@ -172,6 +172,7 @@ function newtonPanel(root) {
   root.classList.add('newton');
   const count = player.data.coordinates.length;
   if (emitted.Phi && count <= MOST_ENTRIES) return new NewtonPanel(root, emitted);
-  root.append(emitted.reason ?? `${count} coordinates are too many to show Newton's method step by step.`);
+  const reason = emitted.reason ?? `${count} coordinates are too many to show every entry of \u03a6_q.`;
+  root.append(`Newton's method cannot be shown: ${reason}`);
   return null;
 }

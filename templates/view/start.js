@@ -274,7 +274,10 @@ function start() {
     if (shownPanel === 'measures') measures.show();
   });
   player.onChange(showState);
-  new ResizeObserver(() => {
+  let width = null;
+  new ResizeObserver(([{ contentRect }]) => {
+    if (contentRect.width === width) return;  // what is said below the drawing is no reason to change it
+    width = contentRect.width;
     stage.resize();
     plots.resize();
     player.refresh();

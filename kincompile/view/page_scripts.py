@@ -24,13 +24,13 @@ def solver_script(model: Mechanism | ConstraintSystem) -> str:
     """Return the script that declares `emitted`: the module, or `reason`, why there is none."""
     count = len(model.system().coordinates)
     if count > MOST_COORDINATES:
-        return _without(f"{count} coordinates are too many to solve for in a page.")
+        return _without(f"{count} coordinates are too many for a page.")
     try:
         emitted = compiler.emit(model, "javascript")
     except UnsupportedError as error:
-        return _without(f"This page cannot solve the mechanism: {error}")
+        return _without(str(error))
     if emitted.unsolvable:
-        return _without(f"This page cannot solve the mechanism: {emitted.unsolvable}")
+        return _without(emitted.unsolvable)
     # In a function of its own, so that no name of a mechanism meets one of the page.
     return (
         f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{emitted.source}"
