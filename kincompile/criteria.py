@@ -9,6 +9,7 @@ what its terms contribute at those scales. So no system of units is judged other
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -274,6 +275,7 @@ def _largest(values: NDArray[np.float64]) -> float:
     return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
+@cache
 def probe_of(n: int) -> NDArray[np.float64]:
     """Return n numbers of size 1/2 to 1 and either sign without a pattern: a quasi-random sequence.
 
@@ -282,4 +284,6 @@ def probe_of(n: int) -> NDArray[np.float64]:
     golden = (math.sqrt(5) - 1) / 2
     sequence = np.arange(1, n + 1) * golden % 1
     signs = np.where(sequence * 64 % 2 < 1, 1.0, -1.0)
-    return np.asarray(signs * (1 + sequence) / 2, dtype=np.float64)
+    probe = np.asarray(signs * (1 + sequence) / 2, dtype=np.float64)
+    probe.setflags(write=False)
+    return probe

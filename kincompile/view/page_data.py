@@ -11,8 +11,8 @@ import numpy as np
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.runtime.singular.events import SENTENCES
-from kincompile.runtime.solve import WORDS
 from kincompile.runtime.status import Status
+from kincompile.runtime.verdict import WORDS
 from kincompile.view.drawing import drawing
 from kincompile.view.picture import picture
 from kincompile.view.svg import svg_element
