@@ -213,11 +213,7 @@ function start() {
   }
   newtonPanel(byId('panel-newton'));
   player.onChange(showState);
-  new ResizeObserver(() => {
-    stage.resize();
-    plots.redraw();
-    player.refresh();
-  }).observe(byId('left'));
+  new ResizeObserver(() => showing.layOut()).observe(byId('left'));
   player.onMotion(forget);
   showPanel('plots');
   showing.theme();
