@@ -72,7 +72,7 @@ class Plot {
     this.read();
     const { width, height } = this.size = this.sizes();
     const type = Math.round(0.76 * stage.type);
-    this.box = { left: 5.2 * type, right: width - 12, top: 10, low: height - 3.1 * type };
+    this.box = { left: 4 * type, right: width - 1.3 * type, top: 1.9 * type, low: height - 3 * type };
     setAttributes(this.svg, { viewBox: `0 0 ${width} ${height}`, width, height, 'font-size': type,
       'font-family': 'system-ui, sans-serif', 'aria-label': `${this.labels[1]} over ${this.labels[0]}` });
     this.ranges();
@@ -130,9 +130,8 @@ class Plot {
     for (const [y, label] of this.levels(type, step_x)) {
       parts.push(line(left, y, right, y), text(left - 5, y + 0.35 * type, 'end', label));
     }
-    const middle = (top + low) / 2;
     parts.push(text((left + right) / 2, low + 2.6 * type, 'middle', this.labels[0], { fill: palette.ink }));
-    parts.push(text(type, middle, 'middle', this.labels[1], { fill: palette.ink, transform: `rotate(-90 ${type} ${middle})` }));
+    parts.push(text(0, 1.1 * type, 'start', this.labels[1], { fill: palette.ink }));
     parts.push(...this.eventLines(palette), this.curve(palette));
     this.now = svgElement('line', { y1: top, y2: low, class: 'now', stroke: palette.drive, 'stroke-width': 2 });
     this.dot = svgElement('circle', { r: 4.5, class: 'dot', fill: palette.paper, stroke: palette.drive, 'stroke-width': 2 });
