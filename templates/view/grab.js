@@ -3,24 +3,6 @@
 
 const REACH = 0.15;  // part of the motion that is searched at once, forth and back
 const FINE = 8;  // places between two solved times
-const TREMBLE = 4;  // pixels that a pointer may move in a click
-
-/* The distance of a place from a line between two others. */
-function distanceToLine([x, y], [a, b], [c, d]) {
-  const square = (c - a) ** 2 + (d - b) ** 2;
-  const part = square ? Math.max(0, Math.min(1, ((x - a) * (c - a) + (y - b) * (d - b)) / square)) : 0;
-  return Math.hypot(x - a - part * (c - a), y - b - part * (d - b));
-}
-
-/* Whether a place is inside a closed chain of others. */
-function isInside([x, y], corners) {
-  let inside = false;
-  corners.forEach(([a, b], k) => {
-    const [c, d] = corners[(k + 1) % corners.length];
-    if ((b > y) !== (d > y) && x < a + (y - b) / (d - b) * (c - a)) inside = !inside;
-  });
-  return inside;
-}
 
 class Grab {
   constructor() {
@@ -29,29 +11,10 @@ class Grab {
     stage.canvas.addEventListener('touchstart', listener, { passive: false });
   }
 
-  /* The frame of the body at a place in the world; of several the one drawn last. */
-  frameAt(place, reach) {
-    let found = null;
-    for (const mark of player.data.drawing.marks) {
-      const frame = mark.frame ?? mark.place?.frame ?? null;
-      if (frame && !isGround(frame) && this.hits(mark, frame, place, reach)) found = frame;
-    }
-    return found;
-  }
-
-  hits(mark, frame, place, reach) {
-    const { q } = player.state, at = point => inWorld(q, frame, point);
-    if (mark.kind === 'wheel') return towards(at(mark.place.point), place)[2] <= mark.radius + reach;
-    if (!mark.points) return mark.place ? towards(at(mark.place.point), place)[2] <= 2 * reach : false;
-    const corners = mark.points.map(at);
-    if (corners.length > 2 && isInside(place, corners)) return true;
-    return corners.some((corner, k) => distanceToLine(place, corner, corners[(k + 1) % corners.length]) <= reach);
-  }
-
   down(place, event) {
     if (!hasMotion() || player.count < 2 || !player.state.isFound) return false;
-    const frame = this.frameAt(place, (event.pointerType === 'touch' ? 2 : 1) * 8 / stage.view.scale);
-    if (!frame) return false;
+    const frame = stage.bodyAt([event.offsetX, event.offsetY])?.frame;
+    if (!frame || stage.fingers.size > 1) return false;
     const { q } = player.state, [x, y] = inWorld(q, frame, [0, 0]), angle = angleOf(q, frame);
     const [c, s] = [Math.cos(angle), Math.sin(angle)], [a, b] = [place[0] - x, place[1] - y];
     this.held = { frame, point: [c * a + s * b, c * b - s * a], from: [event.clientX, event.clientY], isMoved: false };
@@ -62,7 +25,7 @@ class Grab {
   move(place, event) {
     if (!this.held) return false;
     const { from } = this.held;
-    if (!this.held.isMoved && Math.hypot(event.clientX - from[0], event.clientY - from[1]) <= TREMBLE) return true;
+    if (!this.held.isMoved && Math.hypot(event.clientX - from[0], event.clientY - from[1]) <= CLICK) return true;
     if (!this.held.isMoved) player.pause();
     this.held.isMoved = true;
     stage.canvas.style.cursor = 'grabbing';
@@ -76,7 +39,7 @@ class Grab {
     this.held = null;
     stage.canvas.style.cursor = '';
     if (isMoved) player.setIndex(player.state.index);  // a solved time, whose numbers are the solution's own
-    else if (event.type === 'pointerup') stage.click(event);  // on a body a click is still a click
+    else if (event.type === 'pointerup') stage.click(stage.targetAt(event));  // a click is still a click
     return true;
   }
 

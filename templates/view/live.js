@@ -3,8 +3,7 @@
    drawing and messages, and a motion that is kept to compare with.
 
    live.set({ r: 0.12 })  solve again with these values, the others as they are
-   live.reset()           back to what the page was made with
-   live.onSolved(f)       f() is called when there is another motion */
+   live.reset()           back to what the page was made with */
 
 const PARTS = 50;  // the mechanism's diagonal in sizes of marks, as in kincompile/view/drawing.py
 const SAME_POINT = 1e-9;  // relative distance up to which two points of a body are one
@@ -193,13 +192,8 @@ function residualsOf(Phi) {
 /* ---- the panel ---- */
 
 const live = {
-  listeners: [],
   motion: null,  // the last one that the page solved for
   ghost: null,  // { drawing, arrays }: a motion kept to compare with
-
-  onSolved(listener) {
-    this.listeners.push(listener);
-  },
 
   get isChanged() {
     return this.motion !== null;
@@ -336,11 +330,7 @@ const live = {
     data.extent = extent.map((x, k) => (k % 2 ? Math.max(x, this.base[k]) : Math.min(x, this.base[k])));
     this.takeVerdict(null);
     this.showValues();
-    for (const point of stage.points) delete point.greatest;
-    stage.paths.clear();
-    player.state = player.solved(player.state.index);
-    for (const listener of this.listeners) listener();
-    player.refresh();
+    player.motionChanged();
     this.time = performance.now() - begin;
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.explain(), REST);
@@ -350,6 +340,7 @@ const live = {
   takeMotion(motion) {
     const { data } = player, names = ['q', 'q_dot', 'q_ddot', ...(data.outputs.length ? ['y', 'y_dot', 'y_ddot'] : [])];
     for (const name of names) data.arrays[name] = motion[name];
+    player.kept = null;
     withChecks(data.arrays, motion);
     data.status = Array.from(motion.status);
     if (!hasMotion()) data.guessResidual = residualsOf(motion.equations.evaluate(data.guess, player.t[0]).Phi);
@@ -368,8 +359,7 @@ const live = {
   /* Find out what ended the motion: that takes longer than a frame. */
   explain() {
     this.takeVerdict(emitted.solver.explain(this.motion));
-    for (const listener of this.listeners) listener();
-    player.refresh();
+    if (player.data.events.length) player.motionChanged();
   },
 
   /* ---- a motion to compare with ---- */

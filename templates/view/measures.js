@@ -14,7 +14,7 @@ class OutputMotion {
   constructor(motion, k) {
     const width = player.data.outputs.length, { unit, name } = player.data.outputs[k];
     const rows = [...motion.t.keys()].filter(row => Number.isFinite(motion.q_ddot[row * player.n]));
-    if (timesFall()) rows.reverse();
+    if (motion.t[0] > motion.t[motion.t.length - 1]) rows.reverse();
     const column = values => rows.map(row => values[row * width + k]);
     Object.assign(this, { motion, k, name, unit, t: rows.map(row => motion.t[row]) });
     [this.y, this.y_dot, this.y_ddot] = [motion.y, motion.y_dot, motion.y_ddot].map(column);

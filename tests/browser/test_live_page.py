@@ -13,7 +13,7 @@ from kincompile.view.drawing import drawing
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 SOLVED = """values => new Promise(resolve => {
-  live.onSolved(() => setTimeout(resolve));
+  player.onMotion(() => setTimeout(resolve));
   live.set(values);
 })"""
 """Set values, and wait until they are solved with."""
@@ -164,11 +164,11 @@ def test_that_paths_plots_numbers_and_newton_follow(open_page: Callable[..., Any
     page.evaluate(SOLVED, {"a": 1.2})
     page.evaluate("player.setIndex(20)")
     solution = solved_again(page, model, {"a": 1.2})
-    path = page.evaluate("pathOf([...stage.traced][0])")
+    path = page.evaluate("pathOf([...stage.traced][0]).line")
     np.testing.assert_allclose(path, solution.observed.y, atol=1e-9)
-    plotted = page.evaluate("Array.from(plots.list[0].chart.data[1])")
-    label = page.evaluate("plots.list[0].choice.value")
-    np.testing.assert_allclose(plotted, solution.observed.y[:, ("x_P", "y_P").index(label)])
+    assert page.evaluate("plots.list[0].choice.value") == "path of P"
+    plotted = page.evaluate("[plots.list[0].x, plots.list[0].y]")
+    np.testing.assert_allclose(np.transpose(plotted), solution.observed.y, atol=1e-9)
     page.get_by_role("tab", name="Numbers").click()
     row = page.locator("#panel-numbers tr", has_text="phi_rocker").locator("td").nth(1)
     assert float(row.inner_text()) == pytest.approx(solution["phi_rocker"][20], rel=1e-6)
