@@ -453,27 +453,29 @@ const four_bar = (() => {
 
         /* x that makes A x - b smallest: Householder's reflections. */
         function leastSquares(matrix, right) {
-            const rows = matrix.map(row => Array.from(row)), b = Array.from(right), n = rows[0].length;
+            const rows = matrix.map((row, i) => [...row, right[i]]), m = rows.length, n = rows[0].length - 1;
+            const v = new Float64Array(m);
             for (let k = 0; k < n; k += 1) {
-                const v = rows.map((row, i) => (i < k ? 0 : row[k]));
-                const size = v[k] > 0 ? -norm(v) : norm(v);
-                v[k] -= size;
-                const square = v.reduce((sum, x) => sum + x * x, 0);
+                let square = 0;
+                for (let i = k; i < m; i += 1) {
+                    v[i] = rows[i][k];
+                    square += v[i] * v[i];
+                }
+                const size = v[k] > 0 ? -Math.sqrt(square) : Math.sqrt(square);
                 if (square === 0) {
                     rows[k][k] = Infinity;  // nothing depends on it: the shortest solution leaves it
                     continue;
                 }
+                const half = size * (size - v[k]);
+                v[k] -= size;
                 for (let j = k; j <= n; j += 1) {
-                    const entry = i => (j < n ? rows[i][j] : b[i]);
                     let dot = 0;
-                    for (let i = k; i < b.length; i += 1) dot += v[i] * entry(i);
-                    for (let i = k; i < b.length; i += 1) {
-                        const value = entry(i) - 2 * dot / square * v[i];
-                        if (j < n) rows[i][j] = value; else b[i] = value;
-                    }
+                    for (let i = k; i < m; i += 1) dot += v[i] * rows[i][j];
+                    dot /= half;
+                    if (dot !== 0) for (let i = k; i < m; i += 1) rows[i][j] -= dot * v[i];
                 }
             }
-            return upperSolution(rows, b.slice(0, n));
+            return upperSolution(rows, rows.slice(0, n).map(row => row[n]));
         }
 
         /* Singular values, the smallest first, and their directions on the right: Jacobi's rotations of
@@ -1005,6 +1007,23 @@ const four_bar = (() => {
             motion.y_ddot.set(state.outputs_ddot, k * width);
         }
 
+        /* The motion at any time between its points, followed from the nearest of them: a point with
+           outputs, or null where it cannot be followed. */
+        function between(motion, t) {
+            const { equations, t: times, q, status } = motion, { n, model } = equations;
+            const order = [...times.keys()].sort((a, b) => Math.abs(times[a] - t) - Math.abs(times[b] - t));
+            for (const k of order.slice(0, 2).filter(place => status[place] === CONVERGED)) {
+                const march = new March(equations), from = equations.evaluate(q.subarray(k * n, (k + 1) * n), times[k]);
+                march.isDense = true;
+                if (march.complete(from) !== CONVERGED) continue;
+                const { state, position } = march.advance(from, t, MAX_CORRECTIONS);
+                if (!position) continue;
+                if (model.OUTPUTS.length) model.observe_at(state);
+                return state;
+            }
+            return null;
+        }
+
         /* ---- what ends a motion ---- */
 
         /* The curve of solutions in q and t together, followed by its arc length: where it turns back in
@@ -1239,7 +1258,7 @@ const four_bar = (() => {
         }
 
         return {
-            linear: { factor, solve, singularValues }, norm, largest, crawls, iterate, Problem,
+            linear: { factor, solve, singularValues }, norm, iterate, Problem, scaledRows, between,
             solve: motionOver, explain,
         };
     })();

@@ -91,6 +91,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "name": Field(_NAME),
         "default": Field(_EXPRESSION),
         "unit": Field(_TEXT, is_required=False),
+        "range": Field(_POINT, is_required=False),
     },
     "body": {
         "name": Field(_NAME),

@@ -203,8 +203,13 @@ class _ModelReader(SketchReader):
         if name:
             self.names[name] = sympy.Symbol(name)
             self.remember(f"parameter {name!r}", address)
-        default = cast("float", default)  # the checks of the system make a number of it
-        return Parameter(name, default, unit) if self._is_free(name, address) and complete else None
+        limits, known = None, len(self.problems)
+        if "range" in row:
+            limits = self.expressions(row["range"], (*address, "range"), {}, "[least, greatest]", 2)
+            limits = limits if len(self.problems) == known else None
+        # The checks of the system make numbers of them.
+        item = Parameter(name, cast("float", default), unit, cast("Any", limits))
+        return item if self._is_free(name, address) and complete else None
 
     def _body(self, address: Address, row: Row) -> Body | None:
         self.has_fields(address, row, FIELDS["body"])

@@ -67,8 +67,9 @@ def _end(system: ConstraintSystem) -> int | float | str:
 
 
 def _parameter(item: Parameter) -> dict[str, Any]:
-    row = {"name": item.name, "default": item.default}
-    return {**row, "unit": item.unit} if item.unit else row
+    row: dict[str, Any] = {"name": item.name, "default": item.default}
+    row |= {"unit": item.unit} if item.unit else {}
+    return row | ({"range": list(item.range)} if item.range else {})
 
 
 def _body(item: Body) -> dict[str, Any]:

@@ -128,11 +128,16 @@ def body_columns(bodies: Sequence[Body]) -> tuple[range, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A number that may change at run time without recompiling."""
+    """A number that may change at run time without recompiling.
+
+    `range` are the ends of the slider that a page has for it; None for half and double the default.
+    """
 
     name: str
     default: float | None
     unit: str = ""
+    # Not of the code, whose fingerprint is that of what is shown here.
+    range: tuple[float, float] | None = field(default=None, repr=False)
 
 
 def default_values(parameters: Iterable[Parameter]) -> dict[str, float]:

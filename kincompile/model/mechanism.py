@@ -75,7 +75,13 @@ class Mechanism(MatrixViews, TextViews):
     def end(self, given: Scalar) -> None:
         self.end_given = given
 
-    def parameter(self, name: str, default: Scalar | None = None, unit: str = "") -> sympy.Symbol:
+    def parameter(
+        self,
+        name: str,
+        default: Scalar | None = None,
+        unit: str = "",
+        range: Scalars | None = None,  # noqa: A002
+    ) -> sympy.Symbol:
         """Declare a parameter and return its symbol, to be used in attributes and drivers.
 
         Parameters
@@ -86,9 +92,13 @@ class Mechanism(MatrixViews, TextViews):
             Its value where none is given at run time; an angle may be ``30*kc.deg``.
         unit
             Its unit, for documentation.
+        range
+            Its least and its greatest value on the slider of a page, as ``(0.05, 0.2)``; without,
+            half and double its default.
         """
-        # `system` makes a number of it.
-        self.parameters.append(Parameter(name, cast("float", default), unit))
+        # `system` makes numbers of them.
+        limits = cast("tuple[float, float] | None", range)
+        self.parameters.append(Parameter(name, cast("float", default), unit, limits))
         return sympy.Symbol(str(name))
 
     def body(self, name: str, guess: Scalars = (0, 0, 0), outline: Sequence[Scalars] = ()) -> Body:

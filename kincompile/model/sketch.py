@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import sympy
 
     from kincompile.model.arguments import BodyLike, PointLike, ValueLike
-    from kincompile.model.expressions import Scalar
+    from kincompile.model.expressions import Scalar, Scalars
     from kincompile.model.resolve import Point
 
 Item = TypeVar("Item", bound=Constraint | Equation)
@@ -57,13 +57,24 @@ class Sketch:
         self._mechanism = Mechanism(name, length_unit=length_unit, end=end, points=points)
         self._drawn = Drawn(self._mechanism)
 
-    def parameter(self, name: str, default: Scalar | None = None, unit: str = "") -> sympy.Symbol:
+    def parameter(
+        self,
+        name: str,
+        default: Scalar | None = None,
+        unit: str = "",
+        range: Scalars | None = None,  # noqa: A002
+    ) -> sympy.Symbol:
         """Declare a parameter and return its symbol, as `Mechanism.parameter` does."""
-        return self._mechanism.parameter(name, default, unit)
+        return self._mechanism.parameter(name, default, unit, range)
 
-    def length(self, name: str, default: float) -> sympy.Symbol:
+    def length(
+        self,
+        name: str,
+        default: float,
+        range: Scalars | None = None,  # noqa: A002
+    ) -> sympy.Symbol:
         """Declare a parameter in the unit of length and return its symbol."""
-        return self.parameter(name, default, self._mechanism.length_unit)
+        return self.parameter(name, default, self._mechanism.length_unit, range)
 
     def joints(self, /, **places: PointLike) -> None:
         """Draw joints: a place (x, y) by name [length], numbers or expressions of parameters.

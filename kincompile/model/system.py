@@ -332,8 +332,35 @@ def _parameters(
         else:
             unit = str(item.unit)
             default = _number(default, f"parameter {item.name!r}", {}, problems, unit)
-        checked.append(Parameter(item.name, default, item.unit))
+        limits = _range(item, default, problems)
+        checked.append(Parameter(item.name, default, item.unit, limits))
     return tuple(checked)
+
+
+def _range(
+    item: Parameter, default: float | None, problems: list[str]
+) -> tuple[float, float] | None:
+    """Return the least and the greatest value of a parameter as numbers, if it has them."""
+    given, where = item.range, f"parameter {item.name!r}"
+    if given is None or default is None:
+        return None
+    try:
+        low, high = given
+    except (TypeError, ValueError):
+        problems.append(f"{where}: its range is {given!r}; give (least, greatest) value")
+        return None
+    low, high = (
+        _number(end, f"{where}, range", {}, problems, str(item.unit)) for end in (low, high)
+    )
+    if not low < high:
+        problems.append(
+            f"{where}: its range goes from {low:g} to {high:g}; give the least value first"
+        )
+    elif not low <= default <= high:
+        problems.append(
+            f"{where}: its default {default:g} is outside its range from {low:g} to {high:g}"
+        )
+    return low, high
 
 
 def _body_coordinates(

@@ -40,12 +40,22 @@ LOCATED = 1e-6
 
 CANNOT_BE = "No position was found: the mechanism cannot be assembled"
 
-NOT_ASSEMBLED = (
-    f"{CANNOT_BE} at this time (change lengths, or "
-    "what the drivers demand), or the guess is too far away (give one nearer to the assembled "
-    "mechanism; kc.assemblies(module) looks for positions)."
-)
-"""What a first point that does not converge means, and what to do: there is no motion yet."""
+WORDS = {
+    "converged": "{name}: {points} converged; the largest residual is {residual}.",
+    "failed": "{name} failed at t = {t}, point {point} of {count} ({status}).",
+    "one before": "The point before it is good",
+    "before": "The {before} points before it are good",
+    "followed": "; the motion was followed to t = {t}",
+    # There is no motion yet where a first point does not converge.
+    "not assembled": f"{CANNOT_BE} at this time (change lengths, or what the drivers demand), or "
+    "the guess is too far away (give one nearer to the assembled mechanism; kc.assemblies(module) "
+    "looks for positions).",
+    "exhausted": f"Between these two times {MAX_SUBSTEPS:,} steps were not enough: ask for more "
+    "times.",
+    "found": "The position there was found.",
+    "jumps": "A position exists at that time, but the motion does not lead there continuously.",
+}
+"""What is said of a motion, and of how it ended."""
 
 MET = 1e-9
 """Residual, relative to the largest, up to which an equation counts as met."""
@@ -132,12 +142,19 @@ def _verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
         points = f"all {times.size} points" if times.size > 1 else "the point"
         passed = "".join(f" Passed: {event.kind} at t = {event.t:.10g}." for event in events)
         largest = motion.residual.max()
-        return f"{name}: {points} converged; the largest residual is {largest:.2g}.{passed}"
+        return (
+            WORDS["converged"].format(name=name, points=points, residual=f"{largest:.2g}") + passed
+        )
     index = int(np.argmax(motion.status != Status.CONVERGED))
     asked = _asked(inputs, outcome)
     parts = [
-        f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
-        f" ({outcome.status.name}).",
+        WORDS["failed"].format(
+            name=name,
+            t=f"{times[index]:.10g}",
+            point=index + 1,
+            count=times.size,
+            status=outcome.status.name,
+        ),
         _before(outcome, index),
         _why(outcome, events, times[index], asked),
         _there(inputs, outcome),
@@ -149,8 +166,8 @@ def _before(outcome: Outcome, index: int) -> str:
     """Say how far the motion was followed."""
     if outcome.state is None:
         return ""
-    good = f"The {index} points before it are good" if index > 1 else "The point before it is good"
-    reached = f"; the motion was followed to t = {outcome.state.t:.10g}"
+    good = WORDS["before" if index > 1 else "one before"].format(before=index)
+    reached = WORDS["followed"].format(t=f"{outcome.state.t:.10g}")
     return f"{good}{'' if outcome.position else reached}."
 
 
@@ -172,11 +189,9 @@ def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str
     Without one, what the status may mean is said in general, and the last event on the way.
     """
     if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
-        return f"{CANNOT_BE} at this time: {asked}" if asked else NOT_ASSEMBLED
+        return f"{CANNOT_BE} at this time: {asked}" if asked else WORDS["not assembled"]
     if outcome.exhausted:
-        return (
-            f"Between these two times {MAX_SUBSTEPS:,} steps were not enough: ask for more times."
-        )
+        return WORDS["exhausted"]
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
     if events and outcome.state is not None:
         event, end = events[-1], outcome.state.t
@@ -188,9 +203,9 @@ def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str
 def _there(inputs: Inputs, outcome: Outcome) -> str:
     """Name the equations that do not hold at the time of failure, or say what else is there."""
     if outcome.position is not None:
-        return "The position there was found."
+        return WORDS["found"]
     if outcome.jumps:
-        return "A position exists at that time, but the motion does not lead there continuously."
+        return WORDS["jumps"]
     return "" if outcome.nearest is None else _unmet(inputs, outcome.nearest)
 
 

@@ -49,11 +49,11 @@ def links(
     shown = {frame for mark in marks for frame in moves_with(mark)}
     found = []
     for frame in sorted(set(frames) - outlined):
-        points = _distinct(place.point for place in attached if place.frame == frame)
-        if len(points) < 2:
-            points = _distinct([*points, (0.0, 0.0)])
+        own: list[Point] = [place.point for place in attached if place.frame == frame]
+        own += [(0.0, 0.0)] if len(_distinct(own)) < 2 else []
+        points = _distinct(own)
         if len(points) > 1 or frame not in shown:
-            found.append(Hull(frame, _hull(points)))
+            found.append(Hull(frame, _hull(points), tuple(own)))
     return found
 
 
@@ -61,9 +61,9 @@ def _distinct(points: Iterable[Point]) -> list[Point]:
     """Return the points without repetitions."""
     found: list[Point] = []
     for point in points:
-        tolerance = SAME_POINT * (1 + max(map(abs, point)))
-        if all(max(abs(a - b) for a, b in zip(point, other, strict=True)) > tolerance
-               for other in found):  # fmt: skip
+        x, y = map(float, point)
+        tolerance = SAME_POINT * (1 + max(abs(x), abs(y)))
+        if all(max(abs(float(a) - x), abs(float(b) - y)) > tolerance for a, b in found):
             found.append(point)
     return found
 
@@ -89,4 +89,5 @@ def _hull(points: Iterable[Point]) -> tuple[Point, ...]:
 
 def _turn(a: Point, b: Point, c: Point) -> float:
     """Return twice the signed area of a triangle."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    (ax, ay), (bx, by), (cx, cy) = (map(float, point) for point in (a, b, c))
+    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)

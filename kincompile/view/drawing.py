@@ -61,6 +61,8 @@ class JointLabel:
         Whether its value is a function of time.
     rows
         First row of Phi and number of rows.
+    distances
+        Lengths that must be positive; none that is a function of time.
     """
 
     name: str
@@ -68,6 +70,7 @@ class JointLabel:
     place: FramePoint | None
     is_driver: bool
     rows: tuple[int, int]
+    distances: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,11 +174,12 @@ def drawing(
         joint.name: _pointed_at(by_joint[joint.name], geometry.points([joint])) for joint in joints
     }
     ordered = sorted((_lengthened(mark, OVERHANG * size) for mark in marks), key=_depth)
-    return Drawing(system.name, names, frames, tuple(ordered), _labels(system, places), size)
+    labels = _labels(system, places, geometry)
+    return Drawing(system.name, names, frames, tuple(ordered), labels, size)
 
 
 def _labels(
-    system: ConstraintSystem, places: Mapping[str, FramePoint | None]
+    system: ConstraintSystem, places: Mapping[str, FramePoint | None], geometry: Geometry
 ) -> tuple[JointLabel, ...]:
     """Return the labels of the constraints, in order."""
     return tuple(
@@ -185,6 +189,7 @@ def _labels(
             places.get(item.name),
             item.is_driver,
             (first, len(item.equation_names)),
+            geometry.distances(item) if isinstance(item, Joint) else (),
         )
         for item, first in zip(system.constraints, system.row_offsets, strict=True)
     )

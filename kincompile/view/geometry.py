@@ -9,10 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.ir.from_sympy import Converter
+from kincompile.ir.graph import Graph
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND
-from kincompile.model.expressions import alpha, as_expression, depends_on, evaluate
+from kincompile.model.expressions import (
+    alpha,
+    as_expression,
+    depends_on,
+    evaluate,
+    symbol_names,
+)
 from kincompile.model.joints import Revolute
+from kincompile.view.live_numbers import LiveNumber, length_of
 from kincompile.view.marks import GROUND_FRAME, Contour, FramePoint, Pin, Rail, Slider, Span, Wheel
 
 if TYPE_CHECKING:
@@ -54,9 +63,24 @@ class Geometry:
     frames: Mapping[str, PlaneFrame]
     q: Array
 
-    def number(self, value: Scalar) -> float:
-        """Return the number of an expression of parameters; zero where it has none."""
-        return evaluate(as_expression(value), dict(self.values)) or 0.0
+    @cached_property
+    def _code(self) -> tuple[Graph, Converter]:
+        """The code of live numbers, and what writes it."""
+        graph = Graph()
+        return graph, Converter(graph, graph.input)
+
+    def number(self, value: Scalar, **others: float) -> float:
+        """Return the number of an expression of parameters; zero where it has none.
+
+        Of an expression that depends on some, or on others by name, it is a live one.
+        """
+        expression, known = as_expression(value), {**self.values, **others}
+        number = evaluate(expression, known) or 0.0
+        names = symbol_names(expression)
+        if not names or not names <= known.keys():
+            return number
+        graph, converter = self._code
+        return LiveNumber.of(number, graph, converter.convert(expression))
 
     def pair(self, pair: Scalars) -> Point:
         """Return the numbers of a point or a direction."""
@@ -88,6 +112,12 @@ class Geometry:
             for item in joint.written.arguments().values()
             if item.kind is Kind.POINT and item.symbol not in PITCH_LINE
         ]
+
+    def distances(self, joint: Joint) -> tuple[float, ...]:
+        """Return the lengths of a joint that must be positive, but functions of time."""
+        arguments = joint.written.arguments().values()
+        scalars = (joint.scalars[x.symbol] for x in arguments if x.kind is Kind.DISTANCE)
+        return tuple(self.number(value) for value in scalars if not depends_on(value, ("t",)))
 
     @cached_property
     def bearings(self) -> dict[PlaneFrame, FramePoint]:
@@ -145,7 +175,7 @@ class JointGeometry:
     def unit(self, symbol: str) -> Point:
         """Return a direction of the constraint, of length one."""
         x, y = self.mechanism.pair(self.joint.points[symbol])
-        length = math.hypot(x, y) or 1.0
+        length = length_of(x, y) or 1.0
         return x / length, y / length
 
     def number(self, symbol: str) -> float:
@@ -187,13 +217,13 @@ class JointGeometry:
     def profile(self, centre: str, rho: str, style: str) -> Contour:
         """Return the curve of radius rho(alpha) about a centre."""
         place = self.point(centre)
-        x, y = place.point
-        points = []
+        x, y = map(float, place.point)
+        points, radius = [], self.joint.profiles[rho]
         for angle in np.linspace(0, 2 * np.pi, PROFILE_POINTS, endpoint=False).tolist():
-            known = {**self.mechanism.values, alpha.name: angle}
-            length = evaluate(self.joint.profiles[rho], known) or 0.0
+            length = evaluate(radius, {**self.mechanism.values, alpha.name: angle}) or 0.0
             points.append((x + length * math.cos(angle), y + length * math.sin(angle)))
-        return Contour(self.name, place.frame, tuple(points), style)
+        live = self.mechanism.number(radius, **{alpha.name: 0.0})
+        return Contour(self.name, place.frame, tuple(points), style, place.point, live)
 
     def rail(
         self,

@@ -22,6 +22,7 @@ from kincompile.model.joints import (
 )
 from kincompile.model.relative import Distance, RelativeAngle, RelativeX, RelativeY
 from kincompile.view.geometry import JointGeometry
+from kincompile.view.live_numbers import length_of
 from kincompile.view.marks import (
     GROUND_FRAME,
     Drive,
@@ -119,7 +120,7 @@ def _gear(joint: JointGeometry) -> list[Mark]:
 def _rack_and_pinion(joint: JointGeometry) -> list[Mark]:
     """Draw the pitch line from P to Q, and on as far as the pinion rolls."""
     p, q = joint.point("s_P"), joint.point("s_Q")
-    length = math.dist(p.point, q.point)
+    length = length_of(q.point[0] - p.point[0], q.point[1] - p.point[1])
     along = ((q.point[0] - p.point[0]) / length, (q.point[1] - p.point[1]) / length)
     pinion = joint.point("s_j")
     line = joint.rail(p, along, pinion, style="rack", at_least=(0.0, length))

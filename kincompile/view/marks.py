@@ -77,10 +77,14 @@ class FramePoint:
 
 @dataclass(frozen=True, slots=True)
 class Hull:
-    """A body as the convex hull of its joint points; two points are a bar, one is a dot."""
+    """A body as the convex hull of its joint points; two points are a bar, one is a dot.
+
+    `attached` are all its joint points, from which a page finds the hull for other parameters.
+    """
 
     frame: PlaneFrame
     points: tuple[Point, ...]
+    attached: tuple[Point, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,12 +187,17 @@ class Wheel:
 
 @dataclass(frozen=True, slots=True)
 class Contour:
-    """A closed curve in a frame; `style` is "cam" (its edge is touched) or "slot" (a pin in it)."""
+    """A closed curve in a frame; `style` is "cam" (its edge is touched) or "slot" (a pin in it).
+
+    Its points have the distance `rho` from its centre, which is given at the angle zero.
+    """
 
     joint: str
     frame: PlaneFrame
     points: tuple[Point, ...]
     style: str
+    centre: Point = (0.0, 0.0)
+    rho: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

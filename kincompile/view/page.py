@@ -16,8 +16,8 @@ from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.live import solver_script
 from kincompile.view.page_data import as_json, page_data
+from kincompile.view.page_scripts import geometry_script, solver_script
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
-STYLES = ("style.css", "newton.css")
+STYLES = ("style.css", "newton.css", "live.css")
 """Style sheets, in order."""
 
 SCRIPTS = (
     "player.js", "units.js", "draw.js", "stage.js", "poles.js", "tools.js", "tip.js", "columns.js",
     "plots.js", "tables.js", "showing.js", "newton.js", "newton_tables.js", "newton_stage.js",
-    "newton_panel.js", "start.js",
+    "newton_panel.js", "live.js", "measures.js", "grab.js", "start.js",
 )  # fmt: skip
 """Scripts, in order: each uses those before it, and the emitted module."""
 
@@ -128,6 +128,7 @@ def page(
         several variants.
     """
     system = system_of(model)
+    module = None
     if solution is None:
         module = compile_model(system)
         times = np.linspace(0, system.end, system.points) if t is None else t
@@ -135,14 +136,17 @@ def page(
     else:
         _require_motion_of(system, solution)
         message = solution.message
-    shown = page_data(system, solution, message)
+    is_given = assembly is not None or module is None
+    shown = page_data(system, solution, message, starts_there=is_given)
     slots = {
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "scripts": [
             solver_script(system),
+            geometry_script(system, shown["drawing"]),
             *(read(f"view/{name}") for name in SCRIPTS),
         ],
+        "still": shown.pop("still"),
         "data": as_json(shown),
     }
     return Page(system.name, fill("view/page.html.jinja", slots), shown)

@@ -10,8 +10,12 @@ import numpy as np
 
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
+from kincompile.runtime.singular.events import SENTENCES
 from kincompile.runtime.status import Status
+from kincompile.runtime.verdict import WORDS
 from kincompile.view.drawing import drawing
+from kincompile.view.picture import picture
+from kincompile.view.svg import svg_element
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from kincompile.model.bodies import Parameter
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.results.solution import Solution
     from kincompile.view.drawing import Drawing
@@ -33,8 +38,14 @@ LARGEST_DENSE = 300
 """Coordinates up to which the condition number and determinant of Phi_q are computed."""
 
 
-def page_data(system: ConstraintSystem, solution: Solution | None, message: str) -> dict[str, Any]:
-    """Return the data that a page shows, as plain values and arrays.
+def page_data(
+    system: ConstraintSystem,
+    solution: Solution | None,
+    message: str,
+    *,
+    starts_there: bool = False,
+) -> dict[str, Any]:
+    """Return the data that a page shows, as plain values and arrays, and a still picture.
 
     Parameters
     ----------
@@ -44,6 +55,8 @@ def page_data(system: ConstraintSystem, solution: Solution | None, message: str)
         Its motion; None where the equations determine none.
     message
         The message of the solver or of the compiler.
+    starts_there
+        Whether the page itself starts from the first position of the motion, not from the guess.
     """
     guess = np.array([item.guess for item in system.coordinates])
     values = {item.name: item.default or 0.0 for item in system.parameters}
@@ -68,10 +81,9 @@ def page_data(system: ConstraintSystem, solution: Solution | None, message: str)
         "coordinates": [{"name": item.name, "unit": item.unit} for item in system.coordinates],
         "outputs": outputs,
         "equations": list(system.equations),
-        "parameters": [
-            {"name": item.name, "value": values[item.name], "unit": item.unit}
-            for item in system.parameters
-        ],
+        "parameters": [_parameter(item, values[item.name]) for item in system.parameters],
+        "start": (q[0] if starts_there and np.isfinite(q[0]).all() else guess).tolist(),
+        "words": {**WORDS, **SENTENCES},
         "guess": guess.tolist(),
         "guessResidual": _at_guess(system, shapes, guess, t[0], p),
         "violated": VIOLATED * (1 + float(np.max(np.abs(guess), initial=0.0))),
@@ -79,9 +91,28 @@ def page_data(system: ConstraintSystem, solution: Solution | None, message: str)
         "sentences": {item.value: f"{item.name}: {item.sentence}" for item in Status},
         "events": events,
         "drawing": shapes.to_json(),
+        "still": _still(system.name, shapes, np.vstack((q, guess))),
         "extent": shapes.extent(np.vstack((q, guess)) if np.isnan(q).all() else q),
         "arrays": arrays,
     }
+
+
+def _still(name: str, shapes: Drawing, q: Array) -> str:
+    """Return the first position that was found as SVG; nothing where there are no bodies."""
+    found = q[np.isfinite(q).all(axis=1)][0]
+    return svg_element(picture(shapes, found, f"{name} at the start")) if shapes.bodies else ""
+
+
+def _parameter(item: Parameter, value: float) -> dict[str, Any]:
+    """Return a parameter, with the ends of its slider."""
+    default = item.default or 0.0
+    low, high = item.range or sorted((default / 2, 2 * default))
+    if low == high:
+        low, high = -1.0, 1.0
+    return {
+        "name": item.name, "value": value, "unit": item.unit, "default": default,
+        "low": min(low, value), "high": max(high, value),
+    }  # fmt: skip
 
 
 def as_json(data: Mapping[str, Any]) -> str:

@@ -12,8 +12,18 @@ const columns = {
   },
 
   kept: new Map(),
+  made: null,  // groups, and the number of points they were made for
 
   groups() {
+    if (this.made?.count !== stage.points.length) {
+      const groups = this.all();
+      const items = groups.flatMap(group => group.items);
+      this.made = { count: stage.points.length, groups, items: new Map(items.map(item => [item.label, item])) };
+    }
+    return this.made.groups;
+  },
+
+  all() {
     const { data } = player;
     const groups = [
       ...ordersOf(['Outputs', 'Rates of outputs', 'Second rates of outputs'], named(data), 'y', data.outputs),
@@ -27,11 +37,8 @@ const columns = {
   },
 
   find(label) {
-    for (const { items } of this.groups()) {
-      const item = items.find(other => other.label === label);
-      if (item) return item;
-    }
-    return null;
+    this.groups();
+    return this.made.items.get(label) ?? null;
   },
 
   /* The numbers of a column, computed once a motion. */
@@ -68,10 +75,7 @@ function ordersOf(titles, owners, array, all) {
 
 /* Numbers of a point over the motion. */
 function along(point, number) {
-  return Array.from({ length: player.count }, (_, k) => {
-    const state = player.solved(k);
-    return state.isFound ? finite(number(state, point)) : null;
-  });
+  return player.states.map(state => (state.isFound ? finite(number(state, point)) : null));
 }
 
 const titleOf = point => (point.kind.startsWith('origin') ? `origin of ${point.name}` : point.name);

@@ -39,7 +39,6 @@ class NewtonPanel {
     this.root = root;
     this.model = model;
     this.timer = null;
-    this.p = player.data.parameters.map(parameter => parameter.value);
     root.innerHTML = NEWTON_MARKUP;
     this.cells = newtonTables.jacobian(this.part('.jacobian'), model, (i, j) => this.entry(i, j));
     this.rows = newtonTables.coordinates(this.part('.coordinates'), model,
@@ -53,6 +52,10 @@ class NewtonPanel {
 
   get isShown() {
     return !this.root.hidden && !player.isPlaying;
+  }
+
+  get p() {
+    return player.data.parameters.map(({ value }) => value);
   }
 
   part(selector) {
@@ -75,7 +78,7 @@ class NewtonPanel {
     });
     player.onChange(state => {
       // A hidden panel takes the time when it is shown, of which it is told too.
-      if (this.isShown && state.time !== this.t) this.start(this.guess);
+      if (this.isShown && (state.time !== this.t || live.motion !== this.solved)) this.start(this.guess);
     });
   }
 
@@ -84,6 +87,7 @@ class NewtonPanel {
     this.stop();
     this.guess = Array.from(guess);
     this.t = player.state.time;
+    this.solved = live.motion;
     this.motion = player.state.isFound ? Array.from(player.state.q) : null;
     this.run = newton.iterate(this.model, this.guess, this.t, this.p);
     this.last = this.run.iterates.length - 1;
@@ -168,6 +172,7 @@ function newtonPanel(root) {
   root.classList.add('newton');
   const count = player.data.coordinates.length;
   if (emitted.Phi && count <= MOST_ENTRIES) return new NewtonPanel(root, emitted);
-  root.append(emitted.reason ?? `${count} coordinates are too many to show Newton's method step by step.`);
+  const reason = emitted.reason ?? `${count} coordinates are too many to show every entry of \u03a6_q.`;
+  root.append(`Newton's method cannot be shown: ${reason}`);
   return null;
 }

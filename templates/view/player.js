@@ -34,6 +34,7 @@ class Player {
     this.listeners = [];
     this.isPlaying = false;
     this.motionListeners = [];
+    this.kept = null;
     this.speed = this.pleasantSpeed();
     this.state = this.solved(0);
   }
@@ -59,6 +60,12 @@ class Player {
       q_dot: isFound ? this.row('q_dot', k) : still,
       q_ddot: isFound ? this.row('q_ddot', k) : still,
     };
+  }
+
+  /* The states at all solved times, made once a motion. */
+  get states() {
+    this.kept ??= Array.from({ length: this.count }, (_, k) => this.solved(k));
+    return this.kept;
   }
 
   /* The state between solved times: Hermite's cubic through positions and velocities. */
@@ -122,6 +129,7 @@ class Player {
   }
 
   motionChanged() {
+    this.kept = null;
     for (const listener of this.motionListeners) listener();
     this.show(this.solved(this.state.index));
   }

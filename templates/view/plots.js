@@ -71,8 +71,8 @@ class Plot {
     if (!hasMotion()) return;
     this.read();
     const { width, height } = this.size = this.sizes();
-    const type = Math.round(0.76 * fontSize());
-    this.box = { left: 5.2 * type, right: width - 12, top: 10, low: height - 3.1 * type };
+    const type = Math.round(0.76 * stage.type);
+    this.box = { left: 4 * type, right: width - 1.3 * type, top: 1.9 * type, low: height - 3 * type };
     setAttributes(this.svg, { viewBox: `0 0 ${width} ${height}`, width, height, 'font-size': type,
       'font-family': 'system-ui, sans-serif', 'aria-label': `${this.labels[1]} over ${this.labels[0]}` });
     this.ranges();
@@ -81,8 +81,8 @@ class Plot {
   }
 
   sizes() {
-    const width = Math.max(240, this.element.clientWidth);
-    const height = this.isPath ? Math.min(0.8 * width, 1.3 * plots.height()) : plots.height();
+    const { width } = plots;
+    const height = this.isPath ? Math.min(0.8 * width, isProjected() ? plots.height() : 1.3 * plots.height()) : plots.height();
     return { width, height };
   }
 
@@ -130,9 +130,8 @@ class Plot {
     for (const [y, label] of this.levels(type, step_x)) {
       parts.push(line(left, y, right, y), text(left - 5, y + 0.35 * type, 'end', label));
     }
-    const middle = (top + low) / 2;
     parts.push(text((left + right) / 2, low + 2.6 * type, 'middle', this.labels[0], { fill: palette.ink }));
-    parts.push(text(type, middle, 'middle', this.labels[1], { fill: palette.ink, transform: `rotate(-90 ${type} ${middle})` }));
+    parts.push(text(0, 1.1 * type, 'start', this.labels[1], { fill: palette.ink }));
     parts.push(...this.eventLines(palette), this.curve(palette));
     this.now = svgElement('line', { y1: top, y2: low, class: 'now', stroke: palette.drive, 'stroke-width': 2 });
     this.dot = svgElement('circle', { r: 4.5, class: 'dot', fill: palette.paper, stroke: palette.drive, 'stroke-width': 2 });
@@ -142,12 +141,13 @@ class Plot {
 
   /* Heights of the rules across the plot, with their labels. */
   levels(type, step_x) {
-    const [a, b] = this.yRange, count = Math.max(2, (this.box.low - this.box.top) / (2.6 * type));
+    const [a, b] = this.yRange, count = Math.max(2, (this.box.low - this.box.top) / (2.2 * type));
     if (this.isLog) {
       const step = Math.max(1, Math.ceil((b - a) / count));
       return multiples(step, a, b).map(y => [this.py(10 ** y), `1e${y}`]);
     }
-    const step = this.isPath ? step_x : niceStep((b - a) / count);
+    let step = this.isPath ? step_x : niceStep((b - a) / count);
+    if (multiples(step, a, b).length < 2) step = niceStep(step / 2.5);
     return multiples(step, a, b).map(y => [this.py(y), stepText(y, step)]);
   }
 
@@ -156,7 +156,7 @@ class Plot {
     let isDown = false;
     this.y.forEach((y, k) => {
       const isThere = y !== null && this.x[k] !== null;
-      if (isThere) pieces.push(`${isDown ? 'L' : 'M'}${this.px(this.x[k]).toFixed(1)} ${this.py(y).toFixed(1)}`);
+      if (isThere) pieces.push(`${isDown ? 'L' : 'M'}${Math.round(10 * this.px(this.x[k])) / 10} ${Math.round(10 * this.py(y)) / 10}`);
       isDown = isThere;
     });
     const { left, right, top, low } = this.box, edge = 3;
@@ -358,6 +358,7 @@ async function saveImage(name, text, { width, height }) {
 
 const plots = {
   list: [],
+  width: 240,
   range: null,  // of the x axis that all plots but paths show; null for all
   first: null,  // what is plotted when the page opens
 
@@ -395,17 +396,28 @@ const plots = {
     return this.choice.value === TIME ? null : columns.find(this.choice.value);
   },
 
+  /* Three plots fill a screen. */
   height() {
-    const isProjected = document.documentElement.classList.contains('projected');
-    return isProjected ? Math.max(150, (innerHeight - 17 * fontSize()) / 3) : 12.5 * fontSize();
+    return isProjected() ? Math.max(150, (innerHeight - 18.5 * stage.type) / 3) : 12.5 * stage.type;
   },
 
   /* The first plots are made when they can be seen: before, they have no width. */
   show() {
     const labels = this.first;
     this.first = null;
+    this.measure();
     if (labels) labels.forEach(label => this.add(label));
     else this.redraw();
+  },
+
+  /* Take the room there is: asked once, since a browser lays out the page to answer. */
+  measure() {
+    if (this.holder?.clientWidth) this.width = Math.max(240, this.holder.clientWidth);
+  },
+
+  resize() {
+    this.measure();
+    this.redraw();
   },
 
   add(label) {

@@ -24,8 +24,8 @@ function poleOf(state, first, second = GROUND) {
 /* Where the pole of two bodies is over the motion, in the axes of the second: null where it is not.
    With the second as ground this is the fixed centrode, with the bodies exchanged the moving one. */
 function centrode(first, second) {
-  return Array.from({ length: player.count }, (_, k) => {
-    const state = player.solved(k), pole = poleOf(state, first, second);
+  return player.states.map(state => {
+    const pole = poleOf(state, first, second);
     return pole && inFrame(state.q, second, pole);
   });
 }

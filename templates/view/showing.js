@@ -48,7 +48,7 @@ const showing = {
 
   layOut() {
     stage.resize();
-    plots.redraw();
+    plots.resize();
     player.refresh();
   },
 

@@ -45,11 +45,11 @@ class Stage {
   }
 
   resize() {
+    this.type = fontSize();
     const [left, right, low, high] = player.data.extent;
     const width = this.canvas.parentElement.clientWidth;
-    const isProjected = document.documentElement.classList.contains('projected');
-    const most = Math.max(240, innerHeight - (isProjected ? 11 : 18) * fontSize());
-    const wanted = isProjected ? most : Math.max(0.45 * width, width * (high - low) / (right - left) + 4 * NEAR);
+    const most = Math.max(240, innerHeight - (isProjected() ? 11 : 18) * this.type);
+    const wanted = isProjected() ? most : Math.max(0.45 * width, width * (high - low) / (right - left) + 4 * NEAR);
     const height = Math.max(220, Math.min(most, wanted));
     const dense = devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
@@ -62,7 +62,7 @@ class Stage {
 
   /* Sizes of the text on it. */
   font(weight = '') {
-    return `${weight} ${Math.round(0.82 * fontSize())}px system-ui, sans-serif`;
+    return `${weight} ${Math.round(0.82 * this.type)}px system-ui, sans-serif`;
   }
 
   draw(state) {
@@ -125,7 +125,7 @@ class Stage {
     for (const point of shown) {
       if (point.kind === 'origin of the body') continue;
       const [x, y] = this.view.toScreen(this.where(point, state));
-      if (taken.some(([a, b]) => Math.abs(a - x) < 60 && Math.abs(b - y) < fontSize())) continue;
+      if (taken.some(([a, b]) => Math.abs(a - x) < 60 && Math.abs(b - y) < this.type)) continue;
       taken.push([x, y]);
       this.write(point.name, [x + 9, y - 6], this.palette.ink);
     }
@@ -184,6 +184,12 @@ class Stage {
     const pen = new Pen(this.ctx, player.state.q, { view: this.view, palette: this.palette }, drawing.size);
     const found = drawing.frames.findLast(frame => areasOf(pen, frame).some(points => isInside(points, at)));
     return found ? bodyTarget(found) : null;
+  }
+
+  /* The point or the body that a pointer means; a finger means points from farther away. */
+  targetAt({ offsetX, offsetY, pointerType }) {
+    const at = [offsetX, offsetY];
+    return this.near(at, pointerType === 'touch' ? 2 * NEAR : NEAR) ?? this.bodyAt(at);
   }
 
   /* All that is at the place of a point: named points, every joint, whatever body holds it. */
@@ -255,7 +261,6 @@ class Stage {
       if (isKept) event.preventDefault();
       return isKept;
     };
-    const reach = event => (event.pointerType === 'touch' ? 2 * NEAR : NEAR);
     let pressed = null;
     canvas.addEventListener('pointerdown', event => {
       this.fingers.set(event.pointerId, at(event));
@@ -266,14 +271,14 @@ class Stage {
       if (this.fingers.size < 2 && handled('move', event)) return;
       const before = this.fingers.get(event.pointerId);
       if (before) this.moveFinger(event.pointerId, at(event), pressed);
-      else if (event.pointerType !== 'touch') this.hover(this.near(at(event), reach(event)) ?? this.bodyAt(at(event)));
+      else if (event.pointerType !== 'touch') this.hover(this.targetAt(event));
     });
     const up = event => {
       const isClick = pressed && event.type === 'pointerup' && towards(pressed, at(event))[2] < CLICK;
       this.fingers.delete(event.pointerId);
       pressed = null;
       if (handled('up', event) || !isClick) return;
-      this.click(this.near(at(event), reach(event)) ?? this.bodyAt(at(event)));
+      this.click(this.targetAt(event));
     };
     canvas.addEventListener('pointerup', up);
     canvas.addEventListener('pointercancel', up);
@@ -314,6 +319,11 @@ class Stage {
     if (!target.isBody && !this.places.includes(target)) this.traced.add(target);
     this.select(target);
   }
+}
+
+/* Whether the page is shown full screen, with large type. */
+function isProjected() {
+  return document.documentElement.classList.contains('projected');
 }
 
 /* Height of the page's letters, in pixels. */
@@ -392,7 +402,7 @@ function hasMotion() {
 function pathOf(point) {
   const count = Math.min(player.count, PLACES);
   const line = Array.from({ length: count }, (_, k) => {
-    const state = player.solved(Math.round(k * (player.count - 1) / Math.max(count - 1, 1)));
+    const state = player.states[Math.round(k * (player.count - 1) / Math.max(count - 1, 1))];
     return state.isFound ? inWorld(state.q, point.frame, point.point) : null;
   });
   const round = firstRound(line) * player.duration;
@@ -420,8 +430,8 @@ function firstRound(line) {
 function greatestRates(point) {
   if (point.greatest) return point.greatest;
   const most = { velocity: 0, acceleration: 0 };
-  for (let k = 0; k < player.count; k++) {
-    const rates = ratesInWorld(player.solved(k), point.frame, point.point);
+  for (const state of player.states) {
+    const rates = ratesInWorld(state, point.frame, point.point);
     for (const kind of Object.keys(most)) {
       const size = Math.hypot(...rates[kind]);
       if (size > most[kind]) most[kind] = size;

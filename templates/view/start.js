@@ -6,7 +6,7 @@ const hasBodies = player.data.drawing.bodies.length > 0;
 
 /* ---- what the solver says ---- */
 
-function showMessages() {
+function showSizes() {
   const { data } = player;
   const counted = (count, one, several) => `${count} ${count === 1 ? one : several}`;
   const sizes = [
@@ -16,10 +16,14 @@ function showMessages() {
     counted(player.count, 'time', 'times'),
   ];
   byId('summary').textContent = (hasBodies ? sizes : sizes.slice(1)).join(', ');
-  if (!data.success) {
-    byId('message').hidden = false;
-    byId('message').textContent = data.message;
-  }
+}
+
+function showVerdict() {
+  const { data } = player;
+  // While sliders are pulled, the verdict is below them: nothing above them must move.
+  byId('message').hidden = data.success || live.isChanged;
+  byId('message').textContent = data.message;
+  byId('events').replaceChildren();
   for (const event of data.events) {
     const item = document.createElement('li'), button = document.createElement('button');
     const short = `${event.kind} at t = ${+event.t.toPrecision(6)}: ${event.bodies.join(', ')}`;
@@ -43,13 +47,15 @@ function showNote(state) {
   const shown = state.isFound ? '' : ' Shown is the last position that was found.';
   note.textContent = hasMotion()
     ? `t = ${+state.time.toPrecision(6)}: ${sentences[status[state.index]]}${shown}`
-    : 'Shown is the start guess. Constraints that it violates are red.';
+    : state.isFound ? 'Shown is the position at the start.'
+      : 'Shown is the start guess. Constraints that it violates are red.';
 }
 
 /* ---- time ---- */
 
 /* Events, and times at which something was not found, on the time axis. */
 function markTimeline() {
+  byId('marks').replaceChildren();
   if (!(player.duration > 0)) return;
   const part = time => 100 * Math.abs(time - player.t[0]) / player.duration;
   const mark = (className, from, to, title) => {
@@ -110,7 +116,7 @@ function connectKeys() {
   document.addEventListener('keydown', event => {
     const { target } = event;
     // Keys belong to a field that is filled in, a list that is open, a button that is pressed.
-    const isField = target.matches('select, textarea, input:not([type=range], [type=checkbox])');
+    const isField = target.matches('select, textarea, input:not(#time, [type=checkbox])');
     const isPressed = event.key === ' ' && target.matches('button, [type=checkbox]');
     const isTab = target.matches('[role=tab]');
     const isTaken = isField || isPressed || isTab || event.ctrlKey || event.metaKey;
@@ -146,6 +152,7 @@ const panels = {
   plots: () => plots.show(),
   numbers: () => numbers.update(player.state),
   points: () => points.update(player.state),
+  measures: () => measures.show(),
   newton: () => {},  // follows the player by itself
 };
 let shownPanel = 'plots';
@@ -197,7 +204,8 @@ function start() {
   byId('tab-points').hidden = !hasBodies;
   byId('tools').hidden = !hasBodies;
   byId('legend').hidden = !hasBodies;
-  showMessages();
+  showSizes();
+  showVerdict();
   markTimeline();
   connectTransport();
   connectKeys();
@@ -205,29 +213,37 @@ function start() {
   showing.connect();
   plots.build(byId('panel-plots'));
   numbers.build(byId('panel-numbers'));
+  byId('tab-measures').hidden = !player.data.outputs.length || 'reason' in emitted;
+  measures.build(byId('panel-measures'));
   if (hasBodies) {
     points.build(byId('panel-points'));
+    stage.pointer = new Grab();
     stage.listen();
     tools.build();
     traceLongest();
   }
   newtonPanel(byId('panel-newton'));
+  stage.overlays.push((ctx, view, palette) => live.drawGhost(ctx, view, palette));
   player.onChange(showState);
-  new ResizeObserver(() => {
-    stage.resize();
-    plots.redraw();
-    player.refresh();
+  let width = null;
+  new ResizeObserver(([{ contentRect }]) => {
+    if (contentRect.width === width) return;  // what is said below the drawing is no reason to change it
+    width = contentRect.width;
+    showing.layOut();
   }).observe(byId('left'));
   player.onMotion(forget);
   showPanel('plots');
   showing.theme();
+  live.build(byId('live'));
 }
 
 /* The motion is another one: what was computed from the last one is dropped. */
 function forget() {
-  fitMarks(player);
   for (const keeper of [units, columns, poles, stage]) keeper.forget();
   plots.redraw();
+  showVerdict();
+  markTimeline();
+  if (shownPanel === 'measures') measures.show();
 }
 
 start();

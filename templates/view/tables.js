@@ -58,12 +58,7 @@ const numbers = {
       row.append(cell(name, 'th'), cell(is_driver ? `${kind}, driver` : kind), cell(''));
       return row;
     });
-    const parameters = tableOf(['parameter', 'value', 'unit']);
-    for (const { name, value, unit } of player.data.parameters) {
-      parameters.tBodies[0].insertRow().append(cell(name, 'th'), cell(numberText(value)), cell(unit));
-    }
     panel.append(bar, ...(this.observed.length ? [wide(this.outputs)] : []), wide(this.motion), wide(this.equations));
-    if (player.data.parameters.length) panel.append(wide(parameters));
   },
 
   update(state) {

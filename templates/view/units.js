@@ -62,8 +62,12 @@ function largestOfUnits({ coordinates, outputs, arrays, lengthUnit, drawing }) {
   const grow = (unit, value) => { if (value > (scales.get(unit) ?? 0)) scales.set(unit, value); };
   for (const [owners, name] of [[coordinates, 'q'], [outputs, 'y']]) {
     ['', '_dot', '_ddot'].forEach((order, k) => {
-      const per = ['', '/s', '/s²'][k], named = owners.map(({ unit }) => (unit ? unit + per : ''));
-      arrays[name + order]?.forEach((value, place) => grow(named[place % owners.length], Math.abs(value)));
+      const values = arrays[name + order] ?? [], most = new Float64Array(owners.length);
+      for (let place = 0, at = 0; place < values.length; place++, at = at + 1 < most.length ? at + 1 : 0) {
+        const size = Math.abs(values[place]);
+        if (size > most[at]) most[at] = size;
+      }
+      owners.forEach(({ unit }, at) => grow(unit && unit + ['', '/s', '/s²'][k], most[at]));
     });
   }
   grow(lengthUnit, drawing.size);

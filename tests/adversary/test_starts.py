@@ -16,7 +16,7 @@ import kincompile as kc
 from kincompile.runtime.newton import iterate
 from kincompile.runtime.problem import problem
 from kincompile.targets.templates import read
-from kincompile.view.live import solver_script
+from kincompile.view.page_scripts import solver_script
 from tests.adversary.chains import (
     Placement,
     closings,

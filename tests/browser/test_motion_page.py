@@ -377,7 +377,7 @@ def test_that_the_numbers_can_be_copied(open_page: Any, example_named: Any) -> N
     found = np.array([[float(cell) for cell in row.split("\t")[2:]] for row in rows])
     exact = np.stack((solution.q[100], solution.q_dot[100], solution.q_ddot[100]), axis=-1)
     np.testing.assert_array_equal(found, exact)
-    page.get_by_role("button", name="Copy").click()
+    page.get_by_role("button", name="Copy", exact=True).click()
     page.get_by_text("Copied").wait_for()
     page.close()
 

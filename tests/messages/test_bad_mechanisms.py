@@ -371,6 +371,28 @@ def test_that_a_parameter_needs_a_number(default: Any, message: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("ends", "message"),
+    [
+        ((2, 1), "parameter 'h': its range goes from 2 to 1; give the least value first"),
+        ((1, 1), "parameter 'h': its range goes from 1 to 1; give the least value first"),
+        ((2, 3), "parameter 'h': its default 1 is outside its range from 2 to 3"),
+        ((-1, 0.9), "parameter 'h': its default 1 is outside its range from -1 to 0.9"),
+        (5, r"parameter 'h': its range is 5; give \(least, greatest\) value"),
+        ((0, 1, 2), r"parameter 'h': its range is \(0, 1, 2\); give \(least, greatest\) value"),
+        (("a", 2), "parameter 'h', range: 'a' is not a number"),
+        ((0, nan), "parameter 'h', range: nan is not finite"),
+        ((0, 2 * L), r"parameter 'h', range: 2\*L is not a number at the default parameters"),
+        ((0, 90 * kc.deg), "parameter 'h', range: 90.deg is in degrees"),
+    ],
+)
+def test_that_a_range_is_two_numbers_around_the_default(ends: Any, message: str) -> None:
+    m = named()
+    m.parameter("h", 1.0, unit="m", range=ends)
+    with pytest.raises(kc.ModelError, match=message):
+        m.system()
+
+
+@pytest.mark.parametrize(
     ("guess", "message"),
     [
         ((1, 2), r"body 'rod': the guess \(1, 2\) is not \(x, y, phi\)"),

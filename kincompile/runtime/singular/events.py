@@ -25,8 +25,6 @@ from kincompile.runtime.march import March, State
 from kincompile.runtime.singular.curve import Bracket, Curve
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from kincompile.runtime.engine.code import Code
     from kincompile.runtime.engine.engine import Array as Vector
     from kincompile.runtime.engine.engine import Point
@@ -34,6 +32,27 @@ if TYPE_CHECKING:
 
 LOCK_UP, BIFURCATION, BRANCH_SWITCH = "lock-up", "bifurcation", "branch switch"
 """Kinds of events."""
+
+SENTENCES = {
+    LOCK_UP: (
+        "Lock-up at t = {t}: Phi_q is singular, and the velocities of {bodies} grow "
+        "beyond all bounds: the drivers demand what the joints cannot give. End the motion "
+        "before this time (shorten the range of the drivers), change lengths, or drive one of "
+        "these bodies instead."
+    ),
+    BIFURCATION: (
+        "Bifurcation at t = {t}: Phi_q is singular, but velocities stay finite: {bodies} may "
+        "go on in two ways. kc.solve(..., through='smooth'), or --through smooth, goes on along "
+        "the smooth branch; otherwise end the motion before this time, change a length slightly, "
+        "or drive one of these bodies near this time."
+    ),
+    BRANCH_SWITCH: (
+        "Branch switch at t = {t}: at t = {later} the mechanism can be assembled, but "
+        "{bodies} would have to jump there. Make the drivers continuous, or start a new "
+        "motion at that time if the jump is wanted."
+    ),
+}
+"""What is said of an event."""
 
 PASSAGE = 2e-3
 """Half of the piece of curve around a bifurcation, in radians and sizes of the mechanism, over
@@ -197,13 +216,10 @@ def branch_switch(code: Code, state: State, t: float, q: Vector, reference: Vect
     """
     jump = (q - state.point.q) / reference
     bodies = involved(code, jump)
-    return Event(
-        BRANCH_SWITCH, state.t, bodies,
-        f"Branch switch at t = {state.t:.10g}: at t = {t:.10g} the mechanism can be assembled, but "
-        f"{listed(bodies)} would have to jump there. Make the drivers continuous, or start a new "
-        "motion at that time if the jump is wanted.",
-        q, {},
-    )  # fmt: skip
+    text = SENTENCES[BRANCH_SWITCH].format(
+        t=f"{state.t:.10g}", bodies=listed(bodies), later=f"{t:.10g}"
+    )
+    return Event(BRANCH_SWITCH, state.t, bodies, text, q, {})
 
 
 def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:
@@ -215,7 +231,7 @@ def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) ->
     free = directions[np.append(sizes[:-1] <= IN_RANGE * sizes[0], True)]
     bodies = involved(code, np.linalg.norm(free, axis=0))
     return Event(
-        kind, t, bodies, _message(kind, t, bodies), q,
+        kind, t, bodies, SENTENCES[kind].format(t=f"{t:.10g}", bodies=listed(bodies)), q,
         dict(zip(code.coordinates, null.tolist(), strict=True)),
     )  # fmt: skip
 
@@ -223,23 +239,6 @@ def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) ->
 def _scaled(equations: Problem, Phi_q: Vector) -> Vector:
     """Return Phi_q in scales of equations and coordinates."""
     return equations.weights()[:, np.newaxis] * Phi_q * equations.reference
-
-
-def _message(kind: str, t: float, bodies: Sequence[str]) -> str:
-    moving = listed(bodies)
-    if kind == LOCK_UP:
-        return (
-            f"Lock-up at t = {t:.10g}: Phi_q is singular, and the velocities of {moving} grow "
-            "beyond all bounds: the drivers demand what the joints cannot give. End the motion "
-            "before this time (shorten the range of the drivers), change lengths, or drive one of "
-            "these bodies instead."
-        )
-    return (
-        f"Bifurcation at t = {t:.10g}: Phi_q is singular, but velocities stay finite: {moving} may "
-        "go on in two ways. kc.solve(..., through='smooth'), or --through smooth, goes on along "
-        "the smooth branch; otherwise end the motion before this time, change a length slightly, "
-        "or drive one of these bodies near this time."
-    )
 
 
 def involved(code: Code, movement: Vector) -> tuple[str, ...]:

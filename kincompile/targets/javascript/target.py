@@ -120,6 +120,7 @@ def files(
         "header": WRITE.heading(code),
         "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
         "tables": indented(_tables(program)),
+        "table_names": ", ".join(program.tables),
         "has_square": "square(" in text,
         "has_blocks": plan is not None and plan.has_large_blocks,
         "functions": text,

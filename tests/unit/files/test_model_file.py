@@ -64,6 +64,26 @@ def test_that_a_file_describes_a_mechanism():
     np.testing.assert_allclose(solution.q[0], [np.cos(1), np.sin(1), 1], atol=1e-12)
 
 
+def test_that_the_range_of_a_parameter_is_read_and_written():
+    text = ARM.replace('unit = "m" }', 'unit = "m", range = [0.5, "3/2"] }')
+    (parameter,) = toml(text).system().parameters
+    assert parameter.range == (0.5, 1.5)
+    assert "range = [0.5, 1.5]" in toml(text).to_toml()
+    assert "range" not in toml(ARM).to_toml()
+    (problem,) = problems(text.replace('"3/2"', '"length"'))
+    assert problem.startswith("model.toml, line 4: parameter 'length', range, entry 2: ")
+    (problem,) = problems(text.replace('[0.5, "3/2"]', "2"))
+    assert "expected [least, greatest], not 2" in problem
+    (problem,) = problems(text.replace('"3/2"', "0.75"))
+    assert problem.endswith("its default 1 is outside its range from 0.5 to 0.75")
+
+
+def test_that_a_range_changes_no_code():
+    with_range = ARM.replace('unit = "m" }', 'unit = "m", range = [0.5, 1.5] }')
+    texts = [kc.emit(toml(text)).source for text in (ARM, with_range)]
+    assert texts[0] == texts[1]
+
+
 def test_that_a_whole_number_beyond_exact_doubles_compiles():
     emitted = kc.emit(toml(ARM.replace('"-length"', '"asin(sin(9**64))"')))
     assert "3752932311025852488225131751057700648533240507401574081000934 * pi" in emitted.source

@@ -76,7 +76,10 @@ def test_that_times_and_parameters_can_be_chosen():
     data, arrays = data_of(kc.page(pendulum(), t=[0.0, 1.0], p={"length": 2.0}).html)
     positions = arrays["q"].reshape(2, 3)
     np.testing.assert_allclose(positions[:, 0], 2 * np.cos([0, 1]), atol=1e-12)
-    assert data["parameters"] == [{"name": "length", "value": 2.0, "unit": "m"}]
+    (parameter,) = data["parameters"]
+    assert parameter == {
+        "name": "length", "value": 2.0, "unit": "m", "default": 1.0, "low": 0.5, "high": 2.0,
+    }  # fmt: skip
     (link,) = (mark for mark in data["drawing"]["marks"] if mark["kind"] == "hull")
     assert link["points"] == [[-2, 0], [0, 0]]
 

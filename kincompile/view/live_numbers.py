@@ -1,0 +1,157 @@
+"""Numbers of a drawing that know how they come from parameters: a page computes them again."""
+
+from __future__ import annotations
+
+import math
+import operator
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from kincompile.ir.graph import Graph
+from kincompile.targets.javascript.dialect import JAVASCRIPT
+from kincompile.targets.javascript.target import RESERVED
+from kincompile.targets.lines import indented, wrapped
+from kincompile.targets.naming import NameTable
+from kincompile.targets.printer import Printer
+from kincompile.targets.schedule import Scheduler
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import TypeAlias
+
+    Place: TypeAlias = tuple[str | int, ...]
+
+OPERATIONS = {
+    "add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv,
+}  # fmt: skip
+"""Operations of the graph, and of floats."""
+
+ANGLE = "alpha"
+"""The input of a profile beside parameters."""
+
+
+class LiveNumber(float):
+    """A number and the node that computes it; sums, products and sizes of such know theirs."""
+
+    __slots__ = ("graph", "node")
+    graph: Graph
+    node: int
+
+    @classmethod
+    def of(cls, value: float, graph: Graph, node: int) -> LiveNumber:
+        """Return a number with its node."""
+        found = cls(value)
+        found.graph, found.node = graph, node
+        return found
+
+    def _combined(self, operation: str, first: Any, second: Any) -> Any:
+        """Return the result of an operation; with an array it is one that knows nothing."""
+        known = [float(x) if isinstance(x, LiveNumber) else x for x in (first, second)]
+        value = OPERATIONS[operation](*known)
+        if not isinstance(value, float):
+            return value
+        nodes = node_of(self.graph, first), node_of(self.graph, second)
+        return LiveNumber.of(value, self.graph, getattr(self.graph, operation)(*nodes))
+
+    def __add__(self, other: Any) -> Any:
+        """Add."""
+        return self._combined("add", self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        """Add to another one."""
+        return self._combined("add", other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        """Subtract."""
+        return self._combined("sub", self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        """Subtract from another one."""
+        return self._combined("sub", other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        """Multiply."""
+        return self._combined("mul", self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        """Multiply another one."""
+        return self._combined("mul", other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        """Divide."""
+        return self._combined("div", self, other)
+
+    def __abs__(self) -> Any:
+        """Return the size."""
+        return length_of(self, 0.0)
+
+    def __neg__(self) -> Any:
+        """Change the sign."""
+        return self._combined("sub", 0.0, self)
+
+    def __deepcopy__(self, memo: object) -> LiveNumber:
+        """Return itself: a copy for plain data shares the graph."""
+        return self
+
+
+def node_of(graph: Graph, value: float) -> int:
+    """Return the node of a number."""
+    return value.node if isinstance(value, LiveNumber) else graph.const(float(value))
+
+
+def length_of(x: float, y: float) -> float:
+    """Return the length of (x, y), live where one of them is."""
+    live = [value for value in (x, y) if isinstance(value, LiveNumber)]
+    size = math.hypot(x, y)
+    if not live:
+        return size
+    graph = live[0].graph
+    squares = [graph.square(node_of(graph, value)) for value in (x, y)]
+    return LiveNumber.of(size, graph, graph.pow(graph.add(*squares), Fraction(1, 2)))
+
+
+def live_places(data: Any, place: Place = ()) -> Iterator[tuple[Place, LiveNumber]]:
+    """Yield where live numbers are in plain data, and these."""
+    if isinstance(data, LiveNumber):
+        yield place, data
+    elif isinstance(data, dict):
+        for key, value in data.items():
+            yield from live_places(value, (*place, key))
+    elif isinstance(data, list | tuple):
+        for key, value in enumerate(data):
+            yield from live_places(value, (*place, key))
+
+
+def function_text(
+    name: str, numbers: Sequence[LiveNumber], parameters: Sequence[str], tables: Sequence[str]
+) -> str:
+    """Return a JavaScript function of an angle and of parameters that gives numbers as an array.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    numbers
+        What it gives.
+    parameters
+        Names of the parameters, in order.
+    tables
+        Names of splines, which are taken.
+    """
+    table = NameTable((*RESERVED, *tables))
+    graph = numbers[0].graph if numbers else Graph()
+    outputs = [item.node for item in numbers]
+    scheduler = Scheduler(graph.nodes, outputs, {}, table, {})
+    lines = []
+    for node in scheduler.uses:
+        if graph.nodes[node][0] == "input":
+            wanted = str(graph.nodes[node][1])
+            scheduler.names[node] = ANGLE if wanted == ANGLE else table.take(wanted)
+            if wanted != ANGLE:
+                place = f"p[{parameters.index(wanted)}]"
+                lines.append(f"const {scheduler.names[node]} = {place};")
+    steps = scheduler.assign("g", scheduler.operands_first(outputs))
+    printer = Printer(JAVASCRIPT, graph.nodes, scheduler.names)
+    lines += [f"const {item.name} = {printer.definition(item.node)};" for item in steps]
+    lines += ["return [", *(f"    {line}" for line in wrapped(map(printer.text, outputs))), "];"]
+    return f"function {name}({ANGLE}, p) {{\n{indented(lines)}\n}}\n"

@@ -1,0 +1,74 @@
+"""Scripts for what a page computes itself: the functions of the mechanism, and its solver."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import kincompile.compiler as compiler
+from kincompile.errors import UnsupportedError
+from kincompile.view.live_numbers import function_text, live_places
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+MOST_COORDINATES = 150
+"""Coordinates up to which a page solves the mechanism itself."""
+
+
+def solver_script(model: Mechanism | ConstraintSystem) -> str:
+    """Return the script that declares `emitted`: the module, or `reason`, why there is none."""
+    count = len(model.system().coordinates)
+    if count > MOST_COORDINATES:
+        return _without(f"{count} coordinates are too many for a page.")
+    try:
+        emitted = compiler.emit(model, "javascript")
+    except UnsupportedError as error:
+        return _without(str(error))
+    if emitted.unsolvable:
+        return _without(emitted.unsolvable)
+    # In a function of its own, so that no name of a mechanism meets one of the page.
+    return (
+        f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{emitted.source}"
+        "return module.exports;\n})();\n"
+    )
+
+
+def geometry_script(system: ConstraintSystem, drawing: Mapping[str, Any]) -> str:
+    """Return the script that declares `geometry`: what of a drawing depends on parameters.
+
+    `places` are the ways to numbers in the drawing, and `numbers(0, p)` gives these. `profiles` has
+    the way to each curve, and the function of an angle and p that gives its radius.
+
+    Parameters
+    ----------
+    system
+        The mechanism.
+    drawing
+        Its drawing as plain data, with live numbers.
+    """
+    names = [item.name for item in system.parameters]
+    found = list(live_places(drawing))
+    nodes = (node for _, item in found for node in item.graph.nodes)
+    tables = sorted({str(node[1]) for node in nodes if node[0] == "table"})
+    curves = [(place[:-1], item) for place, item in found if place[-1] == "rho"]
+    numbers = [(place, item) for place, item in found if place[-1] != "rho"]
+    functions = function_text("numbers", [item for _, item in numbers], names, tables)
+    profiles = []
+    for k, (place, item) in enumerate(curves):
+        functions += function_text(f"profile_{k}", [item], names, tables)
+        profiles.append(f"{{ place: {json.dumps(place)}, radius: profile_{k} }}")
+    return (
+        "const geometry = (() => {\nconst square = x => x * x;\n"
+        + (f"const {{ spline, {', '.join(tables)} }} = emitted.TABLES ?? {{}};\n" if tables else "")
+        + f"{functions}return {{ places: {json.dumps([place for place, _ in numbers])}, numbers, "
+        f"profiles: [{', '.join(profiles)}] }};\n}})();\n"
+    )
+
+
+def _without(reason: str) -> str:
+    return f"const emitted = {json.dumps({'reason': reason})};\n".replace("<", "\\u003c")

@@ -1,0 +1,83 @@
+'use strict';
+/* The mechanism grabbed and moved: time follows the point of a body that is dragged. */
+
+const REACH = 0.15;  // part of the motion that is searched at once, forth and back
+const FINE = 8;  // places between two solved times
+
+class Grab {
+  constructor() {
+    this.held = null;  // { frame, point }: what of which body the pointer holds
+    const listener = event => { if (this.held) event.preventDefault(); };  // nor does the page scroll
+    stage.canvas.addEventListener('touchstart', listener, { passive: false });
+  }
+
+  down(place, event) {
+    if (!hasMotion() || player.count < 2 || !player.state.isFound) return false;
+    const frame = stage.bodyAt([event.offsetX, event.offsetY])?.frame;
+    if (!frame || stage.fingers.size > 1) return false;
+    const { q } = player.state, [x, y] = inWorld(q, frame, [0, 0]), angle = angleOf(q, frame);
+    const [c, s] = [Math.cos(angle), Math.sin(angle)], [a, b] = [place[0] - x, place[1] - y];
+    this.held = { frame, point: [c * a + s * b, c * b - s * a], from: [event.clientX, event.clientY], isMoved: false };
+    stage.canvas.setPointerCapture(event.pointerId);
+    return true;
+  }
+
+  move(place, event) {
+    if (!this.held) return false;
+    const { from } = this.held;
+    if (!this.held.isMoved && Math.hypot(event.clientX - from[0], event.clientY - from[1]) <= CLICK) return true;
+    if (!this.held.isMoved) player.pause();
+    this.held.isMoved = true;
+    stage.canvas.style.cursor = 'grabbing';
+    player.show(player.between(this.nearest(place)));
+    return true;
+  }
+
+  up(place, event) {
+    if (!this.held) return false;
+    const { isMoved } = this.held;
+    this.held = null;
+    stage.canvas.style.cursor = '';
+    if (isMoved) player.setIndex(player.state.index);  // a solved time, whose numbers are the solution's own
+    else if (event.type === 'pointerup') stage.click(stage.targetAt(event));  // a click is still a click
+    return true;
+  }
+
+  /* The time near the one shown at which the point that is held is nearest to a place. A motion that
+     ends where it began goes on there. */
+  nearest(place) {
+    const { duration } = player, now = Math.abs(player.state.time - player.t[0]);
+    const apart = elapsed => {
+      const state = player.between(this.within(elapsed));
+      return state.isFound ? towards(inWorld(state.q, this.held.frame, this.held.point), place)[2] : Infinity;
+    };
+    const step = duration / (player.count - 1) / FINE, count = Math.ceil(REACH * duration / step);
+    let best = now, least = apart(now);
+    for (const way of [1, -1]) {
+      for (let k = 1, before = least; k <= count; k++) {
+        const elapsed = now + way * k * step, here = apart(elapsed);
+        if (here < least) [best, least] = [elapsed, here];
+        if (here > before && here > 2 * least + step) break;
+        before = here;
+      }
+    }
+    return this.within(best);
+  }
+
+  within(elapsed) {
+    const { duration } = player;
+    if (this.isCyclic) return ((elapsed % duration) + duration) % duration;
+    return Math.max(0, Math.min(duration, elapsed));
+  }
+
+  /* Whether the motion ends where it began, but for whole turns. */
+  get isCyclic() {
+    const last = player.count - 1, { size, frames } = player.data.drawing;
+    if (!player.isFound(0) || !player.isFound(last)) return false;
+    const ends = [player.row('q', 0), player.row('q', last)];
+    return frames.every(frame => [[0, 0], [10 * size, 0]].every(point => {
+      const [one, other] = ends.map(q => inWorld(q, frame, point));
+      return towards(one, other)[2] < 0.01 * size;
+    }));
+  }
+}

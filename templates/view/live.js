@@ -1,0 +1,408 @@
+'use strict';
+/* The mechanism solved again in the page: parameters that are pulled, what they make of motion,
+   drawing and messages, and a motion that is kept to compare with.
+
+   live.set({ r: 0.12 })  solve again with these values, the others as they are
+   live.reset()           back to what the page was made with */
+
+const PARTS = 50;  // the mechanism's diagonal in sizes of marks, as in kincompile/view/drawing.py
+const SAME_POINT = 1e-9;  // relative distance up to which two points of a body are one
+const REST = 120;  // milliseconds without a pull after which what takes longer is looked for
+
+/* ---- drawing: numbers that depend on parameters or on the motion ---- */
+
+/* The convex hull of points, counterclockwise; of points on a line its two ends. */
+function hullOf(points) {
+  const turn = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+  const isNear = ([a, b], [x, y]) =>
+    Math.max(Math.abs(a - x), Math.abs(b - y)) <= SAME_POINT * (1 + Math.max(Math.abs(x), Math.abs(y)));
+  const found = points.filter((point, k) => !points.slice(0, k).some(other => isNear(other, point)));
+  const ordered = found.sort(([a, b], [x, y]) => a - x || b - y);
+  if (ordered.length < 3) return ordered;
+  return [ordered, ordered.slice().reverse()].flatMap(chain => {
+    const kept = [];
+    for (const point of chain) {
+      while (kept.length > 1 && turn(kept[kept.length - 2], kept[kept.length - 1], point) <= 0) kept.pop();
+      kept.push(point);
+    }
+    return kept.slice(0, -1);
+  });
+}
+
+/* The points of a mark, each with the frame it is fixed in and how far the mark reaches beyond it. */
+function reachOf(mark) {
+  switch (mark.kind) {
+    case 'wheel': return [[mark.place.frame, mark.place.point, mark.radius]];
+    case 'pin': case 'span': return [mark.first, mark.second].map(({ frame, point }) => [frame, point, 0]);
+    case 'slider': case 'drive': case 'dot': return [[mark.place.frame, mark.place.point, 0]];
+    case 'rail': return mark.reach.map(s =>
+      [mark.frame, [mark.base[0] + s * mark.axis[0], mark.base[1] + s * mark.axis[1]], 0]);
+    default: return mark.points.map(point => [mark.frame, point, 0]);
+  }
+}
+
+/* Smallest x, largest x, smallest y, largest y of all marks over positions. */
+function boxOf(marks, positions) {
+  let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
+  const fixed = new Map();
+  for (const [frame, point, radius] of marks.flatMap(reachOf)) {
+    if (!fixed.has(frame.index)) fixed.set(frame.index, { columns: frame.columns, circles: [] });
+    fixed.get(frame.index).circles.push([point[0], point[1], radius]);
+  }
+  for (const { columns, circles } of fixed.values()) {
+    const isBody = columns.length > 0, [i, j, k] = columns;
+    for (const q of isBody ? positions : positions.slice(0, 1)) {
+      const [x, y, phi] = isBody ? [q[i], q[j], q[k]] : [0, 0, 0], c = Math.cos(phi), s = Math.sin(phi);
+      for (const [xi, eta, radius] of circles) {
+        const a = x + c * xi - s * eta, b = y + s * xi + c * eta;
+        if (a - radius < left) left = a - radius;
+        if (a + radius > right) right = a + radius;
+        if (b - radius < low) low = b - radius;
+        if (b + radius > high) high = b + radius;
+      }
+    }
+  }
+  return left <= right ? [left, right, low, high] : [-1, 1, -1, 1];
+}
+
+/* Give a drawing the numbers that parameters say. */
+function setNumbers(drawing, p) {
+  const at = place => place.reduce((item, key) => item[key], drawing);
+  const values = geometry.numbers(0, p);
+  geometry.places.forEach((place, k) => { at(place.slice(0, -1))[place[place.length - 1]] = values[k]; });
+  for (const { place, radius } of geometry.profiles) {
+    const mark = at(place), count = mark.points.length, [x, y] = mark.centre;
+    mark.points = mark.points.map((_, k) => {
+      const angle = 2 * Math.PI * k / count, [length] = radius(angle, p);
+      return [x + length * Math.cos(angle), y + length * Math.sin(angle)];
+    });
+    // A face is as long as its cam is wide.
+    const face = drawing.marks.find(({ joint, style }) => joint === mark.joint && style === 'face');
+    const widest = Math.max(...mark.points.map(([a, b]) => Math.hypot(a - x, b - y)));
+    if (face) face.at_least = [-widest, widest];
+  }
+  for (const mark of drawing.marks) if (mark.kind === 'hull') mark.points = hullOf(mark.attached.slice());
+}
+
+/* Make rails, barrels and the sizes of marks fit a motion; returns its extent. */
+function fitDrawing(drawing, motion) {
+  const positions = [];
+  for (let k = 0; k < motion.count; k++) if (motion.isFound(k)) positions.push(motion.row('q', k));
+  if (!positions.length) positions.push(motion.solved(0).q);
+  const relative = drawing.overhang / drawing.size;
+  drawing.overhang = 0;
+  fitMarks(motion);
+  const [left, right, low, high] = boxOf(drawing.marks, positions);
+  drawing.size = (Math.hypot(right - left, high - low) || 1) / PARTS;
+  drawing.overhang = relative * drawing.size;
+  fitMarks(motion);
+  const [a, b, c, d] = boxOf(drawing.marks, positions), pad = 2 * drawing.size;
+  return [a - pad, b + pad, c - pad, d + pad];
+}
+
+/* ---- words: as the solver's own messages ---- */
+
+function filled(text, values) {
+  return text.replace(/\{(\w+)\}/g, (_, name) => values[name]);
+}
+
+function brieflyNumber(value) {
+  return `${+value.toPrecision(10)}`;
+}
+
+/* The event that ended a motion, with its sentence. */
+function withSentence(event, motion) {
+  const { words } = player.data, shown = event.bodies.slice(0, 12).join(', ');
+  const bodies = event.bodies.length > 12 ? `${shown} and ${event.bodies.length - 12} more` : shown;
+  const later = motion.failed ? brieflyNumber(motion.failed.t) : '';
+  return { ...event, message: filled(words[event.kind], { t: brieflyNumber(event.t), bodies, later }) };
+}
+
+/* What is to be said of a motion: that it converged, or where and why it ended. */
+function verdictOf(motion, event) {
+  const { words, sentences, name } = player.data, { failed, t } = motion;
+  if (!failed) {
+    const points = t.length > 1 ? `all ${t.length} points` : 'the point';
+    const residual = motion.residual.reduce((most, x) => Math.max(most, x), 0).toPrecision(2);
+    return filled(words.converged, { name, points, residual: +residual });
+  }
+  const { index, state, position, status } = failed, [title, general] = splitSentence(sentences[status]);
+  const parts = [filled(words.failed, {
+    name, t: brieflyNumber(t[index]), point: index + 1, count: t.length, status: title,
+  })];
+  if (state) {
+    const before = filled(words[index > 1 ? 'before' : 'one before'], { before: index });
+    const reached = position ? '' : filled(words.followed, { t: brieflyNumber(state.t) });
+    parts.push(`${before}${reached}.`);
+  }
+  if (!state && status === 1) parts.push(words['not assembled']);
+  else if (failed.isExhausted) parts.push(words.exhausted);
+  else parts.push(event ? event.message : general);
+  if (position) parts.push(words.found);
+  else if (failed.jumps) parts.push(words.jumps);
+  return parts.join(' ');
+}
+
+function splitSentence(text) {
+  const place = text.indexOf(': ');
+  return [text.slice(0, place), text.slice(place + 2)];
+}
+
+/* The first length that is not positive, as a sentence. */
+function wrongLength(drawing) {
+  for (const { name, distances } of drawing.joints) {
+    const wrong = distances.find(value => !(value > 0));
+    if (wrong !== undefined) return `${name}: the distance is ${brieflyNumber(wrong)}, but must be positive.`;
+  }
+  return '';
+}
+
+/* ---- what is known of positions: residuals, condition, determinant, each when it is asked for ---- */
+
+function withChecks(arrays, motion) {
+  const { solver } = emitted, { equations } = motion, { n } = equations;
+  const over = (width, values) => {
+    const result = new Float64Array(player.count * width).fill(NaN);
+    for (let k = 0; k < player.count; k++) {
+      const q = arrays.q.subarray(k * n, (k + 1) * n);
+      if (q.every(Number.isFinite)) result.set(values(equations.evaluate(q, player.t[k])), k * width);
+    }
+    return result;
+  };
+  const joints = player.data.drawing.joints;
+  const lazily = (name, width, values) => {
+    if (!(name in arrays)) return;
+    let known = null;
+    Object.defineProperty(arrays, name, {
+      configurable: true, enumerable: true, get: () => (known ??= over(width, values)),
+    });
+  };
+  lazily('residual', joints.length, ({ Phi }) => residualsOf(Phi));
+  lazily('determinant', 1, at => [equations.factors(at).determinant]);
+  lazily('condition', 1, at => {
+    const sizes = solver.linear.singularValues(solver.scaledRows(equations, at)).map(({ size }) => size);
+    return [sizes[sizes.length - 1] / sizes[0]];
+  });
+}
+
+function residualsOf(Phi) {
+  return player.data.drawing.joints.map(({ rows: [first, count] }) => Math.hypot(...Phi.slice(first, first + count)));
+}
+
+/* ---- the panel ---- */
+
+const live = {
+  motion: null,  // the last one that the page solved for
+  ghost: null,  // { drawing, arrays }: a motion kept to compare with
+
+  get isChanged() {
+    return this.motion !== null;
+  },
+
+  get names() {
+    return player.data.parameters.map(({ name }) => name);
+  },
+
+  build(panel) {
+    const { parameters } = player.data;
+    panel.hidden = !parameters.length;
+    if (!parameters.length) return;
+    this.given = parameters.map(({ value }) => value);
+    this.values = this.given.slice();
+    this.base = player.data.extent;
+    this.panel = panel;
+    const title = document.createElement('h2');
+    title.textContent = 'Parameters';
+    panel.append(title);
+    if (emitted.reason) {
+      const reason = document.createElement('p');
+      reason.textContent = `This page cannot solve for other values: ${emitted.reason} Those of the motion shown: ${parameters
+        .map(({ name, value, unit }) => `${name} = ${numberText(value)} ${unit}`.trim()).join(', ')}.`;
+      panel.append(reason);
+      return;
+    }
+    const grid = document.createElement('div');
+    grid.className = 'sliders';
+    this.rows = parameters.map((parameter, k) => this.row(grid, parameter, k));
+    this.verdict = document.createElement('output');
+    panel.append(grid, this.buttons(), this.verdict);
+    this.readFragment();
+    addEventListener('hashchange', () => this.readFragment());
+  },
+
+  /* A slider with a box beside it. */
+  row(grid, { name, unit, low, high }, k) {
+    const label = document.createElement('label');
+    Object.assign(label, { textContent: unit ? `${name} [${unit}]` : name, htmlFor: `slider-${k}` });
+    const slider = document.createElement('input');
+    const step = 10 ** Math.floor(Math.log10((high - low) / 200));
+    Object.assign(slider, { type: 'range', id: `slider-${k}`, min: low, max: high, step: 'any' });
+    const box = document.createElement('input');
+    Object.assign(box, { type: 'number', step, ariaLabel: `${name}${unit ? ` in ${unit}` : ''}` });
+    slider.addEventListener('input', () => this.pull(k, +Number(slider.value).toPrecision(6)));
+    slider.addEventListener('keydown', event => this.byKey(event, k, step));
+    box.addEventListener('input', () => { if (box.value !== '') this.pull(k, box.valueAsNumber); });
+    for (const element of [slider, box]) element.addEventListener('change', () => this.writeFragment());
+    const row = document.createElement('div');
+    row.append(label, slider, box);
+    grid.append(row);
+    return { slider, box };
+  },
+
+  /* Arrows move a slider by a two-hundredth of its way; a slider of any step has none of its own. */
+  byKey(event, k, step) {
+    const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
+    if (!way) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const { low, high } = player.data.parameters[k];
+    const value = Math.round(this.values[k] / step + way * (event.shiftKey ? 10 : 1)) * step;
+    this.pull(k, +Math.max(low, Math.min(high, value)).toPrecision(12));
+    this.writeFragment();
+  },
+
+  buttons() {
+    const bar = document.createElement('div');
+    bar.className = 'bar';
+    const button = (id, text, action) => {
+      const element = document.createElement('button');
+      Object.assign(element, { type: 'button', id, textContent: text });
+      element.addEventListener('click', () => action(element));
+      bar.append(element);
+    };
+    const copy = (text, label) => async element => {
+      element.textContent = await copied(text()) ? 'Copied' : 'Not allowed';
+      setTimeout(() => { element.textContent = label; }, 1500);
+    };
+    button('reset', 'Reset', () => this.reset());
+    button('ghost', 'Keep to compare', element => this.toggleGhost(element));
+    button('link', 'Copy link', copy(() => `${location.href.split('#')[0]}${this.fragment()}`, 'Copy link'));
+    button('set', 'Copy as --set', copy(() => this.options(), 'Copy as --set'));
+    return bar;
+  },
+
+  /* The motion shown, as the solver gives it. */
+  motionNow() {
+    this.first ??= this.motion ?? this.solved();
+    return this.motion ?? this.first;
+  },
+
+  solved() {
+    const p = player.data.parameters.map(({ value }) => value);
+    return emitted.solver.solve(emitted, player.t, Float64Array.from(p), player.data.start);
+  },
+
+  pull(k, value) {
+    if (!Number.isFinite(value)) return;
+    this.set({ [this.names[k]]: value });
+  },
+
+  /* Take values, and solve before the next frame: of several pulls in a frame the last one counts. */
+  set(values) {
+    this.names.forEach((name, k) => { if (name in values) this.values[k] = values[name]; });
+    if (this.frame) return;
+    this.frame = requestAnimationFrame(() => {
+      this.frame = null;
+      this.solve();
+    });
+  },
+
+  reset() {
+    this.set(Object.fromEntries(this.names.map((name, k) => [name, this.given[k]])));
+    history.replaceState(null, '', ' ');
+  },
+
+  showValues() {
+    this.rows.forEach(({ slider, box }, k) => {
+      slider.value = this.values[k];
+      if (document.activeElement !== box) box.value = +this.values[k].toPrecision(6);
+    });
+  },
+
+  /* Solve over the page's own times, and show what comes out. */
+  solve() {
+    const begin = performance.now(), { data } = player;
+    data.parameters.forEach((parameter, k) => { parameter.value = this.values[k]; });
+    const motion = this.motion = this.solved();
+    this.takeMotion(motion);
+    setNumbers(data.drawing, motion.p);
+    const extent = fitDrawing(data.drawing, player);
+    data.extent = extent.map((x, k) => (k % 2 ? Math.max(x, this.base[k]) : Math.min(x, this.base[k])));
+    this.takeVerdict(null);
+    this.showValues();
+    player.motionChanged();
+    this.time = performance.now() - begin;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.explain(), REST);
+  },
+
+  /* Put a motion in the place of the one that is shown. */
+  takeMotion(motion) {
+    const { data } = player, names = ['q', 'q_dot', 'q_ddot', ...(data.outputs.length ? ['y', 'y_dot', 'y_ddot'] : [])];
+    for (const name of names) data.arrays[name] = motion[name];
+    player.kept = null;
+    withChecks(data.arrays, motion);
+    data.status = Array.from(motion.status);
+    if (!hasMotion()) data.guessResidual = residualsOf(motion.equations.evaluate(data.guess, player.t[0]).Phi);
+  },
+
+  takeVerdict(event) {
+    const { data } = player, wrong = wrongLength(data.drawing);
+    const passed = event ? [withSentence(event, this.motion)] : [];
+    data.events = passed;
+    data.success = !this.motion.failed && !wrong;
+    data.message = [wrong, verdictOf(this.motion, passed[0])].filter(Boolean).join(' ');
+    this.verdict.textContent = data.message;
+    this.verdict.classList.toggle('failed', !data.success);
+  },
+
+  /* Find out what ended the motion: that takes longer than a frame. */
+  explain() {
+    this.takeVerdict(emitted.solver.explain(this.motion));
+    if (player.data.events.length) player.motionChanged();
+  },
+
+  /* ---- a motion to compare with ---- */
+
+  toggleGhost(button) {
+    const { drawing, arrays } = player.data;
+    this.ghost = this.ghost ? null : { drawing: structuredClone(drawing), q: arrays.q.slice() };
+    button.textContent = this.ghost ? 'Forget what is kept' : 'Keep to compare';
+    button.setAttribute('aria-pressed', String(this.ghost !== null));
+    player.refresh();
+  },
+
+  drawGhost(ctx, view, palette) {
+    if (!this.ghost) return;
+    const { n, state } = player, q = this.ghost.q.subarray(state.index * n, (state.index + 1) * n);
+    if (!q.every(Number.isFinite)) return;
+    drawShapes(ctx, q, { view, palette, ghost: palette.quiet, alpha: 0.4, drawing: this.ghost.drawing });
+  },
+
+  /* ---- values in a link and on the command line ---- */
+
+  fragment() {
+    const changed = this.names.map((name, k) => [name, k]).filter(([, k]) => this.values[k] !== this.given[k]);
+    return changed.length ? `#${changed.map(([name, k]) => `${encodeURIComponent(name)}=${this.values[k]}`).join('&')}` : '';
+  },
+
+  writeFragment() {
+    // A page inside a notebook has no address.
+    try { history.replaceState(null, '', this.fragment() || ' '); } catch { /* so be it */ }
+  },
+
+  /* Take the values of the page's address; names and numbers that are none are left out. */
+  readFragment() {
+    const given = [...new URLSearchParams(location.hash.slice(1))]
+      .map(([name, text]) => [name, text.trim() === '' ? NaN : Number(text)])
+      .filter(([name, value]) => this.names.includes(name) && Number.isFinite(value));
+    if (given.length) this.set(Object.fromEntries(given));
+    else this.showValues();
+  },
+
+  options() {
+    const { parameters } = player.data;
+    return parameters.filter(({ value, default: own }) => value !== own)
+      .map(({ name, value }) => `--set ${name}=${value}`).join(' ');
+  },
+};
