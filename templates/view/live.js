@@ -209,7 +209,6 @@ const live = {
     if (!parameters.length) return;
     this.given = parameters.map(({ value }) => value);
     this.values = this.given.slice();
-    this.base = player.data.extent;
     this.panel = panel;
     const title = document.createElement('h2');
     title.textContent = 'Parameters';
@@ -233,20 +232,20 @@ const live = {
   /* A slider with a box beside it. */
   row(grid, { name, unit, low, high }, k) {
     const label = document.createElement('label');
-    Object.assign(label, { textContent: unit ? `${name} [${unit}]` : name, htmlFor: `slider-${k}` });
+    label.htmlFor = `slider-${k}`;
     const slider = document.createElement('input');
     const step = 10 ** Math.floor(Math.log10((high - low) / 200));
     Object.assign(slider, { type: 'range', id: `slider-${k}`, min: low, max: high, step: 'any' });
     const box = document.createElement('input');
-    Object.assign(box, { type: 'number', step, ariaLabel: `${name}${unit ? ` in ${unit}` : ''}` });
+    box.type = 'number';
     slider.addEventListener('input', () => this.pull(k, +Number(slider.value).toPrecision(6)));
     slider.addEventListener('keydown', event => this.byKey(event, k, step));
-    box.addEventListener('input', () => { if (box.value !== '') this.pull(k, box.valueAsNumber); });
+    box.addEventListener('input', () => { if (box.value !== '') this.pull(k, box.valueAsNumber / units.factor(unit)); });
     for (const element of [slider, box]) element.addEventListener('change', () => this.writeFragment());
     const row = document.createElement('div');
     row.append(label, slider, box);
     grid.append(row);
-    return { slider, box };
+    return { slider, box, label, step };
   },
 
   /* Arrows move a slider by a two-hundredth of its way; a slider of any step has none of its own. */
@@ -309,13 +308,17 @@ const live = {
 
   reset() {
     this.set(Object.fromEntries(this.names.map((name, k) => [name, this.given[k]])));
-    history.replaceState(null, '', ' ');
+    this.writeFragment();
   },
 
   showValues() {
-    this.rows.forEach(({ slider, box }, k) => {
+    this.rows?.forEach(({ slider, box, label, step }, k) => {
+      const { name, unit } = player.data.parameters[k], factor = units.factor(unit), shown = units.name(unit);
+      label.textContent = units.titled(name, unit);
+      Object.assign(box, { step: factor === 1 ? step : 'any', ariaLabel: shown ? `${name} in ${shown}` : name });
       slider.value = this.values[k];
-      if (document.activeElement !== box) box.value = +this.values[k].toPrecision(6);
+      if (document.activeElement !== box) box.value = +(factor * this.values[k]).toPrecision(6);
+      slider.setAttribute('aria-valuetext', `${box.value} ${shown}`.trim());
     });
   },
 
@@ -326,8 +329,6 @@ const live = {
     const motion = this.motion = this.solved();
     this.takeMotion(motion);
     setNumbers(data.drawing, motion.p);
-    const extent = fitDrawing(data.drawing, player);
-    data.extent = extent.map((x, k) => (k % 2 ? Math.max(x, this.base[k]) : Math.min(x, this.base[k])));
     this.takeVerdict(null);
     this.showValues();
     player.motionChanged();
@@ -336,11 +337,17 @@ const live = {
     this.timer = setTimeout(() => this.explain(), REST);
   },
 
+  /* Make the drawing fit a motion; what was seen first stays in view. */
+  fit() {
+    const { data } = player, base = this.base ??= data.extent;
+    const extent = fitDrawing(data.drawing, player);
+    data.extent = extent.map((x, k) => (k % 2 ? Math.max(x, base[k]) : Math.min(x, base[k])));
+  },
+
   /* Put a motion in the place of the one that is shown. */
   takeMotion(motion) {
     const { data } = player, names = ['q', 'q_dot', 'q_ddot', ...(data.outputs.length ? ['y', 'y_dot', 'y_ddot'] : [])];
     for (const name of names) data.arrays[name] = motion[name];
-    player.kept = null;
     withChecks(data.arrays, motion);
     data.status = Array.from(motion.status);
     if (!hasMotion()) data.guessResidual = residualsOf(motion.equations.evaluate(data.guess, player.t[0]).Phi);

@@ -164,9 +164,10 @@ function shortNumber(value) {
   return Number.isFinite(value) ? `${+value.toPrecision(6)}` : '–';
 }
 
-/* A number of an output, zero for a rounding error. */
-function outputNumber({ least, greatest }, value) {
-  return shortNumber(Math.abs(value) < STILL * Math.max(Math.abs(least), Math.abs(greatest)) ? 0 : value);
+/* A number of an output in the unit that is shown, zero for a rounding error. */
+function outputNumber({ least, greatest, unit }, value) {
+  const size = Math.max(Math.abs(least), Math.abs(greatest));
+  return shortNumber(Math.abs(value) < STILL * size ? 0 : value * units.factor(unit));
 }
 
 const MEASURES = [
@@ -195,10 +196,11 @@ const measures = {
   /* Of the motion that the page solved for last; the one it was made with is solved for once. */
   show() {
     const motion = live.motionNow();
-    if (motion === this.solved) return;
+    if (motion === this.solved && units.angle === this.angle) return;
     this.solved = motion;
+    this.angle = units.angle;
     const found = measuresOf(motion);
-    const table = tableOf(['', ...found.map(({ name, unit }) => (unit ? `${name} [${unit}]` : name))]);
+    const table = tableOf(['', ...found.map(({ name, unit }) => units.titled(name, unit))]);
     for (const [title, textOf] of MEASURES) {
       table.tBodies[0].insertRow().append(cell(title, 'th'), ...found.map(item => cell(textOf(item))));
     }

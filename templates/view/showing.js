@@ -26,6 +26,8 @@ const showing = {
   angles() {
     units.angle = units.angle === 'rad' ? 'deg' : 'rad';
     byId('angles').textContent = units.angle === 'rad' ? 'deg' : 'rad';
+    live.showValues();
+    if (shownPanel === 'measures') measures.show();
     plots.zoom(null);
     player.refresh();
   },

@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
 
@@ -244,6 +245,27 @@ def test_that_degrees_are_shown_everywhere(opened: Any, example_named: Any) -> N
     page.close()
 
 
+def test_that_angles_among_parameters_are_typed_and_measured_in_degrees(opened: Any) -> None:
+    m = kc.Mechanism("swing", end=1.0, points=21)
+    start, arm = m.parameter("start", 0.5, unit="rad"), m.body("arm", guess=(0, 0, 0.5))
+    m.add(kc.Revolute("O", m.ground, (0, 0), arm, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", arm, start + sympy.sin(kc.t)))
+    m.output("lean", arm.phi, "rad")
+    page = opened(m)
+    assert page.get_by_label("start in rad").input_value() == "0.5"
+    page.keyboard.press("d")
+    box = page.get_by_label("start in deg")
+    assert float(box.input_value()) == pytest.approx(np.degrees(0.5), rel=1e-5)
+    box.fill("90")
+    page.wait_for_function("Math.abs(player.state.q[2] - Math.PI / 2) < 1e-9")
+    page.get_by_role("tab", name="Measures").click()
+    shown = page.locator("#panel-measures tr").all_inner_texts()
+    assert shown[0].split() == ["lean", "[deg]"]
+    greatest = next(line for line in shown if line.startswith("max"))
+    assert float(greatest.split()[1]) == pytest.approx(90 + np.degrees(np.sin(1)), abs=1e-3)
+    page.close()
+
+
 def test_that_plots_go_over_an_angle_are_zoomed_and_show_paths(opened: Any) -> None:
     m = slider_crank()
     page = opened(m)
@@ -373,6 +395,8 @@ def test_that_nothing_that_was_computed_outlives_a_motion(opened: Any) -> None:
         const array = player.data.arrays[name];
         for (let k = 0; k < array.length; k++) if (k % 3 !== 2) array[k] *= 2;
       }
+      player.kept = null;
+      fitDrawing(player.data.drawing, player);
       player.motionChanged();
     })()""")
     far = 2 * block_pin()[0]
