@@ -42,8 +42,8 @@ for path in sorted(Path(folder).iterdir()):
             verdict = "refused" if len(text) < {LONGEST} else "a message without end"
         except BaseException as error:
             verdict = text = type(error).__name__
-        # A pipe holds 64 KiB until it is read.
-        answer = [verdict, text[:10_000], time.process_time() - started]
+        # Its beginning and its end: a pipe holds 64 KiB until it is read.
+        answer = [verdict, text[:5_000] + text[5_000:][-5_000:], time.process_time() - started]
         os.write(its, json.dumps(answer).encode())
         os._exit(0)
     os.close(its)

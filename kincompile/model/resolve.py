@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Set, Sized
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import isfinite
 from numbers import Real
 from typing import TYPE_CHECKING, Any, cast
 
@@ -359,6 +360,8 @@ def named_tables(value: Any, name: str) -> Any:
 
 def _attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar:
     """Return an attribute: a number or an expression of parameters."""
+    if type(given) is float and isfinite(given):
+        return given  # of a large mechanism nearly all
     value = checked_expression(given, where, scope.declared, scope, unit=unit)
     if value is None:
         return 1
