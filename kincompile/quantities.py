@@ -140,11 +140,6 @@ def kernels(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     return {**position, **single, "kinematics": TOGETHER["kinematics"], **whole}
 
 
-def kernel_of(names: tuple[str, ...], given: Sequence[Quantity]) -> str:
-    """Return the first kernel that computes all these quantities."""
-    return next(kernel for kernel, own in kernels(given).items() if set(names) <= set(own))
-
-
 def nonzeros_of(quantity: Quantity) -> str:
     """Return what compiled code calls the entries of a matrix in the order of its pattern."""
     return "nonzeros" if quantity.name == "Phi_q" else f"{quantity.name}_nonzeros"

@@ -580,6 +580,7 @@ void problem_3_5_6_solve(const problem_3_5_6_system *system)
 // By what the numbers of a motion are judged; each point of a strip has its own.
 typedef struct {
     double reference[N][LANES];  // scale of each coordinate: 1 rad, or the size of the mechanism
+    double inverse[N][LANES];    // and its inverse: a division takes as long as five products
     double magnitude[M][LANES];  // what the terms of each equation contribute at a generic position
     double noise[M][LANES];      // what rounding errors of the coordinates leave of each equation
     double tolerance;
@@ -626,6 +627,7 @@ static void measure(strip *b, double size, size_t count, scales *s)
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
             s->reference[i][k] = ANGULAR[i] ? 1 : size;
+            s->inverse[i][k] = 1 / s->reference[i][k];
             b->q[i][k] += s->reference[i][k] * PROBE[i];
         }
     position_of_strip(b, count);
@@ -704,7 +706,7 @@ static void complete(strip *b, const scales *s, size_t count, outcome *o)
     solve_of_strip(b, b->gamma, b->q_ddot, count);
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
-            const double size = fabs(answer[i][k]) / s->reference[i][k];
+            const double size = fabs(answer[i][k]) * s->inverse[i][k];
             o->sensitivity[k] = size <= o->sensitivity[k] ? o->sensitivity[k] : size;
             total[k] += b->q_dot[i][k] + b->q_ddot[i][k];
         }
@@ -765,8 +767,8 @@ static void step(strip *b, const scales *s, const double *t, size_t count, outco
     complete(b, s, count, o);
     for (int i = 0; i < N; i++)
         for (size_t k = 0; k < count; k++) {
-            const double size = fabs(b->q[i][k] - q[i][k]) / s->reference[i][k];
-            const double turn = fabs(h[k] * (b->q_dot[i][k] - q_dot[i][k])) / s->reference[i][k];
+            const double size = fabs(b->q[i][k] - q[i][k]) * s->inverse[i][k];
+            const double turn = fabs(h[k] * (b->q_dot[i][k] - q_dot[i][k])) * s->inverse[i][k];
             error[k] = size <= error[k] ? error[k] : size;
             kink[k] = turn > kink[k] ? turn : kink[k];
         }
@@ -795,7 +797,7 @@ static void advance(strip *b, const scales *s, state *at, double t, size_t k, ou
     for (int i = 0; i < M; i++)
         own.magnitude[i][0] = s->magnitude[i][k], own.noise[i][0] = s->noise[i][k];
     for (int i = 0; i < N; i++)
-        own.reference[i][0] = s->reference[i][k];
+        own.reference[i][0] = s->reference[i][k], own.inverse[i][0] = s->inverse[i][k];
     own.tolerance = s->tolerance;
     found.is_over[0] = 0;
     o->iterations[k] = 0;
@@ -928,10 +930,10 @@ static void put_to_rest(const problem_3_5_6_variants *all, strip *b, outcome *o,
 
 size_t problem_3_5_6_march_variants(const problem_3_5_6_variants *all)
 {
-    strip b;
+    strip b, from;
     scales s;
     outcome o;
-    state from[LANES];
+    state at;
     double times[LANES];
     size_t good = 0;
     for (size_t first = 0; first < all->variants; first += LANES) {
@@ -940,14 +942,15 @@ size_t problem_3_5_6_march_variants(const problem_3_5_6_variants *all)
         put_to_rest(all, &b, &o, count);
         record(all, &b, &o, 0, first, count);
         for (size_t time = 1; time < all->count; time++) {
-            for (size_t k = 0; k < count; k++) {
-                take_up(&from[k], &b, k);
+            memcpy(&from, &b, ROWS * sizeof b.t);
+            for (size_t k = 0; k < count; k++)
                 times[k] = all->t[time];
-            }
             step(&b, &s, times, count, &o);
             for (size_t k = 0; k < count; k++)
-                if (!o.is_over[k] && o.status[k] != PROBLEM_3_5_6_CONVERGED)
-                    advance(&b, &s, &from[k], times[k], k, &o);
+                if (!o.is_over[k] && o.status[k] != PROBLEM_3_5_6_CONVERGED) {
+                    take_up(&at, &from, k);
+                    advance(&b, &s, &at, times[k], k, &o);
+                }
             put_to_rest(all, &b, &o, count);
             record(all, &b, &o, time, first, count);
         }

@@ -16,6 +16,7 @@
 // A classic script of a page: it declares four_bar. Under node, require() returns the same.
 // The functions take one point: arrays q [9], q_dot [9] and p [5], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
+// solver.solve(module, times, p, guess) gives the motion.
 
 const four_bar = (() => {
     "use strict";
@@ -46,12 +47,47 @@ const four_bar = (() => {
     const GUESS = [
         5.0, 0.0, 0.0, 20.0, 10.0, 0.7853981633974483, 20.0, 9.0, 4.71238898038469,
     ];
+    const OUTPUTS = [
+
+    ];
+    // name, first column and number of columns
+    const BODIES = [
+        ["crank", 0, 3], ["coupler", 3, 3], ["rocker", 6, 3],
+    ];
+    // whether velocities of drivers may jump
+    const CORNERS = false;
     // row, column of the entries of Phi_q that are not identically zero
     const PATTERN = [
         [0, 0], [0, 2], [1, 1], [1, 2], [2, 0], [2, 2], [2, 3], [2, 5], [3, 1], [3, 2], [3, 4],
         [3, 5], [4, 3], [4, 5], [4, 6], [4, 8], [5, 4], [5, 5], [5, 7], [5, 8], [6, 6], [6, 8],
         [7, 7], [7, 8], [8, 2],
     ];
+    const MATRICES = {
+        Phi_q: {
+            rows: 9, columns: 9,
+            pattern: PATTERN,
+        },
+    };
+
+    // A point with its vectors: functions whose names end in _at fill them in.
+    function point(p = DEFAULTS) {
+        return {
+            t: 0,
+            p,
+            q: new Float64Array(N_COORDINATES),
+            q_dot: new Float64Array(N_COORDINATES),
+            q_ddot: new Float64Array(N_COORDINATES),
+            Phi: new Float64Array(9),
+            Phi_q: Float64Array.of(
+                1.0, 0, 1.0, 0, 1.0, 0, -1.0, 0, 1.0, 0, -1.0, 0, 1.0, 0, -1.0, 0, 1.0, 0, -1.0, 0, 1.0, 0,
+                1.0, 0, 1.0,
+            ),
+            nu: new Float64Array(9),
+            gamma: new Float64Array(9),
+            F: new Float64Array(13),
+            determinants: new Float64Array(1),
+        };
+    }
 
     // Refuse a vector of another length, of which JavaScript would read NaN.
     function require_length(name, vector, length) {
@@ -60,14 +96,29 @@ const four_bar = (() => {
         }
     }
 
+    // A quantity at a point: an array, or an array of rows.
+    function evaluated(function_at, quantity, states, t, p) {
+        Object.entries(states).forEach(([name, vector]) => require_length(name, vector, N_COORDINATES));
+        require_length("p", p, DEFAULTS.length);
+        const at = Object.assign(point(p), states, { t });
+        function_at(at);
+        return MATRICES[quantity] ? rows_of(at, quantity) : Array.from(at[quantity]);
+    }
+
+    // A matrix as an array of its rows.
+    function rows_of(at, quantity) {
+        const { rows, columns, pattern } = MATRICES[quantity];
+        const matrix = Array.from({ length: rows }, () => new Array(columns).fill(0));
+        pattern.forEach(([i, j], k) => { matrix[i][j] = at[quantity][k]; });
+        return matrix;
+    }
+
     function square(x) {
         return x * x;
     }
 
-    // Constraint vector Phi(q, t).
-    function Phi(q, t, p = DEFAULTS) {
-        require_length("q", q, N_COORDINATES);
-        require_length("p", p, DEFAULTS.length);
+    function position_at(at) {
+        const { q, t, p, Phi, Phi_q } = at;
         const x_crank = q[0];
         const y_crank = q[1];
         const phi_crank = q[2];
@@ -101,7 +152,6 @@ const four_bar = (() => {
         const c_2 = c / 2;
         const D_rocker_x = c_2 * c_rocker;
         const D_rocker_y = c_2 * s_rocker;
-        const Phi = new Array(9).fill(0);
         // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
         Phi[0] = x_crank - B_crank_x;
         Phi[1] = y_crank - B_crank_y;
@@ -116,88 +166,45 @@ const four_bar = (() => {
         Phi[7] = y_rocker + D_rocker_y;
         // 8  AbsoluteAngle "motor": crank angle omega*t
         Phi[8] = phi_crank - omega * t;
-        return Phi;
-    }
-
-    // Jacobian of Phi by q.
-    function Phi_q(q, t, p = DEFAULTS) {
-        require_length("q", q, N_COORDINATES);
-        require_length("p", p, DEFAULTS.length);
-        const phi_crank = q[2];
-        const phi_coupler = q[5];
-        const phi_rocker = q[8];
-        const a = p[0];
-        const b = p[1];
-        const c = p[2];
-        // body frames: A = [[c, -s], [s, c]]
-        const c_crank = Math.cos(phi_crank);
-        const s_crank = Math.sin(phi_crank);
-        const c_coupler = Math.cos(phi_coupler);
-        const s_coupler = Math.sin(phi_coupler);
-        const c_rocker = Math.cos(phi_rocker);
-        const s_rocker = Math.sin(phi_rocker);
         // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        const a_2 = a / 2;
-        const B_crank_y = a_2 * s_crank;
-        const B_crank_x = a_2 * c_crank;
+        Phi_q[1] = B_crank_y;  // A.x by phi_crank
+        Phi_q[3] = -B_crank_x;  // A.y by phi_crank
         // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        const b_2 = b / 2;
-        const C_coupler_y = b_2 * s_coupler;
-        const C_coupler_x = b_2 * c_coupler;
+        Phi_q[5] = -B_crank_y;  // B.x by phi_crank
+        Phi_q[7] = -C_coupler_y;  // B.x by phi_coupler
+        Phi_q[9] = B_crank_x;  // B.y by phi_crank
+        Phi_q[11] = C_coupler_x;  // B.y by phi_coupler
         // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        const c_2 = c / 2;
-        const D_rocker_y = c_2 * s_rocker;
-        const D_rocker_x = c_2 * c_rocker;
-        const Phi_q = Array.from({ length: 9 }, () => new Array(9).fill(0));
-        // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
-        Phi_q[0][0] = 1;  // A.x by x_crank
-        Phi_q[0][2] = B_crank_y;  // A.x by phi_crank
-        Phi_q[1][1] = 1;  // A.y by y_crank
-        Phi_q[1][2] = -B_crank_x;  // A.y by phi_crank
-        // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
-        Phi_q[2][0] = 1;  // B.x by x_crank
-        Phi_q[2][2] = -B_crank_y;  // B.x by phi_crank
-        Phi_q[2][3] = -1;  // B.x by x_coupler
-        Phi_q[2][5] = -C_coupler_y;  // B.x by phi_coupler
-        Phi_q[3][1] = 1;  // B.y by y_crank
-        Phi_q[3][2] = B_crank_x;  // B.y by phi_crank
-        Phi_q[3][4] = -1;  // B.y by y_coupler
-        Phi_q[3][5] = C_coupler_x;  // B.y by phi_coupler
-        // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
-        Phi_q[4][3] = 1;  // C.x by x_coupler
-        Phi_q[4][5] = -C_coupler_y;  // C.x by phi_coupler
-        Phi_q[4][6] = -1;  // C.x by x_rocker
-        Phi_q[4][8] = -D_rocker_y;  // C.x by phi_rocker
-        Phi_q[5][4] = 1;  // C.y by y_coupler
-        Phi_q[5][5] = C_coupler_x;  // C.y by phi_coupler
-        Phi_q[5][7] = -1;  // C.y by y_rocker
-        Phi_q[5][8] = D_rocker_x;  // C.y by phi_rocker
+        Phi_q[13] = -C_coupler_y;  // C.x by phi_coupler
+        Phi_q[15] = -D_rocker_y;  // C.x by phi_rocker
+        Phi_q[17] = C_coupler_x;  // C.y by phi_coupler
+        Phi_q[19] = D_rocker_x;  // C.y by phi_rocker
         // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
-        Phi_q[6][6] = 1;  // D.x by x_rocker
-        Phi_q[6][8] = -D_rocker_y;  // D.x by phi_rocker
-        Phi_q[7][7] = 1;  // D.y by y_rocker
-        Phi_q[7][8] = D_rocker_x;  // D.y by phi_rocker
-        // 8  AbsoluteAngle "motor": crank angle omega*t
-        Phi_q[8][2] = 1;  // motor by phi_crank
-        return Phi_q;
+        Phi_q[21] = -D_rocker_y;  // D.x by phi_rocker
+        Phi_q[23] = D_rocker_x;  // D.y by phi_rocker
     }
 
-    // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
-    function nu(q, t, p = DEFAULTS) {
-        require_length("q", q, N_COORDINATES);
-        require_length("p", p, DEFAULTS.length);
+    function nu_at(at) {
+        const { q, t, p, nu } = at;
         const omega = p[4];
-        const nu = new Array(9).fill(0);
+        // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+        nu[0] = 0;
+        nu[1] = 0;
+        // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+        nu[2] = 0;
+        nu[3] = 0;
+        // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+        nu[4] = 0;
+        nu[5] = 0;
+        // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
+        nu[6] = 0;
+        nu[7] = 0;
         // 8  AbsoluteAngle "motor": crank angle omega*t
         nu[8] = omega;
-        return nu;
     }
 
-    // Right side of the acceleration equation Phi_q q_ddot = gamma.
-    function gamma(q, q_dot, t, p = DEFAULTS) {
-        require_length("q", q, N_COORDINATES);
-        require_length("q_dot", q_dot, N_COORDINATES);
-        require_length("p", p, DEFAULTS.length);
+    function gamma_at(at) {
+        const { q, q_dot, t, p, gamma } = at;
         const phi_crank = q[2];
         const phi_coupler = q[5];
         const phi_rocker = q[8];
@@ -229,7 +236,6 @@ const four_bar = (() => {
         const c_2 = c / 2;
         const D_rocker_w2_x = phi_rocker_dot_sq * (c_2 * c_rocker);
         const D_rocker_w2_y = phi_rocker_dot_sq * (c_2 * s_rocker);
-        const gamma = new Array(9).fill(0);
         // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
         gamma[0] = -B_crank_w2_x;
         gamma[1] = -B_crank_w2_y;
@@ -242,12 +248,1008 @@ const four_bar = (() => {
         // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
         gamma[6] = D_rocker_w2_x;
         gamma[7] = D_rocker_w2_y;
-        return gamma;
+        // 8  AbsoluteAngle "motor": crank angle omega*t
+        gamma[8] = 0;
     }
+
+    // Constraint vector Phi(q, t).
+    function Phi(q, t, p = DEFAULTS) {
+        return evaluated(position_at, "Phi", { q }, t, p);
+    }
+
+    // Jacobian of Phi by q.
+    function Phi_q(q, t, p = DEFAULTS) {
+        return evaluated(position_at, "Phi_q", { q }, t, p);
+    }
+
+    // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
+    function nu(q, t, p = DEFAULTS) {
+        return evaluated(nu_at, "nu", { q }, t, p);
+    }
+
+    // Right side of the acceleration equation Phi_q q_ddot = gamma.
+    function gamma(q, q_dot, t, p = DEFAULTS) {
+        return evaluated(gamma_at, "gamma", { q, q_dot }, t, p);
+    }
+
+    // What a solve needs of Phi_q, and the determinants of its blocks.
+    // eliminated: phi_crank by motor, x_crank by A.x, y_crank by A.y, x_coupler by B.x
+    // y_coupler by B.y, x_rocker by D.x, y_rocker by D.y
+    // block: phi_coupler, phi_rocker by C.x, C.y
+    function factor_at(at) {
+        const { Phi_q, F, determinants } = at;
+        const A_x_phi_crank = Phi_q[1];
+        const A_y_phi_crank = Phi_q[3];
+        const B_x_phi_crank = Phi_q[5];
+        const B_x_phi_coupler = Phi_q[7];
+        const B_y_phi_crank = Phi_q[9];
+        const B_y_phi_coupler = Phi_q[11];
+        const C_x_phi_coupler = Phi_q[13];
+        const C_x_phi_rocker = Phi_q[15];
+        const C_y_phi_coupler = Phi_q[17];
+        const C_y_phi_rocker = Phi_q[19];
+        const D_x_phi_rocker = Phi_q[21];
+        const D_y_phi_rocker = Phi_q[23];
+        const k_1 = C_x_phi_coupler + B_x_phi_coupler;
+        const k_2 = C_y_phi_coupler + B_y_phi_coupler;
+        const k_3 = C_x_phi_rocker + D_x_phi_rocker;
+        const k_4 = C_y_phi_rocker + D_y_phi_rocker;
+        const determinant = k_1 * k_4 - k_3 * k_2;
+        const k_6 = 1 / determinant;
+        F[0] = A_x_phi_crank;
+        F[1] = A_y_phi_crank;
+        F[2] = B_x_phi_crank;
+        F[3] = B_x_phi_coupler;
+        F[4] = B_y_phi_crank;
+        F[5] = B_y_phi_coupler;
+        F[6] = D_x_phi_rocker;
+        F[7] = D_y_phi_rocker;
+        F[8] = k_1;
+        F[9] = k_2;
+        F[10] = k_3;
+        F[11] = k_4;
+        F[12] = k_6;
+        determinants[0] = determinant;
+    }
+
+    // x of Phi_q x = right.
+    function solve_at(F, right, to) {
+        const A_x_phi_crank = F[0];
+        const A_y_phi_crank = F[1];
+        const B_x_phi_crank = F[2];
+        const B_x_phi_coupler = F[3];
+        const B_y_phi_crank = F[4];
+        const B_y_phi_coupler = F[5];
+        const D_x_phi_rocker = F[6];
+        const D_y_phi_rocker = F[7];
+        const k_1 = F[8];
+        const k_2 = F[9];
+        const k_3 = F[10];
+        const k_4 = F[11];
+        const k_6 = F[12];
+        const A_x = right[0];
+        const A_y = right[1];
+        const B_x = right[2];
+        const B_y = right[3];
+        const C_x = right[4];
+        const C_y = right[5];
+        const D_x = right[6];
+        const D_y = right[7];
+        const motor = right[8];
+        const x_crank = A_x - A_x_phi_crank * motor;
+        const y_crank = A_y - A_y_phi_crank * motor;
+        const b_3 = B_x - B_x_phi_crank * motor - x_crank;
+        const b_4 = B_y - B_y_phi_crank * motor - y_crank;
+        const b_5 = C_x + b_3 + D_x;
+        const b_6 = C_y + b_4 + D_y;
+        const phi_coupler = (k_4 * b_5 - k_3 * b_6) * k_6;
+        const phi_rocker = (k_1 * b_6 - k_2 * b_5) * k_6;
+        const y_rocker = D_y - D_y_phi_rocker * phi_rocker;
+        const x_rocker = D_x - D_x_phi_rocker * phi_rocker;
+        const y_coupler = -(b_4 - B_y_phi_coupler * phi_coupler);
+        const x_coupler = -(b_3 - B_x_phi_coupler * phi_coupler);
+        to[0] = x_crank;
+        to[1] = y_crank;
+        to[2] = motor;
+        to[3] = x_coupler;
+        to[4] = y_coupler;
+        to[5] = phi_coupler;
+        to[6] = x_rocker;
+        to[7] = y_rocker;
+        to[8] = phi_rocker;
+    }
+
+    /* The motion over a time grid, and what ends it, judged as kincompile's runtime judges: from point
+       to point by the prediction q + h q_dot + h^2 q_ddot / 2 and Newton's corrections, in sub-steps
+       where a step does not stay on its branch. The planned elimination takes the ordinary steps; where
+       anything is out of the ordinary, dense matrices with pivoting have the last word. */
+    const solver = (() => {
+        const CONVERGED = 0, NOT_CONVERGED = 1, SINGULAR = 2, NOT_FINITE = 3, NOT_REACHED = 4, CORNER = 5;
+        const TOLERANCE = 1e-10;  // of the last correction, in scales; it has been applied
+        const ASSEMBLED = 10.0 * TOLERANCE;  // residual, relative to its terms, at the end
+        const ROUNDING = 3.552713678800501e-15;  // all that floating point has to give, relatively
+        const MAX_ITERATIONS = 25, MAX_CORRECTIONS = 6;
+        const [WILD, STEEP, FAR] = [1000.0, 1000000.0, 0.7853981633974483];
+        const [SMALL_PART, CONSTANT] = [1e-08, 1e-12];
+        const [LARGEST_ANGLE, BEND, NUDGE, RESTARTS] = [0.5, 0.01, 0.3, 4];
+        const [SUFFICIENT, SHORTEST_STEP] = [0.0001, 9.5367431640625e-07];
+        const [SAME, MOST_TURNED] = [1e-06, 300];
+        const [SINGULAR_SENSITIVITY, TOO_NEAR] = [10000000.0, 100000.0];
+        const [NEARLY_SINGULAR, KINK, SMOOTH] = [30.0, 8.0, 1e-09];
+        const [SMALL_ERROR, LARGE_ERROR, ALLOWED_PART] = [0.05, 0.5, 0.25];
+        const [SMALLEST_PART, MAX_SUBSTEPS] = [9.5367431640625e-07, 10000];
+        const [LONGEST_ARC, FIRST_ARC, SHORTEST_ARC] = [0.05, 0.01, 1e-09];
+        const [MAX_ARCS, ARC_CORRECTIONS, STRAIGHT] = [400, 12, 0.98];
+        const [SMALL_CORRECTION, TOLERABLE_CORRECTION] = [1e-12, 1e-07];
+        const [ROOT_LENGTH, ROOT_STEPS, AROUND] = [1e-13, 80, 0.002];
+        const AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05];
+        const [INVOLVED, LATE, IN_RANGE] = [0.02, 1e-06, 1e-06];
+        const [CORNER_JUMP, SAME_TIME] = [1e-09, 8.881784197001252e-16];
+
+        const norm = vector => Math.hypot(...vector);
+        const largest = vector => vector.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
+        const allFinite = vector => vector.every(Number.isFinite);
+
+        /* ---- dense matrices, as arrays of rows ---- */
+
+        /* Factor a square matrix with partial pivoting: rows of L and U in one, the order of the rows,
+           and the determinant. Where a pivot is a rounding error, `dependent` holds the columns whose
+           combination is zero. */
+        function factor(matrix) {
+            const n = matrix.length, rows = matrix.map(row => Array.from(row));
+            const order = rows.map((_, k) => k);
+            const sizes = order.map(k => matrix.reduce((most, row) => Math.max(most, Math.abs(row[k])), 0));
+            let determinant = 1, dependent = [];
+            for (let k = 0; k < n; k += 1) {
+                let best = k;
+                for (let i = k + 1; i < n; i += 1) {
+                    if (Math.abs(rows[i][k]) > Math.abs(rows[best][k])) best = i;
+                }
+                if (!(Math.abs(rows[best][k]) > n * Number.EPSILON * sizes[k]) && !dependent.length) {
+                    dependent = dependentColumns(rows, k);
+                }
+                if (best !== k) {
+                    [rows[k], rows[best]] = [rows[best], rows[k]];
+                    [order[k], order[best]] = [order[best], order[k]];
+                    determinant = -determinant;
+                }
+                const pivot = rows[k];
+                determinant *= pivot[k];
+                for (let i = k + 1; i < n; i += 1) {
+                    const row = rows[i];
+                    row[k] /= pivot[k];
+                    if (row[k] !== 0) for (let j = k + 1; j < n; j += 1) row[j] -= row[k] * pivot[j];
+                }
+            }
+            return { rows, order, determinant: dependent.length ? 0 : determinant, dependent };
+        }
+
+        /* The columns that take part where column k is a combination of those before it. */
+        function dependentColumns(rows, k) {
+            const weights = upperSolution(rows, rows.slice(0, k).map(row => row[k]));
+            const most = Math.max(1, largest(weights));
+            return [...weights.keys()].filter(j => Math.abs(weights[j]) > 1e-9 * most).concat(k);
+        }
+
+        /* x of U x = b, U in the first rows of a factored matrix. */
+        function upperSolution(rows, b) {
+            const x = Array.from(b);
+            for (let k = x.length - 1; k >= 0; k -= 1) {
+                const row = rows[k];
+                for (let j = k + 1; j < x.length; j += 1) x[k] -= row[j] * x[j];
+                x[k] /= row[k];
+            }
+            return x;
+        }
+
+        /* x of A x = b from the factors of A. */
+        function solve({ rows, order }, b) {
+            const y = order.map(k => b[k]);
+            for (let k = 0; k < y.length; k += 1) {
+                for (let j = 0; j < k; j += 1) y[k] -= rows[k][j] * y[j];
+            }
+            return upperSolution(rows, y);
+        }
+
+        /* x that makes A x - b smallest: Householder's reflections. */
+        function leastSquares(matrix, right) {
+            const rows = matrix.map(row => Array.from(row)), b = Array.from(right), n = rows[0].length;
+            for (let k = 0; k < n; k += 1) {
+                const v = rows.map((row, i) => (i < k ? 0 : row[k]));
+                const size = v[k] > 0 ? -norm(v) : norm(v);
+                v[k] -= size;
+                const square = v.reduce((sum, x) => sum + x * x, 0);
+                if (square === 0) {
+                    rows[k][k] = Infinity;  // nothing depends on it: the shortest solution leaves it
+                    continue;
+                }
+                for (let j = k; j <= n; j += 1) {
+                    const entry = i => (j < n ? rows[i][j] : b[i]);
+                    let dot = 0;
+                    for (let i = k; i < b.length; i += 1) dot += v[i] * entry(i);
+                    for (let i = k; i < b.length; i += 1) {
+                        const value = entry(i) - 2 * dot / square * v[i];
+                        if (j < n) rows[i][j] = value; else b[i] = value;
+                    }
+                }
+            }
+            return upperSolution(rows, b.slice(0, n));
+        }
+
+        /* Singular values, the smallest first, and their directions on the right: Jacobi's rotations of
+           pairs of columns. */
+        function singularValues(matrix) {
+            const n = matrix[0].length;
+            const columns = Array.from({ length: n }, (_, j) => matrix.map(row => row[j]));
+            const directions = columns.map((_, j) => columns.map((_, i) => (i === j ? 1 : 0)));
+            const dot = (a, b) => a.reduce((sum, x, k) => sum + x * b[k], 0);
+            const rotate = (vectors, i, j, c, s) => {
+                const [a, b] = [vectors[i], vectors[j]];
+                vectors[i] = a.map((x, k) => c * x - s * b[k]);
+                vectors[j] = a.map((x, k) => s * x + c * b[k]);
+            };
+            for (let sweep = 0, isDone = false; sweep < 60 && !isDone; sweep += 1) {
+                isDone = true;
+                for (let i = 0; i < n; i += 1) {
+                    for (let j = i + 1; j < n; j += 1) {
+                        const [a, b] = [dot(columns[i], columns[i]), dot(columns[j], columns[j])];
+                        const mixed = dot(columns[i], columns[j]);
+                        if (!(Math.abs(mixed) > Number.EPSILON * Math.sqrt(a * b))) continue;
+                        isDone = false;
+                        const zeta = (b - a) / (2 * mixed);
+                        const t = Math.sign(zeta || 1) / (Math.abs(zeta) + Math.hypot(1, zeta));
+                        const c = 1 / Math.hypot(1, t);
+                        rotate(columns, i, j, c, c * t);
+                        rotate(directions, i, j, c, c * t);
+                    }
+                }
+            }
+            const found = columns.map((column, j) => ({ size: norm(column), direction: directions[j] }));
+            return found.sort((one, other) => one.size - other.size);
+        }
+
+        /* ---- scales: the size of the mechanism, and what the terms of its equations contribute ---- */
+
+        /* Numbers of size 1/2 to 1 and either sign without a pattern. */
+        function probeOf(n) {
+            return Float64Array.from({ length: n }, (_, k) => {
+                const part = (k + 1) * ((Math.sqrt(5) - 1) / 2) % 1;
+                return (part * 64 % 2 < 1 ? 1 : -1) * (1 + part) / 2;
+            });
+        }
+
+        /* The size of a mechanism as its equations show it at a guess or a position: the largest lever
+           arm, else the distance over which derivatives change; 0 where equations are linear. */
+        function sizeOf(model, angular, evaluate, q) {
+            const finite = values => largest(values.filter(Number.isFinite));
+            const ofRows = (entries, isWanted) => {
+                const most = new Float64Array(model.N_EQUATIONS);
+                model.PATTERN.forEach(([i, j], k) => {
+                    if (isWanted(j) && !(most[i] >= Math.abs(entries[k]))) most[i] = Math.abs(entries[k]);
+                });
+                return most;
+            };
+            const probe = probeOf(q.length);
+            const moved = (from, kind, length) => from.map((x, k) => x + (angular[k] === kind ? length * probe[k] : 0));
+            const { Phi_q } = evaluate(moved(q, true, 1));
+            const slopes = ofRows(Phi_q, j => !angular[j]), arms = ofRows(Phi_q, j => angular[j]);
+            const size = finite(arms.map((arm, i) => arm / slopes[i]).filter((_, i) => slopes[i] > 0));
+            if (size) return size;
+            const farthest = finite(q.filter((_, k) => !angular[k])) || 1;
+            const step = SMALL_PART * farthest;
+            const length = step * finite(probe.filter((_, k) => !angular[k]));
+            const bends = from => {
+                const here = evaluate(from), there = evaluate(moved(from, false, step));
+                const change = ofRows(here.Phi_q.map((x, k) => (there.Phi_q[k] - x) / length), () => true);
+                const own = ofRows(here.Phi_q, () => true);
+                const rows = [...own.keys()].filter(i => change[i] * length > CONSTANT * own[i]);
+                return rows.map(i => Math.max(own[i] / change[i], Math.sqrt(Math.abs(here.Phi[i]) / change[i])));
+            };
+            const near = bends(q);
+            if (!near.length) return 0;
+            let found = Math.min(Infinity, ...near.filter(bend => bend > 10 * step));
+            if (found < Infinity) {
+                const known = bends(moved(q, false, found)).filter(bend => bend > 0 && bend < Infinity);
+                found = known.length ? known.length / known.reduce((sum, bend) => sum + 1 / bend, 0) : 0;
+            }
+            return found > 10 * step && found < Infinity ? found : farthest;
+        }
+
+        /* A mechanism with its parameters, and the scales by which all is judged, found at q. */
+        class Problem {
+            constructor(model, p, q, t) {
+                const { N_COORDINATES: n, N_EQUATIONS: m } = model;
+                Object.assign(this, { model, p, n, m });
+                this.angular = model.COORDINATES.map(name => model.UNITS[name] === "rad");
+                const isOwned = k => model.BODIES.some(([, first, count]) => k >= first && k < first + count);
+                this.mayTurn = model.COORDINATES.map((name, k) => {
+                    return this.angular[k] || (model.UNITS[name] === "" && !isOwned(k));
+                });
+                this.size = sizeOf(model, this.angular, x => this.evaluate(x, t), Array.from(q)) || 1;
+                this.reference = Float64Array.from(this.angular, isAngle => (isAngle ? 1 : this.size));
+                this.place = Float64Array.from(q, Math.abs);
+                this.floor = ROUNDING * largest(this.place.filter((_, k) => !this.angular[k])) / this.size;
+                this.probe = probeOf(m);
+                this.magnitude = new Float64Array(m);
+                this.noise = new Float64Array(m);
+                this.limit = new Float64Array(m).fill(Infinity);
+                this.sums = new Float64Array(m);
+                const generic = this.evaluate(this.place.map((_, k) => q[k] + this.reference[k] * this.probe[k]), t);
+                if (!allFinite(generic.Phi) || !allFinite(generic.Phi_q)) return;
+                const own = this.terms(generic, this.reference).slice();
+                const here = this.terms(generic, this.reference.map((x, k) => x + this.place[k])).slice();
+                this.magnitude = own;
+                this.noise = here.map(x => ROUNDING * x);
+                this.limit = here.map(x => (x > 0 ? STEEP * x : Infinity));
+            }
+
+            /* A point with Phi and Phi_q. */
+            evaluate(q, t) {
+                const at = this.model.point(this.p);
+                at.q.set(q);
+                at.t = t;
+                this.model.position_at(at);
+                return at;
+            }
+
+            /* The factors of the dense matrix at a point, kept with it. */
+            factors(at) {
+                at.dense ??= factor(this.model.rows_of(at, "Phi_q"));
+                return at.dense;
+            }
+
+            determinants(at) {
+                this.model.factor_at(at);
+                return at.determinants;
+            }
+
+            weights(terms = this.magnitude) {
+                return terms.map(x => 1 / (x > 0 ? x : 1));
+            }
+
+            /* What the terms of each equation contribute at scales of the coordinates. */
+            terms(at, scale) {
+                const { sums, magnitude, limit } = this, { PATTERN } = this.model;
+                sums.fill(0);
+                for (let k = 0; k < PATTERN.length; k += 1) {
+                    sums[PATTERN[k][0]] += Math.abs(at.Phi_q[k]) * scale[PATTERN[k][1]];
+                }
+                for (let i = 0; i < this.m; i += 1) {
+                    sums[i] = Math.max(magnitude[i], Math.min(sums[i], limit[i]));
+                }
+                return sums;
+            }
+
+            holds(at, tolerance) {
+                const { magnitude, noise } = this;
+                if (at.Phi.every((value, i) => Math.abs(value) <= tolerance * magnitude[i])) return true;
+                const terms = this.terms(at, this.reference);
+                return at.Phi.every((value, i) => Math.abs(value) <= tolerance * terms[i] + noise[i]);
+            }
+
+            /* Whether every equation holds as well as floating point permits. */
+            holdsToRounding(at) {
+                const { reference, place } = this;
+                const scale = at.q.map((x, k) => Math.min(Math.max(Math.abs(x), reference[k]), WILD * reference[k] + place[k]));
+                const terms = this.terms(at, scale);
+                return at.Phi.every((value, i) => Math.abs(value) <= ROUNDING * terms[i]);
+            }
+
+            distance(q, other) {
+                let most = 0;
+                for (let k = 0; k < this.n; k += 1) {
+                    const apart = Math.abs(q[k] - other[k]) / this.reference[k];
+                    if (!(apart <= most)) most = apart;
+                }
+                return most;
+            }
+
+            isFar(q, guess) {
+                return this.mayTurn.some((may, k) => may && Math.abs(q[k] - guess[k]) > FAR);
+            }
+
+            /* Whether a guess shows a branch, and a position found from it lies on another. */
+            leavesBranch(guess, found) {
+                const wanted = this.determinants(guess), here = this.determinants(found);
+                return wanted.every(x => x !== 0) && wanted.some((x, k) => Math.sign(x) !== Math.sign(here[k]));
+            }
+        }
+
+        /* ---- Newton's method from a guess ---- */
+
+        /* Whether corrections shrink no faster than towards a double root, by halves. */
+        function crawls(corrections) {
+            const [before, last] = corrections.slice(-2);
+            return corrections.length > 1 && last > before / 4;
+        }
+
+        function hasConverged(equations, before, at, corrections) {
+            const allowed = k => Math.max(TOLERANCE, equations.floor) * equations.reference[k] + ROUNDING * Math.abs(at.q[k]);
+            const isSmall = at.q.every((x, k) => Math.abs(x - before.q[k]) <= allowed(k));
+            if (isSmall && equations.holds(at, ASSEMBLED)) return true;
+            return (isSmall || crawls(corrections)) && equations.holdsToRounding(at);
+        }
+
+        const whySingular = at => (allFinite(at.Phi_q) ? SINGULAR : NOT_FINITE);
+        const moved = (equations, at, step, part = 1) => {
+            const following = equations.evaluate(at.q.map((x, k) => x + part * step[k]), at.t);
+            return allFinite(following.Phi) ? following : null;
+        };
+
+        /* The whole correction. */
+        function plainStep(equations, at) {
+            const factors = equations.factors(at), step = solve(factors, at.Phi.map(value => -value));
+            if (factors.dependent.length || !allFinite(step)) return whySingular(at);
+            const following = moved(equations, at, step);
+            return following ? [following, norm(step)] : NOT_FINITE;
+        }
+
+        /* As much of the correction, bent towards the gradient while the residual is large, as keeps the
+           angles near and lowers the residual. */
+        function safeguardedStep(equations, at) {
+            const { reference, angular } = equations;
+            const weights = Array.from(equations.weights(equations.terms(at, reference)));
+            const weighed = ({ Phi }) => norm(weights.map((x, i) => x * Phi[i]));
+            const before = weighed(at), bend = Math.sqrt(BEND * Math.min(1, before));
+            const rows = equations.model.rows_of(at, "Phi_q").map((row, i) => row.map((x, k) => weights[i] * x * reference[k]));
+            if (!rows.every(allFinite)) return NOT_FINITE;
+            rows.push(...rows[0].map((_, k) => rows[0].map((_, j) => (j === k ? bend : 0))));
+            const right = [...weights.map((x, i) => -x * at.Phi[i]), ...rows[0].map(() => 0)];
+            const step = leastSquares(rows, right).map((x, k) => x * reference[k]);
+            const excess = largest(step.map((x, k) => x / (reference[k] * (angular[k] ? LARGEST_ANGLE : 1))));
+            for (let part = Math.min(1, 1 / (excess || 1)); part >= SHORTEST_STEP; part /= 2) {
+                const following = moved(equations, at, step, part);
+                const after = following && weighed(following);
+                if (following && (after <= (1 - SUFFICIENT * part) * before || after <= ROUNDING)) {
+                    return [following, part * norm(step)];
+                }
+            }
+            return NOT_CONVERGED;
+        }
+
+        /* All positions from a guess, and how they end. */
+        function iterate(equations, t, guess, most = MAX_ITERATIONS, step = plainStep) {
+            const points = [equations.evaluate(guess, t)], corrections = [];
+            const ended = status => ({ status, points, corrections, last: points[points.length - 1] });
+            if (!allFinite(points[0].Phi)) return { ...ended(NOT_FINITE), last: null };
+            for (let k = 0; k < most; k += 1) {
+                const outcome = step(equations, points[k]);
+                if (typeof outcome === "number") return ended(outcome);
+                points.push(outcome[0]);
+                corrections.push(outcome[1]);
+                if (hasConverged(equations, points[k], outcome[0], corrections)) return ended(CONVERGED);
+            }
+            const creeps = crawls(corrections) && equations.holds(points[points.length - 1], ASSEMBLED);
+            return ended(creeps ? SINGULAR : NOT_CONVERGED);
+        }
+
+        /* A position from a guess: by plain steps, and by safeguarded ones where these fail or stray.
+           What is not far from the guess comes first, then what is on its branch, then the nearer. */
+        function assemble(equations, t, guess) {
+            const plain = iterate(equations, t, guess);
+            const isFound = plain.status === CONVERGED;
+            const strays = () => equations.isFar(plain.last.q, guess) || equations.leavesBranch(plain.points[0], plain.last);
+            if (!plain.last || (isFound && !strays())) return plain;
+            const attempts = [plain], scale = equations.reference, probe = equations.probe;
+            for (let k = 0; k <= (isFound ? 0 : RESTARTS); k += 1) {
+                // With all bodies on a line no equation tells which way to bend.
+                const bend = j => (k ? k * NUDGE * scale[j] * probe[(j - (k - 1) + probe.length) % probe.length] : 0);
+                const begin = Float64Array.from(guess, (x, j) => x + bend(j));
+                attempts.push(iterate(equations, t, begin, MAX_ITERATIONS, safeguardedStep));
+                if (attempts[attempts.length - 1].status === CONVERGED) break;
+            }
+            const least = (list, orders) => list.reduce((best, one) => {
+                const [a, b] = [orders(one), orders(best)], k = a.findIndex((x, i) => x !== b[i]);
+                return k >= 0 && a[k] < b[k] ? one : best;
+            });
+            const missed = ({ last }) => (last ? norm(equations.weights().map((x, i) => x * last.Phi[i])) : Infinity);
+            const good = attempts.filter(attempt => attempt.status === CONVERGED);
+            if (!good.length) return least(attempts.slice(1), attempt => [missed(attempt)]);
+            for (const attempt of good) attempt.last = unwound(equations, t, attempt.last, guess);
+            return least(good, ({ last }) => {
+                const isFar = equations.isFar(last.q, guess);
+                const leaves = !isFar && equations.leavesBranch(plain.points[0], last);
+                return [Number(isFar), Number(leaves), +equations.distance(last.q, guess).toFixed(6)];
+            });
+        }
+
+        /* Turn angles by whole turns towards a guess, as far as the equations allow it. */
+        function unwound(equations, t, at, guess) {
+            const { angular, mayTurn } = equations;
+            const columns = [...guess.keys()].filter(k => (angular[k] || mayTurn[k]) && Math.abs(at.q[k] - guess[k]) > Math.PI);
+            const each = columns.length <= MOST_TURNED ? columns.map(k => [k]) : [];
+            for (const some of [columns, ...each]) {
+                const q = at.q.slice();
+                for (const k of some) q[k] -= 2 * Math.PI * Math.round((q[k] - guess[k]) / (2 * Math.PI));
+                if (q.every((x, k) => x === at.q[k])) continue;
+                const turned = iterate(equations, t, q, MAX_CORRECTIONS);
+                if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME) at = turned.last;
+            }
+            return at;
+        }
+
+        /* ---- from time to time ---- */
+
+        /* Takes a motion from time to time. With `isDense` the matrices are solved with pivoting. */
+        class March {
+            constructor(equations) {
+                Object.assign(this, { equations, model: equations.model, isDense: false, iterations: 0 });
+                this.tolerance = Math.max(TOLERANCE, equations.floor);
+                this.residual = Math.max(ASSEMBLED, ROUNDING);
+                const vector = () => new Float64Array(equations.n);
+                [this.change, this.predicted, this.rounding, this.expected] = [vector(), vector(), vector(), vector()];
+                this.sides = equations.magnitude.map((x, i) => x * equations.probe[i]);
+            }
+
+            prepare(at) {
+                this.model.factor_at(at);
+                at.dense = this.isDense ? factor(this.model.rows_of(at, "Phi_q")) : null;
+            }
+
+            solve(at, right, to) {
+                if (this.isDense) to.set(solve(at.dense, right)); else this.model.solve_at(at.F, right, to);
+            }
+
+            /* Newton's method from a prediction; says whether it converged. */
+            correct(at, most) {
+                const { model, equations, change, rounding } = this, { n, reference } = equations;
+                for (let k = 0; k < n; k += 1) rounding[k] = ROUNDING * Math.abs(at.q[k]);
+                let last = Infinity;
+                model.position_at(at);
+                for (this.iterations = 1; this.iterations <= most; this.iterations += 1) {
+                    this.prepare(at);
+                    this.solve(at, at.Phi, change);
+                    let size = -Infinity;
+                    for (let k = 0; k < n; k += 1) {
+                        at.q[k] -= change[k];
+                        const part = (Math.abs(change[k]) - rounding[k]) / reference[k];
+                        if (!(part <= size)) size = part;
+                    }
+                    model.position_at(at);
+                    // Near a singular position rounding alone keeps the corrections above any bound.
+                    if (size <= this.tolerance || !(size <= last / 4)) {
+                        const isDone = (size <= this.tolerance && equations.holds(at, this.residual)) || equations.holdsToRounding(at);
+                        if (isDone || !(size < Infinity)) return isDone;
+                    }
+                    last = size;
+                }
+                this.iterations = most;
+                return false;
+            }
+
+            /* Solve for velocity and acceleration; a third right side, of the size of the equations' own
+               terms, shows how near to singular Phi_q is. */
+            complete(at) {
+                const { model, change, equations } = this;
+                this.prepare(at);
+                this.solve(at, this.sides, change);
+                model.nu_at(at);
+                this.solve(at, at.nu, at.q_dot);
+                model.gamma_at(at);
+                this.solve(at, at.gamma, at.q_ddot);
+                at.sensitivity = 0;
+                let sum = 0;
+                for (let k = 0; k < equations.n; k += 1) {
+                    const size = Math.abs(change[k]) / equations.reference[k];
+                    if (!(size <= at.sensitivity)) at.sensitivity = size;
+                    sum += at.q_dot[k] + at.q_ddot[k];
+                }
+                if (!(at.sensitivity < SINGULAR_SENSITIVITY)) return whySingular(at);
+                return Number.isFinite(sum) ? CONVERGED : NOT_FINITE;
+            }
+
+            /* Take a step from a good point: `to` counts only where it continues the motion. `to.isThere`
+               says whether it is a position of the motion at that time. */
+            step(from, to, t, most) {
+                const { equations, predicted } = this, { n, reference } = equations, h = t - from.t;
+                for (let k = 0; k < n; k += 1) {
+                    predicted[k] = from.q[k] + h * (from.q_dot[k] + h / 2 * from.q_ddot[k]);
+                }
+                to.q.set(predicted);
+                to.t = t;
+                to.isThere = false;
+                const isGood = this.correct(to, most);
+                const error = equations.distance(to.q, predicted), movement = equations.distance(predicted, from.q);
+                if (!isGood || !(error <= Math.min(LARGE_ERROR, Math.max(SMALL_ERROR, ALLOWED_PART * movement)))) return NOT_CONVERGED;
+                const status = this.complete(to);
+                to.isThere = status !== CONVERGED;
+                if (status !== CONVERGED) return status;
+                for (let k = 0; k < from.determinants.length; k += 1) {
+                    if (Math.sign(from.determinants[k]) !== Math.sign(to.determinants[k])) return SINGULAR;
+                }
+                let kink = 0;
+                for (let k = 0; k < n; k += 1) {
+                    const turn = Math.abs(h * (to.q_dot[k] - from.q_dot[k] - h * from.q_ddot[k])) / reference[k];
+                    if (!(turn <= kink)) kink = turn;
+                }
+                if (!(to.sensitivity <= NEARLY_SINGULAR || kink <= KINK * error + SMOOTH)) return SINGULAR;
+                to.isThere = true;
+                return CONVERGED;
+            }
+
+            /* The time in which something moves as far as its scale. */
+            timeOf({ q_dot, q_ddot }) {
+                const part = (vector) => largest(vector.map((x, k) => x / this.equations.reference[k]));
+                return 1 / Math.max(part(q_dot), Math.sqrt(part(q_ddot)), 1e-300);
+            }
+
+            /* Follow the motion from a good point to a time, in sub-steps that are halved where they fail
+               and doubled where they do not. */
+            advance(from, t, most = MAX_ITERATIONS) {
+                const spare = () => this.model.point(this.equations.p);
+                let h = t - from.t, state = from, to = spare(), status = NOT_CONVERGED;
+                const smallest = Math.min(Math.abs(h), this.timeOf(from)) * SMALLEST_PART;
+                for (let count = 0; count < MAX_SUBSTEPS; count += 1) {
+                    const isWhole = Math.abs(h) >= Math.abs(t - state.t);
+                    status = this.step(state, to, isWhole ? t : state.t + h, most);
+                    const isGood = status === CONVERGED;
+                    const isNear = isGood && to.sensitivity > Math.max(TOO_NEAR, state.sensitivity);
+                    if (isNear && !isWhole) status = SINGULAR;
+                    if (isWhole && to.isThere) return { status, state: isGood ? to : state, position: to };
+                    if (isGood && !isNear) {
+                        [state, to] = [to, spare()];
+                        h *= 2;
+                    } else if (Math.abs(h) <= smallest) {
+                        return { status, state, position: null };
+                    } else {
+                        h /= 2;
+                    }
+                }
+                return { status: NOT_CONVERGED, state, position: null, isExhausted: true };
+            }
+        }
+
+        /* ---- the whole grid ---- */
+
+        /* The times at which the velocity of a driver jumps, as the runtime finds them. */
+        function cornersOf(model, times, p, guess) {
+            if (!model.CORNERS) return times.map(() => 0);
+            const reach = SAME_TIME * largest(times), most = new Float64Array(model.N_EQUATIONS);
+            const jumps = Array.from(times, t => {
+                const [before, after] = [-1, 1].map(side => model.nu(guess, t + side * reach, p));
+                before.forEach((x, i) => { most[i] = Math.max(most[i], Math.abs(x) || 0, Math.abs(after[i]) || 0); });
+                return before.map((x, i) => Math.abs(after[i] - x));
+            });
+            return times.map((_, k) => (jumps[k].some((x, i) => x > CORNER_JUMP * most[i]) ? reach : 0));
+        }
+
+        /* The motion over times: arrays q, q_dot, q_ddot (a point after another, NaN where nothing was
+           found) and y, y_dot, y_ddot of outputs, the status and the iterations of each point, and what
+           `explain` needs: the problem, the failed point and what was found of it. */
+        function motionOver(model, times, p = model.DEFAULTS, guess = model.GUESS) {
+            const n = model.N_COORDINATES, count = times.length, width = model.OUTPUTS.length;
+            const array = size => new Float64Array(count * size).fill(NaN);
+            const motion = {
+                t: times, p, q: array(n), q_dot: array(n), q_ddot: array(n),
+                y: array(width), y_dot: array(width), y_ddot: array(width), residual: array(1),
+                status: new Int32Array(count).fill(NOT_REACHED), iterations: new Int32Array(count),
+                failed: null, near: [],
+            };
+            const corners = cornersOf(model, Float64Array.from(times), p, guess);
+            const timeOf = k => times[k] + corners[k];
+            let outcome = start(model, p, guess, timeOf(0));
+            const march = new March(outcome.equations);
+            motion.equations = outcome.equations;
+            record(motion, 0, outcome, model);
+            let from = outcome.state, to = model.point(p);
+            for (let k = 1; k < count && outcome.status === CONVERGED; k += 1) {
+                march.isDense = false;
+                const status = march.step(from, to, timeOf(k), MAX_CORRECTIONS);
+                if (status === CONVERGED && to.sensitivity <= TOO_NEAR) {
+                    outcome = { status, state: to, position: to };
+                    record(motion, k, outcome, model);
+                    motion.iterations[k] = march.iterations;
+                    [from, to] = [to, from];
+                    continue;
+                }
+                march.isDense = true;
+                outcome = march.advance(from, timeOf(k));
+                if (!outcome.position && !outcome.isExhausted) outcome = giveUp(motion.equations, outcome, timeOf(k));
+                record(motion, k, outcome, model);
+                // Rates near a singularity are too uncertain to predict from: the point before serves.
+                if (outcome.state.sensitivity <= Math.max(TOO_NEAR, from.sensitivity)) {
+                    [from, to] = [outcome.state, model.point(p)];
+                }
+            }
+            if (outcome.status !== CONVERGED) {
+                const index = motion.status.findIndex(status => status !== CONVERGED);
+                motion.failed = { ...outcome, index, t: timeOf(index) };
+            }
+            for (let k = 0; k < count; k += 1) {
+                if (!corners[k] || motion.status[k] !== CONVERGED) continue;
+                motion.status[k] = CORNER;
+                motion.q_ddot.fill(NaN, k * n, (k + 1) * n);
+            }
+            return motion;
+        }
+
+        /* Assemble the mechanism at the first time. */
+        function start(model, p, guess, t) {
+            const rough = new Problem(model, p, guess, t);
+            const attempt = assemble(rough, t, Float64Array.from(guess));
+            if (attempt.status !== CONVERGED) {
+                return { status: attempt.status, equations: rough, state: null, position: null, nearest: attempt.last };
+            }
+            const march = new March(rough), at = attempt.last;
+            march.isDense = true;
+            let status = march.complete(at);
+            // Towards a singular position Newton's method creeps, and ends a rounding error before it.
+            if (status === CONVERGED && crawls(attempt.corrections) && at.sensitivity > TOO_NEAR) status = SINGULAR;
+            // The guess may be rough: from here on the assembled mechanism gives the size.
+            const equations = new Problem(model, p, at.q, t);
+            return { status, equations, state: status === CONVERGED ? at : null, position: at };
+        }
+
+        /* What is there at a time that the motion does not reach. */
+        function giveUp(equations, outcome, t) {
+            const attempt = assemble(equations, t, outcome.state.q);
+            const jumps = attempt.status === CONVERGED;
+            return { ...outcome, status: jumps ? outcome.status : attempt.status, nearest: attempt.last, jumps };
+        }
+
+        function record(motion, k, { status, state, position, nearest, jumps }, model) {
+            const n = model.N_COORDINATES, width = model.OUTPUTS.length;
+            motion.status[k] = status;
+            const known = position || (jumps ? null : nearest);
+            if (known) motion.residual[k] = largest(known.Phi);
+            if (!position) return;
+            motion.q.set(position.q, k * n);
+            if (status !== CONVERGED) return;
+            motion.q_dot.set(state.q_dot, k * n);
+            motion.q_ddot.set(state.q_ddot, k * n);
+            if (state.sensitivity > TOO_NEAR) motion.near.push(k);
+            if (!width) return;
+            model.observe_at(state);
+            motion.y.set(state.outputs, k * width);
+            motion.y_dot.set(state.outputs_dot, k * width);
+            motion.y_ddot.set(state.outputs_ddot, k * width);
+        }
+
+        /* ---- what ends a motion ---- */
+
+        /* The curve of solutions in q and t together, followed by its arc length: where it turns back in
+           time there is a lock-up, where a determinant changes its sign on the way a bifurcation. */
+        class Curve {
+            constructor(equations, state, time) {
+                this.equations = equations;
+                this.scale = [...equations.reference, time];
+                this.weights = equations.weights(equations.terms(state, equations.reference));
+            }
+
+            /* A point of the motion as one of the curve, looking forward or back in time. */
+            start(state, direction) {
+                const towards = [...state.q_dot, 1].map((x, k) => direction * x / this.scale[k]);
+                return this.place(Array.from(state.q), state.t, towards);
+            }
+
+            /* The equations and their scaled derivatives by q and t; null where they are not finite. */
+            derivatives(q, t) {
+                const at = this.equations.evaluate(q, t), { model } = this.equations;
+                model.nu_at(at);
+                const matrix = model.rows_of(at, "Phi_q").map((row, i) => {
+                    return [...row, -at.nu[i]].map((x, k) => this.weights[i] * x * this.scale[k]);
+                });
+                return allFinite(at.Phi) && matrix.every(allFinite) ? { at, matrix } : null;
+            }
+
+            place(q, t, towards) {
+                const found = this.derivatives(q, t);
+                return found && { q, t, ...found, tangent: tangentOf(found.matrix, towards) };
+            }
+
+            /* Go a length along the curve; null where it cannot be followed so far. */
+            step(from, length) {
+                const { scale, weights } = this, n = from.q.length;
+                let y = [...from.q, from.t].map((x, k) => x + length * from.tangent[k] * scale[k]);
+                const predicted = y;
+                const scaled = () => y.map((x, k) => (x - predicted[k]) / scale[k]);
+                let last = Infinity, isDone = false;
+                for (let k = 0; k < ARC_CORRECTIONS && !isDone; k += 1) {
+                    const found = this.derivatives(y.slice(0, n), y[n]);
+                    if (!found) return null;
+                    const away = scaled().reduce((sum, x, j) => sum + x * from.tangent[j], 0);
+                    const right = [...found.at.Phi.map((x, i) => weights[i] * x), away];
+                    const change = solve(factor([...found.matrix, from.tangent]), right);
+                    if (!allFinite(change)) return null;
+                    y = y.map((x, j) => x - change[j] * scale[j]);
+                    const size = largest(change);
+                    isDone = size <= SMALL_CORRECTION || (size <= TOLERABLE_CORRECTION && size > last / 4);
+                    last = size;
+                }
+                if (!isDone || !(norm(scaled()) <= Math.max(Math.abs(length) / 4, TOLERABLE_CORRECTION))) return null;
+                return this.place(y.slice(0, n), y[n], from.tangent);
+            }
+
+            /* Follow the curve up to a time, or to the first step that contains a singular point. */
+            nextSingular(place, latest) {
+                const forward = Math.sign(latest - place.t) || 1, n = place.q.length;
+                for (let count = 0, length = FIRST_ARC; count < MAX_ARCS; count += 1) {
+                    const following = this.step(place, length);
+                    const turned = following && following.tangent.reduce((sum, x, k) => sum + x * place.tangent[k], 0);
+                    if (!following || turned < STRAIGHT) {
+                        length /= 2;
+                        if (length < SHORTEST_ARC) return null;
+                        continue;
+                    }
+                    const turns = following.tangent[n] * place.tangent[n] <= 0;
+                    const blocks = this.changed(place, following);
+                    if (turns || blocks.length) return { first: place, length, turns, blocks };
+                    if ((following.t - latest) * forward > 0) return null;
+                    place = following;
+                    length = Math.min(2 * length, LONGEST_ARC);
+                }
+                return null;
+            }
+
+            /* The determinants of blocks, as parts of what they were. */
+            parts(before, after) {
+                const [there, here] = [before, after].map(({ at }) => this.equations.determinants(at));
+                return Array.from(here, (x, k) => x / there[k]);
+            }
+
+            changed(before, after) {
+                return [...this.parts(before, after).entries()].filter(([, part]) => !(part > 0)).map(([k]) => k);
+            }
+
+            /* The singular configuration in a bracket. */
+            singularPoint({ first, length, turns, blocks }) {
+                const n = first.q.length, along = part => (part ? this.step(first, part) : first);
+                if (turns) {
+                    const at = rootOf(part => along(part)?.tangent[n] ?? null, length);
+                    // Where several movements become free at once no step ends; beside it t is the same.
+                    for (const offset of BESIDE) {
+                        const place = this.step(first, at + offset);
+                        if (place) return place;
+                    }
+                    return null;
+                }
+                const least = part => {
+                    const place = along(part);
+                    return place && Math.min(...this.parts(first, place).filter((_, k) => blocks.includes(k)));
+                };
+                const at = rootOf(least, length), before = this.step(first, at - AROUND);
+                const parts = before ? this.parts(first, before) : null;
+                const block = parts ? blocks.reduce((best, k) => (parts[k] < parts[best] ? k : best)) : blocks[0];
+                return this.between(first, at, block);
+            }
+
+            /* A bifurcation by interpolation of places so far from it that they are accurate. */
+            between(first, at, block) {
+                const places = AROUND_OFFSETS.map(offset => this.step(first, at + offset * AROUND));
+                if (!places.every(Boolean)) return null;
+                const powers = factor(AROUND_OFFSETS.map(x => [1, x, x * x, x * x * x]));
+                const cubic = values => solve(powers, values);
+                const value = cubic(places.map(({ at: point }) => this.equations.determinants(point)[block]));
+                let x = 0;
+                for (let k = 0; k < ROOT_STEPS; k += 1) {
+                    const slope = value[1] + x * (2 * value[2] + 3 * x * value[3]);
+                    x -= (value[0] + x * (value[1] + x * (value[2] + x * value[3]))) / (slope || Infinity);
+                }
+                if (!(Math.abs(x) < 2)) x = 0;
+                const y = [...first.q, 0].map((_, k) => {
+                    const c = cubic(places.map(({ q, t }) => (k < q.length ? q[k] : t)));
+                    return c[0] + x * (c[1] + x * (c[2] + x * c[3]));
+                });
+                return this.place(y.slice(0, -1), y[y.length - 1], first.tangent);
+            }
+        }
+
+        /* The unit vector that a matrix takes to zero, in a direction. */
+        function tangentOf(matrix, towards) {
+            const along = matrix.map(() => 0);
+            let tangent = solve(factor([...matrix, towards]), [...along, 1]);
+            if (!allFinite(tangent)) {
+                tangent = singularValues(matrix)[0].direction;
+                if (tangent.reduce((sum, x, k) => sum + x * towards[k], 0) < 0) tangent = tangent.map(x => -x);
+            }
+            const size = norm(tangent);
+            return tangent.map(x => x / size);
+        }
+
+        /* A zero in (0, length) of a function that changes its sign there: regula falsi with the weights
+           of the Illinois method, a bisection every third step. */
+        function rootOf(value, length) {
+            let low = 0, high = length, atLow = value(low), atHigh = value(high);
+            if (atLow === null || atHigh === null || atLow === 0 || atHigh === 0) return atLow === 0 ? low : high;
+            for (let k = 0; k < ROOT_STEPS; k += 1) {
+                let middle = (low + high) / 2;
+                if (k % 3 < 2 && atHigh !== atLow) middle = (low * atHigh - high * atLow) / (atHigh - atLow);
+                const here = value(middle);
+                if (here === null || here === 0 || high - low <= ROOT_LENGTH) return middle;
+                if (here * atLow > 0) [low, atLow, atHigh] = [middle, here, atHigh / 2];
+                else [high, atHigh, atLow] = [middle, here, atLow / 2];
+            }
+            return (low + high) / 2;
+        }
+
+        /* The rows of Phi_q in scales of equations and coordinates. */
+        function scaledRows(equations, at) {
+            const weights = equations.weights();
+            return equations.model.rows_of(at, "Phi_q").map((row, i) => {
+                return row.map((x, k) => weights[i] * x * equations.reference[k]);
+            });
+        }
+
+        /* The bodies that take part in a movement, and coordinates that belong to none. */
+        function involved({ COORDINATES, BODIES }, movement) {
+            const most = largest(movement);
+            const ownerOf = k => BODIES.find(([, first, count]) => k >= first && k < first + count)?.[0] ?? COORDINATES[k];
+            const large = [...COORDINATES.keys()].filter(k => Math.abs(movement[k]) > INVOLVED * most);
+            return [...new Set(large.map(ownerOf))];
+        }
+
+        /* An event: what happens, when, where, and to which bodies. */
+        function eventAt(equations, kind, q, t, at) {
+            const values = singularValues(scaledRows(equations, at)), most = values[values.length - 1].size;
+            // Equal loops become singular together: then several movements are free.
+            const free = values.filter(({ size }, k) => k === 0 || size <= IN_RANGE * most);
+            const movement = Array.from(q, (_, k) => norm(free.map(({ direction }) => direction[k])));
+            return { kind, t, q: Array.from(q), bodies: involved(equations.model, movement) };
+        }
+
+        /* The singular configuration that a motion cannot pass on its way to a time; null where the curve
+           goes on to that time, or nowhere. */
+        function located(equations, state, latest) {
+            const speed = largest(state.q_dot.map((x, k) => x / equations.reference[k]));
+            const curve = new Curve(equations, state, speed > 0 ? 1 / speed : Math.abs(latest - state.t));
+            const forward = Math.sign(latest - state.t) || 1, first = curve.start(state, forward);
+            const bracket = first && curve.nextSingular(first, latest + LATE * (latest - state.t));
+            const place = bracket && curve.singularPoint(bracket);
+            if (!place || (place.t - latest) * forward > LATE * Math.abs(latest - state.t)) return null;
+            return eventAt(equations, bracket.turns ? "lock-up" : "bifurcation", place.q, place.t, place.at);
+        }
+
+        /* What a position is from which no motion is known. */
+        function singularStart(equations, at) {
+            const { model } = equations;
+            model.nu_at(at);
+            const rows = scaledRows(equations, at), weights = equations.weights();
+            if (!allFinite(at.nu) || !rows.every(allFinite)) return null;
+            const right = at.nu.map((x, i) => weights[i] * x);
+            // Directions on the left are those on the right of the transposed matrix.
+            const values = singularValues(rows[0].map((_, j) => rows.map(row => row[j])));
+            const most = values[values.length - 1].size;
+            const missing = values.filter(({ size }) => size <= IN_RANGE * most)
+                .map(({ direction }) => direction.reduce((sum, x, i) => sum + x * right[i], 0));
+            const kind = norm(missing) > IN_RANGE * norm(right) ? "lock-up" : "bifurcation";
+            return eventAt(equations, kind, at.q, at.t, at);
+        }
+
+        /* The event that ended a motion; null where it did not end, or nobody knows why. */
+        function explain(motion) {
+            const { equations, failed, t } = motion;
+            if (!failed || failed.isExhausted) return null;
+            const { state, position, nearest, jumps, status } = failed;
+            if (!state) return status === SINGULAR && position ? singularStart(equations, position) : null;
+            const found = located(equations, state, failed.t) || locatedFromPoint(motion);
+            if (found || !jumps) return found;
+            const jump = nearest.q.map((x, k) => (x - state.q[k]) / equations.reference[k]);
+            const bodies = involved(equations.model, jump);
+            return { kind: "branch switch", t: state.t, q: Array.from(nearest.q), bodies };
+        }
+
+        /* The event after the last of the times that was reached: a rounding error before it a state is
+           too near to say what it is. */
+        function locatedFromPoint({ equations, failed, q, t }) {
+            const k = failed.index - 1, { n } = equations;
+            if (k < 0) return null;
+            const march = new March(equations), at = equations.evaluate(q.subarray(k * n, (k + 1) * n), t[k]);
+            march.isDense = true;
+            return march.complete(at) === CONVERGED ? located(equations, at, failed.t) : null;
+        }
+
+        return {
+            linear: { factor, solve, singularValues }, norm, largest, crawls, iterate, Problem,
+            solve: motionOver, explain,
+        };
+    })();
+
 
     return {
         NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, COORDINATES, EQUATIONS, PARAMETERS,
-        UNITS, DEFAULTS, GUESS, PATTERN, Phi, Phi_q, nu, gamma,
+        UNITS, DEFAULTS, GUESS, OUTPUTS, BODIES, CORNERS, PATTERN,
+        Phi, Phi_q, nu, gamma, position_at, nu_at, gamma_at,
+        point, rows_of, factor_at, solve_at, solver,
     };
 })();
 

@@ -52,6 +52,11 @@ class Frame:
         return VectorSymbol(f"r_{self.index}_dot"), Symbol(f"phi_{self.index}_dot")
 
     @property
+    def second_rates(self) -> tuple[CoordinateSymbol, ...]:
+        """Their second rates, in the same order."""
+        return VectorSymbol(f"r_{self.index}_ddot"), Symbol(f"phi_{self.index}_ddot")
+
+    @property
     def rotation(self) -> Rotation:
         """The rotation matrix A as a function of the coordinates."""
         return PlaneRotation(self.phi)

@@ -26,7 +26,7 @@ from kincompile.calculus.expressions import (
 )
 from kincompile.compare.reference import Values
 from kincompile.derive.derivation import derive
-from kincompile.model.matrices import SymbolicEnvironment
+from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.quantities import OF_EQUATIONS
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from kincompile.calculus.expressions import (
 from kincompile.derivation.joint_terms import abbreviations
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import evaluate
-from kincompile.model.matrices import SymbolicEnvironment
 from kincompile.model.resolve import Joint
+from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.view.drawing import drawing
 from kincompile.view.geometry import Geometry
 from kincompile.view.marks import GROUND_FRAME, FramePoint

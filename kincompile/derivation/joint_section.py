@@ -44,7 +44,7 @@ from kincompile.derive.partials import partials
 from kincompile.derive.rules import Rule
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import depends_on, evaluate
-from kincompile.model.matrices import SymbolicEnvironment
+from kincompile.model.symbolic import SymbolicEnvironment
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

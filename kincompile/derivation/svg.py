@@ -10,7 +10,7 @@ import numpy as np
 
 from kincompile.derivation.mathml import index_text, letter_text
 from kincompile.derivation.notation import BODY_FIXED, split_name
-from kincompile.view.polylines import FILL
+from kincompile.view.shapes import FILL
 
 if TYPE_CHECKING:
     from kincompile.view.picture import Picture, PictureLabel, PicturePath

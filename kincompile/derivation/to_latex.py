@@ -11,7 +11,7 @@ from kincompile.derivation.document import CrossReference, Verbatim
 from kincompile.derivation.renderer import Renderer
 from kincompile.derivation.tex import TexPrinter, escape
 from kincompile.targets.templates import fill
-from kincompile.view.polylines import FILL
+from kincompile.view.shapes import FILL
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

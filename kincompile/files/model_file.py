@@ -37,9 +37,9 @@ from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.model.equation import Equation
-from kincompile.model.expressions import alpha, as_sympy, t
+from kincompile.model.expressions import alpha, t
 from kincompile.model.mechanism import Mechanism
-from kincompile.model.outputs import Output, outputs_of_points
+from kincompile.model.outputs import Output
 from kincompile.model.points import BodyPoint
 from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed, rate, shown, suggestion
@@ -252,7 +252,7 @@ class _ModelReader(FieldReader):
         if not name or not self._is_free(name, address, "point") or not complete:
             return None
         point = BodyPoint(name, GROUND if body == GROUND.name else Body(body), tuple(local))
-        self._names |= {item.name: as_sympy(item.expression) for item in outputs_of_points([point])}
+        self._names |= dict(zip(point.output_names, (point.x, point.y), strict=True))
         return point
 
     def _output(self, address: Address, row: Row) -> Output | None:

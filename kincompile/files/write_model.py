@@ -14,6 +14,7 @@ from kincompile.model.arguments import Kind
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.expressions import as_expression, as_sympy, deg, t
 from kincompile.model.laws import TableLaw
+from kincompile.model.outputs import ResolvedOutput
 from kincompile.model.resolve import Joint
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
@@ -78,10 +79,15 @@ def _body(item: Body) -> dict[str, Any]:
 
 def _outputs(system: ConstraintSystem) -> list[dict[str, Any]]:
     """Return the outputs but those of points, whose coordinates have names in the others."""
-    count = 2 * len(system.body_points)
-    named = {item.written.expression: sympy.Symbol(item.name) for item in system.outputs[:count]}
+    named = {
+        coordinate: sympy.Symbol(name)
+        for item in system.body_points
+        for name, coordinate in zip(item.output_names, (item.x, item.y), strict=True)
+    }
     rows = []
-    for item in system.outputs[count:]:
+    for item in system.observers:
+        if not isinstance(item, ResolvedOutput):
+            continue
         expression = as_sympy(item.written.expression).xreplace(named)
         row = {"name": item.name, "expression": value(expression)}
         rows.append({**row, "unit": item.unit} if item.unit else row)

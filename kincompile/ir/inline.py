@@ -31,15 +31,12 @@ class ConstraintRows:
 
     Attributes
     ----------
-    text
-        The constraint in words, kept because printing its arguments takes its time.
     entries
         Entries by quantity, row by row; of a matrix those that are not identically zero. The last
         constraint has those to which several contribute.
     """
 
     instance: Instance
-    text: str
     entries: Mapping[str, tuple[Entry, ...]]
 
 
@@ -102,18 +99,18 @@ def inline(program: Program) -> InlineProgram:
             for item, node in inputs.items()
             if isinstance(item, Function)
         ]
-        named += [(new[hint.node], _vector_name(hint, instance)) for hint in kernel.hints]
         named += [
-            (new[node], rate(instance.name, order))
+            (new[node], rate(instance.rows[row].name, order))
             for order, quantity in enumerate(TOGETHER["observe"])
-            for _, _, node in kernel.outputs.get(quantity, ())
+            for row, _, node in kernel.outputs.get(quantity, ())
         ]
+        named += [(new[hint.node], _vector_name(hint, instance)) for hint in kernel.hints]
         for node, name in named:
             # A call is named by its function and argument.
             if graph.nodes[node][0] not in ("neg", "const", "input", "call"):
                 hints.setdefault(node, name)
         entries = _entries(program, instance, new, graph, shared)
-        sections.append(ConstraintRows(instance, instance.constraint.text, entries))
+        sections.append(ConstraintRows(instance, entries))
     if shared:  # a sum is complete where the last constraint has contributed
         sums = _sums(program, graph, shared)
         sections[-1] = replace(sections[-1], entries={**sections[-1].entries, **sums})

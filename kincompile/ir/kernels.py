@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import (
@@ -18,9 +18,10 @@ from kincompile.calculus.expressions import (
     VectorSum,
     VectorSymbol,
 )
-from kincompile.calculus.symbols import s_i, s_j, v_i, v_j
+from kincompile.calculus.symbols import Frame, s_i, s_j, v_i, v_j
 from kincompile.calculus.template import Template
-from kincompile.derive.derivation import derive
+from kincompile.derive.derivation import derive, units
+from kincompile.derive.rules import along
 from kincompile.ir.differentiate import negated_tangents, tangents
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph, pruned, reachable
@@ -34,6 +35,8 @@ from kincompile.ir.program import (
     Kernel,
     StateEntry,
 )
+from kincompile.model.points import POINT, PointCoordinate
+from kincompile.model.points import rate as rate_of
 from kincompile.names import rate
 from kincompile.quantities import TOGETHER
 
@@ -41,15 +44,20 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from fractions import Fraction
 
+    import sympy
+
     from kincompile.calculus.expressions import (
         Components,
+        Expression,
         ProfileFunction,
         Rotation,
         TimeFunction,
         Value,
     )
-    from kincompile.calculus.symbols import CoordinateSymbol, Frame
+    from kincompile.calculus.symbols import CoordinateSymbol
+    from kincompile.ir.graph import Node
     from kincompile.model.bodies import BodyKind
+    from kincompile.model.expressions import Scalar
     from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.resolve import FreeEquation
 
@@ -149,9 +157,9 @@ def frame_entries(template: Template, frame: Frame) -> tuple[FrameEntry, ...]:
 
 def motion_of(template: Template, owner: int, order: int) -> tuple[StateEntry, ...]:
     """Return the coordinates of an owner, or their rates, as inputs."""
-    item, ending = template.owners[owner], "_dot" * order
+    item = template.owners[owner]
     return tuple(
-        StateEntry(owner, k, order, f"{letter}_{item.index}{ending}")
+        StateEntry(owner, k, order, rate(f"{letter}_{item.index}", order))
         for k, letter in enumerate(item.letters)
     )
 
@@ -160,7 +168,8 @@ def _motion(template: Template) -> dict[CoordinateSymbol, tuple[StateEntry, ...]
     """Return the inputs of each coordinate and rate of a template."""
     found = {}
     for owner, item in enumerate(template.owners):
-        for order, symbols in enumerate((item.coordinates, item.rates)):
+        second_rates = item.second_rates if isinstance(item, Frame) else ()
+        for order, symbols in enumerate((item.coordinates, item.rates, second_rates)):
             own = iter(motion_of(template, owner, order))
             for symbol in symbols:
                 found[symbol] = tuple(next(own) for _ in range(symbol.size))
@@ -268,27 +277,156 @@ def equation_kernel(equation: FreeEquation) -> Kernel:
     return differentiated(graph, [convert(item) for item in equation.expressions], equation.columns)
 
 
-def output_kernel(output: ResolvedOutput) -> Kernel:
+@cache
+def point_kernel() -> Kernel:
+    r"""Return the kernel of a point: r + A s, its derivatives along the motion, and by q.
+
+    They are :math:`\dot r + B s \dot\phi` and
+    :math:`\ddot r + B s \ddot\phi - A s \dot\phi^2`.
+    """
+    environment = KernelEnvironment(POINT)
+    expansion = Expansion(environment)
+    (frame,), (found,) = POINT.frames, POINT.Phi
+    outputs = {}
+    motion: dict[Expression, Expression] = dict(zip(frame.coordinates, frame.rates, strict=True))
+    motion |= zip(frame.rates, frame.second_rates, strict=True)
+    by_column = [along(found, {item: x}) for item in frame.coordinates for x in units(item)]
+    for name in TOGETHER["observe"]:
+        outputs[name] = [
+            (row, 0, item.node) for row, item in enumerate(expansion.components(found))
+        ]
+        found = along(found, motion)
+    outputs["outputs_q"] = [
+        (row, column, item.node)
+        for column, vector in enumerate(by_column)
+        for row, item in enumerate(expansion.components(vector))
+        if environment.graph.value_of(item.node) != 0
+    ]
+    return Kernel(
+        POINT.type_name,
+        tuple(environment.inputs),
+        tuple(environment.graph.nodes),
+        {name: tuple(sorted(entries)) for name, entries in outputs.items()},
+        _hints(POINT, expansion),
+    )
+
+
+class _OutputConverter(Converter):
+    """Writes an output into a graph: points by their kernel, rates by differentiation.
+
+    Coordinates, parameters and the places of points are numbered in the order in which they occur,
+    so that outputs of equal structure are the same code.
+
+    Attributes
+    ----------
+    given
+        What each input stands for: a name, or the value of an attribute.
+    motion
+        The rate of each node that moves, as far as it is known without the rules.
+    by_column
+        The derivatives of such nodes by each coordinate.
+    """
+
+    def __init__(self, graph: Graph, columns: Sequence[str]) -> None:
+        super().__init__(graph, self._named)
+        self.given: dict[Input | str, Scalar | str] = {"t": "t"}
+        self.motion = {graph.input("t"): graph.const(1)}
+        self.by_column: dict[str, dict[int, int]] = {}
+        for k, name in enumerate(columns):
+            entries = [StateEntry(0, k, order, rate(f"q_{k}", order)) for order in range(3)]
+            self.given |= {item: rate(name, item.order) for item in entries}
+            orders = [graph.input(item) for item in entries]
+            self.motion |= dict(pairwise(orders))
+            self.by_column[name] = {orders[0]: graph.const(1)}
+        self._inputs: dict[Scalar | str, Input | str] = {
+            name: item for item, name in self.given.items()
+        }
+
+    def _named(self, value: Scalar | str) -> int:
+        """Return the node of the name of what moves, or of an attribute."""
+        if value not in self._inputs:
+            k = len(self.given)
+            item = self._inputs[value] = Attribute("c", k, f"c_{k}")
+            self.given[item] = value
+        return self._graph.input(self._inputs[value])
+
+    def _function(self, value: sympy.Basic) -> int:
+        if isinstance(value, PointCoordinate):
+            return self._point(value)
+        if isinstance(value, rate_of):
+            return tangents(self._graph, [self.convert(value.args[0])], self.motion)[0]
+        return super()._function(value)
+
+    def _point(self, value: PointCoordinate) -> int:
+        """Return the node of a point's coordinate; its derivatives are those of the kernel."""
+        graph, kernel, row = self._graph, point_kernel(), value.row
+        origin, angle = (str(item) for item in value.args[:2])
+        if origin not in self.by_column or angle not in self.by_column:
+            return self.convert(value.written_out())
+        names = {row: origin, 2: angle}
+        inputs: dict[Input | str, int] = {}
+        for item in kernel.inputs:
+            match item:
+                case StateEntry(_, component, order):
+                    own = names.get(component)
+                    inputs[item] = self._named(rate(own, order)) if own else graph.const(0)
+                case FrameEntry(_, entry):
+                    inputs[item] = graph.call(("cos", "sin")[entry], self._named(angle))
+                case Attribute(_, place):
+                    inputs[item] = self._named(cast("sympy.Expr", value.args[2 + place]))
+        new = graph.instantiate(kernel.nodes, inputs)
+        orders = [new[kernel.outputs[name][row][2]] for name in TOGETHER["observe"]]
+        self.motion |= dict(pairwise(orders))
+        for entry, column, node in kernel.outputs["outputs_q"]:
+            if entry == row:
+                self.by_column[names[column]][orders[0]] = new[node]
+        return orders[0]
+
+
+def output_kernel(output: ResolvedOutput) -> tuple[Kernel, Mapping[Input | str, Scalar | str]]:
+    """Return the kernel of an output, and the name or value that each of its inputs stands for."""
+    graph = Graph()
+    converter = _OutputConverter(graph, output.columns)
+    y = converter.convert(output.value)
+    by_column = (tuple(own.items()) for own in converter.by_column.values())
+    motion = tuple(converter.motion.items())
+    # 0.5 and 1/2 are equal, and printed differently.
+    kinds = tuple(type(node[1]) for node in graph.nodes if node[0] == "const")
+    kernel = _observing(tuple(graph.nodes), y, motion, tuple(by_column), kinds)
+    return kernel, converter.given
+
+
+Direction = tuple[tuple[int, int], ...]
+
+
+@lru_cache(maxsize=1024)
+def _observing(
+    nodes: tuple[Node, ...],
+    y: int,
+    motion: Direction,
+    by_column: tuple[Direction, ...],
+    kinds: tuple[type, ...],
+) -> Kernel:
     r"""Return the kernel of an output y, with :math:`\dot y`, :math:`\ddot y` and :math:`y_q`.
 
-    A derivative that would need a third derivative of q is not a number.
+    A derivative that would need a third derivative of q is not a number. What is kept depends on
+    the kinds of the numbers too.
     """
-    graph = Graph()
-    names = output.columns
-    motion = {graph.input("t"): graph.const(1)}
-    for name in names:
-        orders = [graph.input(rate(name, order)) for order in range(3)]
-        motion |= dict(pairwise(orders))
-    last = {graph.input(rate(name, 2)) for name in names}
-    y = Converter(graph, graph.input).convert(output.expression)
+    del kinds
+    graph = Graph(nodes)
+    last = {
+        graph.input(node[1])
+        for node in nodes
+        if node[0] == "input" and isinstance(node[1], StateEntry) and node[1].order == 2
+    }
     found = [y]
     for _ in range(2):
         is_known = last.union([graph.nan()]).isdisjoint(reachable(graph.nodes, found[-1:]))
-        found += tangents(graph, found[-1:], motion) if is_known else [graph.nan()]
-    by_column = [tangents(graph, [y], {graph.input(name): graph.const(1)})[0] for name in names]
+        found += tangents(graph, found[-1:], dict(motion)) if is_known else [graph.nan()]
     outputs = {name: [(0, 0, node)] for name, node in zip(TOGETHER["observe"], found, strict=True)}
+    slopes = [tangents(graph, [y], dict(direction))[0] for direction in by_column]
     outputs["outputs_q"] = [
-        (0, column, node) for column, node in enumerate(by_column) if graph.value_of(node) != 0
+        (0, column, node) for column, node in enumerate(slopes) if graph.value_of(node) != 0
     ]
     return _pruned_kernel("Output", graph, outputs)
 

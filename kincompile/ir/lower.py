@@ -21,10 +21,12 @@ from kincompile.ir.kernels import (
     frame_kernel,
     motion_of,
     output_kernel,
+    point_kernel,
 )
 from kincompile.ir.program import Attribute, BodyFrame, Function, Input, Instance, Kernel, Program
 from kincompile.model.expressions import alpha, t
 from kincompile.model.laws import TableLaw
+from kincompile.model.outputs import ResolvedOutput
 from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.spline import PeriodicSpline, SplineTable
 from kincompile.names import rate
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
     from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
     from kincompile.model.expressions import Scalar
-    from kincompile.model.outputs import ResolvedOutput
+    from kincompile.model.points import PlacedPoint
     from kincompile.model.system import ConstraintSystem
 
 
@@ -56,22 +58,18 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
             raise ModelError(_too_deep(constraint)) from None
         own = tuple(None if name is None else columns[name] for name in names)
         instances.append(Instance(kernel, constraint, first_row, own, bindings))
-    tables = _tables((*system.constraints, *system.outputs))
+    tables = _tables((*system.constraints, *system.observers))
     bodies = tuple(
         binder.frame_of(body, own)
         for body, own in zip(system.bodies, system.body_columns, strict=True)
     )
-    observers = tuple(
-        Instance(
-            kernel := output_kernel(item),
-            item,
-            len(system.equations),
-            tuple(columns[name] for name in item.columns),
-            tuple(graph.input(name) for name in kernel.inputs),
-            row,
-        )
-        for row, item in enumerate(system.outputs)
-    )
+    observers: list[Instance] = []
+    row = 0
+    for item in system.observers:
+        kernel, bindings = binder.observed(item)
+        own = tuple(None if name is None else columns[name] for name in item.columns)
+        observers.append(Instance(kernel, item, len(system.equations), own, bindings, row))
+        row += len(item.rows)
     return Program(
         system.name,
         system.coordinates,
@@ -84,7 +82,7 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
         _fingerprint(system, graph, [*instances, *observers], tables),
         system.end,
         system.points,
-        observers=observers,
+        observers=tuple(observers),
     )
 
 
@@ -133,14 +131,19 @@ def _too_deep(constraint: Joint | FreeEquation) -> str:
     )
 
 
-def _tables(items: Iterable[Joint | FreeEquation | ResolvedOutput]) -> dict[str, SplineTable]:
+def _tables(
+    items: Iterable[Joint | FreeEquation | ResolvedOutput | PlacedPoint],
+) -> dict[str, SplineTable]:
     """Return the splines of profiles, and of motions over time, by name in order of occurrence."""
     values: list[Scalar] = []
     for item in items:
-        if isinstance(item, Joint):
-            values += (*item.profiles.values(), *item.scalars.values())
-        else:
-            values += item.expressions if isinstance(item, FreeEquation) else [item.expression]
+        match item:
+            case Joint():
+                values += (*item.profiles.values(), *item.scalars.values())
+            case FreeEquation():
+                values += item.expressions
+            case ResolvedOutput():
+                values.append(item.value)
     found: dict[str, SplineTable] = {}
     for value in values:
         if isinstance(value, sympy.Expr):
@@ -171,6 +174,23 @@ class _Binder:
             return shared.kernel, shared.columns, self.bind_equation(shared)
         kernel = equation_kernel(constraint)
         return kernel, constraint.columns, tuple(self._graph.input(name) for name in kernel.inputs)
+
+    def observed(self, item: PlacedPoint | ResolvedOutput) -> tuple[Kernel, tuple[int, ...]]:
+        """Return the kernel of a point or an output, and the nodes of its inputs."""
+        if isinstance(item, ResolvedOutput):
+            kernel, given = output_kernel(item)
+            return kernel, tuple(self._named(given[entry]) for entry in kernel.inputs)
+        kernel, template, (body,) = point_kernel(), item.template, item.bodies
+        first: list[Input] = [*motion_of(template, 0, 0), *motion_of(template, 0, 1)]
+        first += frame_entries(template, template.frames[0])
+        known: dict[Input | str, int] = dict(zip(first, self._body(body), strict=True))
+        for entry in motion_of(template, 0, 2):
+            name = item.columns[entry.component]
+            known[entry] = self._graph.input(rate(name, 2)) if name else self._graph.const(0)
+        for symbol, point in item.points.items():
+            own = map(self._value, point)
+            known |= dict(zip(attributes(symbol, len(point)), own, strict=True))
+        return kernel, tuple(known[entry] for entry in kernel.inputs)
 
     def bind(self, joint: Joint, kernel: Kernel) -> tuple[int, ...]:
         """Return the node of each of the kernel's inputs."""
@@ -205,8 +225,8 @@ class _Binder:
         }
         return self._graph.instantiate(nodes, inputs)[-1]
 
-    def _named(self, value: str | sympy.Number) -> int:
-        """Return the node of a symbol by name, or of a number."""
+    def _named(self, value: str | Scalar) -> int:
+        """Return the node of a symbol by name, or of a number or expression."""
         return self._graph.input(value) if isinstance(value, str) else self._convert(value)
 
     def _known(self, joint: Joint) -> list[int]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
+from kincompile.model.points import Observed
 from kincompile.quantities import quantities_of
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from kincompile.ir.graph import Node
     from kincompile.model.bodies import Coordinate, Parameter
     from kincompile.model.outputs import ResolvedOutput
+    from kincompile.model.points import OutputColumn, PlacedPoint
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.spline import SplineTable
     from kincompile.quantities import Columns, Quantity, Rows
@@ -174,7 +176,7 @@ class Instance:
     """
 
     kernel: Kernel
-    constraint: Joint | FreeEquation | ResolvedOutput
+    constraint: Joint | FreeEquation | ResolvedOutput | PlacedPoint
     first_row: int
     columns: tuple[int | None, ...]
     bindings: tuple[int, ...]
@@ -198,6 +200,11 @@ class Instance:
         """Names of body i and body j, as far as the type has them."""
         return tuple(body.name for body in self.constraint.bodies)
 
+    @property
+    def rows(self) -> tuple[OutputColumn, ...]:
+        """The outputs that it gives."""
+        return self.constraint.rows if isinstance(self.constraint, Observed) else ()
+
 
 @dataclass(frozen=True, slots=True)
 class Program:
@@ -219,7 +226,7 @@ class Program:
     unsolvable
         Why the equations cannot determine the coordinates; "" where they can.
     observers
-        The outputs, an instance each.
+        The outputs, an instance each; those of a point are one.
     end, points
         The mechanism's own time grid, for a target that solves too.
     """
@@ -240,9 +247,9 @@ class Program:
     observers: tuple[Instance, ...] = ()
 
     @property
-    def outputs(self) -> tuple[ResolvedOutput, ...]:
+    def outputs(self) -> tuple[OutputColumn, ...]:
         """The outputs."""
-        return tuple(cast("ResolvedOutput", item.constraint) for item in self.observers)
+        return tuple(row for item in self.observers for row in item.rows)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -258,7 +265,9 @@ class Program:
         """Return the names of what the rows or columns of a quantity belong to."""
         return tuple(item if isinstance(item, str) else item.name for item in self._owners(kind))
 
-    def _owners(self, kind: Rows | Columns) -> tuple[str | Coordinate | Instance | Parameter, ...]:
+    def _owners(
+        self, kind: Rows | Columns
+    ) -> tuple[str | Coordinate | OutputColumn | Parameter, ...]:
         """Return what the rows or columns of a quantity belong to."""
         match kind:
             case "equations":
@@ -266,7 +275,7 @@ class Program:
             case "coordinates":
                 return self.coordinates
             case "outputs":
-                return self.observers
+                return self.outputs
             case "parameters":
                 return self.parameters
         return ()

@@ -171,10 +171,13 @@ def symbol_names(value: Scalar) -> set[str]:
 _ELEMENTARY = "write it with elementary functions"
 
 
-def smoothness_problem(value: Scalar, *, corners: bool = False) -> str | None:
+def smoothness_problem(
+    value: Scalar, *, corners: bool = False, known: tuple[type[sympy.Function], ...] = ()
+) -> str | None:
     """Return a message about a function that cannot be differentiated or emitted, or None.
 
-    With `corners` the slope may jump from one time to the next.
+    With `corners` the slope may jump from one time to the next; `known` are functions that are
+    allowed beside those of `SMOOTH`.
     """
     if not isinstance(value, sympy.Expr):
         return None
@@ -196,7 +199,7 @@ def smoothness_problem(value: Scalar, *, corners: bool = False) -> str | None:
             )
         if isinstance(node, AppliedUndef):
             return f"the function {node} is not defined; give it as an expression"
-        if isinstance(node, sympy.Function) and not isinstance(node, (*SMOOTH, MotionLaw)):
+        if isinstance(node, sympy.Function) and not isinstance(node, (*SMOOTH, MotionLaw, *known)):
             return f"the function {node.func.__name__} is not supported; {_ELEMENTARY}"
         if not isinstance(node, _KNOWN):
             return f"{type(node).__name__} in {value} is not supported; {_ELEMENTARY}"

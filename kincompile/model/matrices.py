@@ -13,24 +13,13 @@ from kincompile.derive.equations import derive_equation
 from kincompile.errors import ModelError
 from kincompile.html import picture_html
 from kincompile.model.display import constraints_html, equations_latex, problems_html
-from kincompile.model.expressions import alpha, as_sympy, t
 from kincompile.model.resolve import FreeEquation, Joint
+from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from fractions import Fraction
 
-    from kincompile.calculus.expressions import (
-        Components,
-        ProfileFunction,
-        Rotation,
-        Symbol,
-        TimeFunction,
-        Value,
-        VectorSymbol,
-    )
-    from kincompile.calculus.symbols import CoordinateSymbol
     from kincompile.model.bodies import Coordinate
 
 
@@ -153,57 +142,3 @@ def _joint_rows(joint: Joint) -> list[EquationRow]:
             known = {name: entry for name, entry in by_name if name is not None}
             rows.append(EquationRow(Phi, known, nu, gamma))
     return rows
-
-
-class SymbolicEnvironment:
-    """The leaves of a template as SymPy expressions of a joint's own names."""
-
-    def __init__(self, joint: Joint) -> None:
-        self._joint = joint
-        self._motion: dict[CoordinateSymbol, tuple[sympy.Expr, ...]] = {}
-        names = iter(joint.columns)
-        for item, item_rate in zip(joint.template.coordinates, joint.template.rates, strict=True):
-            own = [next(names) for _ in range(item.size)]
-            self._motion[item] = tuple(_symbol(name) for name in own)
-            self._motion[item_rate] = tuple(_symbol(name and rate(name)) for name in own)
-
-    def number(self, value: Fraction) -> Value:
-        """Return an exact number."""
-        return sympy.Rational(value.numerator, value.denominator)
-
-    def pi(self) -> Value:
-        """Return pi."""
-        return sympy.pi
-
-    def symbol(self, symbol: Symbol) -> Value:
-        """Return a coordinate, a rate or a scalar attribute."""
-        if symbol in self._motion:
-            return self._motion[symbol][0]
-        return as_sympy(self._joint.scalars[symbol.name])
-
-    def vector(self, symbol: VectorSymbol) -> Components:
-        """Return a position, a velocity or a body-fixed point."""
-        if symbol in self._motion:
-            return self._motion[symbol]
-        return tuple(as_sympy(value) for value in self._joint.points[symbol.name])
-
-    def time_function(self, function: TimeFunction) -> Value:
-        """Return C(t) or one of its derivatives."""
-        return as_sympy(self._joint.scalars[function.name]).diff(t, function.order)
-
-    def profile(self, profile: ProfileFunction) -> Value:
-        """Return rho(alpha) or one of its derivatives at the contact parameter."""
-        rho = self._joint.profiles[profile.name].diff(alpha, profile.order)
-        return rho.subs(alpha, self.symbol(profile.argument))
-
-    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
-        """Return the numbers that all vectors share that a rotation turns."""
-        return expand.entries(rotation)
-
-    def call(self, function: str, value: Value) -> Value:
-        """Return an elementary function."""
-        return getattr(sympy, function)(value)
-
-
-def _symbol(name: str | None) -> sympy.Expr:
-    return sympy.S.Zero if name is None else sympy.Symbol(name)

@@ -8,7 +8,6 @@ are often wanted; `rate` stands for the time derivative of an expression, in any
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias, cast
 
@@ -16,20 +15,21 @@ import sympy
 
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Body
-from kincompile.model.expressions import (
-    NotAnExpressionError,
-    as_expression,
-    as_sympy,
-    symbol_names,
-    t,
+from kincompile.model.expressions import as_sympy, symbol_names, t
+from kincompile.model.points import (
+    BodyPoint,
+    Observed,
+    OutputColumn,
+    PlacedPoint,
+    rate,
+    written_out,
 )
-from kincompile.model.points import BodyPoint, rate
 from kincompile.model.resolve import body_named, checked_expression, checked_point, named_tables
 from kincompile.names import rate as rate_name
 from kincompile.names import unit_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint, Scope
@@ -45,15 +45,15 @@ class Output:
 
 
 @dataclass(frozen=True, slots=True)
-class ResolvedOutput:
+class ResolvedOutput(Observed):
     """An output that is known to be good.
 
     Attributes
     ----------
     name, unit
         As in the columns of a solution.
-    expression
-        In plain symbols of coordinates, rates, parameters and t; every `rate` is written out.
+    value
+        In plain symbols of coordinates, rates, parameters and t, with `rate` and points in it.
     columns
         The coordinates on which it depends, or on whose rates.
     written
@@ -61,10 +61,28 @@ class ResolvedOutput:
     """
 
     name: str
-    expression: sympy.Expr
+    value: sympy.Expr
     unit: str
     columns: tuple[str, ...]
     written: Output
+
+    @property
+    def expressions(self) -> tuple[sympy.Expr, ...]:
+        """The value with every `rate` and every point written out."""
+        motion = {rate_name(name, k): (name, k) for name in self.columns for k in range(2)}
+
+        def along_motion(found: sympy.Expr) -> sympy.Expr:
+            inner = cast("sympy.Expr", found.args[0])
+            terms = [inner.diff(t)]
+            for name in sorted(symbol_names(inner) & motion.keys()):
+                coordinate, order = motion[name]
+                following = sympy.Symbol(rate_name(coordinate, order + 1))
+                terms.append(inner.diff(sympy.Symbol(name)) * following)
+            return sympy.Add(*terms)
+
+        plain = written_out(self.value)
+        found = plain.replace(lambda x: isinstance(x, rate), along_motion, simultaneous=False)
+        return (cast("sympy.Expr", found),)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -72,24 +90,9 @@ class ResolvedOutput:
         return ()
 
     @property
-    def text(self) -> str:
-        """The output in words, for comments."""
-        return str(self.expression)
-
-    @property
-    def source(self) -> str:
-        """Where it comes from."""
-        return "output"
-
-    @property
-    def is_driver(self) -> bool:
-        """An output drives nothing."""
-        return False
-
-    @property
-    def corners(self) -> bool:
-        """An output drives nothing, and so has no corners of its own."""
-        return False
+    def rows(self) -> tuple[OutputColumn, ...]:
+        """The one output that it is."""
+        return (OutputColumn(self.name, self.unit),)
 
 
 Place: TypeAlias = BodyPoint | tuple["Scalar", "Scalar"]
@@ -171,42 +174,38 @@ def point_of(joint: Joint) -> BodyPoint | None:
     return None
 
 
-def outputs_of_points(points: Sequence[BodyPoint]) -> tuple[Output, ...]:
-    """Return the outputs that points are: x and y of each."""
-    return tuple(
-        Output(f"{letter}_{item.name}", getattr(item, letter), None)
-        for item in points
-        for letter in ("x", "y")
+def resolved_observers(
+    points: Iterable[BodyPoint], outputs: Iterable[Output], scope: Scope, length_unit: str
+) -> tuple[PlacedPoint | ResolvedOutput, ...]:
+    """Return the valid points, then the valid outputs, resolved."""
+    found = (
+        *(resolved_point(item, scope, length_unit) for item in points),
+        *(_resolved(item, scope, length_unit) for item in outputs),
     )
-
-
-def resolve_point(point: BodyPoint, scope: Scope) -> None:
-    """Check that a point lies on a body of the mechanism, at a place fixed in it."""
-    where = f"point {point.name!r}"
-    body_named(point.body, where, scope)
-    checked_point(point.local, Kind.POINT, where, scope)
-
-
-def resolved_outputs(
-    given: Iterable[Output], scope: Scope, length_unit: str
-) -> tuple[ResolvedOutput, ...]:
-    """Return the valid outputs, resolved."""
-    found = (_resolved(item, scope, length_unit) for item in given)
     return tuple(item for item in found if item is not None)
 
 
+def resolved_point(point: BodyPoint, scope: Scope, length_unit: str) -> PlacedPoint | None:
+    """Check that a point lies on a body of the mechanism, at a place fixed in it."""
+    where, before = f"point {point.name!r}", len(scope.problems)
+    body = body_named(point.body, where, scope)
+    local = checked_point(point.local, Kind.POINT, where, scope)
+    if body is None or len(scope.problems) > before:
+        return None
+    rows = tuple(OutputColumn(name, length_unit) for name in point.output_names)
+    return PlacedPoint(point.name, scope.columns[body.name], local, (body,), rows)
+
+
 def _resolved(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput | None:
-    """Check an output against the names that exist; write out every `rate` in it."""
+    """Check an output against the names that exist."""
     where, before = f"output {output.name!r}", len(scope.problems)
     unit = length_unit if output.unit is None else output.unit
     scope.problems += filter(None, [unit_problem(unit, where)])
-    given = output.expression
-    with suppress(NotAnExpressionError):  # the check below says what is wrong
-        given = as_expression(given)
-    if isinstance(given, sympy.Expr) and given.has(rate):
-        given = _written_out(given, where, scope)
     declared = scope.declared | scope.motion.keys()
-    value = checked_expression(given, where, declared, scope, unit=unit)
+    given = output.expression
+    value = checked_expression(given, where, declared, scope, unit=unit, is_output=True)
+    if isinstance(value, sympy.Expr):
+        _rates(value, where, scope)
     if value is None or len(scope.problems) > before:
         return None
     occurring = {scope.motion[name][0] for name in symbol_names(value) if name in scope.motion}
@@ -215,21 +214,14 @@ def _resolved(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput 
     return ResolvedOutput(output.name, value, unit, columns, output)
 
 
-def _written_out(given: sympy.Expr, where: str, scope: Scope) -> sympy.Expr:
-    """Return an expression in which every `rate` is a time derivative along the motion."""
-
-    def along_motion(found: sympy.Expr) -> sympy.Expr:
-        inner = cast("sympy.Expr", found.args[0])
-        terms = [inner.diff(t)]
-        for name in sorted(symbol_names(inner) & scope.motion.keys()):
-            coordinate, order = scope.motion[name]
-            if order == 2:
-                problem = f"{where}: {found} would be a third derivative; rates go to the second"
-                scope.problems.append(problem)
-                return sympy.S.Zero
-            following = sympy.Symbol(rate_name(coordinate, order + 1))
-            terms.append(inner.diff(sympy.Symbol(name)) * following)
-        return sympy.Add(*terms)
-
-    found = given.replace(lambda part: isinstance(part, rate), along_motion, simultaneous=False)
-    return cast("sympy.Expr", found)
+def _rates(value: sympy.Basic, where: str, scope: Scope) -> int:
+    """Return the highest order of rates in an expression, -1 where nothing in it moves."""
+    if isinstance(value, sympy.Symbol):
+        return scope.motion.get(value.name, ("", -1))[1]
+    order = max((_rates(part, where, scope) for part in value.args), default=-1)
+    if isinstance(value, rate):
+        if order == 2:
+            problem = f"{where}: {value} would be a third derivative; rates go to the second"
+            scope.problems.append(problem)
+        return min(order + 1, 2) if order >= 0 else -1
+    return order

@@ -32,6 +32,8 @@ from kincompile.model.expressions import (
     unknown_problem,
 )
 from kincompile.model.laws import MotionLaw, TableLaw
+from kincompile.model.points import PointCoordinate, written_out
+from kincompile.model.points import rate as rate_of
 from kincompile.model.spline import PeriodicSpline, fit
 from kincompile.names import listed, rate, suggestion
 
@@ -295,8 +297,13 @@ def checked_expression(
     *,
     unit: str = "",
     corners: bool = False,
+    is_output: bool = False,
 ) -> Scalar | None:
-    """Return a checked expression, with radians for degrees; None where a problem was noted."""
+    """Return a checked expression, with radians for degrees; None where a problem was noted.
+
+    In an output there may be rates, and points stay what they are; elsewhere points are written
+    out.
+    """
     try:
         value = as_expression(given)
     except NotAnExpressionError as error:
@@ -304,7 +311,9 @@ def checked_expression(
         return None
     if not isinstance(value, sympy.Expr):
         return value
-    problem = smoothness_problem(value, corners=corners)
+    known = (PointCoordinate, rate_of) if is_output else ()
+    value = value if is_output else written_out(value)
+    problem = smoothness_problem(value, corners=corners, known=known)
     # Rare, so that large mechanisms pay for one look alone.
     if problem is None and (laws := value.atoms(Degree, MotionLaw)):
         problem = degrees_problem(value, unit) or _falling_problem(laws, scope)

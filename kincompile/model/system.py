@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from itertools import chain
 from typing import Any
 
 import sympy
@@ -24,12 +25,10 @@ from kincompile.model.matrices import MatrixViews
 from kincompile.model.outputs import (
     Output,
     ResolvedOutput,
-    outputs_of_points,
     point_of,
-    resolve_point,
-    resolved_outputs,
+    resolved_observers,
 )
-from kincompile.model.points import BodyPoint
+from kincompile.model.points import BodyPoint, PlacedPoint
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
 from kincompile.model.text_views import TextViews
 from kincompile.names import listed, name_problem, rate, unit_problem
@@ -73,8 +72,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         The last time, at the default parameters; `end_given` is it as it was given.
     body_points : tuple of BodyPoint
         The named points.
-    outputs : tuple of ResolvedOutput
-        The coordinates x and y of each point, then the other outputs, in order.
+    observers : tuple of PlacedPoint or ResolvedOutput
+        The points, whose coordinates are outputs, then the other outputs, in order.
 
     Raises
     ------
@@ -84,7 +83,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
-        "length_unit", "name", "outputs", "parameters", "points",
+        "length_unit", "name", "observers", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -94,7 +93,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     constraints: tuple[Joint | FreeEquation, ...]
     equations: tuple[str, ...]
     body_points: tuple[BodyPoint, ...]
-    outputs: tuple[ResolvedOutput, ...]
+    observers: tuple[PlacedPoint | ResolvedOutput, ...]
     length_unit: str
     end: float
     end_given: Scalar
@@ -128,13 +127,12 @@ class ConstraintSystem(MatrixViews, TextViews):
         last: Any = _number(end, "end", defaults, problems) if isinstance(end, sympy.Expr) else end
         wanted = _items(outputs, "outputs", problems)
         body_points = tuple(item for item in wanted if isinstance(item, BodyPoint))
-        named = (*outputs_of_points(body_points), *(x for x in wanted if isinstance(x, Output)))
+        asked = [item for item in wanted if isinstance(item, Output)]
+        named = [*chain(*(item.output_names for item in body_points)), *(x.name for x in asked)]
         _check_names(name, bodies, found, declared, written, named, problems)
         scope = _scope(bodies, found, declared, problems)
         constraints = _resolved(written, scope)
-        for point in body_points:
-            resolve_point(point, scope)
-        found_outputs = resolved_outputs(named, scope, length_unit)
+        observers = resolved_observers(body_points, asked, scope, length_unit)
         if not written:
             problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
         if not found and not bodies:
@@ -145,7 +143,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
-            "outputs": found_outputs, "length_unit": length_unit, "end": last, "end_given": end,
+            "observers": observers, "length_unit": length_unit, "end": last, "end_given": end,
             "points": points,
         }  # fmt: skip
         _fill(self, values)
@@ -160,10 +158,10 @@ class ConstraintSystem(MatrixViews, TextViews):
     def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
         """Return the same system with these points as its outputs, and no others."""
         scope = _scope(self.bodies, self.coordinates, self.parameters, [])
-        outputs = resolved_outputs(outputs_of_points(points), scope, self.length_unit)
+        observers = resolved_observers(points, (), scope, self.length_unit)
         values = {key: getattr(self, key) for key in self.__slots__}
         other = ConstraintSystem.__new__(ConstraintSystem)
-        _fill(other, {**values, "body_points": tuple(points), "outputs": outputs})
+        _fill(other, {**values, "body_points": tuple(points), "observers": observers})
         return other
 
     def joint_points(self) -> tuple[BodyPoint, ...]:
@@ -175,6 +173,15 @@ class ConstraintSystem(MatrixViews, TextViews):
         joints = (item for item in self.constraints if isinstance(item, Joint))
         found = (point_of(item) for item in joints if item.name not in taken)
         return tuple(item for item in found if item is not None)
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """The outputs in plain symbols, points first, with every rate written out."""
+        return tuple(
+            Output(row.name, expression, row.unit)
+            for item in self.observers
+            for row, expression in zip(item.rows, item.expressions, strict=True)
+        )
 
     @property
     def row_offsets(self) -> tuple[int, ...]:
@@ -419,7 +426,7 @@ def _check_names(
     coordinates: list[Coordinate],
     parameters: tuple[Parameter, ...],
     constraints: list[Constraint | Equation],
-    outputs: Sequence[Output],
+    outputs: Sequence[str],
     problems: list[str],
 ) -> None:
     """Check that names and units are well formed, and that each name means one thing."""
@@ -428,7 +435,7 @@ def _check_names(
     named += [("a parameter", item.name) for item in parameters]
     named += [("a coordinate", item.name) for item in coordinates]
     named += [("a constraint", item.name) for item in constraints]
-    named += [("an output", item.name) for item in outputs]
+    named += [("an output", name) for name in outputs]
     problems += [problem for what, text in named if (problem := name_problem(text, what))]
     if not all(isinstance(text, str) for _, text in named):
         raise ModelError(problems)  # further checks need names
@@ -446,9 +453,9 @@ def _check_names(
     if len({body.name for body in bodies}) == len(bodies):
         symbols += [item.name for item in coordinates]
         known = dict.fromkeys(item.name for item in coordinates)
-        known |= dict.fromkeys(item.name for item in outputs)
+        known |= dict.fromkeys(outputs)
         symbols += [rate(name, order) for name in known for order in (1, 2)]
-    symbols += [item.name for item in outputs]
+    symbols += outputs
     kinds = "coordinates, outputs, rates" if outputs else "coordinates, rates"
     _check_unique(f"{kinds} and parameters", symbols, problems)
 

@@ -13,6 +13,7 @@ from kincompile.runtime.engine.engine import Point
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.march import March, Outcome, State, distance
+from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
 from kincompile.runtime.singular.events import branch_switch, locate, singular_start
@@ -38,7 +39,7 @@ class Motion:
     Attributes
     ----------
     q, q_dot, q_ddot : ndarray, shape (N, n)
-        The motion; NaN where nothing was found.
+        The motion; NaN where nothing was found, and unknown after the last point reached.
     status, residual, iterations : ndarray, shape (N,)
         What became of each point.
     statistics : dict
@@ -71,9 +72,9 @@ class Motion:
         """Make the arrays for a time grid, with nothing reached."""
         points = inputs.t.size
         if inputs.code.stages:
-            q, q_dot, q_ddot = np.full((3, points, inputs.guess.size), np.nan)
+            q, q_dot, q_ddot = empty((3, points, inputs.guess.size))
         else:  # each coordinate contiguous in memory, as the code of a grid wants it
-            q, q_dot, q_ddot = np.full((3, inputs.guess.size, points), np.nan).transpose(0, 2, 1)
+            q, q_dot, q_ddot = empty((3, inputs.guess.size, points)).transpose(0, 2, 1)
         return cls(
             q,
             q_dot,

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,12 +49,12 @@ LARGEST_DISPLACEMENT = 1e-3
 CORRECTIONS_ON_GRID = 2
 """Newton corrections of every point."""
 
-TARGET_ERROR = 0.0006
+TARGET_ERROR = 0.001
 """Error of the coarse march's prediction aimed at, in radians or sizes of the mechanism. It falls
 with the third power of the step, the interpolation's with the sixth: this one leaves the points of
-the grid about 1e-6 from their place."""
+the grid about 3e-6 from their place."""
 
-LARGEST_ERROR = 0.0015
+LARGEST_ERROR = 0.0025
 """Error of the prediction above which a coarse step is not trusted."""
 
 LAST_COARSE_CORRECTION = 1e-7
@@ -179,7 +179,8 @@ def _coarse_step(
             break
     else:
         return None
-    q_dot, q_ddot = engine.velocity_and_acceleration(replace(point, q=q))
+    point.q = q
+    q_dot, q_ddot = engine.velocity_and_acceleration(point)
     determinants = point.factors[1]
     if not math.isfinite(sum(q_ddot)):
         return None

@@ -220,13 +220,8 @@ def read_inputs(
     on_grid = method == "grid" or (
         method is None and values[0].size >= SMALLEST_GRID and code.lanes is not None
     )
-    # Where none is given it is zero.
-    without = [
-        body
-        for body, first, size in code.bodies
-        if guess is None and not code.guess[first : first + size].any()
-    ]
-    return Inputs(code, *values, method, on_grid, through == "smooth", sets, sweep, tuple(without))
+    without = () if guess is not None else code.without_guess()
+    return Inputs(code, *values, method, on_grid, through == "smooth", sets, sweep, without)
 
 
 def _require_module(module: object) -> None:

@@ -20,10 +20,18 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kincompile.criteria import (
+    BEND,
+    LARGEST_ANGLE,
     MAX_CORRECTIONS,
     MAX_ITERATIONS,
+    MOST_TURNED,
+    NUDGE,
     RESIDUAL_FACTOR,
+    RESTARTS,
     ROUNDING,
+    SAME_POSITION,
+    SHORTEST_STEP,
+    SUFFICIENT,
     TOLERANCE,
     TOO_NEAR,
 )
@@ -45,30 +53,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.inputs import Inputs, Values
 
     Vector: TypeAlias = NDArray[np.float64]
-
-LARGEST_ANGLE = 0.5
-"""Longest safeguarded step of an angle, rad: sine and cosine are still nearly linear over it."""
-
-BEND = 0.01
-"""Weight of the gradient in a safeguarded step, for a residual as large as its terms. Of 174 starts
-of random four-bars and six-bars that plain Newton fails from, 0.01 rescues 155, 0.1 133, 0.001 149,
-and Newton's own direction 100."""
-
-NUDGE, RESTARTS = 0.3, 4
-"""How far the first restart is from the guess, in radians and sizes of the mechanism, and how many
-there are, each as much further away."""
-
-SAME = 1e-6
-"""Distance, in radians and sizes of the mechanism, up to which two positions are the same."""
-
-MOST_TURNED = 300
-"""Angles up to which each is turned back alone where they do not turn back together."""
-
-SUFFICIENT = 1e-4
-"""Armijo's constant: the part of the decrease promised by the linear model that must come true."""
-
-SHORTEST_STEP = 2.0**-20
-"""A step shortened to this part without a decrease is at a minimum of the residual."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -284,7 +268,7 @@ def unwound(equations: Problem, t: float, point: Point, guess: Vector, tolerance
         if not np.array_equal(q, point.q):
             turned = iterate(equations, t, q, tolerance, MAX_CORRECTIONS)
             is_same = turned.status is Status.CONVERGED
-            if is_same and distance(turned.last.q, q, equations.reference) <= SAME:
+            if is_same and distance(turned.last.q, q, equations.reference) <= SAME_POSITION:
                 point = turned.last
     return point
 

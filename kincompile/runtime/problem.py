@@ -125,8 +125,8 @@ class Problem:
 
     def is_folded(self, guess: Point, found: Point) -> bool:
         """Say whether a guess shows no branch: beside a position, a determinant is zero there."""
-        here, there = (self.engine.determinants(point, point).tolist() for point in (guess, found))
-        return any(abs(one) <= FOLDED * abs(two) for one, two in zip(here, there, strict=True))
+        here, there = (self.engine.determinants(point, point) for point in (guess, found))
+        return bool((np.abs(here) <= FOLDED * np.abs(there)).any())
 
     def has_converged(
         self, before: Point, point: Point, tolerance: float, corrections: list[float]

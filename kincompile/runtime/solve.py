@@ -6,7 +6,7 @@ inputs    checked, in the solver's form            inputs.read_inputs
        solve all points together                   grid.solve_grid
        point by point what cannot be trusted       march.March
        find what ends the motion, or go through it events.locate
-  -> say how it went                               here
+  -> say how it went                               verdict.solution_of
 
 What all of them stand on is one position with its scales: problem.Problem.
 """
@@ -19,59 +19,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, MAX_SUBSTEPS, TOLERANCE
-from kincompile.errors import (
-    AssemblyWarning,
-    BranchSwitchWarning,
-    InputError,
-    SingularConfigurationWarning,
-    SolveError,
-)
-from kincompile.names import listed
+from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
+from kincompile.errors import AssemblyWarning, InputError, SolveError
 from kincompile.runtime.corners import after_corners, corners_of, with_corners
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.problem import problem
-from kincompile.runtime.results.solution import Solution
-from kincompile.runtime.singular.assemblies import assembly_guess, unchosen
-from kincompile.runtime.singular.reach import impossible, missed
-from kincompile.runtime.status import Status
+from kincompile.runtime.singular.assemblies import assembly_guess
 from kincompile.runtime.variants import solve_in_turn, solve_variants
+from kincompile.runtime.verdict import finite, solution_of, start_of, start_of_first
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
     from types import ModuleType
 
     from numpy.typing import ArrayLike
 
-    from kincompile.runtime.engine.code import Array, Code
-    from kincompile.runtime.engine.engine import Point
-    from kincompile.runtime.follow import Motion, Progress
+    from kincompile.runtime.follow import Progress
     from kincompile.runtime.inputs import Inputs, Values
-    from kincompile.runtime.march import Outcome
-    from kincompile.runtime.problem import Problem
-    from kincompile.runtime.singular.events import Event
-
-NAMED_EQUATIONS = 3
-"""How many equations a message names."""
-
-NAMED_BODIES = 6
-"""Of how many bodies a message gives the position."""
-
-LOCATED = 1e-6
-"""How exactly an event is located in time."""
-
-CANNOT_BE = "No position was found: the mechanism cannot be assembled"
-
-NOT_ASSEMBLED = (
-    f"{CANNOT_BE} at this time (change lengths, or "
-    "what the drivers demand), or the guess is too far away (give one nearer to the assembled "
-    "mechanism; kc.assemblies(module) looks for positions)."
-)
-"""What a first point that does not converge means, and what to do: there is no motion yet."""
-
-MET = 1e-9
-"""Residual, relative to the largest, up to which an equation counts as met."""
+    from kincompile.runtime.results.solution import Solution
 
 
 def solve(
@@ -164,13 +128,13 @@ def solve(
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
         if inputs.sets is None:
             motion, outcome = follow(inputs, progress)
-            start = _start(inputs, motion)
-            solution = _solution(inputs, motion, outcome)
+            start = start_of(inputs, motion)
+            solution = solution_of(inputs, motion, outcome)
         else:
             solve_all = solve_in_turn if inputs.code.lanes is None else solve_variants
             solution = solve_all(inputs, inputs.sets, progress)
-            start = _start_of_first(inputs, solution)
-    solution = _finite(solution)
+            start = start_of_first(inputs, solution)
+    solution = finite(solution)
     if start:
         warnings.warn(start, AssemblyWarning, stacklevel=2)
         solution = replace(solution, message=f"{start} {solution.message}")
@@ -181,175 +145,8 @@ def solve(
     return solution
 
 
-def _finite(solution: Solution) -> Solution:
-    """Take no point for converged whose numbers are not all finite, whatever has found it."""
-    numbers = solution.q, solution.q_dot, solution.q_ddot
-    is_finite = np.isfinite(sum(values.sum(axis=-1) for values in numbers))
-    wrong = (solution.status == Status.CONVERGED) & ~is_finite
-    if not wrong.any():
-        return solution
-    status = np.where(wrong, Status.NOT_FINITE, solution.status)
-    text = f"{solution.name} failed: {wrong.sum()} points have numbers that are not finite."
-    message = f"{text} {Status.NOT_FINITE.sentence}"
-    return replace(solution, status=status, success=False, message=message)
-
-
 def _at_assembly(inputs: Inputs, guess: Values, number: int) -> Inputs:
     """Return inputs whose guess is one of the assemblies, of variants those of the first."""
     if guess is not None:
         raise InputError("guess and assembly are both given: give one of them.")
     return replace(inputs, guess=assembly_guess(inputs, number), without_guess=())
-
-
-def _start(inputs: Inputs, motion: Motion) -> str:
-    """Say that a start does not choose between ways to assemble the mechanism, if it does not."""
-    may_be_open = motion.is_folded or inputs.without_guess
-    if not may_be_open or motion.status[0] != Status.CONVERGED:
-        return ""
-    return unchosen(inputs, motion.q[0].copy(), motion.is_folded)
-
-
-def _start_of_first(inputs: Inputs, solution: Solution) -> str:
-    """Say of variants what is said of the first."""
-    if solution.status[0, 0] != Status.CONVERGED:
-        return ""
-    q, time = solution.q[0, 0].copy(), float(inputs.t[0])
-    equations = problem(inputs.code.module, inputs.p, inputs.guess, time)
-    guess, found = (equations.at(position, time) for position in (inputs.guess, q))
-    return unchosen(inputs, q, bool(guess and found and equations.is_folded(guess, found)))
-
-
-def _solution(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
-    """Put names, parameters and a verdict to the numbers, and warn of what was passed."""
-    code = inputs.code
-    success = outcome.status is Status.CONVERGED
-    for event in motion.passed:
-        text = f"{code.name} goes through a bifurcation at t = {event.t:.10g}, and on"
-        warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=3)
-    if motion.near and success:
-        warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=3)
-    return Solution(
-        t=inputs.t,
-        q=motion.q,
-        q_dot=motion.q_dot,
-        q_ddot=motion.q_ddot,
-        status=motion.status,
-        residual=motion.residual,
-        iterations=motion.iterations,
-        success=success,
-        message=_verdict(inputs, motion, outcome) + motion.note,
-        name=code.name,
-        coordinates=code.coordinates,
-        equations=code.equations,
-        units=dict(code.units),
-        parameters=dict(zip(code.parameters, inputs.p.tolist(), strict=True)),
-        sweep={},
-        statistics=motion.statistics,
-        events=motion.events,
-        module=code.module,
-    )
-
-
-def _nearly(inputs: Inputs, near: list[int]) -> str:
-    """Say that points of a motion, given by their numbers, are nearly singular."""
-    more = f" and {len(near) - 1} more times" if len(near) > 1 else ""
-    return (
-        f"{inputs.code.name} is nearly singular at t = {inputs.t[near[0]]:.10g}{more}: its rates "
-        "have few good digits there (see .condition). Drive another coordinate near this time, or "
-        "change a length slightly."
-    )
-
-
-def _verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
-    """Say in words how a motion went; the outcome is that of the last point that was tried."""
-    name, times, events = inputs.code.name, inputs.t, motion.events
-    if outcome.status is Status.CONVERGED:
-        points = f"all {times.size} points" if times.size > 1 else "the point"
-        passed = "".join(f" Passed: {event.kind} at t = {event.t:.10g}." for event in events)
-        largest = motion.residual.max()
-        return f"{name}: {points} converged; the largest residual is {largest:.2g}.{passed}"
-    index = int(np.argmax(motion.status != Status.CONVERGED))
-    asked = _asked(inputs, outcome)
-    parts = [
-        f"{name} failed at t = {times[index]:.10g}, point {index + 1} of {times.size}"
-        f" ({outcome.status.name}).",
-        _before(outcome, index),
-        _why(outcome, events, times[index], asked),
-        _there(inputs, outcome),
-    ]
-    return " ".join(part for part in parts if part)
-
-
-def _before(outcome: Outcome, index: int) -> str:
-    """Say how far the motion was followed."""
-    if outcome.state is None:
-        return ""
-    good = f"The {index} points before it are good" if index > 1 else "The point before it is good"
-    reached = f"; the motion was followed to t = {outcome.state.t:.10g}"
-    return f"{good}{'' if outcome.position else reached}."
-
-
-def _asked(inputs: Inputs, outcome: Outcome) -> str:
-    """Say which drivers and distances ask for more than the mechanism can give, and how much."""
-    point = outcome.nearest
-    if point is None or outcome.jumps or outcome.status is not Status.NOT_CONVERGED:
-        return ""
-    return " ".join(impossible(_equations_at(inputs, point), point.q, point.t))
-
-
-def _equations_at(inputs: Inputs, point: Point) -> Problem:
-    return problem(inputs.code.module, inputs.p, point.q, point.t)
-
-
-def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str:
-    """Say why the motion ended, and what to do: by the event between its end and the failed time.
-
-    Without one, what the status may mean is said in general, and the last event on the way.
-    """
-    if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
-        return f"{CANNOT_BE} at this time: {asked}" if asked else NOT_ASSEMBLED
-    if outcome.exhausted:
-        return (
-            f"Between these two times {MAX_SUBSTEPS:,} steps were not enough: ask for more times."
-        )
-    general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
-    if events and outcome.state is not None:
-        event, end = events[-1], outcome.state.t
-        if abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LOCATED:
-            general = event.message
-    return f"{general} {asked}".rstrip()
-
-
-def _there(inputs: Inputs, outcome: Outcome) -> str:
-    """Name the equations that do not hold at the time of failure, or say what else is there."""
-    if outcome.position is not None:
-        return "The position there was found."
-    if outcome.jumps:
-        return "A position exists at that time, but the motion does not lead there continuously."
-    return "" if outcome.nearest is None else _unmet(inputs, outcome.nearest)
-
-
-def _unmet(inputs: Inputs, point: Point) -> str:
-    """Say by how much which equations are missed at the best position, and where its bodies are."""
-    sizes = np.abs(point.Phi)
-    order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
-    rows = [row for row in order.tolist() if sizes[row] > MET * sizes[order[0]]]
-    equations = _equations_at(inputs, point)
-    worst = ", ".join(missed(equations, point, row) for row in rows)
-    places = listed(_places(inputs.code, point.q), most=NAMED_BODIES)
-    return (
-        f"The equations with the largest residuals at the nearest position: {worst}. "
-        f"There: {places}."
-    )
-
-
-def _places(code: Code, q: Array) -> Iterator[str]:
-    """Yield where each body is, and the values of coordinates that belong to none."""
-    values = dict(zip(code.coordinates, q.tolist(), strict=True))
-    firsts = {body: first for body, first, _ in code.bodies}
-    for owner in dict.fromkeys(code.owners().values()):
-        if owner in firsts:
-            x, y, phi = q[firsts[owner] : firsts[owner] + 3]
-            yield f"{owner} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
-        else:
-            yield f"{owner} = {values[owner]:.4g}"

@@ -76,10 +76,10 @@ def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> So
         With arrays q, q_dot, q_ddot of shape (B, N, n) and a status per variant and point.
     """
     count = len(sets)
-    arrays = _Arrays.over(inputs, count)
+    arrays, begin = _Arrays.over(inputs, count), _first_position(inputs, sets[0])
     for first in range(0, count, CHUNK):
         chunk = slice(first, min(first + CHUNK, count))
-        _solve_chunk(inputs, sets[chunk], arrays, chunk)
+        _solve_chunk(inputs, begin, sets[chunk], arrays, chunk)
         if progress:
             progress(chunk.stop, count)
     return _solution(inputs, sets, arrays)
@@ -99,21 +99,34 @@ def solve_in_turn(inputs: Inputs, sets: Array, progress: Progress | None) -> Sol
     return _solution(inputs, sets, arrays)
 
 
-def _solve_chunk(inputs: Inputs, sets: Array, arrays: _Arrays, chunk: slice) -> None:
+def _first_position(inputs: Inputs, p: Array) -> Array:
+    """Return where all start: the first variant's position, or the guess where it has none.
+
+    It was found with care, and others lie beside it.
+    """
+    time = float(inputs.t[0])
+    equations = problem(inputs.code.module, p, inputs.guess, time)
+    march = March(equations, equations.engine, inputs.tolerance)
+    found = start(march, time, replace(inputs, p=p)).state
+    return inputs.guess if found is None else found.point.q
+
+
+def _solve_chunk(inputs: Inputs, begin: Array, sets: Array, arrays: _Arrays, chunk: slice) -> None:
     """Solve some of the variants: compiled, where the module can, and with care those that fail."""
-    march, together = inputs.code.march_variants, _Chunk(inputs, sets, arrays, chunk.start)
+    march, together = inputs.code.march_variants, _Chunk(inputs, begin, sets, arrays, chunk.start)
     if march is None:
         together.run()
         return
     residual = np.empty((inputs.t.size, len(sets)))
     status, iterations = np.empty((2, *residual.shape), dtype=np.intc)
-    march(inputs, *together.scales, sets, arrays.motion[..., chunk], residual, status, iterations)
+    near, motion = replace(inputs, guess=begin), arrays.motion[..., chunk]
+    march(near, *together.scales, sets, motion, residual, status, iterations)
     arrays.residual[:, chunk] = residual
     arrays.status[:, chunk], arrays.iterations[:, chunk] = status, iterations
     failed = np.flatnonzero(status.any(axis=0) | together.strays(arrays.motion[0, 0, :, chunk]))
     if failed.size:
         alone = _Arrays.over(inputs, failed.size)
-        _Chunk(inputs, sets[failed], alone, 0).run()
+        _Chunk(inputs, begin, sets[failed], alone, 0).run()
         arrays.motion[..., chunk.start + failed] = alone.motion
         arrays.status[:, chunk.start + failed] = alone.status
         arrays.residual[:, chunk.start + failed] = alone.residual
@@ -123,8 +136,11 @@ def _solve_chunk(inputs: Inputs, sets: Array, arrays: _Arrays, chunk: slice) -> 
 class _Chunk:
     """Variants that are solved together, and alone for the steps that are out of the ordinary."""
 
-    def __init__(self, inputs: Inputs, sets: Array, arrays: _Arrays, first: int) -> None:
+    def __init__(
+        self, inputs: Inputs, begin: Array, sets: Array, arrays: _Arrays, first: int
+    ) -> None:
         self._inputs, self._sets, self._arrays, self._first = inputs, sets, arrays, first
+        self._begin = begin[:, np.newaxis]
         self._times: list[float] = inputs.t.tolist()
         self._alive = np.ones(len(sets), dtype=bool)
         engine = Planned(inputs.code, np.ascontiguousarray(sets.T))
@@ -133,15 +149,15 @@ class _Chunk:
         self.scales = self._march.scales
 
     def strays(self, q: Array) -> Mask:
-        """Say which variants (n, B) were assembled so far from the guess that safeguards pay."""
-        found: Mask = self._march.equations.is_far(q, self._inputs.guess[:, np.newaxis])
+        """Say which variants (n, B) were assembled so far from the start that safeguards pay."""
+        found: Mask = self._march.equations.is_far(q, self._begin)
         return found
 
     def run(self) -> None:
         """Go through the grid with all variants."""
         inputs, time = self._inputs, self._times[0]
-        guess = np.repeat(inputs.guess[:, np.newaxis], len(self._sets), axis=1)
-        found = self._march.correct_together(guess, time, inputs.max_iterations)
+        begin = np.repeat(self._begin, len(self._sets), axis=1)
+        found = self._march.correct_together(begin, time, inputs.max_iterations)
         state, checks = self._march.complete(found.point)
         good = all_hold(found.good, checks) & ~self.strays(found.point.q)
         good &= state.sensitivity <= TOO_NEAR

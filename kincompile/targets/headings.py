@@ -71,7 +71,7 @@ def short_title(section: ConstraintRows, first: int = 0) -> str:
 
 def title(section: ConstraintRows, first: int = 0) -> str:
     """Return rows, type, name and points of a constraint, for a comment above its rows."""
-    return f"{short_title(section, first)}: {section.text}"
+    return f"{short_title(section, first)}: {section.instance.constraint.text}"
 
 
 def entry_title(quantity: str, entry: Entry, code: InlineProgram) -> str:

@@ -99,6 +99,23 @@ class Statements:
         """Return the statement that computes a value."""
         return self.assigned(self.value.format(name), text)
 
+    def computed(self, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+        """Return the statements that put what varies of quantities into flat arrays.
+
+        Of a matrix these are its entries in the order of the pattern.
+        """
+        lines = []
+        for quantity, rows in listing.results:
+            places = {place: k for k, place in enumerate(code.pattern(quantity))}
+            is_matrix = quantity_named(quantity).is_matrix
+            for section, entries in rows:
+                lines += [f"{self.comment} {title(section, self.first)}"] if entries else []
+                for item in entries:
+                    index = places[item.row, item.column] if is_matrix else item.row
+                    left, text = self.element.format(quantity, index), printer.text(item.node)
+                    lines += self.assigned(left, text, entry_title(quantity, item, code))
+        return lines
+
     def results(self, quantity: str, code: InlineProgram, printer: Printer) -> list[str]:
         """Return the statements that put a quantity's entries into an array of zeros."""
         lines = []

@@ -27,7 +27,9 @@ from kincompile.view.marks import (
     in_ground,
     moves_with,
     reach,
+    shape_of,
 )
+from kincompile.view.shapes import SHAPES, tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -114,9 +116,10 @@ class Drawing:
         """Return the drawing as plain data; each mark has its type, in small letters, as `kind`."""
         data = asdict(self)
         data["marks"] = [
-            {"kind": type(mark).__name__.lower(), **asdict(mark)} for mark in self.marks
+            {"kind": type(mark).__name__.lower(), "shape": shape_of(mark), **asdict(mark)}
+            for mark in self.marks
         ]
-        return data
+        return data | {"overhang": OVERHANG * self.size, **tables()}
 
 
 def drawing(
@@ -227,15 +230,14 @@ def _size(marks: Iterable[Mark], q: Array) -> float:
 
 def _lengthened(mark: Mark, overhang: float) -> Mark:
     """Return a guide with an overhang, so that its block never stands at its end."""
-    if not isinstance(mark, Rail) or mark.style != "guide":
+    if not isinstance(mark, Rail) or mark.style not in ("guide", "slot"):
         return mark
-    start, end = np.array(mark.start), np.array(mark.end)
-    along = overhang * np.array(mark.axis)
-    return replace(mark, start=tuple((start - along).tolist()), end=tuple((end + along).tolist()))
+    low, high = mark.reach
+    return replace(mark, reach=(low - overhang, high + overhang))
 
 
 def _uncovered(marks: Iterable[Mark], outlined: set[PlaneFrame]) -> list[Mark]:
-    """Return the marks without slides and sleeves that other marks already show.
+    """Return the marks without slides, sleeves and slots that other marks already show.
 
     A cylinder takes the place of its slide; two outlined bodies show by themselves how they slide.
     """
@@ -244,20 +246,19 @@ def _uncovered(marks: Iterable[Mark], outlined: set[PlaneFrame]) -> list[Mark]:
     cylinders = {(mark.first, mark.second) for mark in spans if mark.style == "cylinder"}
     covered = {
         mark.joint
-        for mark in spans
-        if (mark.style == "slide" and (mark.first, mark.second) in cylinders)
-        or {mark.first.frame, mark.second.frame} <= outlined
-    }
+        for mark in found
+        if (isinstance(mark, Span) and mark.style == "slide"
+            and (mark.first, mark.second) in cylinders)
+        or (isinstance(mark, Span) and moves_with(mark) <= outlined)
+        or (isinstance(mark, Rail) and {mark.frame, mark.follower.frame} <= outlined)
+    }  # fmt: skip
     return [
-        mark for mark in found if not (isinstance(mark, Span | Slider) and mark.joint in covered)
+        mark
+        for mark in found
+        if not (isinstance(mark, Span | Slider | Rail) and mark.joint in covered)
     ]
-
-
-_DEPTHS = (
-    "rail", "wheel", "contour", "polygon", "hull", "span", "slider", "pin", "drive", "dot",
-)  # fmt: skip
 
 
 def _depth(mark: Mark) -> int:
     """Return the position of a mark in the order from back to front."""
-    return _DEPTHS.index(type(mark).__name__.lower())
+    return list(SHAPES).index(shape_of(mark))

@@ -13,7 +13,7 @@ from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND
 from kincompile.model.expressions import alpha, as_expression, depends_on, evaluate
 from kincompile.model.joints import Revolute
-from kincompile.view.marks import GROUND_FRAME, Contour, FramePoint, Pin, Rail, Span, Wheel
+from kincompile.view.marks import GROUND_FRAME, Contour, FramePoint, Pin, Rail, Slider, Span, Wheel
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 PROFILE_POINTS = 180
 """Points of a cam profile: its chords are within 1.5e-4 of its radius."""
+
+BARREL = 0.85
+"""Part of a cylinder's shortest length that its barrel has."""
 
 PITCH_LINE = ("s_P", "s_Q")
 """Symbols of the points between which a rack is drawn."""
@@ -166,8 +169,15 @@ class JointGeometry:
         return Pin(self.name, first, second)
 
     def span(self, first: str, second: str, style: str) -> Span:
-        """Return the line between two points."""
-        return Span(self.name, self.point(first), self.point(second), style)
+        """Return the line between two points; a barrel is as long as it can be in the motion."""
+        start, end = self.point(first), self.point(second)
+        apart = np.hypot(*(end.at(self.mechanism.q) - start.at(self.mechanism.q)).T)
+        barrel = BARREL * float(apart.min()) if style == "cylinder" else 0.0
+        return Span(self.name, start, end, style, barrel)
+
+    def slider(self, place: FramePoint, axis: Point, guide: PlaneFrame | None = None) -> Slider:
+        """Return a block, along an axis of its own frame or of its guide's."""
+        return Slider(self.name, place, axis, place.frame if guide is None else guide)
 
     def wheel(self, centre: str, radius: str, theta: str) -> Wheel:
         """Return a gear; a negative radius is an internal one."""
@@ -191,7 +201,7 @@ class JointGeometry:
         axis: Point,
         follower: FramePoint,
         *,
-        style: str = "guide",
+        style: str = "",
         offset: float = 0.0,
         at_least: tuple[float, ...] = (),
     ) -> Rail:
@@ -204,7 +214,7 @@ class JointGeometry:
         follower
             What slides or rolls on it.
         style
-            As for `Rail`.
+            As for `Rail`; without, a guide on the ground, and a slot of a body.
         offset
             Distance of the rail from the line, to its left.
         at_least
@@ -212,9 +222,10 @@ class JointGeometry:
         """
         along = _along(self.mechanism.q, base, axis, follower)
         ends = [float(along.min()), float(along.max()), *at_least]
-        x, y = base.point[0] - offset * axis[1], base.point[1] + offset * axis[0]
-        start, end = ((x + s * axis[0], y + s * axis[1]) for s in (min(ends), max(ends)))
-        return Rail(self.name, base.frame, start, end, axis, style)
+        start = (base.point[0] - offset * axis[1], base.point[1] + offset * axis[0])
+        frame, reach = base.frame, (min(ends), max(ends))
+        style = style or ("guide" if frame == GROUND_FRAME else "slot")
+        return Rail(self.name, frame, start, axis, style, follower, at_least, reach)
 
 
 def _is_on_ground(joint: Joint) -> bool:

@@ -29,7 +29,6 @@ from kincompile.view.marks import (
     Mark,
     Pin,
     Point,
-    Slider,
     Span,
 )
 
@@ -46,28 +45,28 @@ def _revolute(joint: JointGeometry) -> list[Mark]:
 
 
 def _translational(joint: JointGeometry) -> list[Mark]:
-    """Draw a block on a rail of the ground; between moving bodies a sleeve and its slide.
+    """Draw a block on a rail of the ground, or in the slot of a lever.
 
-    The sleeve is on body i, unless body j is the block of a crank that works in a slotted lever.
+    Between other moving bodies there is a sleeve, on body i, with its slide.
     """
     i, j = joint.point("s_i"), joint.point("s_j")
     v_i, v_j = joint.unit("v_i"), joint.unit("v_j")
-    if i.frame == GROUND_FRAME:
-        return [joint.rail(i, v_i, j), Slider(joint.name, j, v_j)]
-    if j.frame == GROUND_FRAME:
-        return [joint.rail(j, v_j, i), Slider(joint.name, i, v_i)]
-    if j.frame in joint.mechanism.blocks:
-        i, j, v_i = j, i, v_j
-    return [Span(joint.name, i, j, "slide"), Slider(joint.name, i, v_i)]
+    blocks = joint.mechanism.blocks
+    if j.frame == GROUND_FRAME or (i.frame in blocks and i.frame != GROUND_FRAME):
+        i, j, v_i, v_j = j, i, v_j, v_i
+    if i.frame == GROUND_FRAME or j.frame in blocks:
+        return [joint.rail(i, v_i, j), joint.slider(j, v_j)]
+    return [Span(joint.name, i, j, "slide"), joint.slider(i, v_i)]
 
 
 def _revolute_translational(joint: JointGeometry) -> list[Mark]:
     """Draw a pin in a straight slot; a driven distance is measured from the axis."""
     i, j = joint.point("s_i"), joint.point("s_j")
-    distance = joint.constant("C")
-    track = joint.rail(i, joint.unit("v_i"), j, offset=distance or 0.0)
-    measure = [Span(joint.name, i, j, "dimension")] if distance is None else []
-    return [track, *measure, Pin(joint.name, j, j)]
+    axis, distance = joint.unit("v_i"), joint.constant("C")
+    track, pin = joint.rail(i, axis, j, offset=distance or 0.0), Pin(joint.name, j, j)
+    if distance is None:
+        return [track, Span(joint.name, i, j, "dimension"), pin]
+    return [track, joint.slider(j, axis, i.frame), pin]
 
 
 def _translational_distance(joint: JointGeometry) -> list[Mark]:
@@ -102,7 +101,8 @@ def _absolute(axis: Point, across: Point) -> DrawJoint:
         if value is None:
             return [Drive(joint.name, place, axis)]
         base = FramePoint(GROUND_FRAME, (value * axis[0], value * axis[1]))
-        return [joint.rail(base, across, place), Pin(joint.name, place, place)]
+        block = joint.slider(place, across, GROUND_FRAME)
+        return [joint.rail(base, across, place), block, Pin(joint.name, place, place)]
 
     return drawing
 

@@ -102,41 +102,72 @@ class Pin:
 
 @dataclass(frozen=True, slots=True)
 class Rail:
-    """A straight piece of a frame, from start to end along an axis of unit length.
+    """A straight piece of a frame on which something slides or rolls.
 
-    Something slides or rolls on it: `style` is "guide" (a track), "rack" (the pitch line of a rack)
-    or "face" (of a follower).
+    Attributes
+    ----------
+    joint
+        The constraint.
+    frame, base, axis
+        A point of its line and the direction, of length one, in a frame.
+    style
+        "guide" (a track of the ground, in which a block slides), "slot" (of a body), "rack" (the
+        pitch line of a rack) or "face" (of a follower).
+    follower
+        What slides or rolls on it.
+    at_least
+        Distances along the axis that it covers in any case.
+    reach
+        Distances along the axis between which it is drawn.
     """
 
     joint: str
     frame: PlaneFrame
-    start: Point
-    end: Point
+    base: Point
     axis: Point
     style: str
+    follower: FramePoint
+    at_least: tuple[float, ...]
+    reach: tuple[float, float]
+
+    @property
+    def start(self) -> Point:
+        """Its first end."""
+        return self._at(self.reach[0])
+
+    @property
+    def end(self) -> Point:
+        """Its other end."""
+        return self._at(self.reach[1])
+
+    def _at(self, distance: float) -> Point:
+        return self.base[0] + distance * self.axis[0], self.base[1] + distance * self.axis[1]
 
 
 @dataclass(frozen=True, slots=True)
 class Slider:
-    """A slider: a block at a point, along an axis of unit length in the same frame."""
+    """A slider: a block at a point, along an axis of unit length in the frame of its guide."""
 
     joint: str
     place: FramePoint
     axis: Point
+    guide: PlaneFrame
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
     """A line between points of two frames.
 
-    `style` is "rod" (a constant length), "cylinder" (a driven length), "slide" (one body telescopes
-    in the other) or "dimension" (a measure without a body of its own).
+    `style` is "rod" (a constant length), "cylinder" (a driven length, whose barrel has a length of
+    its own), "slide" (one body telescopes in the other) or "dimension" (a measure without a body
+    of its own).
     """
 
     joint: str
     first: FramePoint
     second: FramePoint
     style: str
+    barrel: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +209,24 @@ class Dot:
 
 
 Mark: TypeAlias = Hull | Polygon | Pin | Rail | Slider | Span | Wheel | Contour | Drive | Dot
+
+
+def shape_of(mark: Mark) -> str:
+    """Return what a mark looks like: a name in `SHAPES`."""
+    match mark:
+        case Pin():
+            return "stand" if mark.first.frame == GROUND_FRAME else "pin"
+        case Rail():
+            return "track" if mark.style == "guide" else mark.style
+        case Span():
+            return mark.style
+        case Wheel():
+            return "ring" if mark.is_internal else "wheel"
+        case Contour():
+            return "curved slot" if mark.style == "slot" else mark.style
+        case Drive():
+            return "turn" if mark.axis is None else "push"
+    return type(mark).__name__.lower()
 
 
 def moves_with(mark: Mark) -> set[PlaneFrame]:

@@ -12,7 +12,8 @@ from kincompile.names import listed, suggestion
 from kincompile.runtime.results.columns import titled
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME
-from kincompile.view.polylines import FILL, GROUND_COLOUR, LOOKS, polylines
+from kincompile.view.polylines import polylines
+from kincompile.view.shapes import FILL, GROUND_COLOUR
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -191,15 +192,15 @@ def move(artists: list[tuple[Polyline, Any]], q: NDArray[np.float64]) -> None:
 
 def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
     """Return the artist of a polyline."""
-    look, points = LOOKS[polyline.look], polyline.at(q)
+    look, points = polyline.look, polyline.at(q)
     is_ground = polyline.frame == GROUND_FRAME
     colour = look.colour or (GROUND_COLOUR if is_ground else f"C{polyline.frame.index % 10}")
     style: dict[str, Any] = {"linewidth": look.width, "zorder": 2 + order * 1e-3}
     if polyline.is_area:
-        face = look.face or (colour, FILL)
+        face = look.area or (colour, FILL)
         (area,) = ax.fill(*points.T, edgecolor=colour, facecolor=face, **style)
         return area
-    style |= {"linestyle": look.dash or "-", "alpha": look.opacity, "solid_capstyle": "round"}
+    style |= {"linestyle": look.dash or "-", "solid_capstyle": "round"}
     (line,) = ax.plot(*points.T, color=colour, **style)
     return line
 

@@ -16,7 +16,7 @@ from kincompile.model.mechanism import system_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
-from kincompile.view.newton_panel import newton_method, newton_script
+from kincompile.view.live import solver_script
 from kincompile.view.page_data import as_json, page_data
 from kincompile.writing import write_atomically
 
@@ -35,9 +35,9 @@ STYLES = ("vendor/uplot.css", "style.css", "newton.css")
 
 SCRIPTS = (
     "vendor/uplot.js", "player.js", "draw.js", "stage.js", "plots.js", "tables.js",
-    "newton_tables.js", "newton_stage.js", "newton_panel.js", "start.js",
+    "newton.js", "newton_tables.js", "newton_stage.js", "newton_panel.js", "start.js",
 )  # fmt: skip
-"""Scripts, in order: each uses those before it, and the method of Newton's panel."""
+"""Scripts, in order: each uses those before it, and the emitted module."""
 
 FRAME_HEIGHT = "720px"
 """Height of a page inside a notebook."""
@@ -127,7 +127,6 @@ def page(
         several variants.
     """
     system = system_of(model)
-    module = None
     if solution is None:
         module = compile_model(system)
         times = np.linspace(0, system.end, system.points) if t is None else t
@@ -141,8 +140,7 @@ def page(
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "licence": read("view/vendor/uplot.LICENSE.txt"),
         "scripts": [
-            newton_script(system, module),
-            newton_method(),
+            solver_script(system),
             *(read(f"view/{name}") for name in SCRIPTS),
         ],
         "data": as_json(shown),

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.view.marks import GROUND_FRAME, moves_with
-from kincompile.view.polylines import GROUND_COLOUR, LOOKS, Polyline, of_mark
+from kincompile.view.polylines import Polyline, of_mark
+from kincompile.view.shapes import GROUND_COLOUR
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -192,18 +193,17 @@ def colour_of(frame: PlaneFrame) -> str:
 
 def _paths(polyline: Polyline, q: Array, scale: _Scale, opacity: float) -> Iterable[PicturePath]:
     """Yield a polyline in pieces, which NaN separates."""
-    look, points = LOOKS[polyline.look], scale.at(polyline.at(q))
+    look, points = polyline.look, scale.at(polyline.at(q))
     colour = look.colour or colour_of(polyline.frame)
     if polyline.is_area:
-        fill = look.face or colour
-        yield PicturePath(points, colour, fill, look.width, opacity, is_pale=not look.face)
+        fill = look.area or colour
+        yield PicturePath(points, colour, fill, look.width, opacity, is_pale=not look.area)
         return
     gaps = np.flatnonzero(np.isnan(points).any(axis=1))
     for piece in np.split(points, gaps):
         kept = piece[~np.isnan(piece).any(axis=1)]
         if len(kept) > 1:
-            strength = opacity * look.opacity
-            yield PicturePath(kept, colour, "", look.width, strength, dash=look.dash)
+            yield PicturePath(kept, colour, "", look.width, opacity, dash=look.dash)
 
 
 def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, PicturePath]:

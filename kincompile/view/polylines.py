@@ -1,8 +1,4 @@
-"""The marks of a drawing as lines and areas that move with q, for matplotlib and for figures.
-
-A polyline is a chain of points that moves with a frame, is carried by a point without turning, or
-is stretched between two points. Colours and line widths are in `LOOKS`.
-"""
+"""The marks of a drawing as lines and areas that move with q, for matplotlib and for figures."""
 
 from __future__ import annotations
 
@@ -11,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.errors import InternalError
 from kincompile.view.marks import (
-    GROUND_FRAME,
     Contour,
     Dot,
     Drive,
-    FramePoint,
     Hull,
     Mark,
     Pin,
@@ -27,124 +22,69 @@ from kincompile.view.marks import (
     Span,
     Wheel,
     in_ground,
+    shape_of,
 )
+from kincompile.view.shapes import LOOKS, SHAPES, Look, Stroke
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from numpy.typing import ArrayLike
+    from collections.abc import Iterable
 
     from kincompile.view.drawing import Drawing
     from kincompile.view.marks import Array
-GROUND_COLOUR, DRIVER_COLOUR = "#595959", "#1a1a1a"
-"""Colours of the ground and of drivers."""
 
-FILL = 0.22
-"""Opacity of the areas of bodies."""
+CIRCLE = np.stack([f(np.radians(np.arange(0, 360, 2))) for f in (np.cos, np.sin)], axis=-1)
+"""A circle of radius one, every two degrees."""
 
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """What a line or an area is drawn like.
-
-    Attributes
-    ----------
-    width
-        Of the line [points].
-    colour, face
-        Of the line, and of the area; that of the body without, areas pale.
-    opacity
-        Of a line.
-    dash
-        "--", ":" or "" for an unbroken line.
-    """
-
-    width: float
-    colour: str = ""
-    face: str = ""
-    opacity: float = 1.0
-    dash: str = ""
-
-
-LOOKS: Mapping[str, Look] = {
-    "bar": Look(5, opacity=0.75),
-    "body": Look(2),
-    "wheel": Look(1.5),
-    "rim": Look(1.5),
-    "tick": Look(1.5),
-    "rack": Look(1.5),
-    "groove": Look(1.2),
-    "block": Look(1.5),
-    "rod": Look(3, "#4d4d4d"),
-    "piston": Look(2.5, "#4d4d4d"),
-    "barrel": Look(1.5, "#4d4d4d", "#cccccc"),
-    "slide": Look(3, opacity=0.5),
-    "dimension": Look(1, "#666666", dash="--"),
-    "pin": Look(1.2, "#1a1a1a", "#ffffff"),
-    "dot": Look(1, "#1a1a1a", "#1a1a1a"),
-    "stand": Look(1.2, GROUND_COLOUR, "#ebebeb"),
-    "ground": Look(1),
-    "arrow": Look(1.3, DRIVER_COLOUR),
-    "head": Look(0, DRIVER_COLOUR, DRIVER_COLOUR),
-    "gap": Look(2, "#ff0000", dash=":"),
-}
-"""Look of each kind of polyline."""
-
-DOT = 0.3
-"""Radius of a named point, in sizes of the drawing."""
-
-PIN, BLOCK_LENGTH, BLOCK_HEIGHT, HATCH, TURN = 0.45, 1.6, 0.9, 0.8, 1.9
-"""Radius of a pin, half sides of a slider, length of a hatch line, radius of a turning arrow, in
-sizes of the drawing."""
-
-BARREL = 0.6
-"""Part of a cylinder's length, or of a telescope's, that is the outer body."""
-
-UPRIGHT = 1e-9
-"""Horizontal component up to which the axis of a rail is upright."""
-
-CIRCLE = np.stack([f(np.radians(np.arange(0, 360, 5))) for f in (np.cos, np.sin)], axis=-1)
-"""A circle of radius one, every five degrees."""
+ARC = np.radians(15)
+"""Largest angle between the points of a small arc."""
 
 
 @dataclass(frozen=True, slots=True)
 class Polyline:
-    """A line or an area.
+    """A stroke of a mark, in a drawing with marks of a size."""
 
-    Attributes
-    ----------
-    look
-        What it is drawn like, a key of `LOOKS`.
-    frame
-        The frame whose colour it has.
-    points : ndarray, shape (k, 2)
-        In the frame; with `start`, offsets from that point in the axes of the ground; with `end`
-        too, the fraction of the way between both, and the distance to its left. NaN interrupts a
-        line.
-    start, end
-        The points that carry it, if the frame does not.
-    is_area
-        Whether it is closed and filled.
-    """
+    stroke: Stroke
+    mark: Mark
+    size: float
 
-    look: str
-    frame: PlaneFrame
-    points: Array
-    start: FramePoint | None = None
-    end: FramePoint | None = None
-    is_area: bool = False
+    @property
+    def look(self) -> Look:
+        """What it is drawn like."""
+        return LOOKS[self.stroke.look]
+
+    @property
+    def is_area(self) -> bool:
+        """Whether it is closed and filled."""
+        return self.stroke.is_area
+
+    @property
+    def frame(self) -> PlaneFrame:
+        """The frame whose colour it has."""
+        return owner(self.mark, self.stroke.on)
 
     def at(self, q: Array) -> Array:
-        """Return where its points are, shape (k, 2), at a position q of shape (n,)."""
-        if self.start is None:
-            return in_ground(q, self.frame, self.points)
-        start = self.start.at(q)
-        if self.end is None:
-            return start + self.points
-        way = self.end.at(q) - start
-        left = _left_of(way) / (float(np.hypot(*way)) or 1.0)
-        fraction, distance = self.points[:, :1], self.points[:, 1:]
-        return start + fraction * way + distance * left
+        """Return where its points are, shape (k, 2), at a position q of shape (n,).
+
+        NaN interrupts a line.
+        """
+        if not self.stroke.corners:
+            curve = _curve(self.mark, q, self.stroke.grow * self.size)
+            return curve if self.is_area else np.concatenate((curve, curve[:1]))
+        start, along, length = _axes(self.mark, self.stroke.on, q)
+        part, ahead, left = self._corners(length).T[..., None]
+        ahead, left = ahead * self.size, left * self.size
+        if self.stroke.on == "circle":
+            return _around(ahead, left, start, along, length, self.stroke.every * self.size)
+        return np.asarray(start + (part * length + ahead) * along + left * _left_of(along))
+
+    def _corners(self, length: float) -> Array:
+        """Return the corners, repeated along a line; each a part, and sizes ahead and left."""
+        corners = np.array([corner or (np.nan,) * 3 for corner in self.stroke.corners])
+        every = self.stroke.every
+        if not every or self.stroke.on == "circle":
+            return corners
+        feet = np.arange(every / 2, max(length / self.size, every), every)
+        return np.concatenate([corners + np.array((0, foot, 0)) for foot in feet])
 
 
 def polylines(drawn: Drawing) -> list[Polyline]:
@@ -154,32 +94,17 @@ def polylines(drawn: Drawing) -> list[Polyline]:
 
 def of_mark(mark: Mark, size: float) -> Iterable[Polyline]:
     """Return the lines and areas of a mark, in a drawing with marks of a size."""
+    return [Polyline(stroke, mark, size) for stroke in SHAPES[shape_of(mark)]]
+
+
+def owner(mark: Mark, on: str) -> PlaneFrame:
+    """Return the frame whose colour a stroke of a mark has."""
     match mark:
-        case Hull():
-            return _link(mark, size)
-        case Polygon():
-            return [Polyline("body", mark.frame, _array(mark.points), is_area=True)]
-        case Pin():
-            return _pin(mark, size)
-        case Rail():
-            return _rail(mark, size)
-        case Slider():
-            return [_block(mark, size)]
-        case Span():
-            return _span(mark, size)
-        case Wheel():
-            return _wheel(mark, size)
-        case Contour():
-            return _profile(mark)
-        case Drive():
-            return _drive(mark, size)
-        case Dot():
-            frame, place = mark.place.frame, mark.place
-            return [Polyline("dot", frame, DOT * size * CIRCLE, place, is_area=True)]
-
-
-def _array(points: ArrayLike) -> Array:
-    return np.array(points, dtype=np.float64)
+        case Pin() | Span():
+            return mark.first.frame if on in ("first", "barrel") else mark.second.frame
+        case Slider() | Wheel() | Drive() | Dot():
+            return mark.place.frame
+    return mark.frame
 
 
 def _left_of(direction: Array) -> Array:
@@ -187,129 +112,86 @@ def _left_of(direction: Array) -> Array:
     return np.array((-direction[1], direction[0]))
 
 
-def _link(mark: Hull, size: float) -> list[Polyline]:
-    """Draw a bar between two points, an area between more, a disc at one."""
-    points = _array(mark.points)
+def _axes(mark: Mark, on: str, q: Array) -> tuple[Array, Array, float]:
+    """Return origin, direction of length one, and length, of the line that a stroke is drawn on."""
+    match mark:
+        case Rail():
+            return _between(*(in_ground(q, mark.frame, end) for end in (mark.start, mark.end)))
+        case Span() if on == "barrel":
+            start, along, length = _between(mark.first.at(q), mark.second.at(q))
+            return start, along, min(mark.barrel, length)
+        case Span():
+            return _between(mark.first.at(q), mark.second.at(q))
+        case Pin() if on == "line":
+            return _between(mark.first.at(q), mark.second.at(q))
+        case Wheel():
+            theta = np.array((np.cos(mark.theta), np.sin(mark.theta)))
+            centre, frame = np.array(mark.place.point), mark.place.frame
+            return _between(*in_ground(q, frame, np.array((centre, centre + mark.radius * theta))))
+        case Slider():
+            tip = in_ground(q, mark.guide, np.array(((0.0, 0.0), mark.axis)))
+            return mark.place.at(q), tip[1] - tip[0], 0.0
+        case Drive() if mark.axis is not None:
+            return mark.place.at(q), np.array(mark.axis), 0.0
+        case Pin():
+            place = mark.first if on == "first" else mark.second
+        case Drive() | Dot():
+            place = mark.place
+        case _:
+            raise InternalError(f"{type(mark).__name__} has no axes of its own")
+    return place.at(q), np.array((1.0, 0.0)), 0.0
+
+
+def _between(start: Array, end: Array) -> tuple[Array, Array, float]:
+    """Return a point, the direction to another one, and how far that is."""
+    length = float(np.hypot(*(end - start)))
+    return start, (end - start) / length if length else np.array((1.0, 0.0)), length
+
+
+def _curve(mark: Mark, q: Array, grow: float) -> Array:
+    """Return a closed curve, widened: of a wheel, its circle, of a link, its hull."""
+    match mark:
+        case Wheel():
+            points = np.array(mark.place.point) + (mark.radius + grow) * CIRCLE
+            return in_ground(q, mark.place.frame, points)
+        case Hull():
+            points = _rounded(np.array(mark.points), grow)
+        case Polygon():
+            points = np.array(mark.points)
+        case Contour():
+            points = np.array(mark.points)
+            # Along the bisectors of its corners, which of a smooth curve are its normals.
+            along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+            lengths = np.hypot(*along.T)[:, None]
+            points = points + grow * np.stack((along[:, 1], -along[:, 0]), axis=-1) / lengths
+        case _:
+            raise InternalError(f"{type(mark).__name__} has no closed curve")
+    return in_ground(q, mark.frame, points)
+
+
+def _rounded(points: Array, radius: float) -> Array:
+    """Return the corners of a convex polygon, counterclockwise, at a distance, with arcs."""
     if len(points) == 1:
-        return [Polyline("body", mark.frame, points + 1.2 * size * CIRCLE, is_area=True)]
-    if len(points) == 2:
-        return [Polyline("bar", mark.frame, points)]
-    return [Polyline("body", mark.frame, points, is_area=True)]
+        return np.asarray(points + radius * CIRCLE[::8])
+    found = []
+    for before, corner, after in zip(
+        np.roll(points, 1, axis=0), points, np.roll(points, -1, axis=0), strict=True
+    ):
+        (x0, y0), (x1, y1) = corner - before, after - corner
+        first = np.arctan2(-x0, y0)
+        turn = np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1) % (2 * np.pi)
+        angles = first + turn * np.linspace(0, 1, 2 + int(turn / ARC))
+        found.append(corner + radius * np.stack((np.cos(angles), np.sin(angles)), axis=-1))
+    return np.concatenate(found)
 
 
-def _pin(mark: Pin, size: float) -> list[Polyline]:
-    """Draw a small circle, on a stand where it is on the ground, and a gap where it is open."""
-    found = [
-        Polyline("gap", mark.second.frame, _array(((0, 0), (1, 0))), mark.first, mark.second),
-        Polyline("pin", mark.second.frame, PIN * size * CIRCLE, mark.second, is_area=True),
-    ]
-    if mark.first.frame != GROUND_FRAME:
-        return found
-    stand = size * _array(((0, 0), (-1.1, -1.9), (1.1, -1.9)))
-    floor = size * np.concatenate([_array(((-1.8, -1.9), (1.8, -1.9))), _hatching(-1.8, 1.8, -1.9)])
-    return [
-        Polyline("stand", GROUND_FRAME, stand, mark.first, is_area=True),
-        Polyline("ground", GROUND_FRAME, floor, mark.first),
-        *found,
-    ]
-
-
-def _hatching(low: float, high: float, height: float, side: float = -1.0) -> Array:
-    """Return slanted lines along the x axis at a height, to one side, in sizes of the drawing."""
-    gap = (np.nan, np.nan)
-    feet = np.arange(low + HATCH / 2, high + 1e-9, HATCH)
-    ends = [(gap, (x, height), (x - HATCH / 2, height + side * HATCH)) for x in feet]
-    return _array(ends).reshape(-1, 2)
-
-
-def _rail(mark: Rail, size: float) -> list[Polyline]:
-    """Draw two parallel lines, hatched on the ground, the teeth of a rack, or a thick face."""
-    start, end, axis = _array(mark.start), _array(mark.end), _array(mark.axis)
-
-    def along(points: Array) -> Array:
-        """Turn sizes along and to the left of the rail into points of its frame."""
-        return start + size * (points @ np.stack((axis, _left_of(axis))))
-
-    if mark.style == "face":
-        return [Polyline("bar", mark.frame, np.stack((start, end)))]
-    reach = float((end - start) @ axis) / size
-    if mark.style == "rack":
-        teeth = _hatching(0.0, reach, 0.0)
-        line = np.concatenate([_array(((0, 0), (reach, 0))), teeth])
-        return [Polyline("rack", mark.frame, along(line))]
-    sides = [_array(((0, h), (reach, h))) for h in (BLOCK_HEIGHT, -BLOCK_HEIGHT)]
-    if mark.frame != GROUND_FRAME:
-        return [Polyline("groove", mark.frame, along(side)) for side in sides]
-    # Hatched below, or at the left of an upright rail, whichever way its axis points.
-    side = -float(np.sign(axis[0])) if abs(axis[0]) > UPRIGHT else float(np.sign(axis[1]))
-    hatch = _hatching(0.0, reach, side * BLOCK_HEIGHT, side)
-    return [Polyline("ground", GROUND_FRAME, along(line)) for line in (*sides, hatch)]
-
-
-def _block(mark: Slider, size: float) -> Polyline:
-    """Draw a rectangle along the axis."""
-    axis = _array(mark.axis)
-    half_sides = size * _array((BLOCK_LENGTH, BLOCK_HEIGHT))
-    corners = half_sides * _array(((1, 1), (-1, 1), (-1, -1), (1, -1)))
-    points = _array(mark.place.point) + corners @ np.stack((axis, _left_of(axis)))
-    return Polyline("block", mark.place.frame, points, is_area=True)
-
-
-def _span(mark: Span, size: float) -> list[Polyline]:
-    """Draw a line; a cylinder is a barrel with a piston rod in it."""
-    whole = _array(((0, 0), (1, 0)))
-    frame = max(mark.first.frame, mark.second.frame)
-    if mark.style != "cylinder":
-        return [Polyline(mark.style, frame, whole, mark.first, mark.second)]
-    half = 0.8 * size
-    barrel = _array(((0, half), (BARREL, half), (BARREL, -half), (0, -half)))
-    return [
-        Polyline("piston", frame, whole, mark.first, mark.second),
-        Polyline("barrel", frame, barrel, mark.first, mark.second, is_area=True),
-    ]
-
-
-def _wheel(mark: Wheel, size: float) -> list[Polyline]:
-    """Draw the pitch circle with a tick, which on an internal gear is outside."""
-    centre = _array(mark.place.point)
-    rim = centre + mark.radius * CIRCLE
-    direction = _array((np.cos(mark.theta), np.sin(mark.theta)))
-    ends = (mark.radius, mark.radius + size) if mark.is_internal else (0.0, mark.radius)
-    tick = np.stack([centre + end * direction for end in ends])
-    frame = mark.place.frame
-    return [_curve(frame, rim, is_area=not mark.is_internal), Polyline("tick", frame, tick)]
-
-
-def _profile(mark: Contour) -> list[Polyline]:
-    """Draw a cam as an area, a slot as the closed line in which a pin runs."""
-    return [_curve(mark.frame, _array(mark.points), is_area=mark.style == "cam")]
-
-
-def _curve(frame: PlaneFrame, points: Array, *, is_area: bool) -> Polyline:
-    """Draw a closed curve, as an area or as a line."""
-    if is_area:
-        return Polyline("wheel", frame, points, is_area=True)
-    return Polyline("rim", frame, np.concatenate((points, points[:1])))
-
-
-def _drive(mark: Drive, size: float) -> list[Polyline]:
-    """Draw an arrow, bent where the driver turns something."""
-    if mark.axis is None:
-        angles = np.radians(np.linspace(-30, 240, 46))
-        line = TURN * size * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
-        heading = _left_of(line[-1]) / np.hypot(*line[-1])
-    else:
-        heading = _array(mark.axis)
-        line = size * np.outer((0.8, 2.8), heading)
-    return [
-        Polyline("arrow", mark.place.frame, line, mark.place),
-        Polyline(
-            "head", mark.place.frame, _head(line[-1], heading, size), mark.place, is_area=True
-        ),
-    ]
-
-
-def _head(end: Array, heading: Array, size: float) -> Array:
-    """Return the triangle at the end of an arrow."""
-    corners = size * _array(((0.9, 0.0), (-0.3, 0.5), (-0.3, -0.5)))
-    return end + corners @ np.stack((heading, _left_of(heading)))
+def _around(
+    ahead: Array, out: Array, centre: Array, along: Array, radius: float, every: float
+) -> Array:
+    """Return corners, sideways and to the outside of a circle, repeated around it."""
+    count = max(8, round(2 * np.pi * radius / every))
+    first = np.arctan2(along[1], along[0])
+    angles = first + 2 * np.pi * np.arange(count)[:, None] / count
+    outward = np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+    sideways = np.stack((-np.sin(angles), np.cos(angles)), axis=-1)
+    return np.asarray(centre + (radius + out) * outward + ahead * sideways).reshape(-1, 2)

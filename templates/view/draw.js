@@ -1,11 +1,19 @@
 'use strict';
-/* The marks of a drawing on a canvas: one function for each kind.
+/* The marks of a drawing on a canvas.
 
    drawShapes(ctx, q, style) draws the mechanism at coordinates q, any number of times on one canvas.
    style: { view, palette } and, where wanted, alpha, ghost (one colour for everything), violated (a
-   set of joint names that are drawn as broken), drawing (of another mechanism than the player's). */
+   set of joint names that are drawn as broken), drawing (of another mechanism than the player's).
+
+   What a mark looks like is in the data: drawing.shapes has the strokes of each shape, drawing.looks
+   what a stroke is drawn like (kincompile/view/shapes.py).  They are evaluated from the numbers of the
+   marks whenever they are drawn; fitMarks makes rails and barrels fit a motion. */
 
 const GROUND = { index: -1, columns: [] };  // a frame: a body's index, and its columns of q
+const BARREL = 0.85;  // part of a cylinder's shortest length that its barrel has
+const TRUE_SIZES = new Set(['wheel', 'ring', 'rack']);  // teeth of gears are as far apart as those of racks
+const THICK = 8;  // pixels of a mark's size from which on lines grow with it
+const DASHES = { '': [], '--': [5, 4], ':': [4, 3] };
 
 function isGround(frame) {
   return frame.index === GROUND.index;
@@ -16,13 +24,15 @@ function angleOf(q, { columns: [, , phi] }) {
   return phi === undefined ? 0 : q[phi];
 }
 
-/* World to screen: the whole extent fits, and lengths are true. */
+/* World to screen: lengths are true, and the whole extent fits, unless a camera { zoom, centre } says
+   what is looked at. */
 class View {
-  constructor([left, right, low, high], width, height, margin) {
-    const wide = right - left, tall = high - low;
-    this.scale = Math.min((width - 2 * margin) / wide, (height - 2 * margin) / tall);
-    this.left = width / 2 - this.scale * (left + right) / 2;
-    this.top = height / 2 + this.scale * (low + high) / 2;
+  constructor([left, right, low, high], width, height, margin, camera = null) {
+    this.fit = Math.min((width - 2 * margin) / (right - left), (height - 2 * margin) / (high - low));
+    this.scale = this.fit * (camera ? camera.zoom : 1);
+    const [x, y] = camera ? camera.centre : [(left + right) / 2, (low + high) / 2];
+    this.left = width / 2 - this.scale * x;
+    this.top = height / 2 + this.scale * y;
   }
 
   toScreen([x, y]) {
@@ -56,7 +66,7 @@ function ratesInWorld(state, frame, [xi, eta]) {
   };
 }
 
-/* What the functions below draw with: positions on the screen, sizes and colours. */
+/* What is drawn with: positions on the screen, sizes and colours. */
 class Pen {
   constructor(ctx, q, style, size) {
     this.ctx = ctx;
@@ -65,7 +75,8 @@ class Pen {
     this.view = style.view;
     this.palette = style.palette;
     this.size = size;  // the drawing's unit of marks, in the model's lengths
-    this.unit = Math.max(3.2, Math.min(9, size * this.view.scale));  // and in pixels
+    // And in pixels, which do not grow when the picture is looked at more closely.
+    this.unit = Math.max(3.2, Math.min(style.largest ?? 9, size * this.view.fit));
   }
 
   at(frame, point) {
@@ -76,19 +87,20 @@ class Pen {
     return this.at(place.frame, place.point);
   }
 
-  /* Strong colour and tint of a mark. */
-  colours(frame, joint) {
-    const { ghost, violated } = this.style;
-    if (violated && violated.has(joint)) return [this.palette.bad, this.palette.badTint];
-    if (ghost) return [ghost, this.palette.paper];
-    if (isGround(frame)) return [this.palette.quiet, this.palette.tint];
-    const bodies = this.palette.bodies;
-    return bodies[frame.index % bodies.length];
+  /* Strong colour and tint of a body, or of the ground. */
+  colours(frame) {
+    const { bodies, quiet, tint } = this.palette;
+    return isGround(frame) ? [quiet, tint] : bodies[frame.index % bodies.length];
   }
 
   path(points, isClosed) {
     this.ctx.beginPath();
-    points.forEach(([x, y], k) => (k ? this.ctx.lineTo(x, y) : this.ctx.moveTo(x, y)));
+    let isDown = false;
+    for (const point of points) {
+      if (point && isDown) this.ctx.lineTo(point[0], point[1]);
+      else if (point) this.ctx.moveTo(point[0], point[1]);
+      isDown = point !== null;
+    }
     if (isClosed) this.ctx.closePath();
   }
 
@@ -109,19 +121,20 @@ class Pen {
     this.ctx.arc(x, y, Math.max(radius, 0.1), 0, 2 * Math.PI);
   }
 
-  /* A plate with round corners: a wide line in the strong colour, a narrower one in the tint. */
-  plate(points, width, [strong, tint], isFilled) {
-    this.path(points, isFilled);
-    if (points.length === 1) this.circle(points[0], 0.5);
-    this.stroke(strong, width);
-    if (isFilled) this.fill(tint);
-    this.stroke(tint, Math.max(width - 3, 0.5));
+  /* One stroke of a mark, in the colours of its look. */
+  draw(mark, stroke) {
+    const { style, palette } = this, look = this.style.looks[stroke.look];
+    const points = pointsOfStroke(this, mark, stroke);
+    if (stroke.look === 'gap' && towards(points[0], points[1])[2] < 2) return;
+    this.path(points, stroke.is_area);
+    const [strong, tint] = this.colours(ownerOf(mark, stroke.on));
+    const isViolated = style.violated && style.violated.has(mark.joint);
+    const line = isViolated ? palette.bad : style.ghost ?? palette[look.line] ?? strong;
+    const isSolid = look.face !== '' && look.face === look.line;
+    const pale = isViolated ? palette.badTint : style.ghost ? palette.paper : palette[look.face] ?? tint;
+    if (stroke.is_area) this.fill(isSolid ? line : pale);
+    if (look.width) this.stroke(line, look.width * Math.max(1, this.unit / THICK), DASHES[look.dash]);
   }
-}
-
-/* A point between two, or beyond them. */
-function mixed([x0, y0], [x1, y1], part) {
-  return [x0 + part * (x1 - x0), y0 + part * (y1 - y0)];
 }
 
 /* The direction from one point to another, of length one, and the distance. */
@@ -143,228 +156,146 @@ function arrow(pen, from, to, colour, width = 2) {
   pen.fill(colour);
 }
 
-/* Short slanted lines on one side of a line: what stands still. */
-function hatching(pen, from, to, depth, colour) {
-  const [x, y, length] = towards(from, to);
-  pen.ctx.beginPath();
-  for (let along = depth / 2; along <= length; along += depth) {
-    const foot = [from[0] + along * x, from[1] + along * y];
-    pen.ctx.moveTo(...foot);
-    pen.ctx.lineTo(foot[0] - depth * (0.7 * x + y), foot[1] - depth * (0.7 * y - x));
+/* ---- the points of a stroke ---- */
+
+/* The frame whose colour a stroke of a mark has. */
+function ownerOf(mark, on) {
+  if (mark.first) return on === 'first' || on === 'barrel' ? mark.first.frame : mark.second.frame;
+  return mark.place ? mark.place.frame : mark.frame;
+}
+
+/* The points of a stroke on the screen; null interrupts a line. */
+function pointsOfStroke(pen, mark, stroke) {
+  const size = TRUE_SIZES.has(mark.shape) ? pen.size : pen.unit / pen.view.scale;
+  if (!stroke.corners.length) return curveOf(pen, mark, stroke, size);
+  const axes = axesOf(pen.q, mark, stroke.on);
+  if (stroke.on === 'circle') return around(pen, stroke, axes, size);
+  const { start, along: [x, y], length } = axes, points = [];
+  const placed = (part, ahead, left) => {
+    const far = part * length + ahead * size;
+    return pen.view.toScreen([start[0] + far * x - left * size * y, start[1] + far * y + left * size * x]);
+  };
+  const last = stroke.every ? Math.max(length / size, stroke.every) : 1;
+  for (let foot = stroke.every / 2; foot < last; foot += stroke.every || 1) {
+    for (const corner of stroke.corners) {
+      points.push(corner && placed(corner[0], corner[1] + foot, corner[2]));
+    }
   }
-  pen.stroke(colour, 1);
+  return points;
 }
 
-function drawGroundSupport(pen, [x, y], colour) {
-  const half = 1.7 * pen.unit, low = y + 2.1 * pen.unit;
-  pen.path([[x, y], [x - half, low], [x + half, low]], true);
-  pen.fill(pen.palette.tint);
-  pen.stroke(colour, 1.3);
-  // From right to left, so that the hatching is below.
-  hatching(pen, [x + 1.5 * half, low], [x - 1.5 * half, low], 0.8 * pen.unit, colour);
-  pen.path([[x - 1.5 * half, low], [x + 1.5 * half, low]]);
-  pen.stroke(colour, 1.3);
-}
-
-function drawGuide(pen, mark, from, to) {
-  const [strong] = pen.colours(mark.frame, mark.joint);
-  if (!isGround(mark.frame)) {
-    pen.plate([from, to], 2.2 * pen.unit, [strong, pen.palette.paper], false);
-    return;
+/* The line a stroke is drawn on: its start, its direction of length one and its length. */
+function axesOf(q, mark, on) {
+  const at = place => inWorld(q, place.frame, place.point);
+  const between = (start, end, most = Infinity) => {
+    const [x, y, length] = towards(start, end);
+    return { start, along: [x, y], length: Math.min(length, most) };
+  };
+  if (mark.kind === 'rail') return between(...endsOf(mark).map(point => inWorld(q, mark.frame, point)));
+  if (mark.kind === 'span') return between(at(mark.first), at(mark.second), on === 'barrel' ? mark.barrel : Infinity);
+  if (on === 'line') return between(at(mark.first), at(mark.second));
+  const start = at(on === 'first' || on === 'second' ? mark[on] : mark.place);
+  if (mark.kind === 'wheel') {
+    const angle = mark.theta + angleOf(q, mark.place.frame);
+    return { start, along: [Math.cos(angle), Math.sin(angle)], length: mark.radius };
   }
-  const [x, y] = towards(from, to), gap = 1.15 * pen.unit;
-  const moved = ([a, b], side) => [a - side * gap * y, b + side * gap * x];
-  for (const side of [-1, 1]) {
-    pen.path([moved(from, side), moved(to, side)]);
-    pen.stroke(strong, 1.3);
-    const ends = side < 0 ? [moved(to, side), moved(from, side)] : [moved(from, side), moved(to, side)];
-    hatching(pen, ends[1], ends[0], 0.8 * pen.unit, strong);
-  }
+  if (!mark.axis) return { start, along: [1, 0], length: 0 };
+  const turn = mark.guide ? angleOf(q, mark.guide) : 0, [x, y] = mark.axis;
+  const c = Math.cos(turn), s = Math.sin(turn);
+  return { start, along: [c * x - s * y, s * x + c * y], length: 0 };
 }
 
-function drawRack(pen, mark, from, to) {
-  const [strong, tint] = pen.colours(mark.frame, mark.joint);
-  const [x, y, length] = towards(from, to), pitch = 1.2 * pen.size * pen.view.scale;
-  const depth = 0.4 * pitch, points = [];
-  for (let along = 0, up = 1; along <= length; along += pitch / 2, up = -up) {
-    const foot = [from[0] + along * x, from[1] + along * y];
-    for (const side of [up, -up]) points.push([foot[0] + side * depth * y, foot[1] - side * depth * x]);
-  }
-  const back = 3 * depth + 4;
-  const closed = [...points, [to[0] - back * y, to[1] + back * x], [from[0] - back * y, from[1] + back * x]];
-  pen.path(closed, true);
-  pen.fill(tint);
-  pen.stroke(strong, 1.3);
+function endsOf({ base, axis, reach }) {
+  return reach.map(far => [base[0] + far * axis[0], base[1] + far * axis[1]]);
 }
 
-function drawCylinder(pen, mark, first, second) {
-  const [, , length] = towards(first, second);
-  const [inner, outer] = [mark.second, mark.first].map(place => pen.colours(place.frame, mark.joint));
-  const barrel = Math.min(1, (mark.barrel || 0) * pen.view.scale / (length || 1));
-  pen.plate([first, second], 1.1 * pen.unit, inner, false);
-  pen.plate([first, mixed(first, second, barrel)], 2.1 * pen.unit, outer, false);
+/* A closed curve, widened: a circle, a polygon, or the hull of a link with round corners. */
+function curveOf(pen, mark, { grow, is_area }, size) {
+  let points = mark.points;
+  if (mark.kind === 'wheel') {
+    const [x, y] = mark.place.point, radius = mark.radius + grow * size;
+    points = CIRCLE.map(([c, s]) => [x + radius * c, y + radius * s]);
+  } else if (mark.kind === 'hull') points = rounded(points, grow * size);
+  else if (grow) points = points.map((point, k) => widened(points, k, grow * size));
+  const frame = mark.frame ?? mark.place.frame;
+  const curve = points.map(point => pen.at(frame, point));
+  return is_area ? curve : [...curve, curve[0]];
 }
 
-function drawTeeth(pen, [x, y], mark, angle, strong) {
-  const radius = mark.radius * pen.view.scale;
-  const count = Math.max(8, Math.round(2 * Math.PI * mark.radius / (1.2 * pen.size)));
-  const depth = Math.min(0.3 * pen.size * pen.view.scale, 0.2 * radius);
-  pen.ctx.beginPath();
+const CIRCLE = Array.from({ length: 180 }, (_, k) => [Math.cos(k * Math.PI / 90), Math.sin(k * Math.PI / 90)]);
+
+/* A corner of a smooth curve, moved outwards. */
+function widened(points, k, distance) {
+  const count = points.length;
+  const [x, y] = towards(points[(k + count - 1) % count], points[(k + 1) % count]);
+  return [points[k][0] + distance * y, points[k][1] - distance * x];
+}
+
+/* A convex polygon, counterclockwise, at a distance, with arcs around its corners. */
+function rounded(points, radius) {
+  const count = points.length, found = [];
+  const arc = ([x, y], first, turn) => {
+    const steps = 1 + Math.floor(turn / (Math.PI / 12));
+    for (let k = 0; k <= steps; k++) {
+      const angle = first + turn * k / steps;
+      found.push([x + radius * Math.cos(angle), y + radius * Math.sin(angle)]);
+    }
+  };
+  points.forEach((corner, k) => {
+    const [x0, y0, length] = towards(points[(k + count - 1) % count], corner);
+    const [x1, y1] = towards(corner, points[(k + 1) % count]);
+    const turn = Math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1);
+    arc(corner, Math.atan2(-x0, y0), length ? (turn + 2 * Math.PI) % (2 * Math.PI) : 2 * Math.PI);
+  });
+  return found;
+}
+
+/* Corners repeated around a circle. */
+function around(pen, { corners, every }, { start, along, length }, size) {
+  const count = Math.max(8, Math.round(2 * Math.PI * length / (every * size))), points = [];
+  const first = Math.atan2(along[1], along[0]);
   for (let k = 0; k < count; k++) {
-    const c = Math.cos(angle + 2 * Math.PI * k / count), s = Math.sin(angle + 2 * Math.PI * k / count);
-    pen.ctx.moveTo(x + (radius - depth) * c, y - (radius - depth) * s);
-    pen.ctx.lineTo(x + (radius + depth) * c, y - (radius + depth) * s);
+    const c = Math.cos(first + 2 * Math.PI * k / count), s = Math.sin(first + 2 * Math.PI * k / count);
+    for (const corner of corners) {
+      const [side, out] = corner ? [corner[1] * size, length + corner[2] * size] : [];
+      points.push(corner && pen.view.toScreen([start[0] + out * c - side * s, start[1] + out * s + side * c]));
+    }
   }
-  pen.stroke(strong, 1.5);
+  return points;
 }
-
-const DRAW = {
-  hull(pen, mark) {
-    const points = mark.points.map(point => pen.at(mark.frame, point));
-    pen.plate(points, 2.1 * pen.unit, pen.colours(mark.frame), points.length > 2);
-  },
-
-  polygon(pen, mark) {
-    pen.path(mark.points.map(point => pen.at(mark.frame, point)), true);
-    const [strong, tint] = pen.colours(mark.frame);
-    pen.fill(tint);
-    pen.stroke(strong, 1.5);
-  },
-
-  pin(pen, mark) {
-    const [first, second] = [pen.place(mark.first), pen.place(mark.second)];
-    const isViolated = pen.style.violated && pen.style.violated.has(mark.joint);
-    const [quiet] = pen.colours(GROUND, mark.joint);
-    if (isGround(mark.first.frame)) drawGroundSupport(pen, first, quiet);
-    const isApart = towards(first, second)[2] > 2;
-    if (isApart) {
-      pen.path([first, second]);
-      pen.stroke(pen.palette.bad, 1.5, [4, 3]);
-    }
-    for (const point of isApart ? [first, second] : [second]) {
-      pen.circle(point, 0.62 * pen.unit);
-      pen.fill(pen.palette.paper);
-      pen.stroke(isViolated ? pen.palette.bad : pen.style.ghost || pen.palette.ink, 1.6);
-    }
-  },
-
-  rail(pen, mark) {
-    const [from, to] = [pen.at(mark.frame, mark.start), pen.at(mark.frame, mark.end)];
-    if (mark.style === 'rack') drawRack(pen, mark, from, to);
-    else if (mark.style === 'guide') drawGuide(pen, mark, from, to);
-    else {
-      pen.path([from, to]);
-      pen.stroke(pen.colours(mark.frame, mark.joint)[0], 4);
-    }
-  },
-
-  slider(pen, mark) {
-    const { frame, point } = mark.place, axis = mark.axis;
-    const centre = pen.place(mark.place);
-    const [x, y] = towards(centre, pen.at(frame, [point[0] + axis[0], point[1] + axis[1]]));
-    const [long, wide] = [1.9 * pen.unit, 1.15 * pen.unit];
-    const corner = (a, b) => [
-      centre[0] + a * long * x - b * wide * y, centre[1] + a * long * y + b * wide * x,
-    ];
-    pen.path([corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)], true);
-    const [strong, tint] = pen.colours(frame, mark.joint);
-    pen.fill(tint);
-    pen.stroke(strong, 1.6);
-  },
-
-  span(pen, mark) {
-    const [first, second] = [pen.place(mark.first), pen.place(mark.second)];
-    if (mark.style === 'cylinder') drawCylinder(pen, mark, first, second);
-    else if (mark.style === 'rod') pen.plate([first, second], 1.3 * pen.unit, pen.colours(GROUND, mark.joint));
-    else if (mark.style === 'slide') {
-      pen.plate([first, second], 1.5 * pen.unit, pen.colours(mark.second.frame, mark.joint));
-    } else {
-      pen.path([first, second]);
-      pen.stroke(pen.colours(GROUND, mark.joint)[0], 1, [5, 4]);
-    }
-  },
-
-  wheel(pen, mark) {
-    const { frame, point } = mark.place, centre = pen.place(mark.place);
-    const radius = mark.radius * pen.view.scale;
-    const angle = mark.theta + angleOf(pen.q, frame);
-    const [strong, tint] = pen.colours(frame, mark.joint);
-    pen.circle(centre, radius);
-    if (mark.is_internal) {
-      pen.circle(centre, radius + pen.unit);
-      pen.stroke(tint, 2 * pen.unit);
-      pen.circle(centre, radius + 2 * pen.unit);
-      pen.stroke(strong, 1.3);
-      pen.circle(centre, radius);
-    } else {
-      pen.fill(tint);
-    }
-    pen.stroke(strong, 1.3);
-    drawTeeth(pen, centre, mark, angle, strong);
-    if (mark.is_internal) return;
-    pen.path([centre, [centre[0] + radius * Math.cos(angle), centre[1] - radius * Math.sin(angle)]]);
-    pen.stroke(strong, 1.3);
-  },
-
-  contour(pen, mark) {
-    const [strong, tint] = pen.colours(mark.frame, mark.joint);
-    const points = mark.points.map(point => pen.at(mark.frame, point));
-    pen.path(points, true);
-    if (mark.style === 'cam') {
-      pen.fill(tint);
-      pen.stroke(strong, 1.8);
-      return;
-    }
-    pen.fill(tint);
-    pen.stroke(strong, 1.7 * pen.unit + 2.6);
-    pen.stroke(pen.palette.paper, 1.7 * pen.unit);
-  },
-
-  dot(pen, mark) {
-    pen.circle(pen.place(mark.place), 0.45 * pen.unit);
-    pen.fill(pen.style.ghost || pen.palette.ink);
-  },
-
-  drive(pen, mark) {
-    const [x, y] = pen.place(mark.place), radius = 2 * pen.unit;
-    const violated = pen.style.violated && pen.style.violated.has(mark.joint);
-    const colour = violated ? pen.palette.bad : pen.style.ghost || pen.palette.drive;
-    if (mark.axis) {
-      const [a, b] = [2.6 * radius * mark.axis[0], -2.6 * radius * mark.axis[1]];
-      arrow(pen, [x, y], [x + a, y + b], colour);
-      arrow(pen, [x, y], [x - a, y - b], colour);
-      return;
-    }
-    pen.ctx.beginPath();
-    pen.ctx.arc(x, y, radius, 0.25 * Math.PI, -0.55 * Math.PI, true);
-    pen.stroke(colour, 2);
-    const end = [x + radius * Math.cos(-0.6 * Math.PI), y + radius * Math.sin(-0.6 * Math.PI)];
-    arrow(pen, [end[0] + 5, end[1] - 2], [end[0] - 3, end[1] + 1.5], colour);
-  },
-};
 
 function drawShapes(ctx, q, style) {
   const drawing = style.drawing ?? player.data.drawing;
-  const pen = new Pen(ctx, q, style, drawing.size);
+  const pen = new Pen(ctx, q, { ...style, looks: drawing.looks }, drawing.size);
   ctx.save();
   ctx.globalAlpha = style.alpha ?? 1;
   Object.assign(ctx, { lineJoin: 'round', lineCap: 'round' });
-  for (const mark of drawing.marks) DRAW[mark.kind](pen, mark);
+  for (const mark of drawing.marks) for (const stroke of drawing.shapes[mark.shape]) pen.draw(mark, stroke);
   ctx.restore();
 }
 
-/* A barrel keeps its length: most of the shortest that the cylinder has in the motion. */
-function measureBarrels(motion) {
-  for (const mark of motion.data.drawing.marks) {
-    if (mark.kind !== 'span' || mark.style !== 'cylinder') continue;
-    let shortest = Infinity;
-    for (let k = 0; k < motion.count; k++) {
-      const q = motion.solved(k).q;
-      const ends = [mark.first, mark.second].map(place => inWorld(q, place.frame, place.point));
-      shortest = Math.min(shortest, towards(...ends)[2]);
+/* Rails as long as a motion, with their overhang, and barrels as long as they can be: as Python made
+   them for the motion that the page was given (kincompile/view/geometry.py). */
+function fitMarks(motion) {
+  const { marks, overhang } = motion.data.drawing;
+  const states = Array.from({ length: motion.count }, (_, k) => motion.solved(k).q);
+  const least = (values, from) => values.reduce((a, b) => Math.min(a, b), from);
+  for (const mark of marks) {
+    if (mark.kind === 'span' && mark.style === 'cylinder') {
+      mark.barrel = BARREL * least(states.map(q => axesOf(q, mark, 'line').length), Infinity);
+    } else if (mark.kind === 'rail') {
+      const over = mark.style === 'guide' || mark.style === 'slot' ? overhang : 0;
+      const along = [...mark.at_least, ...states.map(q => distanceAlong(q, mark))];
+      mark.reach = [least(along, Infinity) - over, over - least(along.map(x => -x), Infinity)];
     }
-    mark.barrel = 0.85 * shortest;
   }
+}
+
+/* How far along a rail its follower is. */
+function distanceAlong(q, { frame, base, axis, follower }) {
+  const [x, y] = inWorld(q, follower.frame, follower.point);
+  const from = inWorld(q, frame, base), to = inWorld(q, frame, [base[0] + axis[0], base[1] + axis[1]]);
+  return (x - from[0]) * (to[0] - from[0]) + (y - from[1]) * (to[1] - from[1]);
 }
 
 /* ---- colours ---- */

@@ -9,7 +9,6 @@ class Card {
     this.motion = new Player(withArrays(JSON.parse(element.querySelector('script').textContent)));
     this.canvas = element.querySelector('canvas');
     this.isSeen = true;
-    measureBarrels(this.motion);
     new IntersectionObserver(([entry]) => { this.isSeen = entry.isIntersecting; }).observe(this.canvas);
   }
 

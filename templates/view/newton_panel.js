@@ -1,6 +1,7 @@
 'use strict';
 /* The panel on which Newton's method is stepped through, from a guess of the user's. */
 
+const MOST_ENTRIES = 60;  // coordinates up to which every entry of Phi_q is shown
 const PAUSE = 700;  // milliseconds between the steps of a run
 
 const NEWTON_MARKUP = `
@@ -119,7 +120,7 @@ class NewtonPanel {
   random() {
     const [left, right, low, high] = player.data.extent;
     const between = (a, b) => a + (b - a) * Math.random();
-    const scale = newton.scales(this.model);
+    const scale = newton.problem(this.model, this.p).reference;
     const guess = player.data.guess.map((value, k) => value + between(-scale[k], scale[k]));
     for (const { columns: [x, y, phi] } of player.data.drawing.frames) {
       guess[x] = between(left, right);
@@ -165,7 +166,8 @@ class NewtonPanel {
 /* Fill the panel; without emitted functions it says why there are none. */
 function newtonPanel(root) {
   root.classList.add('newton');
-  if (emitted.Phi) return new NewtonPanel(root, emitted);
-  root.append(emitted.reason);
+  const count = player.data.coordinates.length;
+  if (emitted.Phi && count <= MOST_ENTRIES) return new NewtonPanel(root, emitted);
+  root.append(emitted.reason ?? `${count} coordinates are too many to show Newton's method step by step.`);
   return null;
 }

@@ -235,5 +235,4 @@ function violatedJoints() {
 }
 
 const player = new Player(withArrays(JSON.parse(document.getElementById('data').textContent)));
-measureBarrels(player);
 const stage = new Stage(document.getElementById('canvas'));

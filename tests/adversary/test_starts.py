@@ -15,7 +15,8 @@ import pytest
 import kincompile as kc
 from kincompile.runtime.newton import iterate
 from kincompile.runtime.problem import problem
-from kincompile.view.newton_panel import newton_method, newton_script
+from kincompile.targets.templates import read
+from kincompile.view.live import solver_script
 from tests.adversary.chains import (
     Placement,
     closings,
@@ -97,7 +98,7 @@ def test_two_hundred_bad_starts_on_the_page(tmp_path, record):
     statuses = {"converged": 0, "singular": 2, "not finite": 3, "not converged": 1}
     for case, random in cases():
         module, guesses = kc.compile(case.model), bad_starts(case, random, 50)
-        text = newton_script(case.model) + "\n" + newton_method()
+        text = solver_script(case.model) + "\n" + read("view/newton.js")
         starts = json.dumps(guesses.tolist())
         text += f"\nconst all = {starts}.map(g => newton.iterate(emitted, g, 0));"
         path = tmp_path / f"{tried}.js"

@@ -114,6 +114,12 @@ class Code:
     march: Callable[..., int] | None
     march_variants: Callable[..., int] | None
 
+    def without_guess(self) -> tuple[str, ...]:
+        """Return the bodies whose guess is zero throughout, as it is where none is given."""
+        given = np.concatenate(((0,), np.cumsum(self.guess != 0))).tolist()
+        bodies = self.bodies
+        return tuple(body for body, first, size in bodies if given[first] == given[first + size])
+
     def owners(self) -> dict[str, str]:
         """Return the body of each coordinate; one that belongs to none stands for itself."""
         owners = {name: name for name in self.coordinates}

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import SAME_POSITION
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.newton import SAME, iterate, safeguarded_step, unwound
+from kincompile.runtime.newton import iterate, safeguarded_step, unwound
 from kincompile.runtime.problem import norm, problem
 from kincompile.runtime.status import Status
 
@@ -100,7 +101,9 @@ def assembled_positions(inputs: Inputs) -> Vector:
             point = _assembled(equations, time, start)
             if point is not None:
                 q = unwound(equations, time, point, inputs.guess, TOLERANCE).q
-                if all(distance_modulo_turns(equations, q, other) > SAME for other in found):
+                if all(
+                    distance_modulo_turns(equations, q, other) > SAME_POSITION for other in found
+                ):
                     found.append(q)
                     last = k
             if k >= max(FIRST_STARTS, PATIENCE * last):
@@ -151,7 +154,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
         return ""
     taken = int(np.argmin(away))
     other = found[1 if taken == 0 else 0]
-    moved = np.abs(_difference(equations, q, other)) > SAME
+    moved = np.abs(_difference(equations, q, other)) > SAME_POSITION
     owners = inputs.code.owners()
     differing = dict.fromkeys(owners[inputs.code.coordinates[k]] for k in np.flatnonzero(moved))
     missing = [body for body in differing if body in without]
@@ -184,7 +187,7 @@ def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
     mirrored = q.copy()
     mirrored[angles] = -q[angles]
     found = _assembled(equations, time, mirrored)
-    if found is None or distance_modulo_turns(equations, q, found.q) <= SAME:
+    if found is None or distance_modulo_turns(equations, q, found.q) <= SAME_POSITION:
         return False
     other = found.q
     here, there = (
@@ -195,7 +198,7 @@ def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
 
 def _differ(equations: Problem, q: Vector, other: Vector, columns: Sequence[int]) -> bool:
     """Say whether two positions differ in some of the coordinates."""
-    return bool((np.abs(_difference(equations, q, other))[columns] > SAME).any())
+    return bool((np.abs(_difference(equations, q, other))[columns] > SAME_POSITION).any())
 
 
 def _periodic(equations: Problem, t: float, guess: Vector) -> NDArray[np.bool_]:

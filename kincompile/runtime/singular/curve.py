@@ -15,6 +15,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import (
+    ARC_CORRECTIONS,
+    AROUND,
+    AROUND_OFFSETS,
+    BESIDE,
+    FIRST_ARC,
+    LONGEST_ARC,
+    MAX_ARCS,
+    ROOT_LENGTH,
+    ROOT_STEPS,
+    SHORTEST_ARC,
+    SMALL_CORRECTION,
+    STRAIGHT,
+    TOLERABLE_CORRECTION,
+)
 from kincompile.runtime.problem import solve_linear, weights_of
 
 if TYPE_CHECKING:
@@ -25,39 +40,8 @@ if TYPE_CHECKING:
     from kincompile.runtime.march import State
     from kincompile.runtime.problem import Problem
 
-LONGEST, FIRST, SHORTEST = 0.05, 0.01, 1e-9
-"""Lengths of steps along the curve, in radians and sizes of the mechanism."""
-
-MAX_STEPS = 400
-"""Steps after which a search along the curve is given up."""
-
-CORRECTIONS = 12
-"""Newton corrections of a step; four do away from a singular configuration."""
-
-SMALL_CORRECTION, TOLERABLE_CORRECTION = 1e-12, 1e-7
-"""Corrections with which a step ends, and that near a bifurcation may remain of rounding errors."""
-
-STRAIGHT = 0.98
-"""Cosine of the angle by which the tangent may turn in a step."""
-
-ROOT = 1e-13
-"""Length of the piece of curve in which a singular configuration is found."""
-
-AROUND = 2e-3
-"""Distance from a bifurcation, in radians and sizes of the mechanism, at which places on the curve
-are accurate to ten digits."""
-
-OFFSETS = (-2.0, -1.0, 1.0, 2.0)
-"""Where the curve is interpolated around a bifurcation, in that distance."""
-
-BESIDE = (0.0, -1e-8, 1e-8, -1e-6, 1e-6, -1e-5)
-"""Distances from a lock-up at which a place is looked for: its time is off by their square."""
-
 ROUGHLY = 1e-6
 """Imaginary part of a root, relative to its real part, that is a rounding error."""
-
-ROOT_STEPS = 80
-"""Steps of the search in that piece; as many halvings as there are bits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +117,7 @@ class Curve:
         y = np.append(place.q, place.t) + length * place.tangent * self.scale
         predicted = y.copy()
         last = math.inf
-        for _ in range(CORRECTIONS):
+        for _ in range(ARC_CORRECTIONS):
             found = self._derivatives(y[:-1], float(y[-1]))
             if found is None:
                 return None
@@ -159,13 +143,13 @@ class Curve:
 
     def next_singular(self, place: CurvePoint, latest: float) -> Bracket | None:
         """Follow the curve up to a time, or to the first step that contains a singular point."""
-        length = FIRST
+        length = FIRST_ARC
         forward = math.copysign(1.0, latest - place.t)
-        for _ in range(MAX_STEPS):
+        for _ in range(MAX_ARCS):
             following = self.step(place, length)
             if following is None or following.tangent @ place.tangent < STRAIGHT:
                 length /= 2
-                if length < SHORTEST:
+                if length < SHORTEST_ARC:
                     return None
                 continue
             turns = following.tangent[-1] * place.tangent[-1] <= 0
@@ -173,7 +157,7 @@ class Curve:
                 return Bracket(place, following, length, turns)
             if (following.t - latest) * forward > 0:
                 return None
-            place, length = following, min(2 * length, LONGEST)
+            place, length = following, min(2 * length, LONGEST_ARC)
         return None
 
     def singular_point(self, bracket: Bracket) -> tuple[CurvePoint, float] | None:
@@ -195,11 +179,11 @@ class Curve:
 
     def _between(self, first: CurvePoint, at: float, block: int) -> tuple[CurvePoint, float] | None:
         """Return a bifurcation by interpolation of places so far from it that they are accurate."""
-        places = [self.step(first, at + offset * AROUND) for offset in OFFSETS]
+        places = [self.step(first, at + offset * AROUND) for offset in AROUND_OFFSETS]
         known = [place for place in places if place is not None]
-        if len(known) < len(OFFSETS):
+        if len(known) < len(AROUND_OFFSETS):
             return None
-        powers = np.vander(OFFSETS)
+        powers = np.vander(AROUND_OFFSETS)
         values = np.array([
             [*place.q, place.t, self._value(place, first, block)] for place in known
         ])  # fmt: skip
@@ -207,7 +191,7 @@ class Curve:
         roots = np.roots(coefficients[:, -1])
         real = roots.real[np.abs(roots.imag) <= np.abs(roots.real) * ROUGHLY + ROUGHLY]
         x = float(real[np.argmin(np.abs(real))]) if real.size else 0.0
-        y = np.vander([x], len(OFFSETS))[0] @ coefficients[:, :-1]
+        y = np.vander([x], len(AROUND_OFFSETS))[0] @ coefficients[:, :-1]
         place = self._place(y[:-1], float(y[-1]), first.tangent)
         return None if place is None else (place, at + x * AROUND)
 
@@ -287,7 +271,7 @@ def _root(function: Callable[[float], float | None], length: float) -> float:
         value = function(middle)
         if value is None:  # rounding errors at the singular point itself
             return middle
-        if value == 0 or high - low <= ROOT:
+        if value == 0 or high - low <= ROOT_LENGTH:
             return middle
         if value * at_low > 0:
             low, at_low, at_high = middle, value, at_high / 2

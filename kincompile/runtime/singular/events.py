@@ -14,6 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import (
+    IN_RANGE,
+    INVOLVED,
+    LATE,
+)
 from kincompile.html import Shown
 from kincompile.names import listed
 from kincompile.runtime.march import March, State
@@ -30,18 +35,9 @@ if TYPE_CHECKING:
 LOCK_UP, BIFURCATION, BRANCH_SWITCH = "lock-up", "bifurcation", "branch switch"
 """Kinds of events."""
 
-INVOLVED = 0.02
-"""Part of the largest movement in a null vector from which on a coordinate is involved in it."""
-
 PASSAGE = 2e-3
 """Half of the piece of curve around a bifurcation, in radians and sizes of the mechanism, over
 which the motion is interpolated: beyond it Phi_q is good to ten digits."""
-
-LATE = 1e-6
-"""Time after the point that failed, relative to the way to it, up to which an event explains it."""
-
-IN_RANGE = 1e-6
-"""Part of nu that the equations cannot give, below which a singular point is no lock-up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

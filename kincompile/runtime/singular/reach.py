@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import ASSEMBLED
+from kincompile.criteria import ASSEMBLED, SAME_POSITION
 from kincompile.runtime.march import State
-from kincompile.runtime.newton import SAME
 from kincompile.runtime.problem import Dense
 from kincompile.runtime.singular.assemblies import MOST_COORDINATES, distance_modulo_turns
 from kincompile.runtime.singular.curve import Curve
@@ -261,7 +260,7 @@ def _extremes(curve: Curve, state: State, direction: float) -> tuple[list[float]
             return [item.t for item in found], False
         if bracket.turns and (turn := curve.singular_point(bracket)) is not None:
             away = (distance_modulo_turns(curve.equations, turn[0].q, other.q) for other in found)
-            if any(distance <= math.sqrt(SAME) for distance in away):
+            if any(distance <= math.sqrt(SAME_POSITION) for distance in away):
                 return [item.t for item in found], True
             found.append(turn[0])
             if (turn[0].t > 0) != (state.t > 0):

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from kincompile.quantities import quantity_named
 from kincompile.targets.c.dialect import C
-from kincompile.targets.headings import entry_title, title
-from kincompile.targets.lines import wrapped
 from kincompile.targets.planned_solve import explained
 from kincompile.targets.printer import Printer
-from kincompile.targets.schedule import Assignment, count_uses
+from kincompile.targets.solve_statements import factorization, operands, solution
 from kincompile.targets.statements import Statements
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from kincompile.ir.inline import InlineProgram
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.planned_solve import BlockCall, SolveListing
@@ -40,20 +37,7 @@ def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer
     body += WRITE.inputs(code.program, listing)
     body += ["const double t = at->t[lane];"] if "t" in listing.inputs else []
     body += _frames(listing, printer) + WRITE.steps(listing, printer)
-    numbers = {
-        quantity: {place: k for k, place in enumerate(code.pattern(quantity))}
-        for quantity, _ in listing.results
-    }
-    for quantity, rows in listing.results:
-        for section, entries in rows:
-            if entries:
-                body.append(f"// {title(section)}")
-            for entry in entries:
-                index = entry.row
-                if quantity_named(quantity).is_matrix:
-                    index = numbers[quantity][entry.row, entry.column]
-                left, text = WRITE.element.format(quantity, index), printer.text(entry.node)
-                body += WRITE.assigned(left, text, entry_title(quantity, entry, code))
+    body += WRITE.computed(code, listing, printer)
     write = _with_angles if has_angles else _plain
     return [f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
 
@@ -119,43 +103,13 @@ def _frames(listing: Listing, printer: Printer) -> list[str]:
 
 def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
-    plan, names = listing.plan, listing.names
-    printer = Printer(C, plan.nodes, names)
-    numbers = {place: k for k, place in enumerate(code.pattern())}
-    read = count_uses(plan.nodes, (*listing.factors, *plan.determinants))
-    factor = [
-        f"const double {names[node]} = at->Phi_q[{numbers[row, column]}][lane];"
-        for row, column, node in plan.entries
-        if node in read
-    ]
-    factor += _steps(listing.factor_steps, printer)
-    factor += [f"at->F[{k}][lane] = {names[node]};" for k, node in enumerate(listing.factors)]
-    factor += [
-        f"at->determinants[{k}][lane] = {printer.text(node)};"
-        for k, node in enumerate(plan.determinants)
-    ]
+    printer = Printer(C, listing.plan.nodes, listing.names)
+    body = solution(replace(WRITE, element="{}[{}][lane]"), listing, printer, _block_call)
     return [
         "// What a solve needs of Phi_q, and the determinants of its blocks.",
-        *(f"// {line}" for line in explained(code, plan)),
-        *_plain("factor", factor),
+        *(f"// {line}" for line in explained(code, listing.plan)),
+        *_plain("factor", factorization(WRITE, code, listing, printer, _block_call)),
         "",
-        *_solution(listing, printer),
-    ]
-
-
-def _solution(listing: SolveListing, printer: Printer) -> list[str]:
-    """Return the function that solves for a right side."""
-    plan, names = listing.plan, listing.names
-    read = count_uses(plan.nodes, plan.solution)
-    body = [f"const double {names[node]} = F[{k}][lane];" for k, node in enumerate(listing.factors)]
-    body += [
-        f"const double {names[node]} = right[{k}][lane];"
-        for k, node in enumerate(plan.right)
-        if node in read
-    ]
-    body += _steps(listing.solve_steps, printer)
-    body += [f"to[{k}][lane] = {printer.text(node)};" for k, node in enumerate(plan.solution)]
-    return [
         "// x of Phi_q x = right.",
         "INLINE void solve_at(const double (*restrict F)[LANES],",
         "    const double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)",
@@ -165,21 +119,9 @@ def _solution(listing: SolveListing, printer: Printer) -> list[str]:
     ]
 
 
-def _steps(steps: Iterable[Assignment | BlockCall], printer: Printer) -> list[str]:
-    """Return the statements of a function; larger blocks are solved by a call."""
-    lines: list[str] = []
-    for step in steps:
-        if isinstance(step, Assignment):
-            left = WRITE.value.format(step.name)
-            lines += WRITE.assigned(left, printer.definition(step.node))
-        else:
-            lines += _block_call(step, printer)
-    return lines
-
-
 def _block_call(step: BlockCall, printer: Printer) -> list[str]:
     """Return the call that solves a block, with the names of the unknowns, or its determinant."""
-    matrix = _indented(step.matrix, printer)
+    matrix = operands(step.matrix, printer)
     if not step.right:
         left = WRITE.value.format(step.names[0])
         return [f"{left} = block_determinant({step.size}, (const double[]){{", *matrix, "});"]
@@ -189,11 +131,7 @@ def _block_call(step: BlockCall, printer: Printer) -> list[str]:
         f"block_solve({step.size}, (const double[]){{",
         *matrix,
         "}, (const double[]){",
-        *_indented(step.right, printer),
+        *operands(step.right, printer),
         f"}}, {vector});",
         *(f"const double {name} = {vector}[{k}];" for k, name in enumerate(step.names)),
     ]
-
-
-def _indented(nodes: Iterable[int], printer: Printer) -> list[str]:
-    return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]

@@ -1,18 +1,28 @@
-"""The JavaScript target: one file with Phi, Phi_q, nu and gamma of one point.
+"""The JavaScript target: one file with the quantities of a mechanism, and its motion.
 
 It runs as a classic script in a page, which needs no server and no network, and under node.
 """
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
-from kincompile import quantities
+from kincompile import criteria, quantities
+from kincompile.ir.elimination import plan_solve
 from kincompile.targets.headings import constants
 from kincompile.targets.javascript.dialect import JAVASCRIPT
-from kincompile.targets.lines import indented, wrapped
+from kincompile.targets.javascript.functions import (
+    WRITE,
+    kernel,
+    kernels,
+    single,
+    solve_functions,
+    vectors,
+)
+from kincompile.targets.lines import indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
-from kincompile.targets.statements import Statements
+from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
@@ -26,7 +36,17 @@ if TYPE_CHECKING:
 
 DIALECT = JAVASCRIPT
 
-WRITE = Statements("//", "const {}", "{}[{}]", "{}[{}][{}]")
+CRITERIA = (
+    "ALLOWED_PART", "ARC_CORRECTIONS", "AROUND", "AROUND_OFFSETS", "BEND", "BESIDE", "CONSTANT",
+    "CORNER", "FAR", "FIRST_ARC", "INVOLVED", "IN_RANGE", "KINK", "LARGEST_ANGLE", "LARGE_ERROR",
+    "LATE", "LONGEST_ARC", "MAX_ARCS", "MAX_CORRECTIONS", "MAX_ITERATIONS", "MAX_SUBSTEPS",
+    "MOST_TURNED", "NEARLY_SINGULAR", "NUDGE", "RESIDUAL_FACTOR", "RESTARTS", "ROOT_LENGTH",
+    "ROOT_STEPS", "ROUNDING", "SAME_POSITION", "SAME_TIME", "SHORTEST_ARC", "SHORTEST_STEP",
+    "SINGULAR_SENSITIVITY", "SMALLEST_PART", "SMALL_CORRECTION", "SMALL_ERROR", "SMALL_PART",
+    "SMOOTH", "STEEP", "STRAIGHT", "SUFFICIENT", "TOLERABLE_CORRECTION", "TOLERANCE", "TOO_NEAR",
+    "WILD",
+)  # fmt: skip
+"""The numbers of `criteria` that the solver judges by."""
 
 KEYWORDS = (
     "arguments", "await", "break", "case", "catch", "class", "const", "continue", "debugger",
@@ -53,7 +73,10 @@ STANDARD = (
 
 RESERVED: tuple[str, ...] = (
     *KEYWORDS, *STANDARD, *quantities.singles(quantities.QUANTITIES), "q", "q_dot", "q_ddot", "t",
-    "p", "require_length", "square", "spline", "DEFAULTS", "N_COORDINATES", "N_EQUATIONS",
+    "p", "at", "F", "right", "to", "determinants", "block_solve", "block_determinant", "evaluated",
+    *(f"{name}_at" for name in (*quantities.singles(quantities.QUANTITIES), *quantities.TOGETHER)),
+    "factor_at", "solve_at", "require_length", "square", "spline", "DEFAULTS", "N_COORDINATES",
+    "N_EQUATIONS",
 )  # fmt: skip
 """Names that the functions use."""
 
@@ -64,58 +87,79 @@ TAKEN_BY_ENVIRONMENT = (
 
 
 def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
-    """Return the functions: one a quantity."""
-    return quantities.singles(given)
+    """Return the functions of a point."""
+    return kernels(given)
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return the lines of a function of one point."""
-    quantity = quantities.quantity_named(name)
-    vectors = quantity.states
-    body = [f'require_length("{vector}", {vector}, N_COORDINATES);' for vector in vectors]
-    body.append('require_length("p", p, DEFAULTS.length);')
-    body += WRITE.inputs(code.program, listing)
-    body += WRITE.frames(listing, printer) + WRITE.steps(listing, printer)
-    body.append(f"const {name} = {_zeros(name, code.program)};")
-    body += WRITE.results(name, code, printer)
-    return [
-        "",
-        f"// {quantity.about}",
-        f"function {name}({', '.join(vectors)}, t, p = DEFAULTS) {{",
-        *(f"    {line}" for line in body),
-        f"    return {name};",
-        "}",
-    ]
+    """Return the lines of a function of a point."""
+    return kernel(name, code, listing, printer)
 
 
 def files(
     code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
 ) -> Mapping[str, str]:
     """Return the .js file."""
-    program = code.program
-    text = indented(line for lines in functions.values() for line in lines)
+    program, plan = code.program, plan_solve(code)
+    listing = None if plan is None else schedule_solve(code, plan, NameTable(RESERVED))
+    lines = [line for own in functions.values() for line in own]
+    for quantity in program.quantities:
+        lines += single(quantity, code)
+    lines += [] if listing is None else solve_functions(code, listing)
+    text = indented(lines)
     units = {item.name: item.unit for item in program.coordinates}
     units |= {item.name: item.unit for item in program.parameters}
     units |= {item.name: item.unit for item in program.outputs}
     data = {
         **constants(code, 2, "[{}, {}]"),
         "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),
+        "outputs": indented(quoted(item.name for item in program.outputs), 2),
+        "bodies": indented(wrapped(_bodies(program)), 2),
+        "corners": str(program.corners).lower(),
+        "matrices": indented(_matrices(code), 2),
         "header": WRITE.heading(code),
         "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
         "tables": indented(_tables(program)),
         "has_square": "square(" in text,
+        "has_blocks": plan is not None and plan.has_large_blocks,
         "functions": text,
-        "returned": "".join(f", {name}" for name in functions),
+        "vectors": indented(vectors(code), 3),
+        "n_factors": 0 if listing is None else len(listing.factors),
+        "n_blocks": 0 if listing is None else len(listing.plan.determinants),
+        "solver": "" if listing is None else _solver(),
+        "returned": indented(
+            wrapped(
+                [*(item.name for item in program.quantities), *(f"{name}_at" for name in functions)]
+            ),
+            2,
+        ),
     }
     return {f"{program.name}.js": fill("javascript/module.js.jinja", data)}
 
 
-def _zeros(quantity: str, program: Program) -> str:
-    """Return a vector or a matrix of zeros, to be filled."""
-    rows, *columns = program.shape_of(quantities.quantity_named(quantity))
-    if columns:
-        return f"Array.from({{ length: {rows} }}, () => new Array({columns[0]}).fill(0))"
-    return f"new Array({rows}).fill(0)"
+def _solver() -> str:
+    """Return the script that solves for the motion, with the criteria of the runtime."""
+    numbers = {name: json.dumps(getattr(criteria, name)) for name in CRITERIA}
+    return indented(fill("javascript/solver.js.jinja", numbers).split("\n"))
+
+
+def _bodies(program: Program) -> list[str]:
+    """Return name, first column and number of columns of each body."""
+    return [f'["{x.name}", {x.columns.start}, {len(x.columns)}]' for x in program.bodies]
+
+
+def _matrices(code: InlineProgram) -> list[str]:
+    """Return rows, columns and pattern of each matrix, by name."""
+    lines = []
+    for quantity in code.program.quantities:
+        if quantity.is_matrix:
+            rows, columns = code.program.shape_of(quantity)
+            places = wrapped(f"[{i}, {j}]" for i, j in code.pattern(quantity.name))
+            pattern = ["pattern: [", *(f"    {line}" for line in places), "],"]
+            pattern = ["pattern: PATTERN,"] if quantity.name == "Phi_q" else pattern
+            own = [f"rows: {rows}, columns: {columns},", *pattern]
+            lines += [f"{quantity.name}: {{", *(f"    {line}" for line in own), "},"]
+    return lines
 
 
 def _tables(program: Program) -> list[str]:

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any, Literal
 
 from kincompile.ir.elimination import plan_solve
-from kincompile.quantities import FORMAT, kernel_of, kernels, quantity_named, states_of
+from kincompile.quantities import FORMAT, kernels, quantity_named, states_of
 from kincompile.targets.evaluators import varying, vectors
 from kincompile.targets.headings import entry_title, header, short_title, title
 from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
@@ -96,7 +96,7 @@ def files(
 
 def _has(name: str, lines: Iterable[str]) -> bool:
     """Return whether a constant is used."""
-    return any(re.search(rf"\b{name}\b", line) for line in lines)
+    return re.search(rf"\b{name}\b", "\n".join(lines)) is not None
 
 
 def _constants(code: InlineProgram) -> dict[str, Any]:
@@ -184,11 +184,16 @@ def _results(program: Program) -> Iterator[str]:
 
 def _functions(code: InlineProgram) -> Iterator[str]:
     """Yield the public functions of the quantities."""
+    given = code.program.quantities
+    found = kernels(given)
+    counts = {
+        item.name: sum(len(varying(code, part, item.name)) for part in code.sections)
+        for item in given
+    }
     for quantity, name, lines in public_functions(code.program, len(code.pattern())):
-        kernel = kernel_of((quantity.name,), code.program.quantities)
-        computed = kernels(code.program.quantities)[kernel]
-        before = computed[: computed.index(quantity.name)]
-        skip = sum(len(varying(code, part, item)) for item in before for part in code.sections)
+        kernel = next(key for key, own in found.items() if quantity.name in own)
+        computed = found[kernel]
+        skip = sum(counts[item] for item in computed[: computed.index(quantity.name)])
         result = f"_{name.upper()}"
         yield from lines
         states = ", ".join(quantity.states)
@@ -295,13 +300,16 @@ def _section(
     if quantity is None:
         return [line for text in texts for line in element(text, "")]
     is_own = quantity.rows == "equations" and not quantity.is_matrix
-    line = f"    {', '.join(texts)},  # {short_title(section)}"
-    if is_own and name != "Phi" and len(line) <= WIDTH - 4:
-        return [line]
-    whole = f"    {texts[0]},  # {title(section)}"
-    if is_own and len(texts) == 1 and len(whole) <= WIDTH - 4:
-        return [whole]
-    lines = [f"    {line}" for line in commented(title(section))] if is_own else []
+    lines: list[str] = []
+    if is_own:
+        line = f"    {', '.join(texts)},  # {short_title(section)}"
+        if name != "Phi" and len(line) <= WIDTH - 4:
+            return [line]
+        whole = title(section)
+        line = f"    {texts[0]},  # {whole}"
+        if len(texts) == 1 and len(line) <= WIDTH - 4:
+            return [line]
+        lines = [f"    {line}" for line in commented(whole)]
     for entry, text in zip(entries, texts, strict=True):
         lines += element(text, entry_title(name, entry, code))
     return lines

@@ -26,8 +26,8 @@ from kincompile.compare.report import Report
 from kincompile.compare.vectors import Exchanged
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
-from kincompile.model.matrices import SymbolicEnvironment
 from kincompile.model.resolve import Joint
+from kincompile.model.symbolic import SymbolicEnvironment
 
 NUMBERS = {
     "a": 0.25, "b": -0.15, "c": -0.35, "d": 0.45, "e": 0.6, "f": 0.9, "g": -0.4, "h": 0.7,

@@ -3,6 +3,7 @@
 import dataclasses
 import stat
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 import matplotlib as mpl
 from matplotlib import pyplot as plt
 from matplotlib.animation import AbstractMovieWriter, PillowWriter
+from matplotlib.colors import to_rgba
 from PIL import Image, ImageSequence
 
 
@@ -54,8 +56,9 @@ class Recorder(AbstractMovieWriter):
 
     def grab_frame(self, **savefig_kwargs):
         (ax,) = self.fig.axes
-        (bar,) = [line for line in ax.lines if line.get_color() == "C0"]
-        self.bars.append(np.column_stack(bar.get_data()))
+        bar: Any
+        bar, *_ = [area for area in ax.patches if to_rgba("C0")[:3] == area.get_facecolor()[:3]]
+        self.bars.append(bar.get_xy()[:-1])
         self.titles.append(ax.get_title(loc="left"))
 
     def finish(self):
@@ -73,7 +76,10 @@ def test_that_a_frame_is_a_position_of_the_solution(motion):
     assert shown.titles == [f"arm   t = {t:.2f} s" for t in motion.t]
     tips = np.stack((np.cos(motion.t**2), np.sin(motion.t**2)), axis=-1)
     for bar, tip in zip(shown.bars, tips, strict=True):
-        np.testing.assert_allclose(bar, [(0, 0), tip], atol=1e-9)
+        np.testing.assert_allclose(bar.mean(axis=0), np.array(tip) / 2, atol=1e-9)
+        along = np.array(tip) / np.hypot(*tip)
+        across = (bar @ (-along[1], along[0])).max()
+        np.testing.assert_allclose((bar @ along).max(), np.hypot(*tip) + across, rtol=1e-2)
 
 
 def test_that_a_gif_has_every_frame_at_the_tempo_of_the_motion(motion, tmp_path):
@@ -96,7 +102,8 @@ def test_that_the_pixels_of_a_gif_show_the_bar(motion, tmp_path):
             frames.append(np.asarray(gif.convert("RGB"), dtype=int))
     blue = [frame[..., 2] - frame[..., 0] > 80 for frame in frames]
     height = [np.ptp(np.nonzero(pixels)[0]) for pixels in blue]
-    assert height[0] < 20 < 100 < height[1]
+    # Level it is as high as it is wide, two sizes: a twenty-fifth of the diagonal.
+    assert height[0] < 30 < 100 < height[1]
 
 
 @pytest.mark.parametrize(

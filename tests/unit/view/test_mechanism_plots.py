@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.view.polylines import DRIVER_COLOUR, GROUND_COLOUR
+from kincompile.view.shapes import DRIVER_COLOUR, GROUND_COLOUR
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 from matplotlib import pyplot as plt
@@ -64,6 +64,18 @@ def has_line(ax, colour, points):
     )
 
 
+def is_bar(points, start, end):
+    """Whether an area is a bar with round ends, everywhere as far from its middle line."""
+    start, along = np.array(start), np.subtract(end, start)
+    part = np.clip((points - start) @ along / (along @ along), 0, 1)
+    far = np.hypot(*(points - start - part[:, None] * along).T)
+    return len(points) > 20 and np.ptp(far) < 1e-9 and 0 < far[0] < 0.2 * np.hypot(*along)
+
+
+def has_bar(ax, colour, start, end):
+    return any(is_bar(points, start, end) for points in areas(ax, colour))
+
+
 def centres(polygons):
     return np.array([points.mean(axis=0) for points in polygons])
 
@@ -73,8 +85,8 @@ def test_that_pins_bars_and_slider_are_those_of_the_triangle(slider_crank):
     ax = kc.plot_mechanism(slider_crank, q)
     pins = centres(areas(ax, "white"))
     np.testing.assert_allclose(pins, [(0, 0), a, b], atol=1e-12)
-    assert has_line(ax, "C0", [(0, 0), a])
-    assert has_line(ax, "C1", [a, b])
+    assert has_bar(ax, "C0", (0, 0), a)
+    assert has_bar(ax, "C1", a, b)
     (block,) = areas(ax, "C2")
     np.testing.assert_allclose(block.mean(axis=0), b, atol=1e-12)
     assert np.ptp(block[:, 0]) > np.ptp(block[:, 1]) > 0
@@ -100,7 +112,7 @@ def test_that_the_guess_is_drawn_without_a_position(slider_crank):
 def test_that_parameters_change_the_shapes(slider_crank):
     q, _, _ = slider_crank_position(0.7)
     ax = kc.plot_mechanism(slider_crank, q, p={"r": 0.2})
-    assert has_line(ax, "C0", [(0, 0), (0.2 * np.cos(0.7), 0.2 * np.sin(0.7))])
+    assert has_bar(ax, "C0", (0, 0), (0.2 * np.cos(0.7), 0.2 * np.sin(0.7)))
 
 
 MECHANISMS = (
@@ -150,7 +162,7 @@ def test_that_gears_have_their_radius_and_turn(example_named):
     np.testing.assert_allclose((x, y), (0.05 * np.cos(angle), 0.05 * np.sin(angle)), atol=1e-12)
     turned = 2 * np.pi * solution.t[k]
     assert has_line(ax, "C0", [(0, 0), (0.02 * np.cos(turned), 0.02 * np.sin(turned))])
-    (ring,) = [line for line in lines(ax, GROUND_COLOUR) if len(line) > 60]
+    ring = next(line for line in lines(ax, GROUND_COLOUR) if len(line) > 60)
     np.testing.assert_allclose(np.hypot(*ring.T), 0.08, rtol=1e-12)
 
 

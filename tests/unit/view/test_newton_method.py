@@ -11,7 +11,8 @@ import sympy
 import kincompile as kc
 from kincompile.runtime.newton import iterate
 from kincompile.runtime.problem import problem
-from kincompile.view.newton_panel import MOST_COORDINATES, newton_method, newton_script
+from kincompile.targets.templates import read
+from kincompile.view.live import MOST_COORDINATES, solver_script
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 STATUSES = {
@@ -24,7 +25,7 @@ node = pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: n
 
 def run(tmp_path, script, expression):
     """Return what an expression of `newton` and of a script's declarations gives."""
-    text = f"{script}\n{newton_method()}\nconsole.log(JSON.stringify({expression}))"
+    text = f"{script}\n{read('view/newton.js')}\nconsole.log(JSON.stringify({expression}))"
     (tmp_path / "all.js").write_text(text, encoding="utf-8")
     done = subprocess.run(
         [str(NODE), "all.js"], cwd=tmp_path, capture_output=True, text=True, check=False
@@ -43,15 +44,18 @@ def guesses(module):
     return [module.GUESS + scale * rng.normal(0, spread, scale.size) for spread in spreads]
 
 
+LINEAR = "emitted.solver.linear"
+
+
 @node
 def test_that_factors_solve_and_give_the_determinant(tmp_path):
     rng = np.random.default_rng(5)
     for n in (1, 2, 5, 15):
         matrix, b = rng.normal(size=(n, n)), rng.normal(size=n)
         matrix[0, 0] = 0 if n > 1 else matrix[0, 0]
-        text = f"(() => {{ const f = newton.factor({json.dumps(matrix.tolist())});"
-        text += f"return [newton.solve(f, {json.dumps(b.tolist())}), f.determinant]; }})()"
-        x, determinant = run(tmp_path, "", text)
+        text = f"(() => {{ const f = {LINEAR}.factor({json.dumps(matrix.tolist())});"
+        text += f"return [{LINEAR}.solve(f, {json.dumps(b.tolist())}), f.determinant]; }})()"
+        x, determinant = run(tmp_path, solver_script(folded()), text)
         np.testing.assert_allclose(x, np.linalg.solve(matrix, b), rtol=1e-11)
         np.testing.assert_allclose(determinant, np.linalg.det(matrix), rtol=1e-12)
 
@@ -60,9 +64,25 @@ def test_that_factors_solve_and_give_the_determinant(tmp_path):
 def test_that_columns_that_depend_on_each_other_are_found(tmp_path):
     matrix = np.random.default_rng(6).normal(size=(5, 5))
     matrix[:, 3] = 2 * matrix[:, 0] - matrix[:, 2]
-    factors = run(tmp_path, "", f"newton.factor({json.dumps(matrix.tolist())})")
+    text = f"{LINEAR}.factor({json.dumps(matrix.tolist())})"
+    factors = run(tmp_path, solver_script(folded()), text)
     assert factors["determinant"] == 0
     assert factors["dependent"] == [0, 2, 3]
+
+
+@node
+@pytest.mark.parametrize("shape", [(1, 1), (4, 4), (6, 4), (4, 5)])
+def test_that_singular_values_are_numpys(tmp_path, shape):
+    matrix = np.random.default_rng(7).normal(size=shape)
+    matrix[:, 0] = matrix[:, -1]
+    text = f"{LINEAR}.singularValues({json.dumps(matrix.tolist())})"
+    found = run(tmp_path, solver_script(folded()), text)[::-1]
+    sizes = np.zeros(shape[1])
+    sizes[: min(shape)] = np.linalg.svd(matrix, compute_uv=False)
+    np.testing.assert_allclose([item["size"] for item in found], sizes, atol=1e-14)
+    directions = np.array([item["direction"] for item in found])
+    np.testing.assert_allclose(directions @ directions.T, np.eye(shape[1]), atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(matrix @ directions.T, axis=0), sizes, atol=1e-14)
 
 
 @node
@@ -70,7 +90,7 @@ def test_that_iterates_are_those_of_the_runtime(tmp_path, example):
     module, t = example.module, 0.3
     starts = [guess.tolist() for guess in guesses(module)]
     text = f"{json.dumps(starts)}.map(guess => newton.iterate(emitted, guess, {t}))"
-    found = run(tmp_path, newton_script(example.model), text)
+    found = run(tmp_path, solver_script(example.model), text)
     for guess, attempt in zip(starts, found, strict=True):
         q = np.array(guess)
         # The page has the size of the mechanism from the model's guess.
@@ -90,7 +110,7 @@ def test_that_iterates_are_those_of_the_lecture(tmp_path, example_named):
     """Reference case R3, to the digits printed there."""
     example = example_named("problem_3_5_6")
     text = "newton.iterate(emitted, [0.2, 0.2, Math.PI / 4], 0).iterates"
-    found = run(tmp_path, newton_script(example.model), text)
+    found = run(tmp_path, solver_script(example.model), text)
     expected = [
         (0.4232233047, 0.1767766953, 0.7853981634), (0.38125, 0.1348033906, 1.0228350305),
         (0.3813100372, 0.1215644989, 1.06347535), (0.3812500401, 0.1210317905, 1.065432028),
@@ -120,7 +140,7 @@ def stated(tmp_path, m, guess, motion, t=0.0):
     """Return what the panel says of a run."""
     guess, motion = (json.dumps(None if q is None else list(q)) for q in (guess, motion))
     text = f"newton.statement(emitted, newton.iterate(emitted, {guess}, {t}), {t}, "
-    return run(tmp_path, newton_script(m), f"{text}emitted.DEFAULTS, {motion})")
+    return run(tmp_path, solver_script(m), f"{text}emitted.DEFAULTS, {motion})")
 
 
 @node
@@ -190,8 +210,8 @@ def test_that_a_lock_up_is_named(tmp_path, example_named):
 
 def test_that_the_script_has_no_name_of_the_mechanism_outside():
     m = folded()
-    assert newton_script(m).startswith("const emitted = (() => {\n")
-    assert "</" not in newton_script(m)
+    assert solver_script(m).startswith("const emitted = (() => {\n")
+    assert "</" not in solver_script(m)
 
 
 def test_that_the_script_says_why_there_are_no_functions():
@@ -199,10 +219,9 @@ def test_that_the_script_says_why_there_are_no_functions():
     for k in range(MOST_COORDINATES // 3 + 1):
         m.body(f"b{k}")
     m.add(kc.AbsoluteAngle("motor", "b0", kc.t))
-    assert newton_script(m) == (
-        'const emitted = {"reason": "63 coordinates are too many to show Newton\'s method step by '
-        'step."};\n'
+    assert solver_script(m) == (
+        'const emitted = {"reason": "153 coordinates are too many to solve for in a page."};\n'
     )
     m = kc.Mechanism("few")
     m.add(kc.AbsoluteAngle("motor", m.body("b"), kc.t))
-    assert "Newton's method cannot be shown: " in newton_script(m)
+    assert "This page cannot solve the mechanism: " in solver_script(m)

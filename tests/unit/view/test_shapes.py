@@ -97,7 +97,7 @@ def test_that_a_slider_has_a_rail_on_the_ground_as_long_as_its_motion():
     q = np.zeros((3, 6))
     q[:, 3:] = [(0, 1, np.pi / 2), (0, 4, np.pi / 2), (0, 9, np.pi / 2)]
     (rail,), (block,) = marks(m, Rail, q=q), marks(m, Slider, q=q)
-    assert block == Slider("C", at(1, (0.5, 0)), (1, 0))
+    assert block == Slider("C", at(1, (0.5, 0)), (1, 0), FRAMES[1])
     # The point (0.5, 0) is at y = 1.5, 4.5, 9.5; the rail goes on a little at both ends.
     over = rail.end[1] - 9.5
     assert over > 0
@@ -123,9 +123,10 @@ def test_that_the_block_of_a_slotted_lever_is_the_body_at_the_crank_pin(is_lever
     i, j = sides if is_lever_first else sides[::-1]
     m.add(kc.Translational("slot", *i, *j))
     m.add(kc.AbsoluteAngle("motor", crank, kc.t))
-    (slide,), (sleeve,) = marks(m, Span), marks(m, Slider)
-    assert (sleeve.place, sleeve.axis) == (at(2, (0, 0)), (0, 1))
-    assert slide == Span("slot", at(2, (0, 0)), at(1, (0, 0)), "slide")
+    (slot,), (block,) = marks(m, Rail), marks(m, Slider)
+    assert (block.place, block.axis, block.guide) == (at(2, (0, 0)), (0, 1), FRAMES[2])
+    assert (slot.frame, slot.axis, slot.style) == (FRAMES[1], (1, 0), "slot")
+    assert slot.follower == block.place
 
 
 def test_that_a_cylinder_takes_the_place_of_its_slide():
@@ -141,10 +142,13 @@ def test_that_a_cylinder_takes_the_place_of_its_slide():
 def test_that_a_distance_is_a_rod_or_a_cylinder(length, style):
     m = two_bodies(lambda m, i, j, a: kc.Distance("D", i, (0, 0), j, (1, 0), length))
     (span,) = marks(m, Span)
-    assert span == Span("D", at(0, (0, 0)), at(1, (1, 0)), style)
+    # At the guess the points are at (0, 0) and (2, 1) + (cos 0.5, sin 0.5).
+    barrel = 0.85 * np.hypot(2 + np.cos(0.5), 1 + np.sin(0.5)) if style == "cylinder" else 0
+    assert (span.first, span.second, span.style) == (at(0, (0, 0)), at(1, (1, 0)), style)
+    assert span.barrel == pytest.approx(barrel)
     m = two_bodies(lambda m, i, j, a: kc.AbsoluteDistance("D", i, (1, 0), (5, 5), length))
     (span,) = marks(m, Span)
-    assert span == Span("D", at(GROUND, (5, 5)), at(0, (1, 0)), style)
+    assert (span.first, span.second) == (at(GROUND, (5, 5)), at(0, (1, 0)))
 
 
 @pytest.mark.parametrize(

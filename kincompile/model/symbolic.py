@@ -1,0 +1,105 @@
+"""A vector expression in SymPy: the leaves of a template in the user's own names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import sympy
+
+from kincompile.model.expressions import Scalar, alpha, as_sympy, t
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from fractions import Fraction
+
+    from kincompile.calculus.expand import Expansion
+    from kincompile.calculus.expressions import (
+        Components,
+        ProfileFunction,
+        Rotation,
+        Symbol,
+        TimeFunction,
+        Value,
+        VectorSymbol,
+    )
+    from kincompile.calculus.symbols import CoordinateSymbol
+    from kincompile.calculus.template import Template
+
+
+class Bound(Protocol):
+    """A template with what its symbols stand for: a joint, or a point of a body."""
+
+    @property
+    def template(self) -> Template:
+        """The vectors."""
+
+    @property
+    def columns(self) -> tuple[str | None, ...]:
+        """Names of the coordinates, None for those of the ground."""
+
+    @property
+    def scalars(self) -> Mapping[str, Scalar]:
+        """Scalar attributes by symbol."""
+
+    @property
+    def points(self) -> Mapping[str, tuple[Scalar, Scalar]]:
+        """Points and directions by symbol."""
+
+    @property
+    def profiles(self) -> Mapping[str, sympy.Expr]:
+        """Profiles of cams by symbol."""
+
+
+class SymbolicEnvironment:
+    """The leaves of a template as SymPy expressions."""
+
+    def __init__(self, bound: Bound) -> None:
+        self._bound = bound
+        self._motion: dict[CoordinateSymbol, tuple[sympy.Expr, ...]] = {}
+        names = iter(bound.columns)
+        for item, item_rate in zip(bound.template.coordinates, bound.template.rates, strict=True):
+            own = [next(names) for _ in range(item.size)]
+            self._motion[item] = tuple(_symbol(name) for name in own)
+            self._motion[item_rate] = tuple(_symbol(name and rate(name)) for name in own)
+
+    def number(self, value: Fraction) -> Value:
+        """Return an exact number."""
+        return sympy.Rational(value.numerator, value.denominator)
+
+    def pi(self) -> Value:
+        """Return pi."""
+        return sympy.pi
+
+    def symbol(self, symbol: Symbol) -> Value:
+        """Return a coordinate, a rate or a scalar attribute."""
+        if symbol in self._motion:
+            return self._motion[symbol][0]
+        return as_sympy(self._bound.scalars[symbol.name])
+
+    def vector(self, symbol: VectorSymbol) -> Components:
+        """Return a position, a velocity or a body-fixed point."""
+        if symbol in self._motion:
+            return self._motion[symbol]
+        return tuple(as_sympy(value) for value in self._bound.points[symbol.name])
+
+    def time_function(self, function: TimeFunction) -> Value:
+        """Return C(t) or one of its derivatives."""
+        return as_sympy(self._bound.scalars[function.name]).diff(t, function.order)
+
+    def profile(self, profile: ProfileFunction) -> Value:
+        """Return rho(alpha) or one of its derivatives at the contact parameter."""
+        rho = self._bound.profiles[profile.name].diff(alpha, profile.order)
+        return rho.subs(alpha, self.symbol(profile.argument))
+
+    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
+        """Return the numbers that all vectors share that a rotation turns."""
+        return expand.entries(rotation)
+
+    def call(self, function: str, value: Value) -> Value:
+        """Return an elementary function."""
+        return getattr(sympy, function)(value)
+
+
+def _symbol(name: str | None) -> sympy.Expr:
+    return sympy.S.Zero if name is None else sympy.Symbol(name)

@@ -1,0 +1,173 @@
+"""The motion that emitted JavaScript solves for, against the runtime: numbers, statuses, events."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.runtime.results.observed import observed
+
+from .conftest import CHROMIUM, NODE, in_chromium, in_node
+
+FACTORS = ((1.0, 1.0), (0.9, 1.1), (0.6, 1.5), (0.3, 2.0))
+"""Between which parts of its default each parameter is drawn, for one motion after the other."""
+
+SOLVE = """JSON.stringify(JOBS.map(([t, p, guess]) => {
+  const motion = MODEL.solver.solve(MODEL, t, p, guess), event = MODEL.solver.explain(motion);
+  const arrays = ["q", "q_dot", "q_ddot", "y", "y_dot", "y_ddot", "status", "near"];
+  return [Object.fromEntries(arrays.map(name => [name, Array.from(motion[name])])), event];
+}))"""
+
+RUNNERS = [
+    pytest.param(
+        in_node, marks=pytest.mark.skipif(NODE is None, reason="node is not installed"), id="node"
+    ),
+    pytest.param(
+        in_chromium,
+        marks=[
+            pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed"),
+            pytest.mark.slow,
+            pytest.mark.browser,
+        ],
+        id="chromium",
+    ),
+]
+
+
+@pytest.fixture(params=RUNNERS)
+def solved(request, tmp_path):
+    """Return the function that solves a model for (times, parameters, guess) in JavaScript."""
+
+    def run(model, jobs):
+        (tmp_path / "model.js").write_text(kc.emit(model, "javascript").source, encoding="utf-8")
+        text = SOLVE.replace("JOBS", json.dumps(jobs)).replace("MODEL", model.name)
+        return json.loads(request.param(tmp_path, {"model": model.name}, text))
+
+    return run
+
+
+def compare(found, event, solution):
+    """Compare a motion with the runtime's, relative to the largest number of its kind."""
+    assert found["status"] == solution.status.tolist()
+    module, p = solution.module, np.array(list(solution.parameters.values()))
+    motion = solution.q, solution.q_dot, solution.q_ddot
+    outputs = observed(module, motion, solution.t, p)
+    names = ("q", "q_dot", "q_ddot", "y", "y_dot", "y_ddot")
+    for name, known in zip(names, (*motion, outputs.y, outputs.y_dot, outputs.y_ddot), strict=True):
+        values = np.array(found[name], dtype=float).reshape(known.shape)
+        np.testing.assert_array_equal(np.isfinite(values), np.isfinite(known), name)
+        scale = np.max(np.abs(known), where=np.isfinite(known), initial=0.0)
+        np.testing.assert_allclose(values, known, rtol=0, atol=1e-9 * scale, err_msg=name)
+    assert (event is None) == (not solution.events)
+    if event is not None:
+        known = solution.events[-1]
+        assert (event["kind"], tuple(event["bodies"])) == (known.kind, known.bodies)
+        assert event["t"] == pytest.approx(known.t, rel=1e-7)
+
+
+def jobs_of(model, module):
+    """Return times and parameters: the model's own, and twice as long with other lengths."""
+    rng = np.random.default_rng(20261122)
+    size = module.DEFAULTS.size
+    sets = [module.DEFAULTS * rng.uniform(*part, size) for part in FACTORS[: 4 if size else 1]]
+    end, points = model.system().end, min(model.system().points, 201)
+    grids = np.linspace(0, end, points), np.linspace(0, 2 * end, 151)
+    return [[t.tolist(), p.tolist(), module.GUESS.tolist()] for p in sets for t in grids]
+
+
+@pytest.mark.filterwarnings("ignore::kincompile.errors.SingularConfigurationWarning")
+def test_that_motions_of_examples_are_those_of_the_runtime(solved, example):
+    jobs = jobs_of(example.model, example.module)
+    for (t, p, _), (found, event) in zip(jobs, solved(example.model, jobs), strict=True):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", kc.AssemblyWarning)
+            compare(found, event, kc.solve(example.module, t, p))
+
+
+def test_that_lock_ups_are_among_them(example_named):
+    """Else the comparison above would not see one."""
+    kinds = set()
+    for name in ("wrecker_boom", "swing_and_dwell", "problem_3_5_6"):
+        example = example_named(name)
+        for t, p, _ in jobs_of(example.model, example.module):
+            kinds |= {event.kind for event in kc.solve(example.module, t, p).events}
+    assert kinds == {"lock-up"}
+
+
+def parallelogram():
+    """Return a parallelogram, which goes through a bifurcation when it lies flat."""
+    m = kc.Mechanism("parallelogram", end=4.0, points=41)
+    r = m.parameter("r", 1.0, unit="m")
+    names = ("left", "coupler", "right")
+    left, coupler, right = (m.body(name) for name in names)
+    m.add(kc.Revolute("A", m.ground, (0, 0), left, (0, 0)))
+    m.add(kc.Revolute("B", left, (r, 0), coupler, (0, 0)))
+    m.add(kc.Revolute("C", coupler, (3, 0), right, (r, 0)))
+    m.add(kc.Revolute("D", right, (0, 0), m.ground, (3, 0)))
+    m.add(kc.AbsoluteAngle("motor", left, 1 + kc.t))
+    return m
+
+
+GUESS = [0, 0, 1, 0.54, 0.84, 0, 3, 0, 1]
+
+
+def free(name, equation, unit=""):
+    coordinate = kc.Coordinate("x", guess=0.4, unit=unit) if unit else "x"
+    return kc.ConstraintSystem(name, [coordinate], [equation])
+
+
+x = sympy.Symbol("x")
+CASES = {
+    "bifurcation": (parallelogram, GUESS, (0, 4, 41)),
+    "beside it": (parallelogram, GUESS, (0, 4, 18)),
+    "falling times": (parallelogram, GUESS, (2, -3, 41)),
+    "at a bifurcation": (parallelogram, [0, 0, 0, 1, 0, 0, 3, 0, 0], (-1, 1, 5)),
+    "one time": (parallelogram, GUESS, (0.5, 0.5, 1)),
+    "rough guess": (parallelogram, [0] * 9, (0, 1, 5)),
+    "far guess": (parallelogram, [5, -7, 9, 40, 3, 30, -3, 8, -9], (0, 1, 5)),
+    "lock-up": (lambda: free("root", x**2 - 1 + kc.t), [1.0], (0, 2, 21)),
+    "lock-up at a point": (lambda: free("root", x**2 - 1 + kc.t), [1.0], (0, 2, 3)),
+    "lock-up at the start": (lambda: free("root", x**2 - kc.t), [0.0], (0, 1, 3)),
+    "no root": (lambda: free("none", x**2 + 1 + kc.t**2), [0.3], (0, 1, 3)),
+    "not finite": (lambda: free("log", sympy.log(x) - kc.t), [-1.0], (0, 1, 3)),
+    "ends": (lambda: free("ends", x - sympy.sqrt(1 - kc.t)), [1.0], (0, 2, 5)),
+    "jump": (
+        lambda: free("jump", x - sympy.Piecewise((0, kc.t < 0.55), (3, True))), [0.0], (0, 1, 11)
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.filterwarnings("ignore::kincompile.errors.CornerWarning")
+@pytest.mark.filterwarnings("ignore::kincompile.errors.AssemblyWarning")
+@pytest.mark.filterwarnings("ignore::kincompile.errors.SingularConfigurationWarning")
+def test_that_a_motion_ends_as_in_the_runtime(solved, case):
+    make, guess, grid = CASES[case]
+    model = make()
+    module, t = kc.compile(model), np.linspace(*grid)
+    ((found, event),) = solved(model, [[t.tolist(), module.DEFAULTS.tolist(), guess]])
+    compare(found, event, kc.solve(module, t, guess=guess))
+
+
+def test_that_corners_of_drivers_have_their_status(solved):
+    m = kc.Mechanism("ramp", end=1.0, points=11)
+    arm = m.body("arm", guess=(0, 0, 0))
+    m.add(kc.Revolute("pin", m.ground, (0, 0), arm, (0, 0)))
+    angle = sympy.Piecewise((0, kc.t < 0.5), (kc.t - 0.5, True))
+    m.add(kc.AbsoluteAngle("motor", arm, angle, corners=True))
+    module, t = kc.compile(m), np.linspace(0, 1, 11)
+    ((found, event),) = solved(m, [[t.tolist(), [], module.GUESS.tolist()]])
+    with pytest.warns(kc.CornerWarning):
+        solution = kc.solve(module, t)
+    assert set(found["status"]) == {0, 5}
+    compare(found, event, solution)
+
+
+def test_that_redundant_equations_have_no_solver(case_named):
+    with pytest.warns(kc.RedundantConstraintWarning):
+        source = kc.emit(case_named("repeated").model, "javascript").source
+    assert "There is no solve" in source
+    assert "solver" not in source
