@@ -27,7 +27,7 @@ from kincompile.compare.fault import (
     WHOLE_TRANSPOSED,
     WITH_RATES,
 )
-from kincompile.compare.forms import is_same_space
+from kincompile.compare.forms import OTHER, is_same_space
 from kincompile.compare.matching import Matcher, Matching
 from kincompile.compare.report import Report
 from kincompile.model.expressions import symbol_names
@@ -154,12 +154,12 @@ class Comparer:
         """Prefer one fault in a constraint to what only looks like a way of writing it.
 
         That is a factor that explains its rows in part only: blocks of two bodies that are swapped
-        have most entries right but for the sign. Where no convention is forgiven, it is also
-        another equation that Phi_q alone shows.
+        have most entries right but for the sign. It is also another equation that Phi_q alone
+        shows, unless its form is known, as an angle for its sine, and forgiven.
         """
         before, form = self._matching, self._matching.form(block.rows[0])
-        is_guess = self._strict and form is not None and form.defines
-        is_guess &= "Phi" not in self._quantities
+        is_guess = form is not None and form.defines and "Phi" not in self._quantities
+        is_guess &= self._strict or (form is not None and form.text == OTHER)
         wrong = {row for _, row, _ in self._wrong(block)}
         own = {k for k, row in enumerate(before.rows) if row in block.rows and wrong}
         forms = tuple(item for item in before.forms if item is not form or not is_guess)

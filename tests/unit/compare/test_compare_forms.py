@@ -121,6 +121,18 @@ def test_an_angle_instead_of_its_sine() -> None:
     assert not kc.compare(MODEL, Phi_q=[[-1, 0, 0], [0, 1, 1]], constraint="guide").equal
 
 
+def test_that_a_slip_is_no_other_equation_that_only_phi_q_shows(joint_types: Any) -> None:
+    model = joint_types["Translational"]()
+    e, f = sympy.symbols("e f")
+    swapped = model.Phi.subs({e: f, f: e}, simultaneous=True)
+    q = sympy.Matrix([sympy.Symbol(item.name) for item in model.system().coordinates])
+    rows = [model.Phi[0], swapped[1]]  # v_i with xi and eta swapped in the parallel row
+    Phi_q = sympy.Matrix(rows).jacobian(q)
+    for strict in (False, True):
+        report = kc.compare(model, Phi_q=Phi_q, strict=strict)
+        assert {d.kind for e in report.different for d in e.diagnoses} == {"xi and eta swapped"}
+
+
 def test_that_an_angle_in_another_assembly_is_no_solution() -> None:
     assert not guide(u, psi - sympy.pi).equal
     assert not guide(u, psi**2).equal  # a double root: Phi_q vanishes where it holds
