@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.compare.matching import Matching
+    from kincompile.compare.reference import Reference
 
 OPPOSITE = {"nu": "Phi_t", "gamma": "left side"}
 """What an author may state that nu and gamma are; they then have the opposite sign."""
@@ -45,11 +46,14 @@ def _choices() -> str:
     )
 
 
-def conventions_found(matching: Matching, equations: Sequence[str]) -> Iterator[Convention]:
-    """Yield the conventions of a matching; `equations` are the names of the system's rows."""
+def conventions_found(matching: Matching, reference: Reference) -> Iterator[Convention]:
+    """Yield the conventions of a matching."""
+    equations = reference.equations
     if text := matching.layout.convention:
         kind = "ground columns" if "ground" in text else "order of columns"
-        yield Convention(kind, f"Phi_q: {text}.")
+        order = ["(ground)" if k is None else reference.coordinates[k]
+                 for k in matching.layout.columns]  # fmt: skip
+        yield Convention(kind, f"Phi_q: {text}, the same in all rows: {listed(order, 30)}.")
     parts = ["angles are taken in degrees"] if matching.units.takes_degrees else []
     parts += ["derivatives are per degree"] if matching.units.per_degree else []
     if parts:

@@ -15,7 +15,16 @@ import numpy as np
 from kincompile.compare.agreement import ABSOLUTE
 from kincompile.compare.comparison import Diagnosis
 from kincompile.compare.entry_faults import entry_faults
-from kincompile.compare.fault import LEFT_ZERO, MISSING_TERM, OMISSIONS, OTHER_FORM, Fault
+from kincompile.compare.fault import (
+    LEFT_ZERO,
+    MISSING_TERM,
+    OMISSIONS,
+    OTHER_FORM,
+    SIGN,
+    TERM_SIGN,
+    TRANSPOSED,
+    Fault,
+)
 from kincompile.compare.forms import known_forms
 from kincompile.compare.joint_faults import PARTS_OF_GAMMA, Index, JointFaults, NumericFault
 from kincompile.compare.reference import Subject
@@ -105,9 +114,12 @@ class Diagnostician:
     def is_one_fault(
         self, block: ConstraintBlock, written: Mapping[Index, Given], form: Form | None
     ) -> bool:
-        """Return whether a single fault in vectors explains entries of Phi_q; see `explain`."""
+        """Return whether a single fault in vectors explains entries of Phi_q; see `explain`.
+
+        The sign of a whole row is none: that is a way to write it.
+        """
         return any(
-            len(fault.result) == len(written) and _fits(fault, written)
+            fault.kind != SIGN and len(fault.result) == len(written) and _fits(fault, written)
             for fault in self._catalogue(block, "Phi_q", form)
         )
 
@@ -248,14 +260,21 @@ def _close(one: Array, other: Array, lost: Array | float = 0.0) -> bool:
 
 def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
     """Return one diagnosis for each kind of fault, the first of its kind."""
+    faults = list(faults)
     by_kind: dict[str, NumericFault] = {}
     for fault in faults:
         by_kind.setdefault(fault.kind, fault)
     if LEFT_ZERO in by_kind and not any(map(np.any, by_kind[LEFT_ZERO].result.values())):
         # Zero was written. That a missing term would also give zero is no further explanation.
         by_kind = {LEFT_ZERO: by_kind[LEFT_ZERO]}
-    if OMISSIONS.intersection(by_kind):
-        by_kind.pop(MISSING_TERM, None)  # the same in other words, which say less
+    if MISSING_TERM in by_kind and OMISSIONS.intersection(by_kind):
+        by_kind[MISSING_TERM] = by_kind.pop(MISSING_TERM)  # last: it says less of the same
+    signs = [fault for fault in faults if fault.kind == SIGN]
+    if TRANSPOSED in by_kind and [fault.text for fault in signs] == [TERM_SIGN]:
+        # What a transposed rotation is in one entry: told in one sentence.
+        cause, shown = by_kind[TRANSPOSED], by_kind.pop(SIGN)
+        text = f"{shown.text}, as where {cause.text}"
+        by_kind[TRANSPOSED] = replace(cause, text=text, detail=shown.detail)
     return tuple(
         Diagnosis(fault.kind, f"{fault.text}.", fault.detail)
         for fault in list(by_kind.values())[:MOST_NAMED]

@@ -10,6 +10,7 @@ import sympy
 
 from kincompile.compare.agreement import agrees
 from kincompile.compare.fault import (
+    A_TERM,
     MISSING_FACTOR,
     MISSING_RATE,
     MISSING_SQUARE,
@@ -77,7 +78,7 @@ def _faults_of_term(
 ) -> Iterator[Fault[sympy.Expr]]:
     """Yield the faults of a term; the result stands in its place."""
     full = str(term)
-    yield from term_faults("a term", lambda factor: factor * term, full)
+    yield from term_faults(A_TERM, lambda factor: factor * term, full)
     functions = sorted(term.atoms(sympy.sin, sympy.cos), key=str)
     yield Fault(SINE_COSINE, "sine and cosine are swapped in a term", _sine_cosine(term), full)
     for function in functions if len(functions) > 1 else ():

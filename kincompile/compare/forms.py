@@ -43,6 +43,7 @@ EQUIVALENT = "equivalent form"
 LENGTH = "the length instead of its square"
 ANGLE = "an angle instead of its sine"
 OTHER = "another equation that holds where the generated one holds"
+COMBINED = "the rows are combinations of the generated ones: only the row spaces of Phi_q agree"
 
 Evaluate = Callable[[States], Mapping[str, Array]]
 """Gives the quantities at states, (N, rows, 1) or (N, rows, n)."""
@@ -220,7 +221,7 @@ def jacobian_form(subject: Subject, rows: Sequence[int], Phi_q: Function) -> For
         return None
     with np.errstate(all="ignore"):
         generated = reference.values(states)["Phi_q"][:, list(rows)]
-        if not _is_same_space(Phi_q(states), generated) or not _is_gradient(Phi_q, subject):
+        if not is_same_space(Phi_q(states), generated) or not _is_gradient(Phi_q, subject):
             return None
 
     def evaluate(states: States) -> Mapping[str, Array]:
@@ -275,7 +276,19 @@ def _named(form: Form, subject: Subject) -> Form:
     of_angle = (np.ptp(own, axis=0) == 0).all(axis=-1) & turns
     if np.any(of_angle & (np.ptp(generated, axis=0) > 0).any(axis=-1)):
         return replace(form, text=ANGLE)
-    return form
+    return form if _has_own_rows(form, subject) else replace(form, text=COMBINED)
+
+
+def _has_own_rows(form: Form, subject: Subject) -> bool:
+    """Return whether each row is a multiple of a generated one where the equations hold."""
+    states = subject.near(form.rows)
+    assert states is not None, "forms are looked for there"
+    generated = subject.reference.values(states)["Phi_q"][:, list(form.rows)]
+    own = form.evaluate(states)["Phi_q"]
+    return all(
+        any(is_same_space(own[:, [k]], generated[:, [other]]) for other in range(len(form.rows)))
+        for k in range(len(form.rows))
+    )
 
 
 def _is_equivalent(form: Form, subject: Subject) -> bool:
@@ -290,10 +303,10 @@ def _is_equivalent(form: Form, subject: Subject) -> bool:
     reach = np.sum(np.abs(values["Phi_q"]) * reference.sizes, axis=-1)
     is_zero = np.abs(values["Phi"][..., 0]) <= ON_MANIFOLD * np.max(reach, axis=0)
     generated = reference.values(states)["Phi_q"][:, list(form.rows)]
-    return bool(is_zero.all()) and _is_same_space(values["Phi_q"], generated)
+    return bool(is_zero.all()) and is_same_space(values["Phi_q"], generated)
 
 
-def _is_same_space(rows: Array, generated: Array) -> bool:
+def is_same_space(rows: Array, generated: Array) -> bool:
     """Return whether the rows of two Jacobians span the same space at each state."""
     lengths = [np.linalg.norm(item, axis=-1, keepdims=True) for item in (rows, generated)]
     if not all(np.all(np.isfinite(length) & (length > 0)) for length in lengths):

@@ -21,6 +21,7 @@ from kincompile.calculus.expressions import (
     Pi,
     Power,
     Product,
+    ProfileFunction,
     Rotated,
     Scalar,
     Scaled,
@@ -32,7 +33,6 @@ from kincompile.calculus.expressions import (
     VectorSymbol,
 )
 from kincompile.calculus.rotations import PlaneRotation
-from kincompile.compare.collected import is_rate
 from kincompile.compare.fault import (
     A_FOR_B,
     DRIVER_RATE,
@@ -41,7 +41,9 @@ from kincompile.compare.fault import (
     MISSING_RATE,
     MISSING_SQUARE,
     MIXED_ANGLES,
+    MIXED_ORDERS,
     MIXED_POINTS,
+    MIXED_RATES,
     SECOND_DERIVATIVE,
     SINE_COSINE,
     TRANSPOSED,
@@ -51,9 +53,14 @@ from kincompile.compare.fault import (
 )
 from kincompile.compare.plain_text import described
 from kincompile.compare.vectors import Exchanged
+from kincompile.derivation.notation import is_rate
+from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
+
+HIGHEST_ORDER = 2
+"""Of the derivatives of a function that one mistakes for each other."""
 
 _MINUS_ONE = Number(Fraction(-1))
 
@@ -119,11 +126,24 @@ def _here(node: Expression, symbols: Symbols) -> Iterator[Fault[Expression]]:
         case Power(base, 2):
             text = f"{described(base)} stands where {described(node)} belongs"
             yield Fault(MISSING_SQUARE if is_rate(base) else MISSING_FACTOR, text, base)
-        case TimeFunction(name, order) if order:
-            kind = SECOND_DERIVATIVE if order == 2 else DRIVER_RATE
-            yield Fault(kind, f"{name}{chr(39) * order} is taken as zero", ZERO)
+        case TimeFunction(_, order):
+            if order:
+                kind = SECOND_DERIVATIVE if order == 2 else DRIVER_RATE
+                yield Fault(kind, f"{described(node)} is taken as zero", ZERO)
+            yield from _wrong_orders(node)
+        case ProfileFunction():
+            yield from _wrong_orders(node)
         case Rotated() | VectorSymbol():
             yield from swaps(node, symbols)
+
+
+def _wrong_orders(node: TimeFunction | ProfileFunction) -> Iterator[Fault[Expression]]:
+    """Yield the neighbours of a function in the row of its derivatives."""
+    for order in (node.order - 1, node.order + 1):
+        if 0 <= order <= HIGHEST_ORDER:
+            other = replace(node, order=order)
+            text = f"{described(other)} stands where {described(node)} belongs"
+            yield Fault(MIXED_ORDERS, text, other)
 
 
 def _terms(
@@ -172,6 +192,18 @@ def swaps(node: Expression, symbols: Symbols) -> Iterator[Fault[Expression]]:
         if partner is not None:
             text = f"{partner} stands where {node.name} belongs"
             yield Fault(MIXED_POINTS, text, VectorSymbol(partner))
+    if (other := rate_or_position(node)) is not None:
+        yield Fault(
+            MIXED_RATES, f"{described(other)} stands where {described(node)} belongs", other
+        )
+
+
+def rate_or_position(node: Expression) -> VectorSymbol | None:
+    """Return the velocity of a position r_i, or the position of its velocity; else None."""
+    if not isinstance(node, VectorSymbol) or not node.name.startswith("r_"):
+        return None
+    position = node.name.removesuffix(rate(""))
+    return VectorSymbol(rate(position) if node.name == position else position)
 
 
 def _wrong_rotations(node: Rotated, symbols: Symbols) -> Iterator[Fault[Expression]]:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,46 +23,67 @@ from kincompile.calculus.expressions import (
     ZERO_VECTOR,
     Expression,
     Number,
+    Pi,
     Power,
+    Product,
     Rotated,
     Scalar,
     Sum,
     Symbol,
+    TimeFunction,
     Vector,
     VectorSum,
     VectorSymbol,
     product_of,
     split_coefficient,
-    sum_of,
 )
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.compare.agreement import agrees
-from kincompile.compare.collected import CollectedTerm, collected, is_rate, perfect_square
+from kincompile.compare.collected import (
+    CollectedTerm,
+    collected,
+    perfect_square,
+    times_product,
+)
 from kincompile.compare.fault import (
     A_FOR_B,
     BLOCKS,
     COUPLING,
     CROSS_TERM,
+    DRIVER_DEGREES,
     FACTOR,
     MISSING_SQUARE,
-    MISSING_TERM,
     MIXED_ANGLES,
     MIXED_POINTS,
+    MIXED_RATES,
     PHI_TT,
     QUADRATIC_TERM,
     ROWS,
+    SIGN,
     SINE_COSINE,
     SQUARES,
     TRANSPOSED,
     X_AND_Y,
     Fault,
+    term_faults,
     whole_faults,
 )
-from kincompile.compare.formula_faults import Symbols, everywhere, one_place, swaps, times
+from kincompile.compare.formula_faults import (
+    Symbols,
+    everywhere,
+    one_place,
+    rate_or_position,
+    swaps,
+    times,
+)
 from kincompile.compare.plain_text import described
 from kincompile.compare.vectors import NumericExpansion, column_values, component_values
+from kincompile.derivation.notation import is_rate
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
+from kincompile.model.absolute import AbsoluteAngle
+from kincompile.model.relative import RelativeAngle
+from kincompile.names import rate
 
 if TYPE_CHECKING:
     from kincompile.compare.reference import Reference
@@ -123,9 +145,9 @@ class JointFaults:
             yield from self._if_different(fault.kind, fault.text, values)
         if self._quantity == "Phi_q":
             yield from self._exchanged_columns()
-        elif len(self._right) == 1 and self._right[0, 0].shape[1] == 2:
-            swapped = {(0, 0): self._right[0, 0][:, ::-1]}
-            yield from self._if_different(ROWS, "its two rows are swapped", swapped)
+            yield from self._opposite_rows()
+        else:
+            yield from self._exchanged_rows()
 
     def _if_different(
         self, kind: str, text: str, values: Mapping[Index, Array]
@@ -180,6 +202,8 @@ class JointFaults:
             yield from _same_slips(self._parts, self._symbols)
         if self._quantity == "Phi_q" and len(self._joint.bodies) == 2:
             yield from self._exchanged_blocks()
+        if isinstance(self._joint.written, AbsoluteAngle | RelativeAngle):
+            yield from _in_degrees(self._parts)
 
     def _faults_of_part(self, place: Index, expression: Expression) -> Iterator[Fault[Expression]]:
         name = self._quantity
@@ -190,13 +214,11 @@ class JointFaults:
             self._quantity, name, lambda factor: times(factor, expression) if factor else zero
         )
         yield from one_place(_joined(expression), self._symbols)
-        if isinstance(expression, Scalar):
-            terms = collected(expression)
-            if len(terms) > 1 or len(terms[0].factors if terms else ()) > 1:
-                whole = Sum(tuple(term.expression for term in terms))
-                yield from one_place(whole, self._symbols)
-            if self._quantity == "gamma":
-                yield from _wrong_velocities(terms)
+        terms = collected(expression)
+        if isinstance(expression, Scalar) and sum(len(term.rates) for term in terms) > 1:
+            yield from one_place(_sum(tuple(term.expression for term in terms)), self._symbols)
+        if self._quantity == "gamma":
+            yield from _wrong_velocities(terms)
         if self._quantity == "gamma":
             yield from _missing_parts_of_gamma(self._blocks[place[0]])
 
@@ -204,12 +226,33 @@ class JointFaults:
         """Yield the Jacobians with the blocks of bodies i and j in each other's place."""
         other = {0: 2, 1: 3, 2: 0, 3: 1}
         swapped = {(b, k): self._parts[b, other[k]] for b, k in self._parts if k in other}
-        text = "the blocks of bodies i and j are swapped"
+        text = "the blocks of bodies i and j are exchanged"
         yield Fault(BLOCKS, text, swapped)
         for b in range(len(self._blocks)):
             yield Fault(BLOCKS, text, {place: swapped[place] for place in swapped if place[0] == b})
             angles = {place: swapped[place] for place in ((b, 1), (b, 3))}
             yield Fault(BLOCKS, "the derivatives by phi_i and phi_j are swapped", angles)
+
+    def _opposite_rows(self) -> Iterator[NumericFault]:
+        """Yield the Jacobians with a row that has another sign than Phi."""
+        for b in range(len(self._blocks)):
+            own = {place: item for place, item in self._right.items() if place[0] == b}
+            count = own[b, 0].shape[1]
+            for signs in (*(1 - 2 * np.eye(count)), -np.ones(count))[count == 1 :]:
+                values = {place: item * signs[:, None] for place, item in own.items()}
+                text = "all its entries have the wrong sign"
+                yield from self._if_different(SIGN, text, values)
+
+    def _exchanged_rows(self) -> Iterator[NumericFault]:
+        """Yield a vector with two of its rows in each other's place."""
+        rows = np.concatenate([*self._right.values()], axis=1)
+        starts = np.cumsum([item.shape[1] for item in self._right.values()])[:-1]
+        for a, b in combinations(range(rows.shape[1]), 2):
+            swapped = rows.copy()
+            swapped[:, [a, b]] = rows[:, [b, a]]
+            values = dict(zip(self._right, np.split(swapped, starts, axis=1), strict=True))
+            text = f"its rows {a + 1} and {b + 1} are swapped"
+            yield from self._if_different(ROWS, text, values)
 
     def _exchanged_columns(self) -> Iterator[NumericFault]:
         """Yield the Jacobians with the columns of x and y in each other's place."""
@@ -260,6 +303,33 @@ def _same_slips(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
     }
     for kind, text in texts.items():
         yield Fault(kind, text, _changed(parts, partial(slip, kind)))
+    for belongs, stands in (("positions", "velocities"), ("velocities", "positions")):
+        text = f"{stands} stand where {belongs} belong, for every body"
+        yield Fault(MIXED_RATES, text, _changed(parts, partial(_instead, belongs)))
+
+
+def _instead(belongs: str, node: Expression) -> Expression | None:
+    """Return the velocity of a position, or the position of a velocity that belongs there."""
+    other = rate_or_position(node)
+    is_velocity = isinstance(node, VectorSymbol) and node.name.endswith(rate(""))
+    return other if is_velocity == (belongs == "velocities") else None
+
+
+def _in_degrees(parts: Parts) -> Iterator[Fault[Parts]]:
+    """Yield the formulas of a driven angle whose author mixes degrees and radians."""
+    per_degree = (Number(Fraction(1, 180)), Pi())
+    for text, factors in (
+        (
+            "the driver is in degrees, and the angle in radians",
+            (Number(Fraction(180)), Power(Pi(), -1)),
+        ),
+        ("the driver is in radians already: pi/180 is too much", per_degree),
+    ):
+
+        def change(node: Expression, factors: tuple[Scalar, ...] = factors) -> Expression | None:
+            return Product((*factors, node)) if isinstance(node, TimeFunction) else None
+
+        yield Fault(DRIVER_DEGREES, text, _changed(parts, change))
 
 
 def _joined(expression: Expression) -> Expression:
@@ -336,33 +406,41 @@ def _wrong_velocities(terms: tuple[CollectedTerm, ...]) -> Iterator[Fault[Expres
     rest = tuple(term.expression for term in terms if term not in coupled)
     if coupled and rest:
         text = "the terms with w and r_j_dot - r_i_dot are missing"
-        yield Fault(COUPLING, text, sum_of(rest))
-        halves = (HALF * term.expression for term in coupled)
-        yield Fault(FACTOR, "the 2 of 2 w (r_j_dot - r_i_dot) is missing", Sum((*rest, *halves)))
+        yield Fault(COUPLING, text, _sum(rest))
+        halves = (times(HALF, term.expression) for term in coupled)
+        yield Fault(FACTOR, "the 2 of 2 w (r_j_dot - r_i_dot) is missing", _sum((*rest, *halves)))
     for term in terms:
-        if square := perfect_square(term.factors):
+        if square := perfect_square(term.rates):
             others = tuple(item.expression for item in terms if item is not term)
             yield from _wrong_squares(others, term, square)
-    every = [(term.product, factor) for term in terms for factor in term.factors]
-    for velocity in dict.fromkeys(_velocities(factor) for _, factor in every):
-        kept = [factor * product for product, factor in every if _velocities(factor) != velocity]
-        if velocity != ONE and kept:
-            text = f"the terms with {described(velocity)} are missing"
-            yield Fault(MISSING_TERM, text, Sum(tuple(kept)))
+    parts: dict[Scalar, list[Expression]] = {}
+    for product, factor in ((term.product, factor) for term in terms for factor in term.factors):
+        parts.setdefault(_velocities(factor), []).append(times_product(factor, product))
+    for velocity, own in parts.items() if len(parts) > 1 else ():
+        if velocity != ONE:
+            kept = [item for other, items in parts.items() if other != velocity for item in items]
+            multiple = partial(_plus_multiple, tuple(kept), _sum(tuple(own)))
+            yield from term_faults(f"the part with {described(velocity)}", multiple)
+
+
+def _plus_multiple(kept: tuple[Expression, ...], own: Expression, factor: Fraction) -> Expression:
+    return _sum((*kept, times(factor, own)) if factor else kept)
 
 
 def _wrong_squares(
-    others: tuple[Scalar, ...], term: CollectedTerm, square: tuple[Symbol, Symbol, Scalar]
+    others: tuple[Expression, ...], term: CollectedTerm, square: tuple[Scalar, Scalar, Fraction]
 ) -> Iterator[Fault[Expression]]:
     """Yield gamma with a wrong square of the difference of two velocities a and b."""
     a, b, c = square
-    right = f"({described(a)} - {described(b)})^2"
-    for first, second in ((a, b), (b, a)):
-        text = f"{described(first)}^2 - {described(second)}^2 stands where {right} belongs"
-        wrong = c * (first**2 - second**2) * term.product
-        yield Fault(SQUARES, text, Sum((*others, wrong)))
-    without = c * (a**2 + b**2) * term.product
-    yield Fault(SQUARES, f"the mixed term of {right} is missing", Sum((*others, without)))
+    one, other = described(a), described(b)
+    for text, wrong in (
+        (f"{one}^2 - {other}^2 stands where {{}} belongs", a**2 - b**2),
+        (f"{other}^2 - {one}^2 stands where {{}} belongs", b**2 - a**2),
+        (f"({one}^2 - {other}^2)^2 stands where {{}} belongs", (a**2 - b**2) ** 2),
+        ("the mixed term of {} is missing", a**2 + b**2),
+    ):
+        result = _sum((*others, times_product(c * wrong, term.product)))
+        yield Fault(SQUARES, text.format(f"({one} - {other})^2"), result)
 
 
 def _velocities(term: Scalar) -> Scalar:

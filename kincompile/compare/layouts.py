@@ -11,7 +11,7 @@ import numpy as np
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from kincompile.compare.reference import ConstraintBlock, Reference
     from kincompile.compare.states import Array
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Columns = tuple[int | None, ...]
 _MOST_PERMUTED = 5  # 120 orders; with more bodies only the reversed order is tried
 MOVED = "the bodies have another order"
+PERMUTED = "the coordinates have another order"
 _WITH_GROUND = "columns of the ground are present (they are not checked)"
 
 
@@ -37,6 +38,16 @@ class Layout:
         last = np.full((*values.shape[:-1], 1), np.nan)
         order = [-1 if column is None else column for column in self.columns]
         return np.concatenate([values, last], axis=-1)[..., order]
+
+    def is_shown(self, rows: Collection[int], blocks: Iterable[ConstraintBlock]) -> bool:
+        """Return whether rows that it explains show it; it is one for all of a hand-in.
+
+        Blocks of two bodies that are swapped in one constraint are a slip, and so are two entries
+        that are swapped in one row: for another order of bodies it takes two constraints.
+        """
+        if self.convention.startswith(MOVED):
+            return sum(not set(rows).isdisjoint(block.rows) for block in blocks) > 1
+        return len(rows) > (self.convention == PERMUTED)
 
     def by_column(self, values: Array, count: int) -> Array:
         """Return values in this order by the `count` columns of the system; zeros for the rest."""
@@ -73,7 +84,7 @@ def expected_widths(reference: Reference, block: ConstraintBlock | None) -> str:
     return text
 
 
-def other_layouts(reference: Reference, usual: Layout, row_count: int) -> Iterator[Layout]:
+def other_layouts(reference: Reference, usual: Layout) -> Iterator[Layout]:
     """Yield layouts in other orders: of the bodies, of their coordinates, of the ground."""
     groups, rest = _split(reference, usual.columns)
     bodies = [group for group in groups if None not in group]
@@ -81,18 +92,15 @@ def other_layouts(reference: Reference, usual: Layout, row_count: int) -> Iterat
     seen = {usual.columns}
     for order in _orders(bodies):
         for words, columns in _arrangements(order, is_moved=list(order) != bodies):
-            if row_count == 1 and words == [MOVED]:
-                continue  # one row alone cannot tell an order from blocks that are swapped
             for placed in _with_ground((*columns, *rest), ground):
                 if placed not in seen:
                     seen.add(placed)
                     text = [*words, _WITH_GROUND] if ground else words
                     yield Layout(placed, "; ".join(text))
-    # One row alone cannot distinguish an order from a slip.
-    if not groups and row_count > 1 and len(rest) <= _MOST_PERMUTED:
+    if not groups and len(rest) <= _MOST_PERMUTED:
         for other in permutations(rest):
             if other != usual.columns:
-                yield Layout(other, "the coordinates have another order")
+                yield Layout(other, PERMUTED)
 
 
 def _split(reference: Reference, columns: Columns) -> tuple[list[Columns], Columns]:

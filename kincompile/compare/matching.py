@@ -19,7 +19,7 @@ from kincompile.compare.reference import QUANTITIES
 from kincompile.compare.rows import match_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from kincompile.compare.reference import ConstraintBlock, Reference, Subject
     from kincompile.compare.states import Array, States
@@ -95,10 +95,15 @@ class Matching:
 
 @dataclass(frozen=True, slots=True)
 class _Candidate:
-    """A matching, and the share of the rows that it explains entirely."""
+    """A matching, and the written rows that it explains entirely."""
 
     matching: Matching
-    share: float
+    explained: frozenset[int]
+
+    @property
+    def share(self) -> float:
+        """The share of the rows that are explained."""
+        return len(self.explained) / len(self.matching.rows)
 
 
 class Matcher:
@@ -125,12 +130,14 @@ class Matcher:
     def match(self) -> Matching:
         """Return how the written formulas are laid out."""
         usual = self._usual_layout()
-        best = self._rows_matched(usual, Units())
+        plain = best = self._rows_matched(usual, Units())
         if self._reference.angular.any():
-            units = (Units(True, False), Units(True, True), Units(False, True))
-            best = self._better(best, ((usual, item) for item in units))
-        if "Phi_q" in self._quantities and best.share < 0.5:
-            best = self._better(best, ((item, Units()) for item in self._promising(usual)))
+            for units in (Units(True, False), Units(True, True), Units(False, True)):
+                best = self._better(best, usual, units)
+        if "Phi_q" in self._quantities and best.share < 1:
+            for layout in self._promising(usual):
+                other = self._better(best, layout, Units())
+                best = other if self._is_whole(other, plain) else best
         return self._with_forms(best.matching)
 
     def expected(self, matching: Matching, states: States) -> dict[str, Array]:
@@ -200,7 +207,7 @@ class Matcher:
         Where rows and columns both have another order, it sees nothing; then a few are tried. An
         order that explains no more rows than the usual one is none: a row with the wrong sign.
         """
-        layouts = [usual, *other_layouts(self._reference, usual, len(self._subject.rows))]
+        layouts = [usual, *other_layouts(self._reference, usual)]
         values, _ = self._quantities["Phi_q"].evaluate(self._subject.states)
         written = _directions(finite(values))
         Phi_q = self._reference.values(self._subject.states)["Phi_q"][:, list(self._subject.rows)]
@@ -219,15 +226,18 @@ class Matcher:
         order = sorted(better, key=lambda k: -scores[k])
         return [layouts[k] for k in order[:_MOST_TRIED]]
 
-    def _better(self, best: _Candidate, others: Iterable[tuple[Layout, Units]]) -> _Candidate:
+    def _better(self, best: _Candidate, layout: Layout, units: Units) -> _Candidate:
         """Return the candidate that explains the most rows; another one only if it is most rows."""
-        for layout, units in others:
-            if best.share == 1.0:
-                break
-            other = self._rows_matched(layout, units)
-            if other.share > best.share and other.share >= 0.5:
-                best = other
-        return best
+        if best.share == 1.0:
+            return best
+        other = self._rows_matched(layout, units)
+        return other if other.share > best.share and other.share >= 0.5 else best
+
+    def _is_whole(self, other: _Candidate, plain: _Candidate) -> bool:
+        """Return whether an order of columns is that of all rows, and more than one slip."""
+        gained = [other.matching.rows[k] for k in other.explained - plain.explained]
+        is_shown = other.matching.layout.is_shown(gained, self._subject.blocks)
+        return is_shown and plain.explained <= other.explained
 
     def _rows_matched(self, layout: Layout, units: Units) -> _Candidate:
         """Find order and factors of the rows under a layout."""
@@ -244,7 +254,7 @@ class Matcher:
         )
         factors = np.stack([item.factor for item in found])
         matching = replace(plain, rows=tuple(rows[k] for k in order), factors=factors)
-        return _Candidate(matching, float(np.mean([item.share == 1.0 for item in found])))
+        return _Candidate(matching, frozenset(k for k, x in enumerate(found) if x.share == 1.0))
 
     def _with_forms(self, matching: Matching) -> Matching:
         """Take the other forms in which constraints are written.

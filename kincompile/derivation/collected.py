@@ -63,6 +63,9 @@ Core: TypeAlias = Vector | None
 
 Term: TypeAlias = tuple[Fraction, Monomial, Core]
 
+Polynomial: TypeAlias = dict[Monomial, Fraction]
+"""A sum of products of rates."""
+
 AGREEMENT = 1e-9
 """Difference, relative to the terms, up to which two forms are equal at random numbers."""
 
@@ -82,14 +85,7 @@ def collected(expression: Expression, names: Mapping[Expression, Glyph]) -> Expr
     InternalError
         If the two differ in numbers: the line is never printed.
     """
-    found: dict[tuple[Monomial, Core], dict[Monomial, Fraction]] = {}
-    for number, monomial, core in _terms(expression, _Atoms(names)):
-        rates = tuple(item for item in monomial if is_rate(item[0]))
-        others = tuple(item for item in monomial if not is_rate(item[0]))
-        polynomial = found.setdefault((others, core), {})
-        polynomial[rates] = polynomial.get(rates, Fraction(0)) + number
-    kept = [(key, {k: v for k, v in item.items() if v}) for key, item in found.items()]
-    parts = [(others, core, item) for (others, core), item in kept if item]
+    parts = like_terms(expression, names)
     result: Expression
     if isinstance(expression, Vector):
         result = vector_sum(tuple(_vector(_part(*part)) for part in parts))
@@ -99,7 +95,27 @@ def collected(expression: Expression, names: Mapping[Expression, Glyph]) -> Expr
     return result
 
 
-def _over_divisors(parts: list[tuple[Monomial, Core, dict[Monomial, Fraction]]]) -> Scalar:
+def like_terms(
+    expression: Expression, names: Mapping[Expression, Glyph]
+) -> list[tuple[Monomial, Core, Polynomial]]:
+    """Return an expression multiplied out: scalars, vector, and the rates that stand with them.
+
+    Parameters
+    ----------
+    expression, names
+        As for `collected`.
+    """
+    found: dict[tuple[Monomial, Core], Polynomial] = {}
+    for number, monomial, core in _terms(expression, _Atoms(names)):
+        rates = tuple(item for item in monomial if is_rate(item[0]))
+        others = tuple(item for item in monomial if not is_rate(item[0]))
+        polynomial = found.setdefault((others, core), {})
+        polynomial[rates] = polynomial.get(rates, Fraction(0)) + number
+    kept = [(key, {k: v for k, v in item.items() if v}) for key, item in found.items()]
+    return [(others, core, item) for (others, core), item in kept if item]
+
+
+def _over_divisors(parts: list[tuple[Monomial, Core, Polynomial]]) -> Scalar:
     """Return a sum of scalars; those with the same divisor are over it together."""
     found: dict[Monomial, list[Scalar]] = {}
     for others, core, rates in parts:
@@ -131,7 +147,7 @@ class _Atoms:
             ):
                 rest.subtract(wanted)
                 found.append(item)
-        return [*found, *(_power(base, n) for base, n in rest.items() if n)]
+        return [*found, *(power(base, n) for base, n in rest.items() if n)]
 
     @staticmethod
     def _powers(factors: Iterable[Scalar]) -> Iterable[tuple[Scalar, int]]:
@@ -262,14 +278,15 @@ def _vector(item: Expression | None) -> Vector:
     return item
 
 
-def _power(base: Scalar, exponent: int) -> Scalar:
+def power(base: Scalar, exponent: int) -> Scalar:
+    """Return a power as it is written."""
     return base if exponent == 1 else Power(base, exponent)
 
 
-def _part(others: Monomial, core: Core, rates: dict[Monomial, Fraction]) -> Expression:
+def _part(others: Monomial, core: Core, rates: Polynomial) -> Expression:
     """Return number, scalars, scalar products, vector, with the polynomial in the rates."""
-    number, factors = _factored(rates)
-    scalars = [_power(*item) for item in sorted(others, key=lambda x: isinstance(x[0], Dot))]
+    number, factors = factored(rates)
+    scalars = [power(*item) for item in sorted(others, key=lambda x: isinstance(x[0], Dot))]
     scalar = _product(number, (*scalars, *factors))
     return scalar if core is None else scaled(scalar, core)
 
@@ -282,7 +299,7 @@ def _product(number: Fraction, factors: tuple[Scalar, ...]) -> Scalar:
     return Product((Number(number), *factors))
 
 
-def _factored(polynomial: dict[Monomial, Fraction]) -> tuple[Fraction, tuple[Scalar, ...]]:
+def factored(polynomial: Polynomial) -> tuple[Fraction, tuple[Scalar, ...]]:
     """Return a polynomial in the rates as a number and factors: what all terms share, the rest."""
     first = next(iter(polynomial))
     common = tuple(
@@ -294,13 +311,13 @@ def _factored(polynomial: dict[Monomial, Fraction]) -> tuple[Fraction, tuple[Sca
     rest = {_joined(monomial, divisor): number for monomial, number in polynomial.items()}
     number = _content(list(rest.values()))
     rest = {monomial: value / number for monomial, value in rest.items()}
-    shared = tuple(_power(base, exponent) for base, exponent in common)
+    shared = tuple(power(base, exponent) for base, exponent in common)
     if len(rest) == 1:
         return number, shared
     square = _square(rest)
     if square is not None:
         return number, (*shared, square)
-    return number, (*shared, Sum(tuple(_monomial(item, value) for item, value in rest.items())))
+    return number, (*shared, Sum(tuple(rates_term(item, value) for item, value in rest.items())))
 
 
 def _content(numbers: list[Fraction]) -> Fraction:
@@ -310,11 +327,12 @@ def _content(numbers: list[Fraction]) -> Fraction:
     return Fraction(above if numbers[0] > 0 else -above, below)
 
 
-def _monomial(monomial: Monomial, number: Fraction) -> Scalar:
-    return _product(number, tuple(_power(base, exponent) for base, exponent in monomial))
+def rates_term(monomial: Monomial, number: Fraction) -> Scalar:
+    """Return a number times rates."""
+    return _product(number, tuple(power(base, exponent) for base, exponent in monomial))
 
 
-def _square(polynomial: dict[Monomial, Fraction]) -> Scalar | None:
+def _square(polynomial: Polynomial) -> Scalar | None:
     """Return (a + b - c)^2 where a polynomial is the square of such a sum."""
     bases = list(dict.fromkeys(base for monomial in polynomial for base, _ in monomial))
     first = bases[0]

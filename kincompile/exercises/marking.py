@@ -31,7 +31,10 @@ MOST_BYTES = 100_000
 MOST_CHARACTERS = 300
 """Characters of a reason."""
 
-_LINE = re.compile(r"\s*(B\d+)\s*=\s*(.*?)\s*")
+_COMMENT = re.compile(r"[#%].*")
+_LINE = re.compile(r"\s*(B\d+)\b\s*(=?)\s*(.*?)[\s;]*", re.IGNORECASE)
+_PLACE = re.compile(r"\w+, row \d+, column \d+: (line 1, )?")
+"""Where a formula stands in a matrix, which no student has seen."""
 
 RIGHT, EMPTY = "right", "not filled"
 
@@ -105,12 +108,10 @@ def mark(folder: str | os.PathLike[str]) -> Marks:
     found: dict[str, tuple[Mark, ...]] = {}
     for student in students:
         model = read(target / INSTRUCTOR / MODELS / f"{student}.toml").system()
-        answers, problem = _answers(target / STUDENTS / student / HAND_IN)
-        found[student] = (
-            tuple(Mark(item, 0, problem) for item in blanks)
-            if problem
-            else _marked(Reference(model), blanks, answers)
-        )
+        lines, problem = _lines(target / STUDENTS / student / HAND_IN)
+        answers, unread = _answers(lines)
+        empty = {item: Mark(item, 0, problem or unread.get(item.name, EMPTY)) for item in blanks}
+        found[student] = tuple((empty | _marked(Reference(model), blanks, answers)).values())
     return Marks(target, found)
 
 
@@ -141,29 +142,44 @@ def _key(folder: Path) -> tuple[list[Blank], list[str]]:
     return blanks, students
 
 
-def _answers(path: Path) -> tuple[dict[str, str], str]:
-    """Return the formulas of a hand-in file by blank, and what is wrong with the whole file."""
+def _lines(path: Path) -> tuple[list[str], str]:
+    """Return the lines of a hand-in file, and what is wrong with the whole file."""
     try:
         if not path.is_file():
-            return {}, "nothing handed in"
+            return [], "nothing handed in"
         content = path.read_bytes()[: MOST_BYTES + 1]
         if len(content) > MOST_BYTES:
-            return {}, f"the file has more than {MOST_BYTES} bytes"
-        text = content.decode("utf-8-sig")
+            return [], f"the file has more than {MOST_BYTES} bytes"
+        return content.decode("utf-8-sig").splitlines(), ""
     except OSError as error:
-        return {}, f"the file cannot be read: {error.strerror}"
+        return [], f"the file cannot be read: {error.strerror}"
     except UnicodeDecodeError:
-        return {}, "the file is not a text in UTF-8"
-    lines = (_LINE.fullmatch(line.partition("#")[0]) for line in text.splitlines())
-    return {found[1]: found[2] for found in lines if found}, ""
+        return [], "the file is not a text in UTF-8"
+
+
+def _answers(lines: Sequence[str]) -> tuple[dict[str, str], dict[str, str]]:
+    """Return formulas by blank, and what is wrong with lines that name one."""
+    answers: dict[str, str] = {}
+    unread: dict[str, str] = {}
+    for line in lines:
+        if (found := _LINE.fullmatch(_COMMENT.sub("", line))) is None:
+            continue
+        name, equals, formula = found[1].upper(), found[2], found[3]
+        if not equals:
+            unread[name] = _short(f"not read, for there is no = sign: {line}")
+        elif formula and name in answers:
+            unread[name] = "filled more than once"
+        elif formula:
+            answers[name] = formula
+    return {name: text for name, text in answers.items() if name not in unread}, unread
 
 
 def _marked(
     reference: Reference, blanks: Sequence[Blank], answers: Mapping[str, str]
-) -> tuple[Mark, ...]:
-    """Mark the blanks of each constraint together; alone where one of them cannot be read."""
-    found: dict[Blank, Mark] = {item: Mark(item, 0, EMPTY) for item in blanks}
-    filled = [item for item in blanks if answers.get(item.name)]
+) -> dict[Blank, Mark]:
+    """Mark what is filled, of each constraint together; alone where something cannot be read."""
+    found: dict[Blank, Mark] = {}
+    filled = [item for item in blanks if item.name in answers]
     for constraint in dict.fromkeys(item.constraint for item in filled):
         own = [item for item in filled if item.constraint == constraint]
         try:
@@ -171,14 +187,14 @@ def _marked(
         except KincompileError:
             for item in own:
                 found |= _alone(reference, item, answers)
-    return tuple(found.values())
+    return found
 
 
 def _alone(reference: Reference, blank: Blank, answers: Mapping[str, str]) -> dict[Blank, Mark]:
     try:
         return _compared(reference, [blank], answers)
     except KincompileError as error:
-        return {blank: Mark(blank, 0, _short(f"cannot be read: {error}"))}
+        return {blank: Mark(blank, 0, _short(f"cannot be read: {_PLACE.sub('', str(error))}"))}
 
 
 def _compared(

@@ -110,6 +110,55 @@ def test_the_order_of_columns(columns: list[int], text: str) -> None:
     assert report.entries[1].column == REFERENCE.coordinates[columns[1]]
 
 
+SWAPPED = [3, 4, 5, 0, 1, 2]
+
+
+@pytest.mark.parametrize("strict", [False, True])
+@pytest.mark.parametrize("kind", ["Revolute", "Translational", "Distance", "Gear"])
+def test_that_blocks_exchanged_in_one_constraint_are_no_order(
+    kind: str, strict: bool, joint_types: Any
+) -> None:
+    model = joint_types[kind]()
+    given = {"Phi": model.Phi, "nu": model.nu, "gamma": model.gamma}
+    for beside in ({}, given):
+        report = kc.compare(model, Phi_q=model.Phi_q[:, SWAPPED], **beside, strict=strict)
+        found = {item.text for entry in report.different for item in entry.diagnoses}
+        assert found == {"the blocks of bodies i and j are exchanged."}
+        assert {entry.quantity for entry in report.different} == {"Phi_q"}
+        assert report.conventions == ()
+
+
+@pytest.mark.parametrize("name", ["R", "D", "T"])
+def test_that_blocks_exchanged_in_one_of_many_constraints_are_no_order(name: str) -> None:
+    matrix = PHI_Q.as_mutable()
+    rows = [k for k, row in enumerate(REFERENCE.equations) if row.split(".")[0] == name]
+    for row in rows:
+        matrix[row, :] = matrix[row, SWAPPED]
+    for given in ({}, {"Phi": PHI, "nu": NU, "gamma": GAMMA}):
+        report = kc.compare(REFERENCE, Phi_q=matrix, **given)
+        assert {entry.row for entry in report.different} == {REFERENCE.equations[k] for k in rows}
+        assert {d.kind for e in report.different for d in e.diagnoses} == {"body blocks swapped"}
+    alone = kc.compare(REFERENCE, Phi_q=PHI_Q[rows, SWAPPED], constraint=name)
+    assert {d.kind for e in alone.different for d in e.diagnoses} == {"body blocks swapped"}
+
+
+def test_that_another_order_of_bodies_is_that_of_the_whole_matrix(example_named: Any) -> None:
+    model = example_named("four_bar").model
+    # Exchanged are the first two of three bodies: the rows of the third joint stay as they are.
+    order = [3, 4, 5, 0, 1, 2, 6, 7, 8]
+    report = kc.compare(model, Phi_q=model.Phi_q[:, order], gamma=model.gamma)
+    assert (report.verdict, kinds(report)) == ("equal up to convention", ["order of columns"])
+    assert report.conventions[0].text == (
+        "Phi_q: the bodies have another order, the same in all rows: x_coupler, y_coupler, "
+        "phi_coupler, x_crank, y_crank, phi_crank, x_rocker, y_rocker, phi_rocker."
+    )
+    assert not kc.compare(model, Phi_q=model.Phi_q[:, order], strict=True).equal
+    matrix = model.Phi_q[:, order].as_mutable()
+    matrix[2, 0] *= 2
+    report = kc.compare(model, Phi=model.Phi, Phi_q=matrix)
+    assert [entry.label for entry in report.different] == ["Phi_q[B.x, x_coupler]"]
+
+
 @pytest.mark.parametrize("place", [0, 3, 6])
 def test_columns_of_the_ground(place: int) -> None:
     ground = sympy.Matrix(7, 3, lambda row, column: row + column)

@@ -164,5 +164,5 @@ def test_that_every_single_fault_is_found_and_named(step: int, joint_types: Mode
         unique.append(bool(kinds) and (kinds <= meant or kinds == {"left zero"}))
         found.append(not kinds.isdisjoint({*meant, "left zero"}))
     # The rest has two names: xi and eta swapped can be sine and cosine swapped, in numbers.
-    assert np.mean(unique) >= 0.915  # 92 % are wanted, 91.96 reached
-    assert np.mean(found) >= 0.98
+    assert np.mean(unique) >= 0.94
+    assert np.mean(found) >= 0.99

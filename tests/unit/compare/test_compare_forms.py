@@ -121,6 +121,18 @@ def test_an_angle_instead_of_its_sine() -> None:
     assert not kc.compare(MODEL, Phi_q=[[-1, 0, 0], [0, 1, 1]], constraint="guide").equal
 
 
+def test_that_a_slip_is_no_other_equation_that_only_phi_q_shows(joint_types: Any) -> None:
+    model = joint_types["Translational"]()
+    e, f = sympy.symbols("e f")
+    swapped = model.Phi.subs({e: f, f: e}, simultaneous=True)
+    q = sympy.Matrix([sympy.Symbol(item.name) for item in model.system().coordinates])
+    rows = [model.Phi[0], swapped[1]]  # v_i with xi and eta swapped in the parallel row
+    Phi_q = sympy.Matrix(rows).jacobian(q)
+    for strict in (False, True):
+        report = kc.compare(model, Phi_q=Phi_q, strict=strict)
+        assert {d.kind for e in report.different for d in e.diagnoses} == {"xi and eta swapped"}
+
+
 def test_that_an_angle_in_another_assembly_is_no_solution() -> None:
     assert not guide(u, psi - sympy.pi).equal
     assert not guide(u, psi**2).equal  # a double root: Phi_q vanishes where it holds
@@ -130,6 +142,54 @@ def test_rows_that_are_combined() -> None:
     assert guide(u * sympy.cos(psi) + v * sympy.sin(psi), psi).equal
     assert guide(u + sympy.sin(psi), u - 3 * sympy.tan(psi)).equal
     assert not guide(u + sympy.sin(psi), 2 * u + 2 * sympy.tan(psi)).equal  # one equation twice
+
+
+COMBINE = sympy.Matrix([[1, 1], [1, -1]])
+SINE, COSINE = (f(sympy.Symbol("phi_lower")) for f in (sympy.sin, sympy.cos))
+TURN = sympy.Matrix([[COSINE, SINE], [-SINE, COSINE]])
+ROW_SPACES = "only the row spaces of Phi_q agree"
+
+
+def wrist(matrix: sympy.Matrix, *names: str, **changes: Any) -> Report:
+    """Compare a revolute joint whose named quantities have combined rows."""
+    rows = [MODEL.system().equations.index(f"wrist.{axis}") for axis in "xy"]
+    given = {name: matrix * getattr(MODEL, name)[rows, :] for name in names}
+    right = {name: getattr(MODEL, name)[rows, :] for name in changes.pop("right", ())}
+    report: Report = kc.compare(MODEL, constraint="wrist", **given, **right, **changes)
+    return report
+
+
+@pytest.mark.parametrize("names", [("Phi_q",), QUANTITIES[1:], QUANTITIES])
+def test_sum_and_difference_of_two_rows(names: tuple[str, ...]) -> None:
+    report = wrist(COMBINE, *names)
+    assert report.verdict == "equal up to convention"
+    assert ROW_SPACES in texts(report)[0]
+    assert not wrist(COMBINE, *names, strict=True).equal
+
+
+def test_that_gamma_must_have_the_combinations_of_phi_q() -> None:
+    report = wrist(COMBINE, "Phi_q", right=("nu", "gamma"))
+    assert set(flagged(report)) == {"gamma"}
+    assert ROW_SPACES in texts(report)[0]
+
+
+def named(report: Report) -> set[tuple[str, str]]:
+    return {(e.quantity, item.kind) for e in report.different for item in e.diagnoses}
+
+
+@pytest.mark.parametrize("beside", [(), ("Phi",)])
+def test_that_combinations_that_vary_are_no_derivative(beside: tuple[str, ...]) -> None:
+    report = wrist(TURN, "Phi_q", "nu", "gamma", right=beside)
+    assert named(report) == {("Phi_q", "row spaces agree"), ("gamma", "row spaces agree")}
+    of = "your Phi" if beside else "any Phi"
+    text = "only the row spaces agree: the rows are combinations of the right ones, and not the "
+    assert f"{text}derivative of {of}" in report.to_text()
+
+
+def test_that_combined_rows_do_not_follow_from_a_phi_that_is_not() -> None:
+    report = wrist(COMBINE, "Phi_q", "nu", "gamma", right=("Phi",))
+    assert named(report) == {("Phi_q", "row spaces agree"), ("gamma", "row spaces agree")}
+    assert set(flagged(report)) == {"Phi_q", "gamma"}
 
 
 def test_that_one_for_the_cosine_does_not_follow_from_the_sine() -> None:

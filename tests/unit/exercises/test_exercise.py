@@ -166,6 +166,25 @@ def test_that_what_cannot_be_read_costs_its_own_blank(four_bar: Path) -> None:
         assert part in row["reasons"]
 
 
+def test_that_what_surrounds_an_answer_does_not_matter(four_bar: Path) -> None:
+    fill(four_bar, "03", {"B1": lambda x: f"{x};", "B2": lambda x: f"{x}  % from the page"})
+    path = four_bar / "students" / "03" / "hand_in.txt"
+    path.write_text(path.read_text(encoding="utf-8").replace("B", "b"), encoding="utf-8")
+    assert rows_of(four_bar)["03"]["points"] == "9"
+
+
+def test_that_a_line_that_is_not_read_is_told(four_bar: Path) -> None:
+    fill(four_bar, "04", {"B9": lambda _: "1 +"})
+    path = four_bar / "students" / "04" / "hand_in.txt"
+    text = path.read_text(encoding="utf-8").replace("B2 =", "B2:")
+    path.write_text(f"{text}\nB4 = 0\n", encoding="utf-8")
+    row = rows_of(four_bar)["04"]
+    assert [row[f"B{k}"] for k in range(1, 10)] == list("101011110")
+    for part in ("B2: not read, for there is no = sign: B2:", "B4: filled more than once"):
+        assert part in row["reasons"]
+    assert "row 1, column" not in row["reasons"]  # of a matrix that no student has seen
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
