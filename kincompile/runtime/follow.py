@@ -17,7 +17,13 @@ from kincompile.runtime.march import March, Outcome, State, distance
 from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
-from kincompile.runtime.singular.events import branch_switch, involved, locate, singular_start
+from kincompile.runtime.singular.events import (
+    branch_switch,
+    involved,
+    locate,
+    singular_start,
+    status_after,
+)
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -122,6 +128,7 @@ def follow(inputs: Inputs, progress: Progress | None = None) -> tuple[Motion, Ou
     outcome = way.run(outcome)
     while outcome.status is not Status.CONVERGED:
         passage = way.explain(outcome)
+        outcome = way.judged(outcome)
         if passage is None or not inputs.smooth:
             break
         outcome = way.run(way.go_through(passage))
@@ -220,6 +227,15 @@ class _Way:
             motion.events.append(branch_switch(equations.code, state, t, q, equations.reference))
         return None
 
+    def judged(self, outcome: Outcome) -> Outcome:
+        """Give a failed point the status of the event that ends the motion before it."""
+        motion, index = self._motion, self._index - 1
+        if motion.events and motion.events[-1] not in motion.passed:
+            t = float(self._times[index])
+            outcome = replace(outcome, status=status_after(motion.events[-1], outcome, t))
+            motion.status[index] = outcome.status
+        return outcome
+
     def _locate_from_point(self, t: float) -> tuple[Event, Passage | None] | None:
         """Find the event that ends the motion from the last of the times that was reached."""
         index = self._index - 2
@@ -251,9 +267,6 @@ class _Way:
     def end(self) -> None:
         """Clear the results of a grid after the last point reached."""
         self._motion.forget(self._index)
-        if not self._may_be_dense:
-            # Beside the reach of a very large mechanism its parts are small: no singularity.
-            self._motion.near.clear()
         self._count_pivoted()
 
     def _count_pivoted(self) -> None:
