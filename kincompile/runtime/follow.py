@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     Progress: TypeAlias = Callable[[int, int], object]
 
 
+OTHER = 100.0
+"""How many times smaller or larger an equation must have become to be measured again."""
+
+
 @dataclass(slots=True, eq=False)
 class Motion:
     """The arrays of a solution while they are being filled, N points and n coordinates.
@@ -285,9 +289,11 @@ class _Way:
             isinstance(self._march.engine, Staged) and self._inputs.guess.size > LARGEST_CAREFUL
         )
 
-    def _march_at(self, q: NDArray[np.float64], engine: Engine | None) -> March:
+    def _march_at(
+        self, q: NDArray[np.float64], engine: Engine | None, t: float | None = None
+    ) -> March:
         """Return the march of the mechanism, whose scales are those at a position."""
-        inputs, time = self._inputs, float(self._times[0])
+        inputs, time = self._inputs, float(self._times[0]) if t is None else t
         equations = problem(inputs.code.module, inputs.p, q, time, staged=True, engine=engine)
         march = March(equations, equations.engine, inputs.tolerance)
         march.alive = lambda: self._progress(self._index, len(self._times))
@@ -311,6 +317,10 @@ class _Way:
         outcome = march.advance(state, t, most)
         doubtful = outcome.state is None or outcome.state.sensitivity > TOO_NEAR
         doubtful = doubtful or outcome.status is not Status.CONVERGED
+        if doubtful and not outcome.exhausted and self._measure_again(state):
+            again = self._advance(state)
+            self._motion.iterations[self._index - 1] += outcome.iterations
+            return again
         if self._is_staged and doubtful and not outcome.exhausted:
             self._leave_stages(state.point.q)
             known = self._state(state.point.q, state.t)
@@ -326,6 +336,18 @@ class _Way:
         if outcome.state and outcome.state.sensitivity > max(TOO_NEAR, state.sensitivity):
             return replace(outcome, state=state)
         return outcome
+
+    def _measure_again(self, state: State) -> bool:
+        """Measure the equations where the motion has come to; say whether they are others there.
+
+        exp(-x) is not nearly singular at x = 20: it is small.
+        """
+        fresh = self._march_at(state.point.q, self._march.engine, state.t)
+        now, before = fresh.equations.magnitude, self._march.equations.magnitude
+        if not ((now < before / OTHER) | (now > before * OTHER)).any():
+            return False
+        self._march = fresh
+        return True
 
     def _solve_grid(self, outcome: Outcome) -> NDArray[np.bool_]:
         """Solve all points from the last one on together; return which can be trusted."""

@@ -334,7 +334,7 @@ class March:
             if outcome.state and not near:
                 # After a step that was too long the next ones are no longer.
                 state, wait = outcome.state, max(wait - 1, 0)
-                step *= 1 if wait else 2
+                step *= 1 if wait and abs(2 * step) < abs(t - state.t) else 2
             elif abs(step) <= smallest:
                 break
             else:
