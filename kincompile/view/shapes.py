@@ -26,6 +26,16 @@ INKS: Mapping[str, str] = {
 }  # fmt: skip
 """Colours on white paper; a page has its own by the same names, for light and dark."""
 
+HUES: Mapping[str, tuple[str, ...]] = {
+    "light": (
+        "#2563eb", "#b45309", "#047857", "#7c3aed", "#0e7490", "#be185d", "#4d7c0f", "#475569",
+    ),
+    "dark": (
+        "#7aa7ff", "#f0b35a", "#4fd1a5", "#b99aff", "#4cc9e0", "#f48cc0", "#a5cf5a", "#a9b6c9",
+    ),
+}  # fmt: skip
+"""Colours of bodies and of paths, on light and on dark paper."""
+
 FILL = 0.22
 """Opacity of the areas of bodies."""
 
@@ -226,8 +236,9 @@ SHAPES: Mapping[str, tuple[Stroke, ...]] = {
 
 
 def tables() -> dict[str, Any]:
-    """Return `SHAPES` and `LOOKS` as plain data, for a page."""
+    """Return the tables as plain data, for a page."""
     return {
         "shapes": {name: [asdict(item) for item in strokes] for name, strokes in SHAPES.items()},
         "looks": {name: asdict(look) for name, look in LOOKS.items()},
+        "hues": dict(HUES),
     }
