@@ -200,6 +200,9 @@ ROOT_STEPS = 80
 INVOLVED = 0.02
 """Part of the largest movement in a null vector from which on a coordinate is involved in it."""
 
+AT_EVENT = 1e-9
+"""Part of a time up to which it is that of an event."""
+
 LATE = 1e-6
 """Time after the point that failed, relative to the way to it, up to which an event explains it."""
 

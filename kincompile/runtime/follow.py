@@ -17,7 +17,13 @@ from kincompile.runtime.march import March, Outcome, State, distance
 from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
-from kincompile.runtime.singular.events import branch_switch, involved, locate, singular_start
+from kincompile.runtime.singular.events import (
+    branch_switch,
+    involved,
+    locate,
+    singular_start,
+    status_after,
+)
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -31,6 +37,10 @@ if TYPE_CHECKING:
     from kincompile.runtime.singular.events import Event, Passage
 
     Progress: TypeAlias = Callable[[int, int], object]
+
+
+OTHER = 100.0
+"""How many times smaller or larger an equation must have become to be measured again."""
 
 
 @dataclass(slots=True, eq=False)
@@ -122,6 +132,7 @@ def follow(inputs: Inputs, progress: Progress | None = None) -> tuple[Motion, Ou
     outcome = way.run(outcome)
     while outcome.status is not Status.CONVERGED:
         passage = way.explain(outcome)
+        outcome = way.judged(outcome)
         if passage is None or not inputs.smooth:
             break
         outcome = way.run(way.go_through(passage))
@@ -220,6 +231,15 @@ class _Way:
             motion.events.append(branch_switch(equations.code, state, t, q, equations.reference))
         return None
 
+    def judged(self, outcome: Outcome) -> Outcome:
+        """Give a failed point the status of the event that ends the motion before it."""
+        motion, index = self._motion, self._index - 1
+        if motion.events and motion.events[-1] not in motion.passed:
+            t = float(self._times[index])
+            outcome = replace(outcome, status=status_after(motion.events[-1], outcome, t))
+            motion.status[index] = outcome.status
+        return outcome
+
     def _locate_from_point(self, t: float) -> tuple[Event, Passage | None] | None:
         """Find the event that ends the motion from the last of the times that was reached."""
         index = self._index - 2
@@ -251,9 +271,6 @@ class _Way:
     def end(self) -> None:
         """Clear the results of a grid after the last point reached."""
         self._motion.forget(self._index)
-        if not self._may_be_dense:
-            # Beside the reach of a very large mechanism its parts are small: no singularity.
-            self._motion.near.clear()
         self._count_pivoted()
 
     def _count_pivoted(self) -> None:
@@ -272,9 +289,11 @@ class _Way:
             isinstance(self._march.engine, Staged) and self._inputs.guess.size > LARGEST_CAREFUL
         )
 
-    def _march_at(self, q: NDArray[np.float64], engine: Engine | None) -> March:
+    def _march_at(
+        self, q: NDArray[np.float64], engine: Engine | None, t: float | None = None
+    ) -> March:
         """Return the march of the mechanism, whose scales are those at a position."""
-        inputs, time = self._inputs, float(self._times[0])
+        inputs, time = self._inputs, float(self._times[0]) if t is None else t
         equations = problem(inputs.code.module, inputs.p, q, time, staged=True, engine=engine)
         march = March(equations, equations.engine, inputs.tolerance)
         march.alive = lambda: self._progress(self._index, len(self._times))
@@ -298,6 +317,10 @@ class _Way:
         outcome = march.advance(state, t, most)
         doubtful = outcome.state is None or outcome.state.sensitivity > TOO_NEAR
         doubtful = doubtful or outcome.status is not Status.CONVERGED
+        if doubtful and not outcome.exhausted and self._measure_again(state):
+            again = self._advance(state)
+            self._motion.iterations[self._index - 1] += outcome.iterations
+            return again
         if self._is_staged and doubtful and not outcome.exhausted:
             self._leave_stages(state.point.q)
             known = self._state(state.point.q, state.t)
@@ -313,6 +336,18 @@ class _Way:
         if outcome.state and outcome.state.sensitivity > max(TOO_NEAR, state.sensitivity):
             return replace(outcome, state=state)
         return outcome
+
+    def _measure_again(self, state: State) -> bool:
+        """Measure the equations where the motion has come to; say whether they are others there.
+
+        exp(-x) is not nearly singular at x = 20: it is small.
+        """
+        fresh = self._march_at(state.point.q, self._march.engine, state.t)
+        now, before = fresh.equations.magnitude, self._march.equations.magnitude
+        if not ((now < before / OTHER) | (now > before * OTHER)).any():
+            return False
+        self._march = fresh
+        return True
 
     def _solve_grid(self, outcome: Outcome) -> NDArray[np.bool_]:
         """Solve all points from the last one on together; return which can be trusted."""

@@ -45,6 +45,9 @@ if TYPE_CHECKING:
 SIGN_OF_LIFE = 256
 """Sub-steps between two times after which progress is shown."""
 
+PATIENCE = 8
+"""Sub-steps after one that was too long before a longer one is tried again."""
+
 SAME_DETERMINANT = 0.5
 """Part of a determinant down to which Phi_q counts as no nearer to singular."""
 
@@ -313,7 +316,7 @@ class March:
 
         Where it does not get there, the last good state on the way is in the outcome.
         """
-        step, iterations = t - state.t, 0
+        step, iterations, wait = t - state.t, 0, 0
         smallest = min(abs(step), self.time_of(state)) * SMALLEST_PART
         status = Status.NOT_CONVERGED
         for count in range(MAX_SUBSTEPS):
@@ -329,11 +332,13 @@ class March:
             if whole and outcome.position:
                 return Outcome(status, iterations, outcome.state or state, outcome.position)
             if outcome.state and not near:
-                state, step = outcome.state, 2 * step
+                # After a step that was too long the next ones are no longer.
+                state, wait = outcome.state, max(wait - 1, 0)
+                step *= 1 if wait and abs(2 * step) < abs(t - state.t) else 2
             elif abs(step) <= smallest:
                 break
             else:
-                step /= 2
+                step, wait = step / 2, PATIENCE
         else:
             return Outcome(Status.NOT_CONVERGED, iterations, state, exhausted=True)
         return Outcome(status, iterations, state)

@@ -19,6 +19,7 @@ from kincompile.runtime.march import March, Outcome, State, all_hold, largest
 from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
+from kincompile.runtime.singular.events import locate, status_after
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -194,6 +195,9 @@ class _Chunk:
                 if outcome.position is None:
                     own = replace(self._inputs, p=self._sets[variant])
                     outcome = give_up(alone, outcome, t, own)
+                    if outcome.jumps and (found := locate(alone, known, t)):
+                        status = status_after(found[0], outcome, t)
+                        outcome = replace(outcome, status=status)
             self._take(index, following, variant, outcome)
         return following
 

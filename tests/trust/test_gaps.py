@@ -67,3 +67,48 @@ def test_a_lock_up_is_an_event_on_every_grid(method, points, end):
     (event,) = solution.events
     assert event.kind == "lock-up"
     assert event.t == pytest.approx(LOCKS, abs=1e-7)
+
+
+def test_that_no_smaller_steps_are_taken_than_the_motion_asks_for(pendulum):
+    # 26,000 of them once; a step of a radian takes two or three.
+    solution = kc.solve(pendulum, [0, 2777.0], method="march")
+    assert solution.success
+    assert solution.iterations[1] < 3 * 2777
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+@pytest.mark.parametrize("end", [40.0, 400.0])
+def test_an_equation_that_becomes_small_is_not_singular(form, end, quick_compiler):
+    x = sympy.Symbol("x")
+    decay = kc.ConstraintSystem("decay", [x], [sympy.exp(-x) - sympy.exp(-kc.t)], guess=(0,))
+    t = np.linspace(0, end, 41)
+    solution = kc.solve(kc.compile(decay, **form), t)
+    assert solution.success, solution.message
+    np.testing.assert_allclose(solution.q[:, 0], t, rtol=0, atol=1e-7 * end)
+    np.testing.assert_allclose(solution.q_dot, 1, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+@pytest.mark.parametrize("length", [1e-12, 1e-9, 1e9])
+def test_that_tiny_and_huge_free_lengths_are_solved_alike(form, length, quick_compiler):
+    x = sympy.Symbol("x")
+    root = kc.ConstraintSystem("root", [x], [x**2 - length**2 * (1 + kc.t)], guess=(length,))
+    t = np.linspace(0, 3, 40)
+    solution = kc.solve(kc.compile(root, **form), t)
+    assert solution.success, solution.message
+    assert solution.events == []
+    np.testing.assert_allclose(solution.q[:, 0], length * np.sqrt(1 + t), rtol=1e-12)
+
+
+@pytest.mark.parametrize("end", [LOCKS + 1e-6, LOCKS + 0.1, 6.0])
+@pytest.mark.parametrize("points", [2, 13, 60])
+def test_that_what_lies_beyond_a_lock_up_has_one_status(end, points, quick_compiler):
+    t = np.linspace(0, end, points)
+    modules = [kc.compile(linkages.peaucellier().mechanism, **form) for form in FORMS]
+    found = [kc.solve(module, t).status for module in modules]
+    p = np.broadcast_to(modules[0].DEFAULTS, (2, 1, modules[0].DEFAULTS.size))
+    found += [kc.solve(module, t, p=p).status[1] for module in modules]
+    beyond = int(np.argmax(t > LOCKS))
+    for status in found:
+        assert status[:beyond].tolist() == [kc.Status.CONVERGED] * beyond
+        assert status[beyond] == kc.Status.NOT_CONVERGED

@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import (
+    AT_EVENT,
     IN_RANGE,
     INVOLVED,
     LATE,
 )
 from kincompile.html import Shown
 from kincompile.names import listed
-from kincompile.runtime.march import March, State
+from kincompile.runtime.march import March, Outcome, State
 from kincompile.runtime.singular.curve import Bracket, Curve
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Code
@@ -198,6 +200,20 @@ def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
     demanded = float(np.linalg.norm(missing)) > IN_RANGE * float(np.linalg.norm(weights * nu))
     kind = LOCK_UP if demanded else BIFURCATION
     return _event(equations, kind, point.q, t, point.Phi_q)
+
+
+def status_after(event: Event, outcome: Outcome, t: float) -> Status:
+    """Return the status of a point at which an event has ended the motion.
+
+    How Newton's method fails there rounding decides: beyond a lock-up there is no position that
+    continues the motion, as there is none where it would have to jump; at a lock-up or a
+    bifurcation, and beyond one, Phi_q is singular.
+    """
+    if outcome.position is not None or outcome.status is Status.NOT_FINITE:
+        return outcome.status
+    is_there = abs(event.t - t) <= AT_EVENT * max(abs(event.t), abs(t))
+    is_singular = event.kind == BIFURCATION or (event.kind == LOCK_UP and is_there)
+    return Status.SINGULAR if is_singular else Status.NOT_CONVERGED
 
 
 def branch_switch(code: Code, state: State, t: float, q: Vector, reference: Vector) -> Event:
