@@ -1245,7 +1245,7 @@ const cam_by_table = (() => {
         NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, COORDINATES, EQUATIONS, PARAMETERS,
         UNITS, DEFAULTS, GUESS, OUTPUTS, BODIES, CORNERS, PATTERN,
         Phi, Phi_q, nu, gamma, position_at, nu_at, gamma_at,
-        TABLES: { spline, rho_j_contact },
+        tables: { spline, rho_j_contact },
         point, rows_of, factor_at, solve_at, solver,
     };
 })();

@@ -64,7 +64,7 @@ def geometry_script(system: ConstraintSystem, drawing: Mapping[str, Any]) -> str
         profiles.append(f"{{ place: {json.dumps(place)}, radius: profile_{k} }}")
     return (
         "const geometry = (() => {\nconst square = x => x * x;\n"
-        + (f"const {{ spline, {', '.join(tables)} }} = emitted.TABLES ?? {{}};\n" if tables else "")
+        + (f"const {{ spline, {', '.join(tables)} }} = emitted.tables ?? {{}};\n" if tables else "")
         + f"{functions}return {{ places: {json.dumps([place for place, _ in numbers])}, numbers, "
         f"profiles: [{', '.join(profiles)}] }};\n}})();\n"
     )
