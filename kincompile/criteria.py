@@ -67,6 +67,13 @@ MIRRORED = 2.0
 """How much further than the first assembly another one may seem to be, and still be looked at: what
 tells of it is of first order."""
 
+MOST_MIRRORED = 300
+"""Coordinates up to which the assembly on the other side of a singular position is looked for:
+beyond, singular values take a tenth of a second."""
+
+MIRROR_STEP = 1e-5
+"""Step of the difference that shows how a singular value changes, in distances of a near guess."""
+
 FAR = math.pi / 4
 """Angle between a guess and a position beyond which small steps from the guess may well lead to a
 nearer one. Of 3000 guesses within 30 degrees and a tenth of a length of an assembly Newton's own

@@ -321,6 +321,9 @@ const slider_crank = (() => {
         const [LARGEST_ANGLE, BEND, NUDGE, RESTARTS] = [0.5, 0.01, 0.3, 4];
         const [SUFFICIENT, SHORTEST_STEP] = [0.0001, 9.5367431640625e-07];
         const [SAME, MOST_TURNED] = [1e-06, 300];
+        const [NEAR_ANGLE, NEAR_PART, SETTLED] = [0.5235987755982988, 0.1, 0.5];
+        const [ASTRAY, AS_NEAR, MIRRORED] = [5.0, 1.1, 2.0];
+        const [MOST_MIRRORED, MIRROR_STEP, AT_EVENT] = [300, 1e-05, 1e-09];
         const [SINGULAR_SENSITIVITY, TOO_NEAR] = [10000000.0, 100000.0];
         const [NEARLY_SINGULAR, KINK, SMOOTH] = [30.0, 8.0, 1e-09];
         const [SMALL_ERROR, LARGE_ERROR, ALLOWED_PART] = [0.05, 0.5, 0.25];
@@ -425,8 +428,8 @@ const slider_crank = (() => {
             return upperSolution(rows, rows.slice(0, n).map(row => row[n]));
         }
 
-        /* Singular values, the smallest first, and their directions on the right: Jacobi's rotations of
-           pairs of columns. */
+        /* Singular values, the smallest first, their directions on the right and what the matrix makes of
+           these: Jacobi's rotations of pairs of columns. */
         function singularValues(matrix) {
             const n = matrix[0].length;
             const columns = Array.from({ length: n }, (_, j) => matrix.map(row => row[j]));
@@ -453,7 +456,7 @@ const slider_crank = (() => {
                     }
                 }
             }
-            const found = columns.map((column, j) => ({ size: norm(column), direction: directions[j] }));
+            const found = columns.map((column, j) => ({ size: norm(column), direction: directions[j], image: column }));
             return found.sort((one, other) => one.size - other.size);
         }
 
@@ -465,6 +468,12 @@ const slider_crank = (() => {
                 const part = (k + 1) * ((Math.sqrt(5) - 1) / 2) % 1;
                 return (part * 64 % 2 < 1 ? 1 : -1) * (1 + part) / 2;
             });
+        }
+
+        /* A scale with 24 bits: with rounding errors of its own, all targets judge by the same numbers. */
+        function rounded(x) {
+            const near = Math.fround(x);
+            return Math.abs(near - x) <= 2 ** -24 * Math.abs(x) ? near : x;
         }
 
         /* The size of a mechanism as its equations show it at a guess or a position: the largest lever
@@ -514,8 +523,10 @@ const slider_crank = (() => {
                 this.mayTurn = model.COORDINATES.map((name, k) => {
                     return this.angular[k] || (model.UNITS[name] === "" && !isOwned(k));
                 });
-                this.size = sizeOf(model, this.angular, x => this.evaluate(x, t), Array.from(q)) || 1;
+                this.size = rounded(sizeOf(model, this.angular, x => this.evaluate(x, t), Array.from(q))) || 1;
                 this.reference = Float64Array.from(this.angular, isAngle => (isAngle ? 1 : this.size));
+                // How far each coordinate of a guess may be from an assembly that it is near.
+                this.near = this.reference.map((x, k) => x * (this.angular[k] ? NEAR_ANGLE : NEAR_PART));
                 this.place = Float64Array.from(q, Math.abs);
                 this.floor = ROUNDING * largest(this.place.filter((_, k) => !this.angular[k])) / this.size;
                 this.probe = probeOf(m);
@@ -525,7 +536,7 @@ const slider_crank = (() => {
                 this.sums = new Float64Array(m);
                 const generic = this.evaluate(this.place.map((_, k) => q[k] + this.reference[k] * this.probe[k]), t);
                 if (!allFinite(generic.Phi) || !allFinite(generic.Phi_q)) return;
-                const own = this.terms(generic, this.reference).slice();
+                const own = this.terms(generic, this.reference).map(rounded);
                 const here = this.terms(generic, this.reference.map((x, k) => x + this.place[k])).slice();
                 this.magnitude = own;
                 this.noise = here.map(x => ROUNDING * x);
@@ -584,10 +595,10 @@ const slider_crank = (() => {
                 return at.Phi.every((value, i) => Math.abs(value) <= ROUNDING * terms[i]);
             }
 
-            distance(q, other) {
+            distance(q, other, scale = this.reference) {
                 let most = 0;
                 for (let k = 0; k < this.n; k += 1) {
-                    const apart = Math.abs(q[k] - other[k]) / this.reference[k];
+                    const apart = Math.abs(q[k] - other[k]) / scale[k];
                     if (!(apart <= most)) most = apart;
                 }
                 return most;
@@ -601,6 +612,28 @@ const slider_crank = (() => {
             leavesBranch(guess, found) {
                 const wanted = this.determinants(guess), here = this.determinants(found);
                 return wanted.every(x => x !== 0) && wanted.some((x, k) => Math.sign(x) !== Math.sign(here[k]));
+            }
+
+            /* Whether a position found from a guess is not what the guess shows. */
+            strays(guess, found) {
+                const isFar = this.isFar(found.q, guess.q) || this.distance(found.q, guess.q, this.near) > ASTRAY;
+                return isFar || this.leavesBranch(guess, found);
+            }
+
+            /* About where the mechanism can be assembled beyond the nearest singular position: along its
+               movement v the smallest singular value u^T Phi_q v falls to zero half way. Null where the
+               mechanism is too large. */
+            otherSide(at) {
+                if (this.n > MOST_MIRRORED) return null;
+                const { near } = this, here = scaledRows(this, at, near);
+                if (!here.every(allFinite)) return null;
+                const [{ size, direction, image }] = singularValues(here);
+                const aside = this.evaluate(at.q.map((x, k) => x + MIRROR_STEP * near[k] * direction[k]), at.t);
+                const there = scaledRows(this, aside, near);
+                const bend = here.reduce((total, row, i) => {
+                    return total + image[i] / size * row.reduce((sum, x, k) => sum + (there[i][k] - x) * direction[k], 0);
+                }, 0) / MIRROR_STEP;
+                return at.q.map((x, k) => x - 2 * size / bend * near[k] * direction[k]);
             }
         }
 
@@ -672,33 +705,64 @@ const slider_crank = (() => {
             return ended(creeps ? SINGULAR : NOT_CONVERGED);
         }
 
-        /* A position from a guess: by plain steps, and by safeguarded ones where these fail or stray.
-           What is not far from the guess comes first, then what is on its branch, then the nearer. */
+        /* A position from a guess: by plain steps, and by safeguarded ones where these fail or stray; then
+           the assembly on the other side of the nearest singular position is looked at too. `other` is
+           another one that is as near to the guess. */
         function assemble(equations, t, guess) {
-            const plain = iterate(equations, t, guess);
-            const isFound = plain.status === CONVERGED;
-            const strays = () => equations.isFar(plain.last.q, guess) || equations.leavesBranch(plain.points[0], plain.last);
-            if (!plain.last || (isFound && !strays())) return plain;
-            const attempts = [plain], scale = equations.reference, probe = equations.probe;
+            const away = q => equations.distance(q, guess, equations.near);
+            const plain = iterate(equations, t, guess), isFound = plain.status === CONVERGED;
+            if (!plain.last || (isFound && away(plain.last.q) <= SETTLED)) return plain;
+            let good = [plain];
+            if (!isFound || equations.strays(plain.points[0], plain.last)) {
+                const attempts = safeguarded(equations, t, guess, isFound);
+                good = ordered(equations, plain.points[0], [plain, ...attempts]);
+                if (!good.length) return leastMissed(equations, attempts);
+            }
+            const mirrored = equations.otherSide(good[0].last), near = Math.max(1, away(good[0].last.q));
+            if (mirrored && away(mirrored) <= MIRRORED * near) {
+                const beyond = iterate(equations, t, mirrored);
+                if (beyond.last && away(beyond.last.q) <= Math.min(AS_NEAR * near, MIRRORED)) {
+                    good = ordered(equations, plain.points[0], [...good, beyond]);
+                }
+            }
+            const [first, ...rest] = good, reach = AS_NEAR * away(first.last.q);
+            const isOther = q => equations.distance(q, first.last.q) > SAME && away(q) <= reach;
+            first.other = rest.find(({ last }) => isOther(last.q))?.last ?? null;
+            return first;
+        }
+
+        /* Safeguarded attempts, from further and further away until one converges. */
+        function safeguarded(equations, t, guess, isFound) {
+            const attempts = [], { reference, probe } = equations;
             for (let k = 0; k <= (isFound ? 0 : RESTARTS); k += 1) {
                 // With all bodies on a line no equation tells which way to bend.
-                const bend = j => (k ? k * NUDGE * scale[j] * probe[(j - (k - 1) + probe.length) % probe.length] : 0);
+                const bend = j => (k ? k * NUDGE * reference[j] * probe[(j - (k - 1) + probe.length) % probe.length] : 0);
                 const begin = Float64Array.from(guess, (x, j) => x + bend(j));
                 attempts.push(iterate(equations, t, begin, MAX_ITERATIONS, safeguardedStep));
                 if (attempts[attempts.length - 1].status === CONVERGED) break;
             }
-            const least = (list, orders) => list.reduce((best, one) => {
-                const [a, b] = [orders(one), orders(best)], k = a.findIndex((x, i) => x !== b[i]);
-                return k >= 0 && a[k] < b[k] ? one : best;
-            });
-            const missed = ({ last }) => (last ? norm(equations.weights().map((x, i) => x * last.Phi[i])) : Infinity);
-            const good = attempts.filter(attempt => attempt.status === CONVERGED);
-            if (!good.length) return least(attempts.slice(1), attempt => [missed(attempt)]);
-            for (const attempt of good) attempt.last = unwound(equations, t, attempt.last, guess);
-            return least(good, ({ last }) => {
-                const isFar = equations.isFar(last.q, guess);
-                const leaves = !isFar && equations.leavesBranch(plain.points[0], last);
-                return [Number(isFar), Number(leaves), +equations.distance(last.q, guess).toFixed(6)];
+            return attempts;
+        }
+
+        function leastMissed(equations, attempts) {
+            const weights = equations.weights();
+            const missed = ({ last }) => (last ? norm(weights.map((x, i) => x * last.Phi[i])) : Infinity);
+            return attempts.reduce((best, attempt) => (missed(attempt) < missed(best) ? attempt : best));
+        }
+
+        /* The attempts that converged, angles turned back: what is near the guess comes first, the nearest
+           of it; then what is not far, then what is on its branch, then the nearer. */
+        function ordered(equations, guess, attempts) {
+            const good = attempts.filter(({ status }) => status === CONVERGED);
+            const orders = new Map(good.map(attempt => {
+                const at = attempt.last = unwound(equations, guess.t, attempt.last, guess.q);
+                const away = +equations.distance(at.q, guess.q, equations.near).toFixed(6);
+                const isFar = equations.isFar(at.q, guess.q), leaves = !isFar && equations.leavesBranch(guess, at);
+                return [attempt, [Math.min(away, 1), isFar, leaves, +equations.distance(at.q, guess.q).toFixed(6)]];
+            }));
+            return good.sort((one, other) => {
+                const [a, b] = [orders.get(one), orders.get(other)], k = a.findIndex((x, i) => x !== b[i]);
+                return k < 0 ? 0 : a[k] - b[k];
             });
         }
 
@@ -863,8 +927,9 @@ const slider_crank = (() => {
         }
 
         /* The motion over times: arrays q, q_dot, q_ddot (a point after another, NaN where nothing was
-           found) and y, y_dot, y_ddot of outputs, the status and the iterations of each point, and what
-           `explain` needs: the problem, the failed point and what was found of it. */
+           found) and y, y_dot, y_ddot of outputs, the status and the iterations of each point; whether the
+           start `strays` from the branch of the guess, and the bodies that another start, as near to it,
+           has elsewhere; and what `explain` needs: the problem, the failed point, what was found of it. */
         function motionOver(model, times, p = model.DEFAULTS, guess = model.GUESS) {
             const n = model.N_COORDINATES, count = times.length, width = model.OUTPUTS.length;
             const array = size => new Float64Array(count * size).fill(NaN);
@@ -872,13 +937,14 @@ const slider_crank = (() => {
                 t: times, p, q: array(n), q_dot: array(n), q_ddot: array(n),
                 y: array(width), y_dot: array(width), y_ddot: array(width), residual: array(1),
                 status: new Int32Array(count).fill(NOT_REACHED), iterations: new Int32Array(count),
-                failed: null, near: [],
+                failed: null, near: [], other: null, strays: false,
             };
             const corners = cornersOf(model, Float64Array.from(times), p, guess);
             const timeOf = k => times[k] + corners[k];
             let outcome = start(model, p, guess, timeOf(0));
             const march = new March(outcome.equations);
-            motion.equations = outcome.equations;
+            const { equations, other = null, strays = false } = outcome;
+            Object.assign(motion, { equations, other, strays });
             record(motion, 0, outcome, model);
             let from = outcome.state, to = model.point(p);
             for (let k = 1; k < count && outcome.status === CONVERGED; k += 1) {
@@ -926,7 +992,12 @@ const slider_crank = (() => {
             if (status === CONVERGED && crawls(attempt.corrections) && at.sensitivity > TOO_NEAR) status = SINGULAR;
             // The guess may be rough: from here on the assembled mechanism gives the size.
             const equations = new Problem(model, p, at.q, t);
-            return { status, equations, state: status === CONVERGED ? at : null, position: at };
+            const elsewhere = attempt.other?.q.map((x, k) => (x - at.q[k]) / rough.reference[k]);
+            return {
+                status, equations, state: status === CONVERGED ? at : null, position: at,
+                other: elsewhere ? involved(model, elsewhere) : null,
+                strays: rough.leavesBranch(rough.evaluate(guess, t), at),
+            };
         }
 
         /* What is there at a time that the motion does not reach. */
@@ -1129,10 +1200,10 @@ const slider_crank = (() => {
         }
 
         /* The rows of Phi_q in scales of equations and coordinates. */
-        function scaledRows(equations, at) {
+        function scaledRows(equations, at, scale = equations.reference) {
             const weights = equations.weights();
             return equations.model.rows_of(at, "Phi_q").map((row, i) => {
-                return row.map((x, k) => weights[i] * x * equations.reference[k]);
+                return row.map((x, k) => weights[i] * x * scale[k]);
             });
         }
 
@@ -1181,11 +1252,19 @@ const slider_crank = (() => {
             return eventAt(equations, kind, at.q, at.t, at);
         }
 
-        /* The event that ended a motion; null where it did not end, or nobody knows why. */
+        /* The event that ended a motion; null where it did not end, or nobody knows why. The failed point
+           gets its status: how Newton's method fails there rounding decides. */
         function explain(motion) {
-            const { equations, failed, t } = motion;
-            if (!failed || failed.isExhausted) return null;
-            const { state, position, nearest, jumps, status } = failed;
+            const { failed, status } = motion, event = failed && !failed.isExhausted ? endOf(motion) : null;
+            if (!event || failed.position || failed.status === NOT_FINITE) return event;
+            const isThere = Math.abs(event.t - failed.t) <= AT_EVENT * Math.max(Math.abs(event.t), Math.abs(failed.t));
+            const isSingular = event.kind === "bifurcation" || (event.kind === "lock-up" && isThere);
+            status[failed.index] = failed.status = isSingular ? SINGULAR : NOT_CONVERGED;
+            return event;
+        }
+
+        function endOf(motion) {
+            const { equations, failed, t } = motion, { state, position, nearest, jumps, status } = failed;
             if (!state) return status === SINGULAR && position ? singularStart(equations, position) : null;
             const found = located(equations, state, failed.t) || locatedFromPoint(motion);
             if (found || !jumps) return found;

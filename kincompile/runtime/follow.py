@@ -18,6 +18,7 @@ from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
 from kincompile.runtime.singular.events import (
+    DOUBTS,
     branch_switch,
     involved,
     locate,
@@ -168,15 +169,12 @@ class _Way:
 
     def _doubt(self, outcome: Outcome, time: float) -> str:
         """Say that the position found from the guess may not be the one that is meant."""
-        said = f"The position at t = {time:.10g} is on another branch than the guess"
+        said, bodies = DOUBTS["strays"], ""
         if outcome.other is not None and outcome.position is not None:
             away = outcome.other.q - outcome.position.q
-            bodies = involved(self._inputs.code, away / self._march.equations.reference)
-            said = (
-                f"Another position at t = {time:.10g}, with {listed(bodies)} elsewhere, is as near "
-                "to the guess"
-            )
-        return f" {said}: kc.assemblies gives all of them, and each serves as a guess."
+            said = DOUBTS["other"]
+            bodies = listed(involved(self._inputs.code, away / self._march.equations.reference))
+        return f" {said.format(t=f'{time:.10g}', bodies=bodies)}{DOUBTS['remedy']}"
 
     def march_compiled(self, outcome: Outcome) -> bool:
         """Let a compiled module follow the motion from its start; say whether all went well.

@@ -19,6 +19,8 @@ from kincompile.criteria import (
     ASTRAY,
     FAR,
     FOLDED,
+    MIRROR_STEP,
+    MOST_MIRRORED,
     NEAR_ANGLE,
     NEAR_PART,
     RESIDUAL_FACTOR,
@@ -49,13 +51,6 @@ a step takes a fraction of a second."""
 
 THROWN = 10.0
 """Distance from a guess, in those up to which it is near, beyond which an iterate is thrown far."""
-
-MOST_MIRRORED = 300
-"""Coordinates up to which the assembly on the other side of a singular position is looked for:
-beyond, singular values take a tenth of a second."""
-
-MIRROR_STEP = 1e-5
-"""Step of the difference that shows how a singular value changes, in distances of a near guess."""
 
 LARGEST_POWER = 700.0
 """Power of e beyond which no determinant is given: floating point ends at 709."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
-from kincompile.runtime.singular.events import SENTENCES
+from kincompile.runtime.singular.events import DOUBTS, SENTENCES
 from kincompile.runtime.status import Status
 from kincompile.runtime.verdict import WORDS
 from kincompile.view.drawing import drawing
@@ -83,7 +83,7 @@ def page_data(
         "equations": list(system.equations),
         "parameters": [_parameter(item, values[item.name]) for item in system.parameters],
         "start": (q[0] if starts_there and np.isfinite(q[0]).all() else guess).tolist(),
-        "words": {**WORDS, **SENTENCES},
+        "words": {**WORDS, **SENTENCES, **DOUBTS},
         "guess": guess.tolist(),
         "guessResidual": _at_guess(system, shapes, guess, t[0], p),
         "violated": VIOLATED * (1 + float(np.max(np.abs(guess), initial=0.0))),

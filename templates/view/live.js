@@ -110,10 +110,21 @@ function brieflyNumber(value) {
   return `${+value.toPrecision(10)}`;
 }
 
+function listed(bodies) {
+  const shown = bodies.slice(0, 12).join(', ');
+  return bodies.length > 12 ? `${shown} and ${bodies.length - 12} more` : shown;
+}
+
+/* What is to be said of a start that may not be the one that is meant. */
+function doubtOf({ t, other, strays }) {
+  const { words } = player.data, said = other ? words.other : words.strays;
+  if (!other && !strays) return '';
+  return filled(said, { t: brieflyNumber(t[0]), bodies: other && listed(other) }) + words.remedy;
+}
+
 /* The event that ended a motion, with its sentence. */
 function withSentence(event, motion) {
-  const { words } = player.data, shown = event.bodies.slice(0, 12).join(', ');
-  const bodies = event.bodies.length > 12 ? `${shown} and ${event.bodies.length - 12} more` : shown;
+  const { words } = player.data, bodies = listed(event.bodies);
   const later = motion.failed ? brieflyNumber(motion.failed.t) : '';
   return { ...event, message: filled(words[event.kind], { t: brieflyNumber(event.t), bodies, later }) };
 }
@@ -358,7 +369,7 @@ const live = {
     const passed = event ? [withSentence(event, this.motion)] : [];
     data.events = passed;
     data.success = !this.motion.failed && !wrong;
-    data.message = [wrong, verdictOf(this.motion, passed[0])].filter(Boolean).join(' ');
+    data.message = [wrong, verdictOf(this.motion, passed[0]), doubtOf(this.motion)].filter(Boolean).join(' ');
     this.verdict.textContent = data.message;
     this.verdict.classList.toggle('failed', !data.success);
   },
@@ -366,6 +377,7 @@ const live = {
   /* Find out what ended the motion: that takes longer than a frame. */
   explain() {
     this.takeVerdict(emitted.solver.explain(this.motion));
+    player.data.status = Array.from(this.motion.status);
     if (player.data.events.length) player.motionChanged();
   },
 

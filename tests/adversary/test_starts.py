@@ -1,4 +1,4 @@
-"""Bad starts: what NumPy, C and the page's JavaScript make of the same one, and who gets home.
+"""Bad starts: what NumPy, C and JavaScript make of the same one, and who gets home.
 
 Every found position is compared with the closed form of the chain, which knows all assemblies.
 """
@@ -14,7 +14,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.runtime.newton import iterate
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import THROWN, problem
 from kincompile.targets.templates import read
 from kincompile.view.page_scripts import solver_script
 from tests.adversary.chains import (
@@ -25,7 +25,7 @@ from tests.adversary.chains import (
     random_chain,
     reach,
 )
-from tests.adversary.test_chains import Case, start_of
+from tests.adversary.test_chains import Case, chain_of, start_of
 
 STRUCTURES = (("RRR",), ("RRP", "slot"), ("RRR", "gear", "RRR"), ("slot", "RRR", "RRP"))
 AT_START = np.zeros(1)
@@ -86,7 +86,100 @@ def test_two_thousand_bad_starts(quick_compiler, record):
     compare(2000, record)
 
 
-@pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
+def under_node(folder, text, result):
+    """Return the value of an expression after a script."""
+    path = folder / "starts.js"
+    path.write_text(f"{text}\nconsole.log(JSON.stringify({result}))", encoding="utf-8")
+    done = subprocess.run([str(NODE), str(path)], capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def in_javascript(folder, model, t, guesses):
+    """Return statuses, positions, the event and what another start has elsewhere, of each guess."""
+    solve = """JOBS.map(guess => {
+      const motion = MODEL.solver.solve(MODEL, TIMES, MODEL.DEFAULTS, guess);
+      const event = MODEL.solver.explain(motion);
+      return [Array.from(motion.status), Array.from(motion.q), event, motion.other, motion.strays];
+    })"""
+    solve = solve.replace("TIMES", json.dumps(np.atleast_1d(t).tolist()))
+    solve = solve.replace("JOBS", json.dumps(np.atleast_2d(guesses).tolist()))
+    source = kc.emit(model, "javascript").source
+    found = under_node(folder, source, solve.replace("MODEL", model.name))
+    for status, q, *rest in found:
+        yield np.array(status), np.array(q, dtype=float).reshape(len(status), -1), *rest
+
+
+def is_thrown(module, guess):
+    """Say whether plain steps go so far that the last digit of a sine decides where they end."""
+    equations = problem(module, module.DEFAULTS, guess, 0.0)
+    points = iterate(equations, 0.0, guess, 1e-10, 25).points
+    return max(equations.away(point.q, guess) for point in points) > THROWN
+
+
+def compare_in_javascript(count, folder, record):
+    """Solve bad starts in JavaScript: all is as in the runtime; return how many are not.
+
+    These are thrown so far that roundings decide where they end.
+    """
+    tried = other = 0
+    for case, random in cases():
+        module, guesses = kc.compile(case.model), bad_starts(case, random, count // len(STRUCTURES))
+        results = in_javascript(folder, case.model, 0.0, guesses)
+        for guess, (status, q, _, elsewhere, strays) in zip(guesses, results, strict=True):
+            known, q_known, said = solved(module, guess)
+            tried += 1
+            is_same = status[0] == known and np.allclose(q, q_known, 1e-9, 1e-9, equal_nan=True)
+            bodies = f"with {', '.join(elsewhere or ())} elsewhere, is as near to the guess"
+            is_same &= (bodies if elsewhere else "on another branch" if strays else "") in said
+            is_same &= bool(elsewhere or strays) == ("each serves as a guess" in said)
+            assert is_same or is_thrown(module, guess)
+            other += not is_same
+    record(tried=tried, wrong=0, gave_up=other)
+    return other
+
+
+needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
+
+
+@needs_node
+def test_a_few_bad_starts_in_javascript(tmp_path, record):
+    assert compare_in_javascript(40, tmp_path, record) == 0
+
+
+@needs_node
+@pytest.mark.slow
+def test_two_thousand_starts_in_javascript(tmp_path, record):
+    assert compare_in_javascript(2000, tmp_path, record) <= 20
+
+
+def motions_in_javascript(seeds, folder):
+    """Follow chains up to and beyond lock-ups in JavaScript; return how many ended in one."""
+    lock_ups = 0
+    for case in map(chain_of, seeds):
+        solution = kc.solve(kc.compile(case.model), case.t)
+        ((status, q, event, *_),) = in_javascript(folder, case.model, case.t, case.guess)
+        np.testing.assert_array_equal(status, solution.status)
+        is_there = np.isfinite(solution.q).all(axis=1)
+        np.testing.assert_array_equal(np.isfinite(q).all(axis=1), is_there)
+        apart = reach(q[is_there], solution.q[is_there], case.at.scale * (1 + abs(case.at.origin)))
+        assert np.max(apart, initial=0.0) < 1e-9
+        assert (event and event["kind"]) == (solution.events[-1].kind if solution.events else None)
+        lock_ups += event is not None
+    return lock_ups
+
+
+@needs_node
+def test_that_chains_end_alike_in_javascript(tmp_path):
+    assert motions_in_javascript(range(6), tmp_path) >= 2
+
+
+@needs_node
+@pytest.mark.slow
+def test_that_many_chains_end_alike_in_javascript(tmp_path):
+    assert motions_in_javascript(range(6, 60), tmp_path) >= 18
+
+
+@needs_node
 @pytest.mark.slow
 def test_two_hundred_bad_starts_on_the_page(tmp_path, record):
     """Newton's panel takes the plain iterates, and so they are compared."""
@@ -96,11 +189,8 @@ def test_two_hundred_bad_starts_on_the_page(tmp_path, record):
         module, guesses = kc.compile(case.model), bad_starts(case, random, 50)
         text = solver_script(case.model) + "\n" + read("view/newton.js")
         starts = json.dumps(guesses.tolist())
-        text += f"\nconst all = {starts}.map(g => newton.iterate(emitted, g, 0));"
-        path = tmp_path / f"{tried}.js"
-        path.write_text(text + "\nconsole.log(JSON.stringify(all))", encoding="utf-8")
-        done = subprocess.run([str(NODE), str(path)], capture_output=True, text=True, check=True)
-        for guess, found in zip(guesses, json.loads(done.stdout), strict=True):
+        result = f"{starts}.map(g => newton.iterate(emitted, g, 0))"
+        for guess, found in zip(guesses, under_node(tmp_path, text, result), strict=True):
             known = iterate(problem(module, module.DEFAULTS, guess, 0.0), 0.0, guess, 1e-10, 25)
             tried += 1
             if max(known.corrections, default=0.0) > np.pi:  # thrown far: roundings decide where

@@ -56,6 +56,13 @@ SENTENCES = {
 }
 """What is said of an event."""
 
+DOUBTS = {
+    "strays": "The position at t = {t} is on another branch than the guess: ",
+    "other": "Another position at t = {t}, with {bodies} elsewhere, is as near to the guess: ",
+    "remedy": "kc.assemblies gives all of them, and each serves as a guess.",
+}
+"""What is said of a start that may not be the one that is meant."""
+
 PASSAGE = 2e-3
 """Half of the piece of curve around a bifurcation, in radians and sizes of the mechanism, over
 which the motion is interpolated: beyond it Phi_q is good to ten digits."""
