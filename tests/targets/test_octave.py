@@ -1,9 +1,14 @@
 """What the .m files have beside functions: the script of a motion, and MATLAB's limits."""
 
+import re
+
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
+from tests.adversary.test_chains import start_of
+from tests.adversary.test_starts import bad_starts, cases, solved
 
 # One process evaluates each target once for all of them.
 pytestmark = pytest.mark.xdist_group("targets")
@@ -20,8 +25,11 @@ def test_that_the_script_finds_the_same_motion(example, results_of):
         np.testing.assert_allclose(rows, expected, rtol=1e-10, atol=1e-10)
 
 
-def test_that_a_guess_at_which_phi_q_is_singular_gives_no_motion(octave, tmp_path):
-    """Newton goes 1e14 rad away, where corrections are small beside q and Phi is not zero."""
+def test_that_from_a_guess_at_which_phi_q_is_singular_a_position_is_one(octave, tmp_path):
+    """Newton goes 1e14 rad away, where corrections are small beside q and Phi is not zero.
+
+    Shortened corrections do not.
+    """
     m = kc.Mechanism("stuck")
     cam, follower = m.body("cam"), m.body("follower", guess=(0, 0.06, 0))
     angles = [2 * np.pi * k / 36 for k in range(36)]
@@ -33,9 +41,45 @@ def test_that_a_guess_at_which_phi_q_is_singular_gives_no_motion(octave, tmp_pat
     emitted = kc.emit(m, "octave")
     assert "stuck_rho_j_contact.m" in emitted.files
     emitted.write(tmp_path)
+    found = octave(["stuck", "show('q', Q(:, 1));"])
+    q = np.array(found["q"][0])
+    assert np.max(np.abs(q)) < np.pi
+    np.testing.assert_allclose(kc.compile(m).Phi(q, 0.0), 0.0, atol=1e-12)
+
+
+def test_that_what_cannot_be_assembled_has_no_motion(octave, tmp_path):
+    x = sympy.Symbol("x")
+    kc.emit(kc.ConstraintSystem("rootless", ["x"], [x**2 + 1 + kc.t**2]), "octave").write(tmp_path)
     refused = "show('refused', strfind(problem.message, 'no position found at t = 0;'));"
-    found = octave(["try", "stuck", "show('found', 1);", "catch problem", refused, "end"])
-    assert found == {"refused": [[8.0]]}
+    found = octave(["try", "rootless", "show('found', 1);", "catch problem", refused, "end"])
+    assert found == {"refused": [[11.0]]}
+
+
+@pytest.mark.parametrize("number", [0, 1, 3])
+def test_that_bad_starts_end_near_their_guess(octave, tmp_path, number):
+    """By itself Newton's method ends up to hundreds of turns away, or at the far assembly."""
+    case, random = list(cases())[number]
+    guesses = bad_starts(case, random, 40)
+    emitted = kc.emit(case.model, "octave")
+    emitted.write(tmp_path)
+    text = emitted.files["chain.m"]
+    for old, new in ((r"t_end = .*;", "t_end = 0;"), (r"points = .*;", "points = 1;"),
+                     (r"\nq = \[[^]]*\];", "\nq = guess;")):  # fmt: skip
+        text, count = re.subn(old, new, text)
+        assert count == 1
+    (tmp_path / "chain.m").write_text(text)
+    lines = ["warning('off', 'all');"]
+    for k, guess in enumerate(guesses):
+        lines += [f"guess = {guess.tolist()}';", f"try, chain, show('at_{k}', Q); catch, end"]
+    found = octave(lines)
+    assert len(found) >= 30
+    module = kc.compile(case.model)
+    for k in (k for k in range(40) if f"at_{k}" in found):
+        q = np.array(found[f"at_{k}"][0])
+        assert np.max(np.abs(q - guesses[k])[2::3]) < 2.02 * np.pi
+        assert start_of(case, q) is not None
+        if k % 2 and number < 3:  # near, with no other assembly as near
+            np.testing.assert_allclose(q, solved(module, guesses[k])[1], rtol=0, atol=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")

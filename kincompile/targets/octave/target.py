@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
     from kincompile.model.spline import SplineTable
     from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
@@ -43,8 +44,8 @@ KEYWORDS = (
 
 CALLED = (
     *NAMES.values(), "abs", "all", "either", "error", "find", "in_reals", "isempty", "isreal",
-    "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "numel", "pi", "polyval", "size",
-    "sum", "zeros",
+    "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell", "numel", "pi", "polyval",
+    "round", "size", "sum", "zeros",
 )  # fmt: skip
 """Functions that the files call; a script of such a name would be called in their place."""
 
@@ -152,6 +153,16 @@ def _literal(text: str) -> str:
     return "'" + text.replace("'", "''") + "' ..."
 
 
+def _angles(program: Program) -> str:
+    """Return the numbers of the coordinates that may turn, as a column."""
+    owned = {column for body in program.bodies for column in body.columns}
+    units = [item.unit for item in program.coordinates]
+    turning = [
+        str(k + 1) for k, unit in enumerate(units) if unit == "rad" or not (unit or k in owned)
+    ]
+    return f"[{'; '.join(turning)}]" if turning else "zeros(0, 1)"
+
+
 def _script(code: InlineProgram) -> str:
     """Return the script that solves the motion."""
     program = code.program
@@ -173,5 +184,6 @@ def _script(code: InlineProgram) -> str:
         "points": points,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 1),
         "guess": _column(((item.name, item.guess) for item in program.coordinates), 1),
+        "angles": _angles(program),
     }
     return fill("octave/script.m.jinja", data)
