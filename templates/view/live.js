@@ -209,7 +209,6 @@ const live = {
     if (!parameters.length) return;
     this.given = parameters.map(({ value }) => value);
     this.values = this.given.slice();
-    this.base = player.data.extent;
     this.panel = panel;
     const title = document.createElement('h2');
     title.textContent = 'Parameters';
@@ -309,7 +308,7 @@ const live = {
 
   reset() {
     this.set(Object.fromEntries(this.names.map((name, k) => [name, this.given[k]])));
-    history.replaceState(null, '', ' ');
+    this.writeFragment();
   },
 
   showValues() {
@@ -330,8 +329,6 @@ const live = {
     const motion = this.motion = this.solved();
     this.takeMotion(motion);
     setNumbers(data.drawing, motion.p);
-    const extent = fitDrawing(data.drawing, player);
-    data.extent = extent.map((x, k) => (k % 2 ? Math.max(x, this.base[k]) : Math.min(x, this.base[k])));
     this.takeVerdict(null);
     this.showValues();
     player.motionChanged();
@@ -340,11 +337,17 @@ const live = {
     this.timer = setTimeout(() => this.explain(), REST);
   },
 
+  /* Make the drawing fit a motion; what was seen first stays in view. */
+  fit() {
+    const { data } = player, base = this.base ??= data.extent;
+    const extent = fitDrawing(data.drawing, player);
+    data.extent = extent.map((x, k) => (k % 2 ? Math.max(x, base[k]) : Math.min(x, base[k])));
+  },
+
   /* Put a motion in the place of the one that is shown. */
   takeMotion(motion) {
     const { data } = player, names = ['q', 'q_dot', 'q_ddot', ...(data.outputs.length ? ['y', 'y_dot', 'y_ddot'] : [])];
     for (const name of names) data.arrays[name] = motion[name];
-    player.kept = null;
     withChecks(data.arrays, motion);
     data.status = Array.from(motion.status);
     if (!hasMotion()) data.guessResidual = residualsOf(motion.equations.evaluate(data.guess, player.t[0]).Phi);

@@ -239,6 +239,7 @@ function start() {
 
 /* The motion is another one: what was computed from the last one is dropped. */
 function forget() {
+  live.fit();
   for (const keeper of [units, columns, poles, stage]) keeper.forget();
   plots.redraw();
   showVerdict();

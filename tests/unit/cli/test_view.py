@@ -19,7 +19,7 @@ def test_that_options_choose_times_and_parameters(kincompile, pendulum, tmp_path
     assert kincompile("view", pendulum, "-o", page, *options).exit_code == 0
     html = page.read_text(encoding="utf-8")
     assert '"status":[0,0,0]' in html
-    assert '{"name":"length","value":2.0,"unit":"m"}' in html
+    assert '{"name":"length","value":2.0,"unit":"m",' in html
 
 
 def test_that_several_models_go_into_a_folder_with_an_index(
