@@ -1319,7 +1319,6 @@ const cam_by_table = (() => {
         };
     })();
 
-
     return {
         NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, COORDINATES, EQUATIONS, PARAMETERS,
         UNITS, DEFAULTS, GUESS, OUTPUTS, BODIES, CORNERS, PATTERN,

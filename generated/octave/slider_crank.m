@@ -34,6 +34,8 @@ q = [
 
 tolerance = 1e-10;  % of the last correction, which is applied
 most_iterations = 25;
+largest_angle = 0.5;  % of a shortened correction, rad
+angles = [3; 6; 9];  % which coordinates are angles
 
 T = linspace(0, t_end, points);
 Q = zeros(9, points);
@@ -46,24 +48,56 @@ for k = 1:points
         q = q + h * q_dot + h^2 / 2 * q_ddot;
     end
 
-    % position: Phi(q, t) = 0 by Newton's method
+    % position: Phi(q, t) = 0 by Newton's method. Where that fails from the guess, or leaves it by
+    % more than an eighth of a turn: again, with corrections shortened until Phi falls
+    start = q;
     extent = 1 + norm(q);
-    for iteration = 1:most_iterations
-        correction = slider_crank_Phi_q(q, t, p) \ slider_crank_Phi(q, t, p);
-        q = q - correction;
-        has_converged = norm(correction) <= tolerance * (1 + norm(q));
-        if has_converged
-            break
+    is_found = false;
+    for attempt = 1:1 + (k == 1)
+        q = start;
+        for iteration = 1:most_iterations
+            Phi = slider_crank_Phi(q, t, p);
+            correction = slider_crank_Phi_q(q, t, p) \ Phi;
+            if attempt > 1
+                part = 1 / max([1; abs(correction(angles)) / largest_angle]);
+                while part > 1e-6 && ~(norm(slider_crank_Phi(q - part * correction, t, p)) < norm(Phi))
+                    part = part / 2;
+                end
+                correction = part * correction;
+            end
+            q = q - correction;
+            has_converged = norm(correction) <= tolerance * (1 + norm(q));
+            if has_converged
+                break
+            end
+        end
+        % Where a singular Phi_q sends q far away, the corrections are small beside it, but Phi is not.
+        allowed = 10 * tolerance * extent * sum(abs(slider_crank_Phi_q(q, t, p)), 2);
+        if has_converged && norm(q) < Inf && all(abs(slider_crank_Phi(q, t, p)) <= allowed)
+            is_found = true;
+            found = q;
+            bounds = allowed;
+            if all(abs(q(angles) - start(angles)) <= pi / 4)
+                break
+            end
         end
     end
-    % Where a singular Phi_q sends q far away, the corrections are small beside it, but Phi is not.
-    Phi_q = slider_crank_Phi_q(q, t, p);
-    is_met = abs(slider_crank_Phi(q, t, p)) <= 10 * tolerance * extent * sum(abs(Phi_q), 2);
-    if ~has_converged || ~all(is_met)
+    if ~is_found
         error('slider_crank: no position found at t = %g; take more points, or another guess', t);
     end
 
+    % Angles turn back by whole turns, as far as the equations allow it: together, and each alone
+    q = found;
+    for some = [{angles}, num2cell(angles')]
+        turned = q;
+        turned(some{1}) = q(some{1}) - 2 * pi * round((q(some{1}) - start(some{1})) / (2 * pi));
+        if all(abs(slider_crank_Phi(turned, t, p)) <= bounds)
+            q = turned;
+        end
+    end
+
     % velocity: Phi_q q_dot = nu; acceleration: Phi_q q_ddot = gamma
+    Phi_q = slider_crank_Phi_q(q, t, p);
     q_dot = Phi_q \ slider_crank_nu(q, t, p);
     q_ddot = Phi_q \ slider_crank_gamma(q, q_dot, t, p);
 

@@ -1,12 +1,15 @@
 import math
+import warnings
 
 import numpy as np
 import pytest
 
+import kincompile as kc
 from kincompile.errors import AssemblyWarning, SolveError
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.solve import solve
 from kincompile.runtime.status import Status
+from tests.trust.test_passages import FLAT, row_of_parallelograms
 
 DIGITS = 5.1e-11  # ten decimals printed
 
@@ -386,3 +389,14 @@ def test_columns_by_name(pendulum):
     np.testing.assert_array_equal(solution["phi_rod"], solution.q[:, 2])
     np.testing.assert_array_equal(solution["x_rod_dot"], solution.q_dot[:, 0])
     np.testing.assert_array_equal(solution["y_rod_ddot"], solution.q_ddot[:, 1])
+
+
+def test_that_more_than_a_thousand_coordinates_are_warned_about_too():
+    module = kc.compile(row_of_parallelograms(112, 0.0))
+    assert module.N_COORDINATES > 1000
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert kc.solve(module, [0.0, 1.0, FLAT - 0.1]).success
+    said = r"row is nearly singular at t = 2\.14159165"
+    with pytest.warns(kc.SingularConfigurationWarning, match=said):
+        assert kc.solve(module, [0.0, 1.0, FLAT - 1e-6]).success
