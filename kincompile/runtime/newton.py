@@ -261,7 +261,8 @@ def assemble(
     away = equations.away(good[0].last.q, guess)
     if equations.away(mirrored, guess) <= MIRRORED * max(1.0, away):
         beyond = iterate(equations, t, mirrored, *limits)
-        if equations.away(beyond.last.q, guess) <= min(AS_NEAR * max(1.0, away), MIRRORED):
+        most = min(AS_NEAR * max(1.0, away), MIRRORED)
+        if beyond.points and equations.away(beyond.last.q, guess) <= most:
             good = _ordered(equations, plain.points[0], [*good, beyond], tolerance)
     if len(good) > 1:
         good[0].other = _as_near(equations, guess, good)

@@ -141,6 +141,7 @@ CASES = {
     "lock-up at the start": (lambda: free("root", x**2 - kc.t), [0.0], (0, 1, 3)),
     "no root": (lambda: free("none", x**2 + 1 + kc.t**2), [0.3], (0, 1, 3)),
     "not finite": (lambda: free("log", sympy.log(x) - kc.t), [-1.0], (0, 1, 3)),
+    "no other side": (lambda: free("log", x * sympy.log(x) + 0.3), [0.3717418546365915], (0, 1, 3)),
     "ends": (lambda: free("ends", x - sympy.sqrt(1 - kc.t)), [1.0], (0, 2, 5)),
     "jump": (
         lambda: free("jump", x - sympy.Piecewise((0, kc.t < 0.55), (3, True))), [0.0], (0, 1, 11)

@@ -188,3 +188,11 @@ def test_an_ill_conditioned_point_in_millimetres_is_accepted(four_bar):
 def test_newton_works_at_one_time(problem_3_5_6):
     with pytest.raises(InputError, match="newton works at one time, got 2: use solve for a grid"):
         newton(problem_3_5_6, [0, 1], START)  # type: ignore[arg-type]  # what is refused
+
+
+def test_that_equations_need_no_value_on_the_other_side():
+    x = sympy.Symbol("x")
+    module = kc.compile(kc.ConstraintSystem("log", ["x"], [x * sympy.log(x) + 0.3]))
+    found = kc.newton(module, 0.0, [0.3717418546365915])
+    assert found.status is kc.Status.CONVERGED
+    assert found.q * np.log(found.q) == pytest.approx(-0.3)
