@@ -104,7 +104,7 @@ $(BENCH_READY): $(DEMO_READY)
 
 bench: $(BENCH_READY)
 	@$(BIN)/python -m benchmarks
-	@for part in points analysis scale variants; do $(BIN)/python -m benchmarks.$$part || exit 1; done
+	@for part in points analysis scale variants page; do $(BIN)/python -m benchmarks.$$part || exit 1; done
 
 clean:
 	@rm -rf $(VENV) demo build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache

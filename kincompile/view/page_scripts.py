@@ -20,6 +20,10 @@ MOST_COORDINATES = 150
 """Coordinates up to which a page solves the mechanism itself."""
 
 
+DEPENDENT = "its equations depend on each other at every position."
+"""Why a mechanism that could be emitted has no solver."""
+
+
 def solver_script(model: Mechanism | ConstraintSystem) -> str:
     """Return the script that declares `emitted`: the module, or `reason`, why there is none."""
     count = len(model.system().coordinates)
@@ -34,7 +38,8 @@ def solver_script(model: Mechanism | ConstraintSystem) -> str:
     # In a function of its own, so that no name of a mechanism meets one of the page.
     return (
         f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{emitted.source}"
-        "return module.exports;\n})();\n"
+        f"return module.exports.solver ? module.exports : {json.dumps({'reason': DEPENDENT})};\n"
+        "})();\n"
     )
 
 

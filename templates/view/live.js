@@ -226,6 +226,7 @@ const live = {
     this.verdict = document.createElement('output');
     panel.append(grid, this.buttons(), this.verdict);
     this.readFragment();
+    setTimeout(() => this.motionNow(), REST);  // the first pull is not the first solve: that takes longer
     addEventListener('hashchange', () => this.readFragment());
   },
 

@@ -89,7 +89,7 @@ const newtonTables = (() => {
 
   /* Colour a cell by a part between 0 and 1. */
   function shade(element, part) {
-    element.style.setProperty('--part', `${Math.round(75 * part)}%`);
+    element.style.setProperty('--part', `${Math.round(45 * part)}%`);
   }
 
   /* The guess as fields, with place for the iterate and its correction; onGuess(k, value): the

@@ -201,6 +201,19 @@ def test_that_poles_are_where_velocities_meet_and_centrodes_go_through_them(open
     page.close()
 
 
+def test_that_dots_of_a_path_are_equal_times_of_its_first_round(opened: Any) -> None:
+    page = opened(slider_crank())
+    # The crank turns steadily, once in 2 pi s of 7: 24 dots are 15 degrees apart.
+    dots = np.array(page.evaluate("pathOf(stage.points.find(point => point.name === 'A')).dots"))
+    angles = np.unwrap(np.arctan2(dots[:, 1], dots[:, 0]))
+    np.testing.assert_allclose(np.diff(angles), np.radians(15), rtol=1e-3)
+    colours = page.evaluate(
+        "['A', 'B'].map(name => stage.colourOf(stage.points.find(point => point.name === name)))"
+    )
+    assert len(set(colours)) == 2
+    page.close()
+
+
 @pytest.mark.parametrize("length", [0.0031, 0.12, 4.4, 7600.0])
 def test_that_steps_of_the_grid_are_round_and_not_smaller(opened: Any, length: float) -> None:
     page = opened(slider_crank())

@@ -8,6 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile.runtime.problem import problem
 from kincompile.runtime.results.observed import observed
 
 from .conftest import CHROMIUM, NODE, in_chromium, in_node
@@ -18,7 +19,9 @@ FACTORS = ((1.0, 1.0), (0.9, 1.1), (0.6, 1.5), (0.3, 2.0))
 SOLVE = """JSON.stringify(JOBS.map(([t, p, guess]) => {
   const motion = MODEL.solver.solve(MODEL, t, p, guess), event = MODEL.solver.explain(motion);
   const arrays = ["q", "q_dot", "q_ddot", "y", "y_dot", "y_ddot", "status", "near"];
-  return [Object.fromEntries(arrays.map(name => [name, Array.from(motion[name])])), event];
+  const found = Object.fromEntries(arrays.map(name => [name, Array.from(motion[name])]));
+  const { size, magnitude, noise } = motion.equations;
+  return [{ ...found, scales: [[size], Array.from(magnitude), Array.from(noise)] }, event];
 }))"""
 
 RUNNERS = [
@@ -55,6 +58,11 @@ def compare(found, event, solution):
     module, p = solution.module, np.array(list(solution.parameters.values()))
     motion = solution.q, solution.q_dot, solution.q_ddot
     outputs = observed(module, motion, solution.t, p)
+    if np.isfinite(solution.q[0]).all():
+        equations = problem(module, p, solution.q[0].copy(), solution.t[0])
+        scales = [equations.size], equations.magnitude, equations.noise
+        for values, known in zip(found["scales"], scales, strict=True):
+            np.testing.assert_allclose(values, known, rtol=1e-6)
     names = ("q", "q_dot", "q_ddot", "y", "y_dot", "y_ddot")
     for name, known in zip(names, (*motion, outputs.y, outputs.y_dot, outputs.y_ddot), strict=True):
         values = np.array(found[name], dtype=float).reshape(known.shape)
@@ -150,6 +158,27 @@ def test_that_a_motion_ends_as_in_the_runtime(solved, case):
     module, t = kc.compile(model), np.linspace(*grid)
     ((found, event),) = solved(model, [[t.tolist(), module.DEFAULTS.tolist(), guess]])
     compare(found, event, kc.solve(module, t, guess=guess))
+
+
+@pytest.mark.filterwarnings("ignore::kincompile.errors.AssemblyWarning")
+@pytest.mark.parametrize("name", ["four_bar", "slider_crank", "cam_flat_follower"])
+def test_that_rough_guesses_lead_where_the_runtime_goes(solved, example_named, name):
+    """Turned by whole turns, and so rough that the nearer branch is not the first that is found."""
+    model, module = example_named(name).model, example_named(name).module
+    start = example_named(name).solution.q[0]
+    equations = problem(module, module.DEFAULTS, start.copy(), 0.0)
+    rng = np.random.default_rng(7)
+    guesses = start + equations.reference * rng.uniform(-0.8, 0.8, (60, start.size))
+    guesses[::2] += equations.angular * 2 * np.pi * rng.integers(-2, 3, (30, start.size))
+    jobs = [[[0.0], module.DEFAULTS.tolist(), guess.tolist()] for guess in guesses]
+    ways = set()
+    for guess, (found, _) in zip(guesses, solved(model, jobs), strict=True):
+        known = kc.solve(module, [0.0], guess=guess)
+        assert found["status"] == known.status.tolist()
+        q = np.array(found["q"], dtype=float)
+        np.testing.assert_allclose(q, known.q[0], atol=1e-8 * equations.size)
+        ways.add(tuple(np.round(known.q[0] - start, 3)))
+    assert len(ways) > 3
 
 
 def test_that_corners_of_drivers_have_their_status(solved):

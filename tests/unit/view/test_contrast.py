@@ -69,3 +69,12 @@ def test_that_edges_of_controls_and_of_bodies_are_seen(scheme):
         pale = blended(hue, palette["paper"], 0.22 if scheme == "light" else 0.32)
         assert contrast(hue, pale) >= GRAPHICS
         assert contrast(palette["ink"], pale) >= TEXT
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_that_numbers_are_read_in_the_strongest_cells_of_newtons_panel(scheme):
+    palette = palettes()[scheme]
+    (percent,) = re.findall(r"Math\.round\((\d+) \* part\)", read("view/newton_tables.js"))
+    for name in ("bad", "positive", "negative"):
+        cell = blended(palette[name], palette["paper"], int(percent) / 100)
+        assert contrast(palette["ink"], cell) >= TEXT, name

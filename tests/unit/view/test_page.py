@@ -84,6 +84,31 @@ def test_that_times_and_parameters_can_be_chosen():
     assert link["points"] == [[-2, 0], [0, 0]]
 
 
+def test_that_a_page_starts_where_its_motion_started():
+    m = pendulum(driver=kc.t + 0.25)
+    assert data_of(kc.page(m).html)[0]["start"] == [1, 0, 0.5]
+    solution = kc.solve(kc.compile(m), [0.0, 1.0], guess={"bob.phi": 0.25})
+    assert data_of(kc.page(m, solution).html)[0]["start"] == solution.q[0].tolist()
+
+
+def test_that_the_ends_of_sliders_contain_the_value():
+    def ends(default, value=None, **options):
+        m = kc.Mechanism("ends")
+        m.parameter("a", default, **options)
+        m.add(kc.AbsoluteAngle("motor", m.body("bob"), kc.t))
+        m.add(kc.Revolute("pin", m.ground, (0, 0), "bob", (0, 0)))
+        p = {} if value is None else {"a": value}
+        (item,) = data_of(kc.page(m, p=p).html)[0]["parameters"]
+        return item["low"], item["high"]
+
+    assert ends(2.0) == (1, 4)
+    assert ends(-2.0) == (-4, -1)
+    assert ends(0.0) == (-1, 1)
+    assert ends(2.0, 7.0) == (1, 7)
+    assert ends(2.0, range=(1.5, 3)) == (1.5, 3)
+    assert ends(2.0, 1.0, range=(1.5, 3)) == (1, 3)
+
+
 def test_that_the_guess_and_what_it_violates_are_given_where_nothing_can_be_compiled():
     page = kc.page(pendulum(driver=None))
     data, arrays = data_of(page.html)
