@@ -12,7 +12,7 @@ import numpy as np
 
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, of_mark
-from kincompile.view.shapes import GROUND_COLOUR
+from kincompile.view.shapes import GROUND_COLOUR, HUES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -31,9 +31,6 @@ FAINT = 0.25
 
 MOST_FAINT = 12
 """Bodies up to which those that a picture is not about are shown."""
-
-HUES = ("#2563eb", "#b45309", "#047857", "#7c3aed", "#0e7490", "#be185d", "#4d7c0f", "#475569")
-"""Colours of bodies, those of the page."""
 
 HEAD, THICK = 7.0, 1.4
 """Length of the head of a vector, and width of its line [points]."""
@@ -188,7 +185,9 @@ def _opacity(mark: Mark, shown: set[PlaneFrame] | None) -> float:
 
 def colour_of(frame: PlaneFrame) -> str:
     """Return the colour of a body, or of the ground."""
-    return GROUND_COLOUR if frame == GROUND_FRAME else HUES[frame.index % len(HUES)]
+    return (
+        GROUND_COLOUR if frame == GROUND_FRAME else HUES["light"][frame.index % len(HUES["light"])]
+    )
 
 
 def _paths(polyline: Polyline, q: Array, scale: _Scale, opacity: float) -> Iterable[PicturePath]:

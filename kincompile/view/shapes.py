@@ -26,6 +26,16 @@ INKS: Mapping[str, str] = {
 }  # fmt: skip
 """Colours on white paper; a page has its own by the same names, for light and dark."""
 
+HUES: Mapping[str, tuple[str, ...]] = {
+    "light": (
+        "#2563eb", "#b45309", "#047857", "#7c3aed", "#0e7490", "#be185d", "#4d7c0f", "#475569",
+    ),
+    "dark": (
+        "#7aa7ff", "#f0b35a", "#4fd1a5", "#b99aff", "#4cc9e0", "#f48cc0", "#a5cf5a", "#a9b6c9",
+    ),
+}  # fmt: skip
+"""Colours of bodies and of paths, on light and on dark paper."""
+
 FILL = 0.22
 """Opacity of the areas of bodies."""
 
