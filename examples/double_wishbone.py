@@ -16,12 +16,15 @@ s.link("upper_arm", "C D", s.length("upper", 0.27))
 s.link("upright", "B D W P")
 s.drive("S T", 0.45 + s.length("stroke", 0.04) * sympy.sin(kc.pi * kc.t))
 mechanism = s.mechanism()
+point = {item.name: item for item in mechanism.outputs}
+upwards = ((0, 0), (0, 1))
+mechanism.output("camber", kc.outputs.angle(upwards, (point["P"], point["W"])), "rad")
 
 if __name__ == "__main__":
     module = kc.compile(mechanism)
     solution = kc.solve(module, np.linspace(0, mechanism.end, mechanism.points))
     print(solution.message)
-    camber = np.degrees(solution["phi_upright"] - solution["phi_upright"][0])
+    camber = np.degrees(solution["camber"])
     print(f"camber from {camber.min():+.3f} to {camber.max():+.3f} degrees")
     rise, track = (solution[name] - solution[name][0] for name in ("W.y", "P.x"))
     print(f"while the wheel moves from {1e3 * rise.min():+.2f} to {1e3 * rise.max():+.2f} mm")

@@ -15,15 +15,15 @@ s.link("crank", "O A", s.length("r", 0.1))
 s.link("lever", "C D", s.length("lever_length", 0.7))
 s.slot("A", along="C D")
 s.link("rod", "D R", s.length("rod_length", 0.3))
-s.slider("ram", "R", along=(1, 0))
+ram = s.slider("ram", "R", along=(1, 0))
 s.drive("crank", 2 * kc.pi * kc.t)
 mechanism = s.mechanism()
+mechanism.output("feed", ram.x, "m")
 
 if __name__ == "__main__":
     module = kc.compile(mechanism)
     solution = kc.solve(module, np.linspace(0, mechanism.end, mechanism.points))
     print(solution.message)
-    ram = solution["x_ram"]
-    forth = (ram.argmax() - ram.argmin()) % (ram.size - 1)
-    print(f"the ram's stroke is {ram.max() - ram.min():.6f} m")
-    print(f"it takes {forth} degrees of the crank one way and {360 - forth} the other")
+    feed = solution.measures()["feed"]
+    print(f"the ram's stroke is {feed.stroke:.6f} m")
+    print(f"the slow stroke takes {feed.time_ratio:.6f} times as long as the fast one")

@@ -33,11 +33,8 @@ from kincompile.errors import (
 )
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
-from kincompile.model.arguments import Kind
-from kincompile.model.expressions import evaluate
 from kincompile.model.mechanism import Mechanism, system_of
 from kincompile.model.origins import remember_model
-from kincompile.model.resolve import Joint
 from kincompile.names import listed
 from kincompile.structure.counting import counting_problem
 from kincompile.targets.emission import emit_program
@@ -52,7 +49,6 @@ if TYPE_CHECKING:
     from kincompile.ir.grouping import GroupedProgram
     from kincompile.ir.program import Program
     from kincompile.model.system import ConstraintSystem
-    from kincompile.runtime.results.driver_range import Driver
     from kincompile.structure.report import Inspection
     from kincompile.targets.target import Emitted
 
@@ -222,7 +218,7 @@ def compile(  # noqa: A001 - the public name kc.compile
         if isinstance(code, InlineProgram) and target == "c":
             module = _native(module, code)
     vars(module)[JOINT_POINTS] = partial(_joint_points, system)
-    vars(module)[DRIVERS] = partial(_drivers, system)
+    vars(module)[DRIVERS] = system.drivers_at
     return remember_model(module, system)
 
 
@@ -232,23 +228,6 @@ def _joint_points(system: ConstraintSystem) -> ModuleType:
 
     program = lower(system.observing(system.joint_points()))
     return from_source(emit_program("numpy", inline(program)).source, system.name)
-
-
-def _drivers(system: ConstraintSystem, t: float, p: NDArray[np.float64]) -> tuple[Driver, ...]:
-    """Return the drivers of a system at a time and parameters, for who asks how far they can go."""
-    from kincompile.runtime.results.driver_range import Driver
-
-    values = {item.name: float(x) for item, x in zip(system.parameters, p, strict=True)} | {"t": t}
-    found = []
-    for item, row in zip(system.constraints, system.row_offsets, strict=True):
-        if isinstance(item, Joint) and item.is_driver:
-            (given,) = (x for x in item.written.arguments().values() if x.symbol == "C")
-            unit = "rad" if given.unit == "rad" else system.length_unit
-            value = evaluate(item.scalars["C"], values)
-            is_squared = given.kind is Kind.DISTANCE
-            if value is not None:
-                found.append(Driver(item.name, unit, row, value, is_squared))
-    return tuple(found)
 
 
 def _native(module: ModuleType, code: InlineProgram) -> ModuleType:

@@ -21,7 +21,8 @@ from kincompile.compare.reference import QUANTITIES
 from kincompile.errors import InputError, ModelError
 from kincompile.files.content import decoded, file_content
 from kincompile.files.data_text import MAX_PROBLEMS, read_json, read_toml
-from kincompile.files.safe_expressions import ExpressionError, Place, Places
+from kincompile.files.safe_expressions import ExpressionError
+from kincompile.files.text_places import TextPlace, TextPlaces
 from kincompile.names import escaped, listed, shown, suggestion
 
 if TYPE_CHECKING:
@@ -74,28 +75,28 @@ class _Draft:
         self.constraint: str | None = None
         self.conventions: dict[str, str] = {}
 
-    def problem(self, place: Place, text: str) -> None:
+    def problem(self, place: TextPlace, text: str) -> None:
         """Add a problem; very many end the reading."""
         self._problems.append(f"{self._name}, line {place.line}, column {place.column}: {text}")
         if len(self._problems) == MAX_PROBLEMS:
             raise InputError([*self._problems, "and perhaps more: mend these first"])
 
-    def add_matrix(self, name: str, value: str | Rows, place: Place) -> None:
+    def add_matrix(self, name: str, value: str | Rows, place: TextPlace) -> None:
         """Add a quantity."""
         if name in self._quantities:
             self.problem(place, f"{name} is given twice; keep one of them")
         try:
             self._quantities[name] = split_matrix(value, place) if isinstance(value, str) else value
         except ExpressionError as error:
-            self.problem(Place(error.line, error.column), f"{name}: {error.problem}")
+            self.problem(TextPlace(error.line, error.column), f"{name}: {error.problem}")
 
-    def add_alias(self, name: str, text: str, place: Place) -> None:
+    def add_alias(self, name: str, text: str, place: TextPlace) -> None:
         """Add an alias."""
         if name in self._aliases:
             self.problem(place, f"{shown(name)} is given twice; keep one of them")
         self._aliases[name] = Cell(text, place)
 
-    def unknown(self, name: str, place: Place) -> None:
+    def unknown(self, name: str, place: TextPlace) -> None:
         """Add the problem of a key that means nothing."""
         keys = (*QUANTITIES, "constraint", "aliases", "conventions")
         hint = suggestion(name, keys)
@@ -105,7 +106,8 @@ class _Draft:
         """Return the file, or raise all the problems at once."""
         if not self._problems and not self._quantities:
             self.problem(
-                Place(), f"the file compares nothing; give at least one of: {listed(QUANTITIES)}"
+                TextPlace(),
+                f"the file compares nothing; give at least one of: {listed(QUANTITIES)}",
             )
         if self._problems:
             raise InputError(self._problems)
@@ -167,7 +169,7 @@ def _from_lines(file: Path, content: bytes) -> HandFile:
     text = decoded(file, content).replace("\r\n", "\n").replace("\r", "\n")
     # Comments and quotes are blanked out, so that every offset stays.
     text = plain(re.sub(r"[#%][^\n]*", lambda found: " " * len(found[0]), text))
-    places = Places(text)
+    places = TextPlaces(text)
     section: str | None = None
     offset = 0
     while offset < len(text):
@@ -194,7 +196,9 @@ def _from_lines(file: Path, content: bytes) -> HandFile:
     return draft.finished()
 
 
-def _add_statement(draft: _Draft, section: str | None, name: str, value: str, place: Place) -> None:
+def _add_statement(
+    draft: _Draft, section: str | None, name: str, value: str, place: TextPlace
+) -> None:
     if section == "conventions":
         draft.conventions[name] = value.strip()
     elif name in QUANTITIES:
@@ -231,7 +235,7 @@ def _from_data(name: str, document: Document) -> HandFile:
         raise ModelError(
             document.problem((), f"expected names and values, not {shown(document.data)}")
         )
-    places = Places(document.text)
+    places = TextPlaces(document.text)
     for key, value in document.data.items():
         locate = _Locator(document, places, (key,))
         if key in QUANTITIES:
@@ -275,7 +279,7 @@ def _add_data(draft: _Draft, name: str, value: object, locate: _Locator) -> None
 class _Locator:
     """Finds the texts of one key again in the file, one after the other."""
 
-    def __init__(self, document: Document, places: Places, address: Address) -> None:
+    def __init__(self, document: Document, places: TextPlaces, address: Address) -> None:
         self._text = document.text
         self._places = places
         key = str(address[-1])
@@ -283,7 +287,7 @@ class _Locator:
         found = self._text.find(key, begin)
         self._cursor = begin if found < 0 else found + len(key)
 
-    def place(self, fragment: str) -> Place:
+    def place(self, fragment: str) -> TextPlace:
         """Return where a fragment begins; the last place if it is not found."""
         found = self._text.find(fragment, self._cursor) if fragment else -1
         if found >= 0:

@@ -13,12 +13,13 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from kincompile.compare.notation import plain
-from kincompile.files.safe_expressions import ExpressionError, Places, unbalanced_bracket
+from kincompile.files.safe_expressions import ExpressionError, unbalanced_bracket
+from kincompile.files.text_places import TextPlaces
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from kincompile.files.safe_expressions import Place
+    from kincompile.files.text_places import TextPlace
 
 _OPERATORS = "+-*/^"
 
@@ -28,7 +29,7 @@ class Cell:
     """One element: its text, and where it begins in the file."""
 
     text: str
-    place: Place
+    place: TextPlace
 
 
 Rows = tuple[tuple[Cell, ...], ...]
@@ -36,7 +37,7 @@ Span = tuple[int, int]
 """Begin and end of a part of the text."""
 
 
-def split_matrix(text: str, place: Place) -> Rows:
+def split_matrix(text: str, place: TextPlace) -> Rows:
     """Split a matrix into rows of elements.
 
     Parameters
@@ -57,8 +58,8 @@ def split_matrix(text: str, place: Place) -> Rows:
 class _Splitter:
     """A text to be split."""
 
-    def __init__(self, text: str, place: Place) -> None:
-        self._places = Places(text, place)
+    def __init__(self, text: str, place: TextPlace) -> None:
+        self._places = TextPlaces(text, place)
         # Same length, so that offsets stay: x.*y, x./y, x.^y of MATLAB; its continued lines.
         text = re.sub(r"(?<![0-9])\.(?=[*/^])", " ", text)
         self._text = re.sub(r"\.\.\.[ \t]*\n", lambda found: " " * len(found[0]), text)

@@ -20,11 +20,11 @@ from kincompile.files.safe_expressions import (
     CONSTANTS,
     FUNCTIONS,
     ExpressionError,
-    Place,
     UnknownNameError,
     extent,
     parse_expression,
 )
+from kincompile.files.text_places import TextPlace
 from kincompile.model.expressions import NotAnExpressionError, as_expression, symbol_names, t
 from kincompile.names import listed, name_problem, rate, shown, suggestion
 
@@ -93,7 +93,7 @@ class _Formulas:
         self._read: dict[str, sympy.Expr] = {}
         self._size = 0
 
-    def read(self, text: str, place: Place | None, words: Vocabulary) -> sympy.Expr:
+    def read(self, text: str, place: TextPlace | None, words: Vocabulary) -> sympy.Expr:
         """Return a text as an expression; the names in it must mean what they meant before."""
         if text not in self._read:
             if self._size > MAX_SIZE:
@@ -333,7 +333,7 @@ def _numbers(given: object) -> Array | None:
 def _rows(quantity: str, given: object) -> list[list[object]]:
     if isinstance(given, str):
         try:
-            given = split_matrix(given, Place())
+            given = split_matrix(given, TextPlace())
         except ExpressionError as error:
             raise InputError(f"{quantity}: {error}") from error
     if isinstance(given, sympy.MatrixBase | np.ndarray):

@@ -11,7 +11,7 @@ import re
 import tomllib
 from typing import TYPE_CHECKING
 
-from kincompile.files.safe_expressions import Places
+from kincompile.files.text_places import TextPlaces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,7 +34,7 @@ _JSON_TOKEN = re.compile(JSON_TEXT + r'|[\[\]{},:]|[^\s\[\]{},:"]+', re.DOTALL)
 
 def json_lines(text: str) -> Iterator[tuple[Address, int]]:
     """Yield the address and line of each value of a JSON text, in order; a key twice if it is."""
-    places = Places(text)
+    places = TextPlaces(text)
     outline = _Outline(())
     for found in _JSON_TOKEN.finditer(text):
         place = outline.take(found[0], ":")
@@ -102,7 +102,7 @@ class _TomlScan:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._places = Places(text)
+        self._places = TextPlaces(text)
         self._counts: dict[Address, int] = {}
         self._table: Address = ()
 

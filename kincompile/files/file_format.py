@@ -19,6 +19,8 @@ VERSION = 1
 """Version of the format, the value of the key `kincompile`."""
 MOST_POINTS = 10_000_000
 """Largest time grid that a file may ask for."""
+MOST_DRAWN, MOST_JOINTS = 300, 30
+"""Largest number of joints, parts and parameters of a drawing, and of joints of one link."""
 SMOOTHNESS = 4
 """Continuous derivatives of a profile given by a table: it is a periodic quintic spline."""
 
@@ -68,9 +70,16 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "parameters": Field(_list("parameter"), is_required=False),
         "bodies": Field(_list("body"), is_required=False),
         "coordinates": Field(_list("coordinate"), is_required=False),
+        "sketch": Field({"$ref": "#/$defs/sketch"}, is_required=False),
         "constraints": Field(_list("constraint")),
         "points": Field(_list("point"), is_required=False),
         "outputs": Field(_list("output"), is_required=False),
+    },
+    "sketch": {
+        "lengths": Field({"type": "object", "additionalProperties": _NUMBER}, is_required=False),
+        "ground": Field({"type": "object", "additionalProperties": _POINT}, is_required=False),
+        "joints": Field({"type": "object", "additionalProperties": _POINT}, is_required=False),
+        "parts": Field(_list("part")),
     },
     "analysis": {
         "end": Field(_EXPRESSION, is_required=False),
@@ -120,9 +129,37 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
 """Fields of the file itself, of its tables, and of a free equation."""
 
 _MOTIONS = [{"$ref": "#/$defs/sequence"}, {"$ref": "#/$defs/table"}]
+_VALUE: dict[str, Any] = {"anyOf": [_EXPRESSION, *_MOTIONS]}
+_LINE: Mapping[str, Field] = {
+    "along": Field({"anyOf": [_TEXT, _POINT]}),
+    "on": Field(_NAME, is_required=False),
+}
+
+PARTS: Mapping[str, Mapping[str, Field]] = {
+    "link": {
+        "link": Field(_NAME),
+        "joints": Field(_TEXT),
+        "length": Field(_EXPRESSION, is_required=False),
+    },
+    "wheel": {"wheel": Field(_NAME), "joint": Field(_NAME)},
+    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_LINE},
+    "slot": {"slot": Field(_NAME), **_LINE},
+    "gear": {
+        "gear": Field(_NAME),
+        "i": Field(_NAME), "centre_i": Field(_NAME), "radius_i": Field(_EXPRESSION),
+        "j": Field(_NAME), "centre_j": Field(_NAME), "radius_j": Field(_EXPRESSION),
+    },
+    "drive": {
+        "drive": Field(_TEXT),
+        "value": Field(_VALUE),
+        "against": Field(_NAME, is_required=False),
+    },
+}  # fmt: skip
+"""Parts of a drawing: the methods of `Sketch`, and their arguments in order."""
+
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
-    Kind.VALUE: {"anyOf": [_EXPRESSION, *_MOTIONS]},
-    Kind.DISTANCE: {"anyOf": [_EXPRESSION, *_MOTIONS]},
+    Kind.VALUE: _VALUE,
+    Kind.DISTANCE: _VALUE,
     Kind.BODY: _NAME,
     Kind.POINT: _POINT,
     Kind.AXIS: _POINT,
@@ -150,16 +187,23 @@ def model_schema() -> dict[str, Any]:
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
     kinds = [_object(constraint_fields(item)) for item in CONSTRAINTS.values()]
+    parts = [_object(item) for item in PARTS.values()]
+    # Lengths and places of a link are called as its joints are.
+    parts[0]["additionalProperties"] = {"anyOf": [_EXPRESSION, _POINT]}
+    model = _object(FIELDS["model"])
+    model["required"].remove("constraints")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Mechanism for kincompile, format {VERSION}",
-        **_object(FIELDS["model"]),
+        **model,
+        "anyOf": [{"required": ["constraints"]}, {"required": ["sketch"]}],
         "$defs": {
             "expression": {
                 "description": "a number, or a formula such as -a/2 + sin(omega*t)",
                 "type": ["number", "string"],
             },
             **tables,
+            "part": {"oneOf": parts},
             "constraint": {"oneOf": [*kinds, _object(FIELDS["Equation"])]},
         },
     }

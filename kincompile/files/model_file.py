@@ -24,15 +24,15 @@ import sympy
 
 from kincompile.errors import ModelError
 from kincompile.files.data_text import listed_problems, read_json, read_toml
-from kincompile.files.file_fields import FieldReader
 from kincompile.files.file_format import (
     FIELDS,
     MOST_POINTS,
     SMOOTHNESS,
     VERSION,
+    Field,
     constraint_fields,
 )
-from kincompile.model import motion
+from kincompile.files.sketch_reader import SketchReader
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Parameter
 from kincompile.model.catalogue import CONSTRAINTS
@@ -84,13 +84,11 @@ def read_data_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
     return model
 
 
-class _ModelReader(FieldReader):
+class _ModelReader(SketchReader):
     """Reads the sections of a model one after the other."""
 
     def __init__(self, document: Document) -> None:
         super().__init__(document)
-        self._names: dict[str, sympy.Expr] = {"t": t}
-        self._bodies: dict[str, Address] = {}
         self._taken: dict[tuple[str, str], Address] = {}
 
     def read(self) -> Mechanism | ConstraintSystem | None:
@@ -98,13 +96,20 @@ class _ModelReader(FieldReader):
         data = self.document.data
         if not self._is_model(data):
             return None
-        self.has_fields((), data, FIELDS["model"])
+        fields = dict(FIELDS["model"])
+        if "sketch" in data:  # it has constraints of its own
+            fields["constraints"] = Field(fields["constraints"].schema, is_required=False)
+        self.has_fields((), data, fields)
         name = self.name(data, (), "the model") or "model"
-        parameters = [self._parameter(*item) for item in self.rows(data, "parameters")]
+        given = [self._parameter(*item) for item in self.rows(data, "parameters")]
+        parameters = [item for item in given if item]
         options = {
             "length_unit": self.unit(data.get("length_unit", "m"), ("length_unit",), "lengths"),
             **self._analysis(data.get("analysis", {})),
         }
+        drawn = Mechanism(name)
+        if "sketch" in data:
+            drawn = self.drawn(name, options, parameters, data["sketch"])
         bodies = [self._body(*item) for item in self.rows(data, "bodies")]
         free = [self._coordinate(*item) for item in self.rows(data, "coordinates")]
         points = [self._point(*item) for item in self.rows(data, "points")]
@@ -114,11 +119,11 @@ class _ModelReader(FieldReader):
         constraints = [self._constraint(*item) for item in rows]
         outputs = [self._output(*item) for item in self.rows(data, "outputs")]
         content = {
-            "parameters": [item for item in parameters if item],
-            "bodies": [item for item in bodies if item],
+            "parameters": drawn.parameters or parameters,
+            "bodies": [*drawn.bodies, *(item for item in bodies if item)],
             "coordinates": dict(item for item in free if item),
-            "constraints": [item for item in constraints if item],
-            "outputs": [item for item in (*points, *outputs) if item],
+            "constraints": [*drawn.constraints, *(item for item in constraints if item)],
+            "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
         }
         return self._checked(name, content, options)
 
@@ -171,7 +176,7 @@ class _ModelReader(FieldReader):
         self.has_fields(("analysis",), given, FIELDS["analysis"])
         found: Row = {}
         if "end" in given:
-            names = {name: symbol for name, symbol in self._names.items() if symbol != t}
+            names = {name: symbol for name, symbol in self.names.items() if symbol != t}
             found["end"] = self.constant(given["end"], ("analysis", "end"), names)
         points = given.get("points", 101)
         if type(points) is int and 1 <= points <= MOST_POINTS:
@@ -196,7 +201,7 @@ class _ModelReader(FieldReader):
         default = self.constant(row.get("default", 1.0), (*address, "default"), {})
         unit = self.unit(row.get("unit", ""), (*address, "unit"), f"parameter {name!r}")
         if name:
-            self._names[name] = sympy.Symbol(name)
+            self.names[name] = sympy.Symbol(name)
             self.remember(f"parameter {name!r}", address)
         default = cast("float", default)  # the checks of the system make a number of it
         return Parameter(name, default, unit) if self._is_free(name, address) and complete else None
@@ -205,19 +210,19 @@ class _ModelReader(FieldReader):
         self.has_fields(address, row, FIELDS["body"])
         name = self.name(row, address, "a body")
         guess = row.get("guess", [0, 0, 0])
-        start = self.expressions(guess, (*address, "guess"), self._names, "[x, y, phi]", 3)
+        start = self.expressions(guess, (*address, "guess"), self.names, "[x, y, phi]", 3)
         outline = self._outline(row.get("outline", []), (*address, "outline"))
         if not name:
             return None
-        if name == GROUND.name or name in self._bodies:
-            other = self._bodies.get(name)
+        if name == GROUND.name or name in self.bodies:
+            other = self.bodies.get(name)
             whose = f"of the body in line {self.document.line(other)}" if other else "of the frame"
             self.problem((*address, "name"), f"{name!r} is the name {whose} already")
             return None
-        self._bodies[name] = address
+        self.bodies[name] = address
         body = Body(name, tuple(start), outline)
         for coordinate in body.coordinates:
-            self._names[coordinate] = sympy.Symbol(coordinate)
+            self.names[coordinate] = sympy.Symbol(coordinate)
             self.remember(f"guess of {coordinate}", (*address, "guess"))
         self.remember(f"outline of {name}", (*address, "outline"))
         return body
@@ -228,16 +233,16 @@ class _ModelReader(FieldReader):
             self.problem(address, f"expected a list of corners [xi, eta], not {shown(given)}")
             return ()
         return tuple(
-            tuple(self.expressions(corner, (*address, k), self._names, "[xi, eta]", 2))
+            tuple(self.expressions(corner, (*address, k), self.names, "[xi, eta]", 2))
             for k, corner in enumerate(given)
         )
 
     def _coordinate(self, address: Address, row: Row) -> tuple[str, float | sympy.Expr] | None:
         self.has_fields(address, row, FIELDS["coordinate"])
         name = self.name(row, address, "a coordinate")
-        guess = self.expression(row.get("guess", 0.0), (*address, "guess"), self._names)
+        guess = self.expression(row.get("guess", 0.0), (*address, "guess"), self.names)
         if name:
-            self._names[name] = sympy.Symbol(name)
+            self.names[name] = sympy.Symbol(name)
             self.remember(f"guess of {name}", address)
         return (name, guess) if self._is_free(name, address) else None
 
@@ -248,11 +253,11 @@ class _ModelReader(FieldReader):
         self.remember(f"point {name!r}", address)
         body = self._body_name(row.get("body", GROUND.name), (*address, "body"))
         place = (*address, "local")
-        local = self.expressions(row.get("local", [0, 0]), place, self._names, "[xi, eta]", 2)
+        local = self.expressions(row.get("local", [0, 0]), place, self.names, "[xi, eta]", 2)
         if not name or not self._is_free(name, address, "point") or not complete:
             return None
         point = BodyPoint(name, GROUND if body == GROUND.name else Body(body), tuple(local))
-        self._names |= dict(zip(point.output_names, (point.x, point.y), strict=True))
+        self.names |= dict(zip(point.output_names, (point.x, point.y), strict=True))
         return point
 
     def _output(self, address: Address, row: Row) -> Output | None:
@@ -261,9 +266,9 @@ class _ModelReader(FieldReader):
         name = self.name(row, address, "an output")
         self.remember(f"output {name!r}", address)
         unit = self.unit(row.get("unit", ""), (*address, "unit"), f"output {name!r}")
-        symbols = [item for item, value in self._names.items() if value.is_Symbol]
+        symbols = [item for item, value in self.names.items() if value.is_Symbol]
         rates = [rate(item, order) for item in symbols for order in (1, 2)]
-        names = {**self._names, **{item: sympy.Symbol(item) for item in rates}}
+        names = {**self.names, **{item: sympy.Symbol(item) for item in rates}}
         found = self.expression(row.get("expression", 0), (*address, "expression"), names)
         is_new = self._is_free(name, address, "output")
         return Output(name, found, unit) if is_new and complete else None
@@ -273,7 +278,7 @@ class _ModelReader(FieldReader):
         kind, name = row.get("type"), row.get("name")
         if isinstance(kind, str) and kind in CONSTRAINTS and isinstance(name, str):
             contacts = CONSTRAINTS[kind].contacts_of(name)
-            self._names |= {contact: sympy.Symbol(contact) for contact in contacts}
+            self.names |= {contact: sympy.Symbol(contact) for contact in contacts}
 
     def _constraint(self, address: Address, row: Row) -> Constraint | Equation | None:
         """Return a joint, a driver or a free equation, None where something is wrong with it."""
@@ -306,7 +311,7 @@ class _ModelReader(FieldReader):
         count = max(1, len(given)) if isinstance(given, list) else 1
         return Equation(
             name,
-            *self.expressions(given, place, self._names, "a list of formulas", count),
+            *self.expressions(given, place, self.names, "a list of formulas", count),
             corners=self._corners(row, address),
         )
 
@@ -330,35 +335,35 @@ class _ModelReader(FieldReader):
 
     def _contact_guess(self, kind: type[Constraint], given: Any, address: Address) -> Any:
         if not isinstance(given, list):
-            return self.expression(given, address, self._names)
+            return self.expression(given, address, self.names)
         count = len(kind.contacts)
-        return self.expressions(given, address, self._names, f"{count} start values", count)
+        return self.expressions(given, address, self.names, f"{count} start values", count)
 
     def _argument(self, item: Argument, given: Any, address: Address) -> Any:
         """Return the value of a constraint's argument."""
         if item.kind is Kind.BODY:
             return self._body_name(given, address)
         if item.kind in (Kind.POINT, Kind.AXIS):
-            return tuple(self.expressions(given, address, self._names, "[xi, eta]", 2))
+            return tuple(self.expressions(given, address, self.names, "[xi, eta]", 2))
         if item.kind is Kind.PROFILE:
             return self._profile(given, address)
-        if item.kind in (Kind.VALUE, Kind.DISTANCE) and isinstance(given, dict):
-            return self._motion(given, address)
-        return self.expression(given, address, self._names)
+        if item.kind in (Kind.VALUE, Kind.DISTANCE):
+            return self.driven(given, address)
+        return self.expression(given, address, self.names)
 
     def _body_name(self, given: Any, address: Address) -> str:
         if not isinstance(given, str):
             self.problem(address, f"expected the name of a body, not {shown(given)}")
-        elif given not in self._bodies and given != GROUND.name:
-            near = suggestion(given, self._bodies)
-            known = listed((GROUND.name, *self._bodies))
+        elif given not in self.bodies and given != GROUND.name:
+            near = suggestion(given, self.bodies)
+            known = listed((GROUND.name, *self.bodies))
             self.problem(address, f"there is no body {shown(given)}{near}; bodies are: {known}")
         return str(given)
 
     def _profile(self, given: Any, address: Address) -> Any:
         """Return a radius as a formula in alpha, or as a table."""
         if not isinstance(given, dict):
-            return self.expression(given, address, {**self._names, alpha.name: alpha})
+            return self.expression(given, address, {**self.names, alpha.name: alpha})
         if not self.has_fields(address, given, FIELDS["profile"]):
             return 1.0
         if given["smoothness"] != SMOOTHNESS or isinstance(given["smoothness"], bool):
@@ -368,42 +373,6 @@ class _ModelReader(FieldReader):
                 f"derivatives; write smoothness = {SMOOTHNESS}",
             )
         return tuple(self._numbers(given[key], (*address, key)) for key in ("angles", "radii"))
-
-    def _motion(self, given: Row, address: Address) -> Any:
-        """Return the value of a driver: a sequence of motions, or a table over time."""
-        before = len(self.problems)
-        kind = "table" if "times" in given or "values" in given else "sequence"
-        if not self.has_fields(address, given, FIELDS[kind]):
-            return 1.0
-        columns: dict[str, Any] = {
-            key: self._values(given[key], (*address, key), key)
-            for key in ("points", "times", "values", "velocities")
-            if key in given
-        }
-        if "ramp" in given:
-            columns["ramp"] = self.expression(given["ramp"], (*address, "ramp"), self._names)
-        if "law" in given:
-            columns["law"] = given["law"]
-        if len(self.problems) > before:
-            return 1.0
-        try:
-            return (motion.table if kind == "table" else motion.sequence)(**columns)
-        except ModelError as error:
-            for problem in error.problems:
-                self.problem(address, problem)
-            return 1.0
-
-    def _values(self, given: Any, address: Address, key: str) -> Any:
-        """Return a list of formulas, of points a list of pairs."""
-        if not isinstance(given, list):
-            self.problem(address, f"expected a list, not {shown(given)}")
-            return []
-        if key != "points":
-            return self.expressions(given, address, self._names, "a list", len(given))
-        return [
-            self.expressions(point, (*address, k), self._names, "[time, value]", 2)
-            for k, point in enumerate(given)
-        ]
 
     def _corners(self, row: Row, address: Address) -> bool:
         """Return whether a driver may have corners."""

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import ast
 import math
-import re
 import warnings
-from bisect import bisect_left, bisect_right
-from dataclasses import dataclass
+from bisect import bisect_right
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import sympy
 
+from kincompile.files.text_places import TextPlace, TextPlaces
 from kincompile.model.expressions import NotAnExpressionError, as_expression, deg, evaluate
 from kincompile.model.laws import RISES
 from kincompile.model.points import rate
@@ -71,41 +70,6 @@ _PUNCTUATION = frozenset("_.,+-*/^()[]<>= \t\r\n")
 _EXPECTED = "numbers, names, + - * / ^ ( ) and functions"
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a text begins in the file it comes from; line and column count from 1."""
-
-    line: int = 1
-    column: int = 1
-
-
-class Places:
-    """The places of the characters of a text; each is found by bisection.
-
-    Parameters
-    ----------
-    text
-        The text.
-    first
-        Where it begins in its file.
-    """
-
-    def __init__(self, text: str, first: Place | None = None) -> None:
-        self._first = first or Place()
-        self._ends = [found.start() for found in re.finditer("\n", text)]
-
-    def begin(self, line: int) -> int:
-        """Return the offset of the first character of a line of the text."""
-        return self._ends[line - 2] + 1 if line > 1 else 0
-
-    def __getitem__(self, offset: int) -> Place:
-        """Return the place of the character with an offset."""
-        lines = bisect_left(self._ends, offset)
-        if not lines:
-            return Place(self._first.line, self._first.column + offset)
-        return Place(self._first.line + lines, offset - self._ends[lines - 1])
-
-
 class ExpressionError(NotAnExpressionError):
     """A text that is not an expression.
 
@@ -135,7 +99,7 @@ class UnknownNameError(ExpressionError):
 def parse_expression(
     text: str,
     names: Mapping[str, sympy.Expr],
-    place: Place | None = None,
+    place: TextPlace | None = None,
     refused: Mapping[str, str] | None = None,
 ) -> sympy.Expr:
     """Read one expression.
@@ -163,7 +127,7 @@ def parse_expression(
         If the text holds anything but numbers, declared names, arithmetic and the functions of
         `FUNCTIONS`, or is longer or deeper than the limits of this module.
     """
-    source = _Source(text, place or Place())
+    source = _Source(text, place or TextPlace())
     if len(text) > MAX_LENGTH:
         raise source.error(
             f"the expression has {len(text)} characters; at most {MAX_LENGTH} are read", 0
@@ -198,7 +162,7 @@ def extent(value: sympy.Basic) -> tuple[int, int]:
 class _Source:
     """The text as written, as Python reads it, and the way from one to the other."""
 
-    def __init__(self, text: str, place: Place) -> None:
+    def __init__(self, text: str, place: TextPlace) -> None:
         self.text = text
         self._place = place
         # One line between brackets: line breaks mean nothing inside a formula. `^` is Python's
@@ -243,7 +207,7 @@ class _Source:
 
     def error(self, problem: str, offset: int) -> ExpressionError:
         """Return an error at a place in the text."""
-        place = Places(self.text, self._place)[offset]
+        place = TextPlaces(self.text, self._place)[offset]
         return ExpressionError(problem, place.line, place.column)
 
     def node_error(self, problem: str, node: ast.AST) -> ExpressionError:

@@ -95,11 +95,11 @@ class ResolvedOutput(Observed):
         return (OutputColumn(self.name, self.unit),)
 
 
-Place: TypeAlias = BodyPoint | tuple["Scalar", "Scalar"]
+AnyPoint: TypeAlias = BodyPoint | tuple["Scalar", "Scalar"]
 """A point of a body, or a fixed one (x, y)."""
 
 
-def angle(i: Body | tuple[Place, Place], j: Body | tuple[Place, Place]) -> sympy.Expr:
+def angle(i: Body | tuple[AnyPoint, AnyPoint], j: Body | tuple[AnyPoint, AnyPoint]) -> sympy.Expr:
     """Return the angle from i to j [rad], each a body or a direction from one point to another.
 
     Between two bodies it counts whole turns; with a direction it lies between -pi and pi.
@@ -110,7 +110,7 @@ def angle(i: Body | tuple[Place, Place], j: Body | tuple[Place, Place]) -> sympy
     return _expression(sympy.atan2(a * d - b * c, a * c + b * d))
 
 
-def distance(point: Place, other: Place) -> sympy.Expr:
+def distance(point: AnyPoint, other: AnyPoint) -> sympy.Expr:
     """Return the distance of two points [length]."""
     a, b = _direction((point, other))
     return _expression(sympy.sqrt(a**2 + b**2))
@@ -126,7 +126,7 @@ def acceleration(point: BodyPoint) -> sympy.Expr:
     return _expression(sympy.sqrt(rate(rate(point.x)) ** 2 + rate(rate(point.y)) ** 2))
 
 
-def transmission_angle(before: Place, joint: Place, after: Place) -> sympy.Expr:
+def transmission_angle(before: AnyPoint, joint: AnyPoint, after: AnyPoint) -> sympy.Expr:
     """Return the angle between two links at their joint [rad], 0 to pi: pi/2 transmits best.
 
     `joint` is that of coupler and follower, `before` and `after` are their other joints.
@@ -149,7 +149,7 @@ def _expression(found: object) -> sympy.Expr:
     return cast("sympy.Expr", found)
 
 
-def _direction(given: Body | tuple[Place, Place]) -> tuple[sympy.Expr, sympy.Expr]:
+def _direction(given: Body | tuple[AnyPoint, AnyPoint]) -> tuple[sympy.Expr, sympy.Expr]:
     """Return the components of a body's xi axis, or of the way from a point to another."""
     if isinstance(given, Body):
         return _expression(sympy.cos(given.phi)), _expression(sympy.sin(given.phi))
@@ -157,7 +157,7 @@ def _direction(given: Body | tuple[Place, Place]) -> tuple[sympy.Expr, sympy.Exp
     return c - a, d - b
 
 
-def _coordinates(place: Place) -> tuple[sympy.Expr, sympy.Expr]:
+def _coordinates(place: AnyPoint) -> tuple[sympy.Expr, sympy.Expr]:
     if isinstance(place, BodyPoint):
         return place.x, place.y
     x, y = place

@@ -65,7 +65,7 @@ class Sketch:
         """Declare a parameter in the unit of length and return its symbol."""
         return self.parameter(name, default, self._mechanism.length_unit)
 
-    def joints(self, **places: PointLike) -> None:
+    def joints(self, /, **places: PointLike) -> None:
         """Draw joints: a place (x, y) by name [length], numbers or expressions of parameters.
 
         A joint that several links have is a pin, one of a single link a point to be watched, with
@@ -77,7 +77,7 @@ class Sketch:
             where = self._drawn.pair(place, f"joint {name!r}", "a place (x, y)")
             self._drawn.joints[name] = where
 
-    def ground(self, **places: PointLike) -> None:
+    def ground(self, /, **places: PointLike) -> None:
         """Draw joints of the ground, as `joints` does: these are exactly where they are drawn."""
         self.joints(**places)
         ground = self._drawn.links[GROUND.name]

@@ -11,6 +11,7 @@ from typing import Any
 import sympy
 
 from kincompile.errors import ModelError
+from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter, body_columns
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.equation import Equation
@@ -19,6 +20,7 @@ from kincompile.model.expressions import (
     Scalar,
     as_expression,
     degrees_problem,
+    evaluate,
     number_in,
 )
 from kincompile.model.matrices import MatrixViews
@@ -182,6 +184,22 @@ class ConstraintSystem(MatrixViews, TextViews):
             for item in self.observers
             for row, expression in zip(item.rows, item.expressions, strict=True)
         )
+
+    def drivers_at(
+        self, t: float, p: Iterable[float]
+    ) -> tuple[tuple[str, str, int, float, bool], ...]:
+        """Return of each driver name, unit, row, value at t, and whether its row squares that."""
+        names = [item.name for item in self.parameters]
+        values = {"t": t, **{name: float(x) for name, x in zip(names, p, strict=True)}}
+        found = []
+        for item, row in zip(self.constraints, self.row_offsets, strict=True):
+            if isinstance(item, Joint) and item.is_driver:
+                (given,) = (x for x in item.written.arguments().values() if x.symbol == "C")
+                unit = "rad" if given.unit == "rad" else self.length_unit
+                value = evaluate(item.scalars["C"], values)
+                if value is not None:
+                    found.append((item.name, unit, row, value, given.kind is Kind.DISTANCE))
+        return tuple(found)
 
     @property
     def row_offsets(self) -> tuple[int, ...]:

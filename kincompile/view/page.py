@@ -30,12 +30,13 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
-STYLES = ("vendor/uplot.css", "style.css", "newton.css")
+STYLES = ("style.css", "newton.css")
 """Style sheets, in order."""
 
 SCRIPTS = (
-    "vendor/uplot.js", "player.js", "draw.js", "stage.js", "plots.js", "tables.js",
-    "newton.js", "newton_tables.js", "newton_stage.js", "newton_panel.js", "start.js",
+    "player.js", "units.js", "draw.js", "stage.js", "poles.js", "tools.js", "tip.js", "columns.js",
+    "plots.js", "tables.js", "showing.js", "newton.js", "newton_tables.js", "newton_stage.js",
+    "newton_panel.js", "start.js",
 )  # fmt: skip
 """Scripts, in order: each uses those before it, and the emitted module."""
 
@@ -138,7 +139,6 @@ def page(
     slots = {
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
-        "licence": read("view/vendor/uplot.LICENSE.txt"),
         "scripts": [
             solver_script(system),
             *(read(f"view/{name}") for name in SCRIPTS),

@@ -236,8 +236,9 @@ SHAPES: Mapping[str, tuple[Stroke, ...]] = {
 
 
 def tables() -> dict[str, Any]:
-    """Return `SHAPES` and `LOOKS` as plain data, for a page."""
+    """Return the tables as plain data, for a page."""
     return {
         "shapes": {name: [asdict(item) for item in strokes] for name, strokes in SHAPES.items()},
         "looks": {name: asdict(look) for name, look in LOOKS.items()},
+        "hues": dict(HUES),
     }

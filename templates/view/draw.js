@@ -300,14 +300,11 @@ function distanceAlong(q, { frame, base, axis, follower }) {
 
 /* ---- colours ---- */
 
-const HUES = {  // strong colours of the bodies, on light and on dark paper
-  light: ['#2563eb', '#b45309', '#047857', '#7c3aed', '#0e7490', '#be185d', '#4d7c0f', '#475569'],
-  dark: ['#7aa7ff', '#f0b35a', '#4fd1a5', '#b99aff', '#4cc9e0', '#f48cc0', '#a5cf5a', '#a9b6c9'],
-};
-const COLOURS = ['paper', 'ink', 'quiet', 'line', 'tint', 'bad', 'velocity', 'acceleration', 'drive'];
+const COLOURS = ['paper', 'ink', 'quiet', 'line', 'tint', 'bad', 'velocity', 'acceleration', 'drive',
+  'plot', 'pole', 'measure'];
 
 /* The colours of the style sheet, and so of the theme; of each body a strong one and a tint. */
-function paletteNow() {
+function paletteNow(drawing = player.data.drawing) {
   const probe = document.createElement('span');
   document.body.append(probe);
   const palette = Object.fromEntries(COLOURS.map(name => {
@@ -316,7 +313,7 @@ function paletteNow() {
   }));
   probe.remove();
   palette.isDark = luminance(palette.paper) < 0.5;
-  palette.bodies = HUES[palette.isDark ? 'dark' : 'light'].map(
+  palette.bodies = drawing.hues[palette.isDark ? 'dark' : 'light'].map(
     hue => [hue, blended(hue, palette.paper, palette.isDark ? 0.32 : 0.22)]);
   palette.badTint = blended(palette.bad, palette.paper, 0.25);
   return palette;

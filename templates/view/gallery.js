@@ -32,12 +32,13 @@ class Card {
 
 function startGallery() {
   const cards = [...document.querySelectorAll('.card')].map(element => new Card(element));
+  if (!cards.length) return;
   const isStill = matchMedia('(prefers-reduced-motion: reduce)').matches;
   const atRest = card => (card.motion.data.rest ?? REST) * card.motion.duration / card.motion.speed;
-  let palette = paletteNow();
+  let palette = paletteNow(cards[0].motion.data.drawing);
   const drawAll = () => cards.forEach(card => card.draw(atRest(card), palette));
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
-    palette = paletteNow();
+    palette = paletteNow(cards[0].motion.data.drawing);
     drawAll();
   });
   addEventListener('resize', drawAll);

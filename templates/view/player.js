@@ -5,7 +5,9 @@
    player.state       { index, time, q, q_dot, q_ddot, isFound } that is shown now
    player.setIndex(k) show the k-th solved time;  player.setTime(t) the one nearest to t
    player.play() pause() toggle() setSpeed(s)
-   player.onChange(f) f(state) is called whenever the state changes */
+   player.onChange(f) f(state) is called whenever the state changes
+   player.onMotion(f) f() is called when the motion was replaced: after data.arrays or the drawing's
+                      numbers were changed, call player.motionChanged() */
 
 const SPEEDS = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
 const PLEASANT = 6;  // seconds that a motion takes when the page opens, about
@@ -31,8 +33,7 @@ class Player {
     this.duration = this.elapsed[this.count - 1];
     this.listeners = [];
     this.isPlaying = false;
-    this.frameTimes = [];  // milliseconds from frame to frame while playing
-    this.drawTimes = [];   // milliseconds that the work of a frame took
+    this.motionListeners = [];
     this.speed = this.pleasantSpeed();
     this.state = this.solved(0);
   }
@@ -116,6 +117,15 @@ class Player {
     this.listeners.push(listener);
   }
 
+  onMotion(listener) {
+    this.motionListeners.push(listener);
+  }
+
+  motionChanged() {
+    for (const listener of this.motionListeners) listener();
+    this.show(this.solved(this.state.index));
+  }
+
   /* Tell everyone again: something other than the time has changed. */
   refresh() {
     this.show(this.state);
@@ -129,15 +139,10 @@ class Player {
     let last = null;
     const frame = now => {
       if (!this.isPlaying) return;
-      if (last !== null) {
-        elapsed += this.speed * (now - last) / 1000;
-        remember(this.frameTimes, now - last);
-      }
+      if (last !== null) elapsed += this.speed * (now - last) / 1000;
       last = now;
       if (elapsed > this.duration) elapsed %= this.duration || 1;
-      const begin = performance.now();
       this.show(this.between(elapsed));
-      remember(this.drawTimes, performance.now() - begin);
       requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
@@ -172,9 +177,4 @@ class Player {
     return SPEEDS.reduce((best, speed) =>
       Math.abs(Math.log(speed / wanted)) < Math.abs(Math.log(best / wanted)) ? speed : best, 1);
   }
-}
-
-function remember(list, value) {
-  list.push(value);
-  if (list.length > 240) list.shift();
 }

@@ -1,183 +1,325 @@
 'use strict';
-/* Plots over time, drawn by uPlot; the line of the current time is our own. */
+/* Plots of columns over time, over an angle or another column, and paths: SVG of our own, so that what
+   is shown can be saved as it is. */
 
-const PLOT_HEIGHT = 165;
+const TIME = 'time';
+const ZOOM = 0.7;  // part of the range that is left by a key press
 
-/* Everything that can be plotted: groups of { label, unit, values, isLog }. */
-function plottable(data) {
-  const { count } = player;
-  const column = (name, k, width) => Array.from({ length: count },
-    (_, row) => finite(data.arrays[name][row * width + k]));
-  const rates = [['', '', ''], ['_dot', '_dot', '/s'], ['_ddot', '_ddot', '/s²']];
-  const titled = (titles, owners, array) => rates.map(([order, ending, per], k) => ({
-    title: titles[k],
-    items: owners.map(({ name, unit }, place) => ({
-      label: name + ending, unit: unit ? unit + per : '',
-      values: () => column(array + order, place, owners.length),
-    })),
-  }));
-  const groups = [
-    ...titled(['Output', 'Rate of an output', 'Second rate of an output'], data.outputs, 'y'),
-    ...titled(['Position', 'Velocity', 'Acceleration'], data.coordinates, 'q'),
-  ];
-  const joints = data.drawing.joints;
-  groups.push({
-    title: 'Residual',
-    items: !data.arrays.residual ? [] : joints.map(({ name }, k) => ({
-      label: `|Phi| of ${name}`, unit: '', isLog: true,
-      values: () => column('residual', k, joints.length).map(aboveZero),
-    })),
-  });
-  const jacobian = [];
-  if (data.arrays.condition) {
-    jacobian.push({ label: 'condition number of Phi_q', unit: '', isLog: true,
-      values: () => column('condition', 0, 1) });
-  }
-  if (data.arrays.determinant) {
-    jacobian.push({ label: 'determinant of Phi_q', unit: '', values: () => column('determinant', 0, 1) });
-  }
-  groups.push({ title: 'Jacobian', items: jacobian });
-  return groups.filter(group => group.items.length);
-}
-
-function timesFall() {
-  return player.t[0] > player.t[player.count - 1];
-}
-
-function finite(value) {
-  return Number.isFinite(value) ? value : null;
-}
-
-/* A residual of exactly zero has no logarithm. */
-function aboveZero(value) {
-  return value === null ? null : Math.max(value, 1e-18);
-}
+const scalesOf = {
+  linear: { to: x => x, from: x => x },
+  log: { to: x => Math.log10(x), from: x => 10 ** x },
+};
 
 class Plot {
-  constructor(groups, label) {
-    this.items = groups.flatMap(group => group.items);
+  constructor(label) {
     this.element = document.createElement('div');
     this.element.className = 'plot';
     const bar = document.createElement('div');
     bar.className = 'bar';
     this.choice = document.createElement('select');
     this.choice.setAttribute('aria-label', 'What is plotted');
-    for (const group of groups) this.choice.append(optionGroup(group));
+    for (const group of columns.groups()) this.choice.append(optionGroup(group));
     this.choice.value = label;
     this.choice.addEventListener('change', () => this.redraw());
-    const close = document.createElement('button');
-    Object.assign(close, { type: 'button', textContent: '×', title: 'Remove this plot' });
-    close.addEventListener('click', () => plots.remove(this));
-    bar.append(this.choice, close);
-    this.holder = document.createElement('div');
-    this.element.append(bar, this.holder);
-    this.cursor = document.createElement('div');
-    this.cursor.className = 'now';
+    bar.append(this.choice, this.saving(), buttonOf('×', () => plots.remove(this), 'Remove this plot'));
+    this.svg = svgElement('svg', { tabindex: 0, role: 'img' });
+    this.reading = document.createElement('output');
+    this.element.append(bar, this.svg, this.reading);
+    this.pointed = null;  // index of the time that the pointer is at
+    this.listen();
+  }
+
+  saving() {
+    const menu = document.createElement('details'), title = document.createElement('summary');
+    title.textContent = 'Save';
+    menu.className = 'menu';
+    const kinds = { CSV: () => this.csv(), SVG: () => this.svgText(), PNG: null };
+    const holder = document.createElement('div');
+    for (const [kind, text] of Object.entries(kinds)) {
+      holder.append(buttonOf(kind, () => {
+        menu.open = false;
+        if (text) save(`${this.fileName()}.${kind.toLowerCase()}`, new Blob([text()], { type: 'text/plain' }));
+        else saveImage(`${this.fileName()}.png`, this.svgText(), this.size);
+      }));
+    }
+    menu.append(title, holder);
+    return menu;
+  }
+
+  fileName() {
+    return `${player.data.name} ${this.choice.value}`.replace(/[^\w.-]+/g, '_');
+  }
+
+  /* ---- what is plotted ---- */
+
+  /* Numbers of both axes, in the units that are shown. */
+  read() {
+    const item = columns.find(this.choice.value), { path } = item;
+    const over = path ? columns.find(path[0]) : plots.over();
+    const y = path ? columns.find(path[1]) : item;
+    this.isPath = Boolean(path);
+    this.isLog = Boolean(y.isLog);
+    this.y = columns.values(y).map(value => value && value * units.factor(y.unit));
+    this.x = (over ? columns.values(over) : Array.from(player.t)).map(value => value && value * units.factor(over?.unit ?? 's'));
+    this.isOverTime = !over;
+    this.names = [over?.label ?? 't', y.label];
+    this.units = [over?.unit ?? 's', y.unit];
+    this.labels = this.names.map((name, k) => units.titled(name, this.units[k]));
   }
 
   redraw() {
-    if (this.chart) this.chart.destroy();
-    const item = this.items.find(({ label }) => label === this.choice.value);
-    const order = timesFall() ? x => x.reverse() : x => x;  // uPlot wants rising times
-    const series = [order(Array.from(player.t)), order(item.values())];
-    this.chart = new uPlot(this.options(item), series, this.holder);
-    this.chart.over.append(this.cursor);
+    if (!hasMotion()) return;
+    this.read();
+    const { width, height } = this.size = this.sizes();
+    const type = Math.round(0.76 * fontSize());
+    this.box = { left: 5.2 * type, right: width - 12, top: 10, low: height - 3.1 * type };
+    setAttributes(this.svg, { viewBox: `0 0 ${width} ${height}`, width, height, 'font-size': type,
+      'font-family': 'system-ui, sans-serif', 'aria-label': `${this.labels[1]} over ${this.labels[0]}` });
+    this.ranges();
+    this.draw(type);
+    this.move(player.state);
   }
 
-  options(item) {
-    const { ink, quiet, line } = stage.palette;
-    const axis = { stroke: quiet, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 },
-      font: '11px system-ui, sans-serif' };
-    const written = value => (value === null || value === undefined ? '–' : numberText(value));
-    return {
-      width: this.width(), height: PLOT_HEIGHT,
-      scales: { x: { time: false }, y: item.isLog ? { distr: 3 } : { range: openRange } },
-      axes: [
-        { ...axis, size: 26, values: (_, ticks) => ticks.map(tick => `${+tick.toPrecision(6)}`) },
-        { ...axis, size: 62, values: (_, ticks) => ticks.map(tick => (tick === null ? '' : brief(tick))) },
-      ],
-      series: [
-        { label: 't', value: (_, value) => written(value) },
-        { label: item.unit ? `${item.label} [${item.unit}]` : item.label, stroke: stage.palette.plot || ink,
-          width: 1.75, pxAlign: 0,  // on whole pixels a curve is a staircase
-          points: { show: player.count < 2 }, value: (_, value) => written(value) },
-      ],
-      cursor: { drag: { x: true, y: false }, points: { size: 6 } },
-      hooks: {
-        drawClear: [chart => this.shadeFailures(chart)],
-        draw: [chart => this.drawEvents(chart)],
-        setCursor: [() => this.showNumbers(player.state)],
-        ready: [chart => {
-          this.listen(chart);
-          this.move(player.state);
-        }],
-      },
-    };
+  sizes() {
+    const width = Math.max(240, this.element.clientWidth);
+    const height = this.isPath ? Math.min(0.8 * width, 1.3 * plots.height()) : plots.height();
+    return { width, height };
   }
 
-  width() {
-    return Math.max(200, this.element.clientWidth);
+  /* What of both axes is seen; in a path lengths are true. */
+  ranges() {
+    const { to } = this.scale = this.isLog ? scalesOf.log : scalesOf.linear;
+    const x = extentOf(this.x.filter((value, k) => value !== null && this.y[k] !== null));
+    const isZoomed = !this.isPath && plots.range !== null;
+    const [from, until] = isZoomed ? plots.range : x;
+    const isSeen = (_, k) => this.x[k] >= from && this.x[k] <= until;
+    const y = extentOf(this.y.filter((value, k) => value !== null && isSeen(value, k)).map(to));
+    const noise = this.isLog ? 0 : ROUNDING_PART * units.scale(this.units[1]) * units.factor(this.units[1]);
+    this.xRange = isZoomed ? [from, until] : this.isPath ? opened(x, noise) : x;
+    this.yRange = opened(y, noise);
+    if (!this.isPath) return;
+    const { left, right, top, low } = this.box;
+    const [wide, tall] = [this.xRange, this.yRange].map(([a, b]) => b - a);
+    const scale = Math.min((right - left) / wide, (low - top) / tall);
+    this.xRange = centred(this.xRange, (right - left) / scale);
+    this.yRange = centred(this.yRange, (low - top) / scale);
   }
 
-  /* A click, and not the end of a drag, sets the time. */
-  listen(chart) {
-    let from = 0;
-    chart.over.addEventListener('pointerdown', event => { from = event.clientX; });
-    chart.over.addEventListener('click', event => {
-      if (Math.abs(event.clientX - from) > 3) return;
-      player.pause();
-      player.setTime(chart.posToVal(event.offsetX, 'x'));
+  px(x) {
+    const { left, right } = this.box, [a, b] = this.xRange;
+    return left + (right - left) * (x - a) / (b - a || 1);
+  }
+
+  py(y) {
+    const { top, low } = this.box, [a, b] = this.yRange;
+    return low - (low - top) * (this.scale.to(y) - a) / (b - a || 1);
+  }
+
+  /* ---- drawing ---- */
+
+  draw(type) {
+    const { palette } = stage, { left, right, top, low } = this.box;
+    const text = (x, y, anchor, content, more = {}) =>
+      svgElement('text', { x, y, 'text-anchor': anchor, fill: palette.quiet, ...more }, content);
+    const line = (x1, y1, x2, y2, stroke = palette.line) => svgElement('line', { x1, y1, x2, y2, stroke });
+    const parts = [...this.failureAreas(palette)];
+    const step_x = niceStep((this.xRange[1] - this.xRange[0]) / Math.max(2, (right - left) / (6 * type)));
+    for (const x of multiples(step_x, ...this.xRange)) {
+      parts.push(line(this.px(x), top, this.px(x), low), text(this.px(x), low + 1.25 * type, 'middle', stepText(x, step_x)));
+    }
+    for (const [y, label] of this.levels(type, step_x)) {
+      parts.push(line(left, y, right, y), text(left - 5, y + 0.35 * type, 'end', label));
+    }
+    const middle = (top + low) / 2;
+    parts.push(text((left + right) / 2, low + 2.6 * type, 'middle', this.labels[0], { fill: palette.ink }));
+    parts.push(text(type, middle, 'middle', this.labels[1], { fill: palette.ink, transform: `rotate(-90 ${type} ${middle})` }));
+    parts.push(...this.eventLines(palette), this.curve(palette));
+    this.now = svgElement('line', { y1: top, y2: low, class: 'now', stroke: palette.drive, 'stroke-width': 2 });
+    this.dot = svgElement('circle', { r: 4.5, class: 'dot', fill: palette.paper, stroke: palette.drive, 'stroke-width': 2 });
+    parts.push(this.now, this.dot);
+    this.svg.replaceChildren(...parts);
+  }
+
+  /* Heights of the rules across the plot, with their labels. */
+  levels(type, step_x) {
+    const [a, b] = this.yRange, count = Math.max(2, (this.box.low - this.box.top) / (2.6 * type));
+    if (this.isLog) {
+      const step = Math.max(1, Math.ceil((b - a) / count));
+      return multiples(step, a, b).map(y => [this.py(10 ** y), `1e${y}`]);
+    }
+    const step = this.isPath ? step_x : niceStep((b - a) / count);
+    return multiples(step, a, b).map(y => [this.py(y), stepText(y, step)]);
+  }
+
+  curve(palette) {
+    const pieces = [];
+    let isDown = false;
+    this.y.forEach((y, k) => {
+      const isThere = y !== null && this.x[k] !== null;
+      if (isThere) pieces.push(`${isDown ? 'L' : 'M'}${this.px(this.x[k]).toFixed(1)} ${this.py(y).toFixed(1)}`);
+      isDown = isThere;
+    });
+    const { left, right, top, low } = this.box, edge = 3;
+    const style = { fill: 'none', stroke: palette.plot, 'stroke-width': player.count < 2 ? 6 : 2,
+      'stroke-linejoin': 'round', 'stroke-linecap': 'round', transform: `translate(${-left} ${edge - top})` };
+    // An svg in an svg cuts off what is outside.
+    const frame = svgElement('svg', { x: left, y: top - edge, width: right - left, height: low - top + 2 * edge });
+    frame.append(svgElement('path', { d: pieces.join(''), ...style }));
+    return frame;
+  }
+
+  failureAreas(palette) {
+    if (!this.isOverTime) return [];
+    const { left, right, top, low } = this.box;
+    return failures().map(([from, to]) => {
+      const [x0, x1] = [from, to].map(time => Math.max(left, Math.min(right, this.px(time)))).sort((a, b) => a - b);
+      return svgElement('rect', { x: x0, y: top, width: Math.max(1, x1 - x0), height: low - top, fill: palette.badTint });
     });
   }
 
-  shadeFailures(chart) {
-    const { ctx, bbox } = chart;
-    ctx.fillStyle = stage.palette.badTint;
-    for (const [from, to] of failures()) {
-      const [x0, x1] = [from, to].map(time => chart.valToPos(time, 'x', true)).sort((a, b) => a - b);
-      ctx.fillRect(x0, bbox.top, Math.max(1, x1 - x0), bbox.height);
-    }
+  eventLines(palette) {
+    if (!this.isOverTime) return [];
+    const { top, low } = this.box;
+    return player.data.events.map(({ t }) => svgElement('line', { x1: this.px(t), x2: this.px(t), y1: top, y2: low,
+      stroke: palette.bad, 'stroke-dasharray': '5 4' }));
   }
 
-  drawEvents(chart) {
-    const { ctx, bbox } = chart;
-    ctx.save();
-    ctx.strokeStyle = stage.palette.bad;
-    ctx.setLineDash([5, 4]);
-    for (const event of player.data.events) {
-      const x = chart.valToPos(event.t, 'x', true);
-      ctx.beginPath();
-      ctx.moveTo(x, bbox.top);
-      ctx.lineTo(x, bbox.top + bbox.height);
-      ctx.stroke();
-    }
-    ctx.restore();
-  }
-
-  /* The numbers under the plot are those of the pointer; where there is none, of the time shown. */
-  showNumbers(state) {
-    if (this.chart.cursor.left >= 0) return;
-    const idx = timesFall() ? player.count - 1 - state.index : state.index;
-    this.chart.setLegend({ idx }, false);
-  }
+  /* ---- time ---- */
 
   move(state) {
-    if (this.chart.status !== 1) return;  // uPlot lays out a little later, and then calls `ready`
-    const x = this.chart.valToPos(state.time, 'x');
-    this.cursor.style.transform = `translateX(${x}px)`;
-    this.cursor.hidden = !(x >= 0 && x <= this.chart.over.clientWidth);
-    this.showNumbers(state);
+    if (!this.x) return;
+    const { index } = state, { left, right } = this.box;
+    const at = this.isOverTime ? state.time : this.x[index];
+    const x = at === null ? -1 : this.px(at), y = this.y[index];
+    const isSeen = x >= left - 1 && x <= right + 1;
+    this.now.style.display = isSeen && !this.isPath ? '' : 'none';
+    this.dot.style.display = isSeen && y !== null ? '' : 'none';
+    setAttributes(this.now, { x1: x, x2: x });
+    if (y !== null) setAttributes(this.dot, { cx: this.px(this.x[index]), cy: this.py(y) });
+    this.tell(this.pointed ?? index);
+  }
+
+  /* The numbers at a solved time, below the plot. */
+  tell(index) {
+    const written = (name, value, unit) => `${name} = ${units.full(value ?? NaN, unit)}`;
+    const shown = (values, k) => {
+      const value = values[index] === null ? NaN : values[index] / units.factor(this.units[k]);
+      return this.isLog && k ? `${this.names[k]} = ${value.toExponential(3)}` : written(this.names[k], value, this.units[k]);
+    };
+    const time = this.isOverTime ? [] : [written('t', player.t[index], 's')];
+    this.reading.textContent = [...time, shown(this.x, 0), shown(this.y, 1)].join(',  ');
+  }
+
+  /* ---- pointers and keys ---- */
+
+  listen() {
+    const at = event => event.clientX - this.svg.getBoundingClientRect().left;
+    let from = null;
+    this.svg.addEventListener('pointerdown', event => { from = at(event); });
+    this.svg.addEventListener('pointermove', event => {
+      if (event.pointerType === 'touch') return;
+      this.pointed = this.indexAt(event);
+      this.tell(this.pointed);
+      this.showPart(from, at(event));
+    });
+    this.svg.addEventListener('pointerup', event => {
+      const to = at(event), begin = from;
+      from = null;
+      this.showPart(null);
+      if (begin === null) return;
+      if (Math.abs(to - begin) < 4 || this.isPath) this.choose(event);
+      else plots.zoom([begin, to].map(x => this.valueAt(x)).sort((a, b) => a - b));
+    });
+    this.svg.addEventListener('pointerleave', () => {
+      from = null;
+      this.showPart(null);
+      this.pointed = null;
+      this.tell(player.state.index);
+    });
+    this.svg.addEventListener('dblclick', () => plots.zoom(null));
+    this.svg.addEventListener('keydown', event => this.key(event));
+  }
+
+  /* A click, and not the end of a drag, sets the time. */
+  choose(event) {
+    player.pause();
+    player.setIndex(this.indexAt(event));
+  }
+
+  valueAt(x) {
+    const { left, right } = this.box, [a, b] = this.xRange;
+    return a + (b - a) * Math.max(0, Math.min(1, (x - left) / (right - left)));
+  }
+
+  /* The solved time whose point is next to the pointer: of a curve over time, beside it. */
+  indexAt(event) {
+    const box = this.svg.getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
+    if (this.isOverTime) return player.indexNear(this.valueAt(x));
+    let best = 0, least = Infinity;
+    this.x.forEach((value, k) => {
+      if (value === null || this.y[k] === null) return;
+      const distance = Math.hypot(this.px(value) - x, this.py(this.y[k]) - y);
+      if (distance < least) [best, least] = [k, distance];
+    });
+    return best;
+  }
+
+  /* The part of the axis that a drag will show. */
+  showPart(from, to) {
+    this.part?.remove();
+    if (from === null || this.isPath) return;
+    const { top, low } = this.box;
+    this.part = svgElement('rect', { x: Math.min(from, to), width: Math.abs(to - from), y: top, height: low - top,
+      fill: stage.palette.drive, opacity: 0.15 });
+    this.svg.append(this.part);
+  }
+
+  key(event) {
+    const [a, b] = this.xRange ?? [0, 1], now = this.isOverTime ? player.state.time : (a + b) / 2;
+    const half = (b - a) / 2, middle = now >= a && now <= b ? now : (a + b) / 2;
+    const range = { '+': [middle - ZOOM * half, middle + ZOOM * half], '=': [middle - ZOOM * half, middle + ZOOM * half],
+      '-': [middle - half / ZOOM, middle + half / ZOOM], 0: null }[event.key];
+    if (range === undefined || this.isPath) return;
+    plots.zoom(range);
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  /* ---- saving ---- */
+
+  /* The numbers that are seen, in the units that are shown. */
+  csv() {
+    const quoted = text => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+    const heads = this.isOverTime ? this.labels : ['t [s]', ...this.labels];
+    const rows = this.x.map((x, k) => (this.isOverTime ? [x, this.y[k]] : [player.t[k], x, this.y[k]]));
+    const [from, to] = this.xRange;
+    const seen = rows.filter((_, k) => this.isPath || (this.x[k] >= from && this.x[k] <= to));
+    return `${[heads.map(quoted), ...seen.map(row => row.map(value => value ?? ''))].map(row => row.join(',')).join('\n')}\n`;
+  }
+
+  svgText() {
+    const copy = this.svg.cloneNode(true), { width, height } = this.size;
+    copy.setAttribute('xmlns', 'http://www.w3.org/2000/svg');
+    copy.prepend(svgElement('rect', { width, height, fill: stage.palette.paper }));
+    return new XMLSerializer().serializeToString(copy);
   }
 }
 
-/* A constant is shown as a line in the middle, not as rounding errors blown up. */
-function openRange(_, low, high) {
-  if (low === null || high === null) return [-1, 1];
-  const middle = (low + high) / 2, least = 1e-9 * Math.max(1e-12, Math.abs(low), Math.abs(high));
-  const half = Math.max((high - low) / 2, least);
-  const isConstant = half === least;
-  const wide = isConstant ? Math.max(Math.abs(middle) / 10, 1e-9) : 1.08 * half;
+function extentOf(values) {
+  if (!values.length) return [0, 1];
+  return values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+}
+
+/* A range with room at both ends; a constant in the middle of one, not rounding errors blown up. */
+function opened([low, high], noise) {
+  const middle = (low + high) / 2, half = (high - low) / 2;
+  const least = Math.max(noise, 1e-9 * Math.abs(middle));
+  const wide = half <= least ? Math.max(Math.abs(middle) / 10, 10 * noise, 1e-9) : 1.08 * half;
   return [middle - wide, middle + wide];
+}
+
+function centred([a, b], length) {
+  return [(a + b - length) / 2, (a + b + length) / 2];
 }
 
 function optionGroup(group) {
@@ -187,25 +329,36 @@ function optionGroup(group) {
   return element;
 }
 
-/* Pieces of time [from, to] in which something was not found. */
-function failures() {
-  const { status } = player.data, pieces = [];
-  for (let k = 0; k < player.count; k++) {
-    if (status[k] === 0) continue;
-    const begin = player.t[Math.max(0, k - 1)];
-    while (k + 1 < player.count && status[k + 1] !== 0) k++;
-    pieces.push([begin, player.t[k]]);
-  }
-  return pieces;
+function buttonOf(text, act, title = '') {
+  const button = document.createElement('button');
+  Object.assign(button, { type: 'button', textContent: text, title });
+  if (title) button.setAttribute('aria-label', title);
+  button.addEventListener('click', act);
+  return button;
 }
 
-function brief(value) {
-  const size = Math.abs(value);
-  return size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(0) : `${+value.toPrecision(5)}`;
+/* Give a file to the browser, which asks the user or keeps it among the downloads. */
+function save(name, blob) {
+  const link = document.createElement('a');
+  Object.assign(link, { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/* An SVG as pixels, twice as many as are seen. */
+async function saveImage(name, text, { width, height }) {
+  const image = new Image();
+  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(text)}`;
+  await image.decode();
+  const canvas = document.createElement('canvas');
+  Object.assign(canvas, { width: 2 * width, height: 2 * height });
+  canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
+  canvas.toBlob(blob => save(name, blob));
 }
 
 const plots = {
   list: [],
+  range: null,  // of the x axis that all plots but paths show; null for all
   first: null,  // what is plotted when the page opens
 
   build(panel) {
@@ -213,29 +366,50 @@ const plots = {
       panel.append('There is no motion to plot.');
       return;
     }
-    this.groups = plottable(player.data);
     this.holder = document.createElement('div');
-    const more = document.createElement('button');
-    Object.assign(more, { type: 'button', textContent: 'Another plot', id: 'another' });
-    more.addEventListener('click', () => this.add(this.groups[0].items[0].label));
-    panel.append(this.holder, more);
-    const name = movingOutput() ?? liveliest();
-    this.first = [name, `${name}_dot`, `${name}_ddot`];
+    const bar = document.createElement('div'), label = document.createElement('label');
+    bar.className = 'bar';
+    this.choice = document.createElement('select');
+    this.choice.id = 'over';
+    this.choice.append(...[TIME, ...this.overs()].map(name => new Option(name, name)));
+    this.choice.addEventListener('change', () => this.zoom(null));
+    label.append('Over ', this.choice);
+    bar.append(label, buttonOf('All', () => this.zoom(null), 'All of the axis'));
+    const more = buttonOf('Another plot', () => this.add(columns.groups()[0].items[0].label));
+    more.id = 'another';
+    panel.append(bar, this.holder, more);
+    this.first = plottedFirst();
+  },
+
+  /* What plots can have along: the angles of bodies, the driven ones first, and outputs. */
+  overs() {
+    const { outputs, coordinates, drawing } = player.data;
+    const driven = new Set(drawing.marks.filter(mark => mark.kind === 'drive').map(mark => mark.place.frame.index));
+    const angles = drawing.frames.toSorted((a, b) => driven.has(b.index) - driven.has(a.index))
+      .map(({ columns: [, , phi] }) => coordinates[phi].name);
+    return [...angles, ...outputs.map(({ name }) => name)];
+  },
+
+  /* The column along the x axis; null for time. */
+  over() {
+    return this.choice.value === TIME ? null : columns.find(this.choice.value);
+  },
+
+  height() {
+    const isProjected = document.documentElement.classList.contains('projected');
+    return isProjected ? Math.max(150, (innerHeight - 17 * fontSize()) / 3) : 12.5 * fontSize();
   },
 
   /* The first plots are made when they can be seen: before, they have no width. */
   show() {
-    if (this.first) {
-      const labels = this.first;
-      this.first = null;
-      labels.forEach(label => this.add(label));
-    } else {
-      this.resize();
-    }
+    const labels = this.first;
+    this.first = null;
+    if (labels) labels.forEach(label => this.add(label));
+    else this.redraw();
   },
 
   add(label) {
-    const plot = new Plot(this.groups, label);
+    const plot = new Plot(label);
     this.list.push(plot);
     this.holder.append(plot.element);
     plot.redraw();
@@ -243,52 +417,19 @@ const plots = {
 
   remove(plot) {
     this.list.splice(this.list.indexOf(plot), 1);
-    plot.chart.destroy();
     plot.element.remove();
+  },
+
+  zoom(range) {
+    this.range = range;
+    this.redraw();
   },
 
   move(state) {
     for (const plot of this.list) plot.move(state);
   },
 
-  resize() {
-    for (const plot of this.list) {
-      plot.chart.setSize({ width: plot.width(), height: PLOT_HEIGHT });
-      plot.move(player.state);
-    }
-  },
-
   redraw() {
     for (const plot of this.list) plot.redraw();
   },
 };
-
-/* The first output that moves; none where there is no such. */
-function movingOutput() {
-  const { outputs, arrays } = player.data, width = outputs.length;
-  const moves = k => {
-    const values = arrays.y?.filter((value, place) => place % width === k && Number.isFinite(value)) ?? [];
-    const size = values.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-    return values.some(value => Math.abs(value - values[0]) > 1e-9 * Math.max(size, 1e-12));
-  };
-  return outputs.find((_, k) => moves(k))?.name;
-}
-
-/* The coordinate that is plotted first: of bodies an angle, that of the largest acceleration, so that
-   it is not one that a motor turns steadily; where all angles are steady, as of a cam and its follower,
-   any coordinate of the largest acceleration; where nothing accelerates, the one that goes farthest. */
-function liveliest() {
-  const { data, n } = player, { frames } = data.drawing;
-  const all = data.coordinates.map((_, k) => k);
-  const sizes = (name, candidates) => candidates.map(k => {
-    const values = data.arrays[name].filter((value, place) => place % n === k && Number.isFinite(value));
-    return values.reduce((most, value) => Math.max(most, Math.abs(value - values[0])), 0);
-  });
-  const ofBodies = frames.length ? frames.flatMap(({ columns }) => columns) : all;
-  const angles = frames.map(({ columns: [, , phi] }) => phi);
-  for (const [name, candidates] of [['q_ddot', angles], ['q_ddot', ofBodies], ['q', all]]) {
-    const found = sizes(name, candidates), largest = Math.max(0, ...found);
-    if (largest > 1e-9) return data.coordinates[candidates[found.indexOf(largest)]].name;
-  }
-  return data.coordinates[0].name;
-}

@@ -3,36 +3,54 @@
 
    stage.view            world to screen, for the size the canvas has now
    stage.extent          function that gives what the picture must show
-   stage.overlays        functions (ctx, view, palette) that draw on top: ghost bodies, handles
+   stage.camera          null where all of it is seen, or { zoom, centre }
+   stage.underlays       functions (ctx, view, palette, state) that draw below: a grid
+   stage.overlays        functions (ctx, view, palette, state) that draw on top: ghosts, measures, poles
    stage.pointer         null, or { down, move, up } that get (world point, event) before hovering;
                          true from `down` keeps the event
-   stage.points          what can be pointed at: named points, joints and the origins of bodies */
+   stage.points          what can be pointed at: named points, joints and the origins of bodies
+   stage.forget()        the motion is another one */
 
 const NEAR = 16;  // pixels within which a point is meant, twice that with a finger
 const PLACES = 1000;  // points of a traced path
+const DOTS = 24;  // equal times that are marked on it
+const APART = 10;  // pixels between them, on the mean
 const ARROW = 0.2;  // part of the canvas that the longest velocity and acceleration take
+const CLOSEST = 200;  // largest zoom
+const CLICK = 4;  // pixels that a pointer may move in a click
 
 class Stage {
   constructor(canvas) {
     this.canvas = canvas;
     this.ctx = canvas.getContext('2d');
     this.extent = () => player.data.extent;
+    this.camera = null;
+    this.underlays = [];
     this.overlays = [];
     this.pointer = null;
     this.points = pointsOf(player.data.drawing);
+    this.places = placesOf(player.data.drawing);  // further places of joints
     this.traced = new Set(this.points.filter(point => point.isNamed));
     this.selected = null;  // kept by a click
     this.hovered = null;
     this.showsNames = false;
-    this.paths = new Map();  // of traced points, in the world
+    this.fingers = new Map();  // pointers that are down, and where
+    this.forget();
     this.resize();
+  }
+
+  forget() {
+    this.paths = new Map();  // of traced points, in the world
+    for (const point of this.points) delete point.greatest;
   }
 
   resize() {
     const [left, right, low, high] = player.data.extent;
     const width = this.canvas.parentElement.clientWidth;
-    const most = Math.max(240, Math.min(560, innerHeight * 0.62));
-    const height = Math.max(220, Math.min(most, width * (high - low) / (right - left) + 2 * NEAR));
+    const isProjected = document.documentElement.classList.contains('projected');
+    const most = Math.max(240, innerHeight - (isProjected ? 11 : 18) * fontSize());
+    const wanted = isProjected ? most : Math.max(0.45 * width, width * (high - low) / (right - left) + 4 * NEAR);
+    const height = Math.max(220, Math.min(most, wanted));
     const dense = devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
     this.canvas.height = Math.round(height * dense);
@@ -42,56 +60,94 @@ class Stage {
     this.palette = paletteNow();
   }
 
+  /* Sizes of the text on it. */
+  font(weight = '') {
+    return `${weight} ${Math.round(0.82 * fontSize())}px system-ui, sans-serif`;
+  }
+
   draw(state) {
-    this.view = new View(this.extent(), this.width, this.height, NEAR);
+    this.view = new View(this.extent(), this.width, this.height, NEAR, this.camera);
     const { ctx, view, palette } = this;
     ctx.clearRect(0, 0, this.width, this.height);
+    for (const underlay of this.underlays) underlay(ctx, view, palette, state);
     const violated = state.isFound ? null : violatedJoints();
-    const style = { view, palette, violated, alpha: state.isFound || !hasMotion() ? 1 : 0.55 };
+    const largest = Math.max(9, Math.min(this.width, this.height) / 55);
+    const style = { view, palette, violated, largest, alpha: state.isFound || !hasMotion() ? 1 : 0.55 };
     drawShapes(ctx, state.q, style);
     for (const point of this.traced) this.drawPath(point);
-    for (const overlay of this.overlays) overlay(ctx, view, palette);
-    this.drawNames(state, this.points.filter(point => this.showsNames || point.isNamed));
+    for (const overlay of this.overlays) overlay(ctx, view, palette, state);
+    this.drawNames(state);
     const point = this.hovered || this.selected;
-    if (point) this.drawPoint(point, state);
+    if (point && point.isBody) this.drawOutline(point, state, style);
+    else if (point) this.drawPoint(point, state);
   }
 
   where(point, state) {
     return inWorld(state.q, point.frame, point.point);
   }
 
-  drawPath(point) {
-    if (!this.paths.has(point)) this.paths.set(point, pathOf(point));
-    const { ctx, view } = this;
-    ctx.beginPath();
-    let isDown = false;
-    for (const place of this.paths.get(point)) {
-      if (place === null) {
-        isDown = false;
-        continue;
-      }
-      const [x, y] = view.toScreen(place);
-      if (isDown) ctx.lineTo(x, y); else ctx.moveTo(x, y);
-      isDown = true;
-    }
-    Object.assign(ctx, { strokeStyle: this.palette.velocity, lineWidth: 1.5, lineJoin: 'round' });
-    ctx.setLineDash([2, 4]);
-    ctx.stroke();
-    ctx.setLineDash([]);
+  /* Every path has a colour of its own, as long as there are colours. */
+  colourOf(point) {
+    const { bodies } = this.palette;
+    return bodies[(this.points.indexOf(point) + 4) % bodies.length][0];
   }
 
-  drawNames(state, points) {
-    const { ctx, palette } = this;
-    Object.assign(ctx, { font: '12px system-ui, sans-serif', textBaseline: 'bottom', lineWidth: 3 });
+  drawPath(point) {
+    if (!this.paths.has(point)) this.paths.set(point, pathOf(point));
+    const { ctx, view, palette } = this, { line, dots } = this.paths.get(point);
+    const colour = this.colourOf(point), pen = new Pen(ctx, null, this, player.data.drawing.size);
+    ctx.lineJoin = 'round';
+    pen.path(line.map(place => place && view.toScreen(place)));
+    pen.stroke(palette.paper, 4);
+    pen.stroke(colour, 2);
+    // As many as have room, at equal times all the same.
+    const length = dots.reduce((sum, place, k) => (k ? sum + towards(dots[k - 1], place)[2] : 0), 0) * view.scale;
+    const stride = [1, 2, 3, 4, 6, 8, 12].find(each => length * each > APART * dots.length) ?? 24;
+    for (let k = 0; k < dots.length; k += stride) {
+      pen.circle(view.toScreen(dots[k]), 3);
+      pen.fill(palette.paper);
+      pen.stroke(colour, 1.5);
+    }
+  }
+
+  /* Names of points; where they are asked for, of joints and, in their colours, of bodies too. */
+  drawNames(state) {
+    const shown = this.points.filter(point => this.showsNames || point.isNamed);
     const taken = [];
-    for (const point of points) {
+    if (this.showsNames) {
+      player.data.drawing.bodies.forEach((name, k) => {
+        const frame = player.data.drawing.frames[k];
+        const at = this.view.toScreen(inWorld(state.q, frame, middleOf(frame)));
+        taken.push(at);
+        this.write(name, at, this.palette.bodies[k % this.palette.bodies.length][0], 'bold');
+      });
+    }
+    for (const point of shown) {
+      if (point.kind === 'origin of the body') continue;
       const [x, y] = this.view.toScreen(this.where(point, state));
-      const isTaken = taken.some(([a, b]) => Math.abs(a - x) < 60 && Math.abs(b - y) < 13);
-      if (isTaken) continue;
+      if (taken.some(([a, b]) => Math.abs(a - x) < 60 && Math.abs(b - y) < fontSize())) continue;
       taken.push([x, y]);
-      Object.assign(ctx, { strokeStyle: palette.paper, fillStyle: palette.ink });
-      ctx.strokeText(point.name, x + 9, y - 6);
-      ctx.fillText(point.name, x + 9, y - 6);
+      this.write(point.name, [x + 9, y - 6], this.palette.ink);
+    }
+  }
+
+  /* Text on the drawing, with a seam of paper. */
+  write(text, [x, y], colour, weight = '', align = 'start') {
+    const { ctx, palette } = this;
+    Object.assign(ctx, { font: this.font(weight), textBaseline: 'bottom', textAlign: align, lineWidth: 4,
+      lineJoin: 'round', strokeStyle: palette.paper, fillStyle: colour });
+    ctx.strokeText(text, x, y);
+    ctx.fillText(text, x, y);
+    ctx.textAlign = 'start';
+  }
+
+  /* A body that is pointed at has a strong edge. */
+  drawOutline(body, state, style) {
+    const { drawing } = player.data;
+    const pen = new Pen(this.ctx, state.q, { ...style, looks: drawing.looks }, drawing.size);
+    for (const points of areasOf(pen, body.frame)) {
+      pen.path(points, true);
+      pen.stroke(pen.colours(body.frame)[0], 4);
     }
   }
 
@@ -114,7 +170,7 @@ class Stage {
   /* The point nearest to a place on the screen, or null. */
   near([x, y], reach) {
     let best = null, least = reach;
-    for (const point of this.points) {
+    for (const point of [...this.points, ...this.places]) {
       const [a, b] = this.view.toScreen(this.where(point, player.state));
       const distance = Math.hypot(a - x, b - y);
       if (distance < least) [best, least] = [point, distance];
@@ -122,11 +178,23 @@ class Stage {
     return best;
   }
 
-  /* A point with all others of its body that are at the same place. */
+  /* The body at a place on the screen, as something to be pointed at, or null. */
+  bodyAt(at) {
+    const { drawing } = player.data;
+    const pen = new Pen(this.ctx, player.state.q, { view: this.view, palette: this.palette }, drawing.size);
+    const found = drawing.frames.findLast(frame => areasOf(pen, frame).some(points => isInside(points, at)));
+    return found ? bodyTarget(found) : null;
+  }
+
+  /* All that is at the place of a point: named points, every joint, whatever body holds it. */
   together(point, state) {
-    const at = this.where(point, state), least = player.data.drawing.size / 100;
-    const isHere = other => other.frame.index === point.frame.index && towards(at, this.where(other, state))[2] < least;
-    return [point, ...this.points.filter(other => other !== point && isHere(other))];
+    const at = this.where(point, state), least = player.data.drawing.size / 100, found = new Map();
+    for (const other of [point, ...this.points, ...this.places]) {
+      const isOrigin = other.kind === 'origin of the body' && other !== point;
+      if (isOrigin && other.frame.index !== point.frame.index) continue;
+      if (towards(at, this.where(other, state))[2] < least && !found.has(other.name)) found.set(other.name, other);
+    }
+    return [...found.values()];
   }
 
   toggleTrace(point) {
@@ -141,13 +209,46 @@ class Stage {
 
   hover(point) {
     if (point === this.hovered) return;
+    const isSameBody = point?.isBody && this.hovered?.isBody && point.frame === this.hovered.frame;
+    if (isSameBody) return;
     this.hovered = point;
     this.canvas.style.cursor = point ? 'pointer' : '';
     player.refresh();
   }
 
+  /* ---- what is looked at ---- */
+
+  /* Look more closely, or less; what is at a place on the screen stays there. */
+  zoom(factor, at = [this.width / 2, this.height / 2]) {
+    const zoom = Math.min(CLOSEST, (this.camera?.zoom ?? 1) * factor);
+    if (zoom <= 1 && factor < 1) return this.fit();
+    const fixed = this.view.toWorld(at), scale = this.view.fit * zoom;
+    const centre = [fixed[0] - (at[0] - this.width / 2) / scale, fixed[1] + (at[1] - this.height / 2) / scale];
+    return this.look({ zoom, centre });
+  }
+
+  pan(right, down) {
+    const [x, y] = this.view.toWorld([this.width / 2, this.height / 2]);
+    const { scale } = this.view;
+    this.look({ zoom: this.camera?.zoom ?? 1, centre: [x - right / scale, y + down / scale] });
+  }
+
+  fit() {
+    this.look(null);
+  }
+
+  look(camera) {
+    this.camera = camera;
+    // A finger scrolls the page while all is seen, and moves the drawing otherwise.
+    this.canvas.style.touchAction = camera ? 'none' : 'pan-y';
+    player.refresh();
+  }
+
+  /* ---- pointers ---- */
+
   listen() {
     const { canvas } = this;
+    this.look(null);
     const at = event => [event.offsetX, event.offsetY];
     const handled = (kind, event) => {
       const isKept = this.pointer?.[kind]?.(this.view.toWorld(at(event)), event);
@@ -155,26 +256,101 @@ class Stage {
       return isKept;
     };
     const reach = event => (event.pointerType === 'touch' ? 2 * NEAR : NEAR);
+    let pressed = null;
     canvas.addEventListener('pointerdown', event => {
-      if (handled('down', event)) return;
-      const point = this.near(at(event), reach(event));
-      this.hovered = null;
-      if (point === null || point === this.selected) {
-        this.traced.delete(this.selected);
-        this.select(null);
-      } else {
-        this.traced.add(point);
-        this.select(point);
-      }
+      this.fingers.set(event.pointerId, at(event));
+      if (this.fingers.size === 1 && handled('down', event)) return;
+      pressed = this.fingers.size === 1 ? at(event) : null;
     });
     canvas.addEventListener('pointermove', event => {
-      if (handled('move', event) || event.pointerType === 'touch') return;
-      this.hover(this.near(at(event), reach(event)));
+      if (this.fingers.size < 2 && handled('move', event)) return;
+      const before = this.fingers.get(event.pointerId);
+      if (before) this.moveFinger(event.pointerId, at(event), pressed);
+      else if (event.pointerType !== 'touch') this.hover(this.near(at(event), reach(event)) ?? this.bodyAt(at(event)));
     });
-    canvas.addEventListener('pointerup', event => handled('up', event));
-    canvas.addEventListener('pointercancel', event => handled('up', event));
-    canvas.addEventListener('pointerleave', () => this.hover(null));
+    const up = event => {
+      const isClick = pressed && event.type === 'pointerup' && towards(pressed, at(event))[2] < CLICK;
+      this.fingers.delete(event.pointerId);
+      pressed = null;
+      if (handled('up', event) || !isClick) return;
+      this.click(this.near(at(event), reach(event)) ?? this.bodyAt(at(event)));
+    };
+    canvas.addEventListener('pointerup', up);
+    canvas.addEventListener('pointercancel', up);
+    canvas.addEventListener('pointerleave', event => {
+      this.fingers.delete(event.pointerId);
+      this.hover(null);
+    });
+    canvas.addEventListener('wheel', event => {
+      event.preventDefault();
+      this.zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)), at(event));
+    }, { passive: false });
   }
+
+  /* One finger moves the drawing; two move it, and what was between them stays between them. */
+  moveFinger(id, to, pressed) {
+    const from = this.fingers.get(id);
+    const [other] = [...this.fingers].filter(([key]) => key !== id).map(([, place]) => place);
+    if (other) {
+      const [before, after] = [from, to].map(place => towards(place, other)[2]);
+      if (before > 0 && after > 0) this.zoom(after / before, [(to[0] + other[0]) / 2, (to[1] + other[1]) / 2]);
+      this.pan((to[0] - from[0]) / 2, (to[1] - from[1]) / 2);
+    } else {
+      if (pressed && towards(pressed, to)[2] < CLICK) return;
+      this.pan(to[0] - from[0], to[1] - from[1]);
+    }
+    this.fingers.set(id, to);
+  }
+
+  /* What is clicked is kept, a point with its path; clicked again, it is let go. */
+  click(target) {
+    this.hovered = null;
+    const isSame = target?.isBody ? this.selected?.isBody && this.selected.frame === target.frame : target === this.selected;
+    if (target === null || isSame) {
+      if (this.selected && !this.selected.isNamed) this.traced.delete(this.selected);
+      this.select(null);
+      return;
+    }
+    if (!target.isBody && !this.places.includes(target)) this.traced.add(target);
+    this.select(target);
+  }
+}
+
+/* Height of the page's letters, in pixels. */
+function fontSize() {
+  return parseFloat(getComputedStyle(document.body).fontSize);
+}
+
+/* A body as something that can be pointed at. */
+function bodyTarget(frame) {
+  return { name: player.data.drawing.bodies[frame.index], kind: 'body', frame, point: middleOf(frame), isBody: true };
+}
+
+/* A point in the middle of what is drawn of a body. */
+function middleOf(frame) {
+  const own = player.data.drawing.marks.filter(mark => mark.points && mark.frame.index === frame.index);
+  const corners = own.flatMap(mark => mark.points);
+  if (!corners.length) return [0, 0];
+  return [0, 1].map(axis => corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length);
+}
+
+/* The areas that are drawn of a body. */
+function areasOf(pen, frame) {
+  const { marks, shapes } = player.data.drawing;
+  const own = (mark, stroke) => stroke.is_area && ownerOf(mark, stroke.on).index === frame.index;
+  const isBody = mark => !['pin', 'drive', 'dot'].includes(mark.kind);
+  return marks.filter(isBody).flatMap(mark => shapes[mark.shape].filter(stroke => own(mark, stroke))
+    .map(stroke => pointsOfStroke(pen, mark, stroke)));
+}
+
+/* Whether a place is inside a closed polygon: a ray to the right crosses its sides an odd number of times. */
+function isInside(points, [x, y]) {
+  let isIn = false;
+  points.forEach(([x1, y1], k) => {
+    const [x0, y0] = points[(k + points.length - 1) % points.length];
+    if ((y0 > y) !== (y1 > y) && x < x0 + (y - y0) * (x1 - x0) / (y1 - y0)) isIn = !isIn;
+  });
+  return isIn;
 }
 
 /* Named points, joints that are somewhere, then the origins of bodies. */
@@ -184,8 +360,7 @@ function pointsOf(drawing) {
     frame: place.frame, point: place.point, isNamed: true,
   }));
   const joints = drawing.joints.filter(joint => joint.place).map(joint => ({
-    name: joint.name, kind: joint.is_driver ? `${joint.kind}, a driver` : joint.kind,
-    frame: joint.place.frame, point: joint.place.point,
+    name: joint.name, kind: kindOf(joint), frame: joint.place.frame, point: joint.place.point,
   }));
   const isBearing = joint => !joint.kind.endsWith('driver');
   const origins = drawing.bodies.map((name, body) => ({
@@ -195,17 +370,50 @@ function pointsOf(drawing) {
   return [...named, ...joints.filter(isBearing), ...joints.filter(joint => !isBearing(joint)), ...origins];
 }
 
+function kindOf(joint) {
+  return joint.is_driver ? `${joint.kind}, a driver` : joint.kind;
+}
+
+/* All other places of joints: both ends of a rod, both centres of a pair of gears. */
+function placesOf(drawing) {
+  const joints = new Map(drawing.joints.map(joint => [joint.name, joint]));
+  return drawing.marks.filter(mark => joints.has(mark.joint)).flatMap(mark =>
+    [mark.place, mark.first, mark.second].filter(Boolean).map(place => ({
+      name: mark.joint, kind: kindOf(joints.get(mark.joint)), frame: place.frame, point: place.point,
+    })));
+}
+
 function hasMotion() {
   return player.data.status.some(status => status === 0);
 }
 
-/* Where a point is at solved times, at most PLACES of them; null where it is not known. */
+/* Where a point is: a line through at most PLACES solved times, interrupted where it is not known, and
+   dots at equal times. */
 function pathOf(point) {
   const count = Math.min(player.count, PLACES);
-  return Array.from({ length: count }, (_, k) => {
+  const line = Array.from({ length: count }, (_, k) => {
     const state = player.solved(Math.round(k * (player.count - 1) / Math.max(count - 1, 1)));
     return state.isFound ? inWorld(state.q, point.frame, point.point) : null;
   });
+  const round = firstRound(line) * player.duration;
+  const states = Array.from({ length: DOTS }, (_, k) => player.between(k * round / DOTS));
+  const dots = states.filter(state => state.isFound).map(state => inWorld(state.q, point.frame, point.point));
+  return { line, dots };
+}
+
+/* The part of a path that is one round: up to where it meets its start in the same direction, so that
+   dots of several rounds do not mix. */
+function firstRound(line) {
+  if (line.length < 4 || !line[0] || !line[1]) return 1;
+  const [x, y] = towards(line[0], line[1]);
+  for (let k = 2; k + 1 < line.length; k++) {
+    if (!line[k] || !line[k + 1]) return 1;
+    const [u, v, step] = towards(line[k], line[k + 1]), [a, b, way] = towards(line[k], line[0]);
+    const isAlong = u * x + v * y > 0.9 && way * Math.abs(u * b - v * a) < step / 2;
+    const part = way * (u * a + v * b) / step;
+    if (isAlong && part >= 0 && part <= 1) return (k + part) / (line.length - 1);
+  }
+  return 1;
 }
 
 /* The greatest speed and acceleration of a point in the motion, kept with it. */

@@ -74,28 +74,15 @@ function connectTransport() {
   byId('play').disabled = player.count < 2;
   byId('speed').append(...SPEEDS.map(speed => new Option(`${speed} ×`, speed)));
   byId('speed').addEventListener('change', event => player.setSpeed(Number(event.target.value)));
-  byId('names').addEventListener('change', event => {
-    stage.showsNames = event.target.checked;
-    player.refresh();
-  });
 }
 
 function showTransport(state) {
   byId('time').value = state.index;
-  byId('clock').textContent = `t = ${state.time.toFixed(3)} s`;
+  byId('clock').textContent = `t = ${units.full(state.time, 's')}`;
   byId('speed').value = player.speed;
   const isPlaying = player.isPlaying;
   byId('play').textContent = isPlaying ? '❚❚' : '▶';
   byId('play').setAttribute('aria-label', isPlaying ? 'Pause' : 'Play');
-}
-
-/* The frames per second of the last frames, and how long the work of one took. */
-function showRate() {
-  const mean = list => list.reduce((sum, value) => sum + value, 0) / list.length;
-  const { frameTimes, drawTimes } = player;
-  if (frameTimes.length < 10) return;
-  byId('rate').textContent =
-    `${(1000 / mean(frameTimes)).toFixed(0)} frames/s, ${mean(drawTimes).toFixed(1)} ms of work each.`;
 }
 
 const KEYS = {
@@ -107,7 +94,17 @@ const KEYS = {
   '+': () => player.faster(1),
   '=': () => player.faster(1),
   '-': () => player.faster(-1),
+  f: () => showing.project(),
+  d: () => byId('angles').click(),
+  n: () => hasBodies && byId('names').click(),
+  g: () => hasBodies && byId('grid').click(),
+  m: () => hasBodies && byId('measure').click(),
+  0: () => stage.fit(),
+  PageUp: () => stage.zoom(1.25),
+  PageDown: () => stage.zoom(0.8),
 };
+const MOVES = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const MOVE = 40;  // pixels that a key moves the drawing
 
 function connectKeys() {
   document.addEventListener('keydown', event => {
@@ -116,44 +113,18 @@ function connectKeys() {
     const isField = target.matches('select, textarea, input:not([type=range], [type=checkbox])');
     const isPressed = event.key === ' ' && target.matches('button, [type=checkbox]');
     const isTab = target.matches('[role=tab]');
-    const isTaken = isField || isPressed || isTab || event.ctrlKey || event.altKey || event.metaKey;
-    const action = KEYS[event.key];
+    const isTaken = isField || isPressed || isTab || event.ctrlKey || event.metaKey;
+    const onDrawing = target === stage.canvas;
+    const move = event.altKey && onDrawing && MOVES[event.key];
+    const isPage = event.key.startsWith('Page') && !onDrawing;
+    const action = move ? () => stage.pan(MOVE * move[0], MOVE * move[1]) : !event.altKey && !isPage && KEYS[event.key];
     if (isTaken || !action) return;
     event.preventDefault();
     action(event);
   });
 }
 
-/* ---- what is pointed at ---- */
-
-function showTip(state) {
-  const tip = byId('tip'), point = stage.hovered || stage.selected;
-  tip.hidden = !point;
-  if (!point) return;
-  const title = document.createElement('strong');
-  title.textContent = stage.together(point, state).map(({ name }) => name).join(', ');
-  const lines = tipText(point, state).map(text => {
-    const line = document.createElement('div');
-    line.textContent = text;
-    return line;
-  });
-  tip.replaceChildren(title, ` ${point.kind}`, ...lines);
-  const [left, top] = placeOfTip(tip, stage.view.toScreen(stage.where(point, state)), state);
-  tip.style.left = `${left}px`;
-  tip.style.top = `${top}px`;
-}
-
-/* Beside the point or in a corner: the first place that hides the fewest other points. */
-function placeOfTip(tip, [x, y], state) {
-  const [wide, tall] = [tip.offsetWidth, tip.offsetHeight];
-  const [right, low] = [stage.width - wide - 4, stage.height - tall - 4];
-  const beside = [[x + 18, y + 14], [x - 18 - wide, y + 14], [x + 18, y - 14 - tall], [x - 18 - wide, y - 14 - tall]];
-  const inside = beside.filter(([a, b]) => a >= 4 && a <= right && b >= 4 && b <= low);
-  const others = stage.points.map(other => stage.view.toScreen(stage.where(other, state)));
-  const hidden = ([a, b]) => others.filter(([u, v]) => u > a && u < a + wide && v > b && v < b + tall).length;
-  const places = [...inside, [4, 4], [right, 4], [4, low], [right, low]];
-  return places.reduce((best, place) => (hidden(place) < hidden(best) ? place : best));
-}
+/* ---- paths and tabs ---- */
 
 /* Where the model names no point, the longest path is traced from the start: of bodies that are not hung on the ground, where there
    are such, since the others go in circles. */
@@ -164,14 +135,12 @@ function traceLongest() {
   const free = stage.points.filter(point => !hung.has(point.frame.index));
   const candidates = free.length ? free : stage.points;
   const length = point => {
-    const path = pathOf(point).filter(place => place !== null);
+    const path = pathOf(point).line.filter(place => place !== null);
     return path.reduce((sum, place, k) => (k ? sum + towards(path[k - 1], place)[2] : 0), 0);
   };
   const lengths = candidates.map(length), longest = Math.max(...lengths);
   if (longest > player.data.drawing.size) stage.traced.add(candidates[lengths.indexOf(longest)]);
 }
-
-/* ---- tabs and themes ---- */
 
 const panels = {
   plots: () => plots.show(),
@@ -206,27 +175,13 @@ function connectTabs() {
   });
 }
 
-function showTheme() {
-  stage.palette = paletteNow();
-  byId('theme').textContent = stage.palette.isDark ? 'Light' : 'Dark';
-  plots.redraw();
-  player.refresh();
-}
-
-function connectTheme() {
-  byId('theme').addEventListener('click', () => {
-    document.documentElement.dataset.theme = stage.palette.isDark ? 'light' : 'dark';
-    showTheme();
-  });
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', showTheme);
-}
-
 /* ---- start ---- */
 
 function showState(state) {
   if (hasBodies) {
     stage.draw(state);
     showTip(state);
+    tools.show(state);
   }
   showNote(state);
   showTransport(state);
@@ -240,30 +195,39 @@ function start() {
   byId('plain').hidden = hasBodies;
   byId('pointing').hidden = !hasBodies;
   byId('tab-points').hidden = !hasBodies;
-  byId('names').parentElement.hidden = !hasBodies;
+  byId('tools').hidden = !hasBodies;
+  byId('legend').hidden = !hasBodies;
   showMessages();
   markTimeline();
   connectTransport();
   connectKeys();
   connectTabs();
-  connectTheme();
+  showing.connect();
   plots.build(byId('panel-plots'));
   numbers.build(byId('panel-numbers'));
   if (hasBodies) {
     points.build(byId('panel-points'));
     stage.listen();
+    tools.build();
     traceLongest();
   }
   newtonPanel(byId('panel-newton'));
   player.onChange(showState);
   new ResizeObserver(() => {
     stage.resize();
-    plots.resize();
+    plots.redraw();
     player.refresh();
   }).observe(byId('left'));
-  setInterval(showRate, 1000);
+  player.onMotion(forget);
   showPanel('plots');
-  showTheme();
+  showing.theme();
+}
+
+/* The motion is another one: what was computed from the last one is dropped. */
+function forget() {
+  fitMarks(player);
+  for (const keeper of [units, columns, poles, stage]) keeper.forget();
+  plots.redraw();
 }
 
 start();

@@ -46,6 +46,12 @@ const numbers = {
       row.append(cell(name, 'th'), cell(unit), cell(''), cell(''), cell(''));
       return row;
     });
+    this.outputs = tableOf(['output', 'unit', 'value', 'rate', 'second rate']);
+    this.observed = player.data.outputs.map(({ name, unit }) => {
+      const row = this.outputs.tBodies[0].insertRow();
+      row.append(cell(name, 'th'), cell(unit), cell(''), cell(''), cell(''));
+      return row;
+    });
     this.equations = tableOf(['constraint', 'type', '|Phi|']);
     this.joints = player.data.drawing.joints.map(({ name, kind, is_driver }) => {
       const row = this.equations.tBodies[0].insertRow();
@@ -56,19 +62,26 @@ const numbers = {
     for (const { name, value, unit } of player.data.parameters) {
       parameters.tBodies[0].insertRow().append(cell(name, 'th'), cell(numberText(value)), cell(unit));
     }
-    panel.append(bar, wide(this.motion), wide(this.equations));
+    panel.append(bar, ...(this.observed.length ? [wide(this.outputs)] : []), wide(this.motion), wide(this.equations));
     if (player.data.parameters.length) panel.append(wide(parameters));
   },
 
   update(state) {
     const { data } = player;
-    this.at.textContent = state.isFound ? `t = ${numberText(state.time)} s`
-      : `t = ${numberText(state.time)} s: not found; positions are the last found, or the guess`;
-    this.rows.forEach((row, k) => {
-      row.cells[2].textContent = numberText(state.q[k]);
-      row.cells[3].textContent = state.isFound ? numberText(state.q_dot[k]) : '–';
-      row.cells[4].textContent = state.isFound ? numberText(state.q_ddot[k]) : '–';
-    });
+    const time = `t = ${units.full(state.time, 's')}`;
+    this.at.textContent = state.isFound ? time
+      : `${time}: not found; positions are the last found, or the guess`;
+    const fill = (row, unit, values) => {
+      row.cells[1].textContent = units.name(unit);
+      values.forEach((value, k) => {
+        const own = unit ? unit + ['', '/s', '/s²'][k] : '';
+        row.cells[2 + k].textContent = units.text(k && !state.isFound ? NaN : value, own);
+      });
+    };
+    this.rows.forEach((row, k) => fill(row, data.coordinates[k].unit, [state.q[k], state.q_dot[k], state.q_ddot[k]]));
+    const at = state.index * data.outputs.length;
+    const order = (name, k) => (state.isFound ? data.arrays[name][at + k] : NaN);
+    this.observed.forEach((row, k) => fill(row, data.outputs[k].unit, ['y', 'y_dot', 'y_ddot'].map(name => order(name, k))));
     this.joints.forEach((row, k) => {
       const value = residualAt(state, k);
       row.cells[2].textContent = value === null ? '–' : value.toExponential(2);
@@ -81,7 +94,8 @@ const numbers = {
     const { state, data } = player;
     const lines = [`t\t${state.time}`, 'coordinate\tunit\tposition\tvelocity\tacceleration'];
     data.coordinates.forEach(({ name, unit }, k) => lines.push(
-      [name, unit, state.q[k], ...(state.isFound ? [state.q_dot[k], state.q_ddot[k]] : ['', ''])].join('\t')));
+      [name, units.name(unit), ...[state.q[k], ...(state.isFound ? [state.q_dot[k], state.q_ddot[k]] : ['', ''])]
+        .map(value => (value === '' ? value : value * units.factor(unit)))].join('\t')));
     return `${lines.join('\n')}\n`;
   },
 };
@@ -163,28 +177,17 @@ const points = {
   },
 
   update(state) {
+    const unit = player.data.lengthUnit;
     for (const { row, box, point } of this.rows) {
       box.checked = stage.traced.has(point);
       const [x, y] = stage.where(point, state);
       const { velocity, acceleration } = ratesInWorld(state, point.frame, point.point);
       const values = [x, y, Math.hypot(...velocity), Math.hypot(...acceleration)];
+      row.cells[1].style.background = stage.traced.has(point) ? stage.colourOf(point) : '';
       values.forEach((value, k) => {
-        row.cells[2 + k].textContent = k > 1 && !state.isFound ? '–' : numberText(value);
+        const per = ['', '', '/s', '/s²'][k];
+        row.cells[2 + k].textContent = units.text(k > 1 && !state.isFound ? NaN : value, unit + per);
       });
     }
   },
 };
-
-/* What is shown beside a point that is hovered or selected. */
-function tipText(point, state) {
-  const unit = player.data.lengthUnit;
-  const [x, y] = stage.where(point, state);
-  const lines = [`x = ${numberText(x)}, y = ${numberText(y)} ${unit}`];
-  if (state.isFound) {
-    const { velocity, acceleration } = ratesInWorld(state, point.frame, point.point);
-    const vector = ([a, b]) => `(${numberText(a)}, ${numberText(b)})`;
-    lines.push(`v = ${vector(velocity)}, ${numberText(Math.hypot(...velocity))} ${unit}/s`);
-    lines.push(`a = ${vector(acceleration)}, ${numberText(Math.hypot(...acceleration))} ${unit}/s²`);
-  }
-  return lines;
-}

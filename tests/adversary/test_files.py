@@ -4,15 +4,13 @@ The named hostile files are in tests/unit/files/hostile.py; these are of a seede
 knows no case. Each is read by a process of its own, with limits on processor time and memory.
 """
 
-import json
-import os
 import random
-import subprocess
-import sys
 
 import pytest
 
-SECONDS, BYTES = 10, 1_500_000_000
+from tests.bounded import read_bounded
+
+SECONDS = 10
 
 TOKENS = {
     "toml": [
@@ -40,47 +38,6 @@ FIRST = {
     "acf": ["", '{"simulation": ', "["],
 }
 
-READ = f"""
-import json, os, resource, sys, time
-from pathlib import Path
-import kincompile as kc
-
-m = kc.Mechanism("pendulum")
-bob = m.body("bob", guess=(1, 0, 0))
-m.add(kc.Revolute("pin", bob, (-1, 0), m.ground, (0, 0)))
-m.add(kc.AbsoluteAngle("motor", bob, kc.t**2))
-m.system()
-
-
-def read(path):
-    if path.suffix == ".txt":
-        kc.compare_file(m, path)
-    else:
-        (kc.read_analysis if path.suffix == ".acf" else kc.read)(path)
-
-
-for path in sorted(Path().glob("file*")):
-    told, its = os.pipe()
-    child = os.fork()
-    if not child:
-        resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))
-        resource.setrlimit(resource.RLIMIT_AS, ({BYTES}, {BYTES}))
-        started, verdict = time.process_time(), "read"
-        try:
-            read(path)
-        except kc.KincompileError as error:
-            verdict = "refused" if len(str(error)) < 50_000 else "a message without end"
-        except BaseException as error:
-            verdict = type(error).__name__
-        os.write(its, json.dumps([verdict, time.process_time() - started]).encode())
-        os._exit(0)
-    os.close(its)
-    os.waitpid(child, 0)
-    answer = os.read(told, 10_000)
-    os.close(told)
-    print(json.dumps([path.name, *(json.loads(answer) if answer else ["no end", {SECONDS}])]))
-"""
-
 
 def hostile(rng, largest):
     """Return the ending of a file and its content: groups of tokens, repeated and nested."""
@@ -99,19 +56,14 @@ def check_files(seed, count, largest, folder, record):
     for number in range(count):
         ending, text = hostile(rng, largest)
         (folder / f"file{number:04}.{ending}").write_text(text, encoding="utf-8")
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    run = [sys.executable, "-c", READ]
-    done = subprocess.run(
-        run, cwd=folder, env=environment, capture_output=True, text=True, check=True
-    )
-    found = [json.loads(line) for line in done.stdout.splitlines()]
+    found = read_bounded(folder, SECONDS)
     assert len(found) == count
-    wrong = [item for item in found if item[1] not in ("read", "refused")]
-    slowest = max(found, key=lambda item: item[2])
-    record(tried=count, wrong=len(wrong), slowest=slowest[2])
-    assert wrong == []
-    assert sum(item[1] == "refused" for item in found) > 0.8 * count
-    return slowest
+    verdicts = [verdict for verdict, _, _ in found.values()]
+    wrong = {name: item for name, item in found.items() if item[0] not in ("read", "refused")}
+    slowest = max(used for _, _, used in found.values())
+    record(tried=count, wrong=len(wrong), slowest=slowest)
+    assert not wrong
+    assert verdicts.count("refused") > 0.8 * count
 
 
 def test_a_few_random_files(tmp_path, record):

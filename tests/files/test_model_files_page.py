@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import kincompile as kc
-from kincompile.files.file_format import FIELDS
+from kincompile.files.file_format import FIELDS, PARTS
 from kincompile.files.safe_expressions import FUNCTIONS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "model_files.md").read_text(encoding="utf-8")
@@ -21,9 +21,20 @@ def test_that_the_example_swings(tmp_path):
     np.testing.assert_allclose(solution["y_arm"], 0.25 * np.sin(phi), rtol=1e-12)
 
 
+def test_that_the_drawing_is_a_shaper(tmp_path):
+    """Its strokes take as long as the closed form says, (pi + 2 asin(r/d)) : (pi - 2 asin(r/d))."""
+    file = tmp_path / "shaper.toml"
+    file.write_text(re.findall(r"^```toml\n(.*?)^```", PAGE, re.M | re.S)[1], encoding="utf-8")
+    module = kc.compile(kc.read(file))
+    feed = kc.solve(module, np.linspace(0, 1, 181)).measures()["feed"]
+    swing = 2 * np.arcsin(0.1 / 0.45)
+    np.testing.assert_allclose(feed.time_ratio, (np.pi + swing) / (np.pi - swing), rtol=1e-6)
+
+
 def test_that_each_table_has_its_fields():
-    for table in ("model", "analysis", "parameter", "body", "coordinate", "point", "output"):
-        for field in FIELDS[table]:
+    tables = ("model", "analysis", "parameter", "body", "coordinate", "point", "output", "sketch")
+    for fields in (*(FIELDS[table] for table in tables), *PARTS.values()):
+        for field in fields:
             assert f"`{field}`" in PAGE
 
 

@@ -127,7 +127,8 @@ def driver_ranges(solution: MotionTable, module: ModuleType, p: Array) -> tuple[
         return ()
     with np.errstate(all="ignore"):
         equations = problem(module, p, q, t)
-        return tuple(_range(equations, driver, q, t) for driver in describe(t, p))
+        drivers = [Driver(*item) for item in describe(t, p)]
+        return tuple(_range(equations, driver, q, t) for driver in drivers)
 
 
 def _range(equations: Problem, driver: Driver, q: Array, t: float) -> DriverRange:

@@ -164,12 +164,12 @@ def measures(solution: MotionTable, module: ModuleType, p: Array) -> Measures:
         raise InputError(f"{solution.name} has no motion to measure. {solution.message}")
     found: tuple[OutputMeasures, ...] = ()
     if solution.observed.names:
-        motion = _Motion(solution, module, p)
+        motion = _ObservedMotion(solution, module, p)
         found = tuple(_measured(motion, k) for k in range(len(motion.names)))
     return Measures(solution.name, found, driver_ranges(solution, module, p))
 
 
-class _Motion:
+class _ObservedMotion:
     """Outputs over rising times (N,), and between them."""
 
     def __init__(self, solution: MotionTable, module: ModuleType, p: Array) -> None:
@@ -268,7 +268,7 @@ class _Motion:
         return found
 
 
-def _measured(motion: _Motion, k: int) -> OutputMeasures:
+def _measured(motion: _ObservedMotion, k: int) -> OutputMeasures:
     """Return the measures of output k."""
     name = motion.names[k]
     dead, kinks = _dead_points(motion, k)
@@ -281,7 +281,7 @@ def _measured(motion: _Motion, k: int) -> OutputMeasures:
     )  # fmt: skip
 
 
-def _dead_points(motion: _Motion, k: int) -> tuple[list[float], list[float]]:
+def _dead_points(motion: _ObservedMotion, k: int) -> tuple[list[float], list[float]]:
     """Return the times at which an output turns back, and those of them that are corners."""
     t, y, y_dot, y_ddot = motion.t, motion.y[:, k], motion.y_dot[:, k], motion.y_ddot[:, k]
     most = float(np.max(np.abs(y_dot), initial=0.0, where=np.isfinite(y_dot)))
@@ -312,7 +312,7 @@ def _rests(t: Array, signs: Array) -> list[float]:
 
 
 def _brackets(
-    motion: _Motion, k: int, a: int, signs: Array, y_dot: Array, y_ddot: Array
+    motion: _ObservedMotion, k: int, a: int, signs: Array, y_dot: Array, y_ddot: Array
 ) -> list[tuple[float, float]]:
     """Return the times between which a rate has a zero, in the step from point a to the next.
 
@@ -330,7 +330,7 @@ def _brackets(
     return [(start, middle), (middle, stop)] if crosses else []
 
 
-def _zero(motion: _Motion, k: int, low: float, high: float) -> tuple[float, float]:
+def _zero(motion: _ObservedMotion, k: int, low: float, high: float) -> tuple[float, float]:
     """Return when the rate of an output is zero between two times, and the rate there.
 
     Newton's method, or secants where no second rate is emitted, with a bisection where either
@@ -354,7 +354,7 @@ def _zero(motion: _Motion, k: int, low: float, high: float) -> tuple[float, floa
     return t, rate
 
 
-def _extreme(motion: _Motion, k: int, dead: list[float], sign: int) -> tuple[float, float]:
+def _extreme(motion: _ObservedMotion, k: int, dead: list[float], sign: int) -> tuple[float, float]:
     """Return the first time of the least or the greatest value, by sign, and the value."""
     y = motion.y[:, k]
     times = [float(motion.t[0]), *dead, float(motion.t[-1])]
@@ -371,7 +371,7 @@ def _extreme(motion: _Motion, k: int, dead: list[float], sign: int) -> tuple[flo
     return times[best], values[best]
 
 
-def _period(motion: _Motion, k: int, dead: list[float]) -> float | None:
+def _period(motion: _ObservedMotion, k: int, dead: list[float]) -> float | None:
     """Return the time after which an output repeats itself, if it was solved for so long."""
     if not dead:
         return None
@@ -379,7 +379,7 @@ def _period(motion: _Motion, k: int, dead: list[float]) -> float | None:
     return next((period for period in candidates if _repeats(motion, k, dead[0], period)), None)
 
 
-def _repeats(motion: _Motion, k: int, first: float, period: float) -> bool:
+def _repeats(motion: _ObservedMotion, k: int, first: float, period: float) -> bool:
     """Say whether an output and its rate are the same one period later, at some times."""
     start, end = float(motion.t[0]), float(motion.t[-1])
     slack = 1e-9 * motion.span
@@ -395,7 +395,7 @@ def _repeats(motion: _Motion, k: int, first: float, period: float) -> bool:
     return True
 
 
-def _time_ratio(motion: _Motion, dead: list[float], period: float | None) -> float | None:
+def _time_ratio(motion: _ObservedMotion, dead: list[float], period: float | None) -> float | None:
     """Return the longer by the shorter time between the two dead points of a period."""
     if period is None:
         return None
@@ -406,7 +406,7 @@ def _time_ratio(motion: _Motion, dead: list[float], period: float | None) -> flo
     return max(one, period - one) / min(one, period - one)
 
 
-def _means(motion: _Motion, k: int, kinks: list[float]) -> tuple[float, float]:
+def _means(motion: _ObservedMotion, k: int, kinks: list[float]) -> tuple[float, float]:
     """Return the means of an output and of its square over time."""
     t, y, y_dot = motion.t, motion.y[:, k], motion.y_dot[:, k]
     if t.size == 1:
@@ -435,7 +435,7 @@ def _integrals(t: Array, f: Array, f_dot: Array, f_ddot: Array) -> Array:
     return np.asarray(parts[0] + parts[1] + h**3 / 120 * (f_ddot[1:] + f_ddot[:-1]))
 
 
-def _by_gauss(motion: _Motion, k: int, edges: list[float]) -> Array:
+def _by_gauss(motion: _ObservedMotion, k: int, edges: list[float]) -> Array:
     """Return the integrals of an output and of its square over pieces of a step."""
     total = np.zeros(2)
     places, weights = _gauss()

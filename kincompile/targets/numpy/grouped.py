@@ -12,7 +12,7 @@ import numpy as np
 
 from kincompile.ir.graph import pruned
 from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
-from kincompile.quantities import FORMAT, kernels
+from kincompile.quantities import FORMAT, functions, kernels, states_of
 from kincompile.targets.evaluators import input_names, inputs_read, schedule
 from kincompile.targets.lines import indented, wrapped
 from kincompile.targets.naming import NameTable
@@ -217,11 +217,23 @@ def _kernels(program: Program) -> dict[str, tuple[str, ...]]:
 
 
 def _public(program: Program, nonzeros: int) -> Iterator[str]:
-    """Yield the public functions of the quantities."""
+    """Yield the public functions: of the quantities, and of those that are given together."""
     for quantity, name, lines in public_functions(program, nonzeros):
-        states = ", ".join(quantity.states)
         yield from lines
-        yield f'    return _evaluate(("{name}",), t, p, {states})[0]\n\n'
+        yield _call((name,), quantity.states) + "[0]\n\n"
+    for name, own in functions(program.quantities).items():
+        if len(own) > 1:
+            states = states_of(own)
+            yield f"def {name}({', '.join(states)}, t, p=DEFAULTS):"
+            yield f'    """{", ".join(own[:-1])} and {own[-1]} in one go."""'
+            yield _call(own, states) + "\n\n"
+
+
+def _call(names: Sequence[str], states: Sequence[str]) -> str:
+    """Return the line that evaluates quantities."""
+    wanted = ", ".join(f'"{name}"' for name in names)
+    end = "," if len(names) == 1 else ""
+    return f"    return _evaluate(({wanted}{end}), t, p, {', '.join(states)})"
 
 
 def _data(

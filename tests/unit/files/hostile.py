@@ -15,6 +15,16 @@ CONSTRAINT = (
 )
 
 
+def drawing(links: int, joints: int) -> str:
+    """Return a drawing of long links, each of other joints in another order."""
+    names = [f"J{k}" for k in range(joints)]
+    places = ", ".join(f"{name} = [{k}, {k * k % 7}]" for k, name in enumerate(names))
+    parts = [f'{{link="L{k}", joints="{" ".join(names)}"}}' for k in range(links)]
+    return (
+        f'kincompile = 1\nname = "m"\n[sketch]\njoints = {{{places}}}\nparts = [{", ".join(parts)}]'
+    )
+
+
 def doubled(formula: str, count: int = 22, last: str = "gamma = [a{k}, 0, 0]") -> str:
     """Return aliases each of which holds the one before twice."""
     lines = ["a0 = x_bob + sin(phi_bob)"]
@@ -23,6 +33,9 @@ def doubled(formula: str, count: int = 22, last: str = "gamma = [a{k}, 0, 0]") -
 
 
 MODELS: dict[str, Case] = {
+    "long links": ("toml", lambda: drawing(300, 30), ""),
+    "many links": ("toml", lambda: drawing(50000, 2), "at most 300 parts"),
+    "a long link": ("toml", lambda: drawing(1, 900), "at most 30 joints"),
     "dotted key": ("toml", lambda: "a" + ".a" * 40000 + " = 1", "has more than 4 parts"),
     "dotted key with blanks": ("toml", lambda: "a" + " . a" * 40000 + "=1", "more than 4 parts"),
     "dotted key in quotes": ("toml", lambda: "'a'" + ".'a'" * 40000 + " = 1", "more than 4 parts"),

@@ -15,9 +15,9 @@ from kincompile.files.safe_expressions import (
     MAX_LENGTH,
     MAX_NODES,
     ExpressionError,
-    Place,
     parse_expression,
 )
+from kincompile.files.text_places import TextPlace
 from kincompile.model.expressions import SMOOTH
 from kincompile.model.spline import PeriodicSpline
 
@@ -163,9 +163,9 @@ def test_that_a_refused_name_comes_with_its_reason() -> None:
 
 def test_that_places_count_from_where_the_text_begins() -> None:
     with pytest.raises(ExpressionError, match="line 7, column 14") as first:
-        parse_expression("x + zeta", NAMES, Place(7, 10))
+        parse_expression("x + zeta", NAMES, TextPlace(7, 10))
     with pytest.raises(ExpressionError, match="line 8, column 3"):
-        parse_expression("x +\n  zeta", NAMES, Place(7, 10))
+        parse_expression("x +\n  zeta", NAMES, TextPlace(7, 10))
     assert first.value.problem.startswith("there is no 'zeta'")
 
 

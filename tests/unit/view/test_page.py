@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.targets.templates import read, template_root
+from kincompile.targets.templates import template_root
 from kincompile.view.page import SCRIPTS, STYLES
 
 
@@ -173,11 +173,6 @@ def test_that_every_script_and_style_sheet_is_used():
     here = {item.name for item in folder.iterdir() if item.name.endswith((".js", ".css"))}
     gallery = {"gallery.js", "gallery.css"}
     assert here == {name for name in (*SCRIPTS, *STYLES) if "/" not in name} | gallery
-
-
-def test_that_the_licence_of_the_plots_is_in_the_page():
-    assert "Copyright (c) 2022 Leon Sorokin" in kc.page(pendulum()).html
-    assert "</script" not in read("view/vendor/uplot.js")
 
 
 def test_that_a_page_shows_itself_in_a_frame_of_a_notebook():

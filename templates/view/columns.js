@@ -1,0 +1,161 @@
+'use strict';
+/* What can be plotted, listed and saved: columns of numbers over the solved times.
+
+   columns.groups()     [{ title, items: [{ label, unit, isLog, values() }] }], what the model names first
+   columns.find(label)  one of them; 'path of P' has `path`, the labels of its two columns */
+
+const RATES = [['', ''], ['_dot', '/s'], ['_ddot', '/s²']];
+
+const columns = {
+  forget() {
+    this.kept = new Map();
+  },
+
+  kept: new Map(),
+
+  groups() {
+    const { data } = player;
+    const groups = [
+      ...ordersOf(['Outputs', 'Rates of outputs', 'Second rates of outputs'], named(data), 'y', data.outputs),
+      { title: 'Paths', items: stage.points.map(pathItem) },
+      { title: 'Points', items: stage.points.flatMap(pointItems) },
+      ...ordersOf(['Positions', 'Velocities', 'Accelerations'], data.coordinates, 'q', data.coordinates),
+      { title: 'Residuals', items: residualItems(data) },
+      { title: 'Jacobian', items: jacobianItems(data) },
+    ];
+    return groups.filter(group => group.items.length);
+  },
+
+  find(label) {
+    for (const { items } of this.groups()) {
+      const item = items.find(other => other.label === label);
+      if (item) return item;
+    }
+    return null;
+  },
+
+  /* The numbers of a column, computed once a motion. */
+  values(item) {
+    if (!this.kept.has(item.label)) this.kept.set(item.label, item.values());
+    return this.kept.get(item.label);
+  },
+};
+
+function finite(value) {
+  return Number.isFinite(value) ? value : null;
+}
+
+function entries(name, k, width) {
+  return Array.from({ length: player.count }, (_, row) => finite(player.data.arrays[name][row * width + k]));
+}
+
+/* Outputs, those of the model before the coordinates of its points. */
+function named({ outputs, drawing }) {
+  const dots = drawing.marks.filter(mark => mark.kind === 'dot').flatMap(({ name }) => [`x_${name}`, `y_${name}`]);
+  const isDot = ({ name }) => dots.includes(name);
+  return [...outputs.filter(output => !isDot(output)), ...outputs.filter(isDot)];
+}
+
+function ordersOf(titles, owners, array, all) {
+  return RATES.map(([order, per], k) => ({
+    title: titles[k],
+    items: owners.map(owner => ({
+      label: owner.name + order, unit: owner.unit ? owner.unit + per : '',
+      values: () => entries(array + order, all.indexOf(owner), all.length),
+    })),
+  }));
+}
+
+/* Numbers of a point over the motion. */
+function along(point, number) {
+  return Array.from({ length: player.count }, (_, k) => {
+    const state = player.solved(k);
+    return state.isFound ? finite(number(state, point)) : null;
+  });
+}
+
+const titleOf = point => (point.kind.startsWith('origin') ? `origin of ${point.name}` : point.name);
+
+function pointItems(point) {
+  const unit = player.data.lengthUnit, name = titleOf(point);
+  const speed = kind => state => Math.hypot(...ratesInWorld(state, point.frame, point.point)[kind]);
+  const items = [
+    [`x of ${name}`, unit, state => stage.where(point, state)[0]],
+    [`y of ${name}`, unit, state => stage.where(point, state)[1]],
+    [`|v| of ${name}`, `${unit}/s`, speed('velocity')],
+    [`|a| of ${name}`, `${unit}/s²`, speed('acceleration')],
+  ];
+  return items.map(([label, own, number]) => ({ label, unit: own, values: () => along(point, number) }));
+}
+
+function pathItem(point) {
+  const name = titleOf(point);
+  return { label: `path of ${name}`, unit: player.data.lengthUnit, path: [`x of ${name}`, `y of ${name}`] };
+}
+
+/* A residual of exactly zero has no logarithm. */
+function residualItems({ arrays, drawing: { joints } }) {
+  const aboveZero = value => (value === null ? null : Math.max(value, 1e-18));
+  return !arrays.residual ? [] : joints.map(({ name }, k) => ({
+    label: `|Phi| of ${name}`, unit: '', isLog: true,
+    values: () => entries('residual', k, joints.length).map(aboveZero),
+  }));
+}
+
+function jacobianItems({ arrays }) {
+  const all = [['condition', 'condition number of Phi_q', true], ['determinant', 'determinant of Phi_q', false]];
+  return all.filter(([name]) => arrays[name]).map(([name, label, isLog]) => ({
+    label, unit: '', isLog, values: () => entries(name, 0, 1),
+  }));
+}
+
+/* Whether a column is more than rounding around a constant. */
+function moves(item) {
+  const values = columns.values(item).filter(value => value !== null);
+  const size = Math.max(units.scale(item.unit), 1e-12);
+  return values.some(value => Math.abs(value - values[0]) > 1e-9 * size);
+}
+
+/* What is plotted when the page opens: the first output that moves, with its rates; else of the
+   first point of uneven speed its path, speed and acceleration; else the liveliest coordinate. */
+function plottedFirst() {
+  const { data } = player, dots = stage.points.filter(point => point.isNamed);
+  const outputs = named(data).slice(0, data.outputs.length - 2 * dots.length);
+  const output = outputs.find(({ name }) => moves(columns.find(name)));
+  if (output) return RATES.map(([order]) => output.name + order);
+  const dot = dots.find(({ name }) => moves(columns.find(`|v| of ${name}`)));
+  if (dot) return [`path of ${dot.name}`, `|v| of ${dot.name}`, `|a| of ${dot.name}`];
+  const name = liveliest();
+  return RATES.map(([order]) => name + order);
+}
+
+/* Of bodies an angle, that of the largest acceleration, so that it is not one that a motor turns
+   steadily; where all angles are steady, as of a cam and its follower, any coordinate of the largest
+   acceleration; where nothing accelerates, the one that goes farthest. */
+function liveliest() {
+  const { data, n } = player, { frames } = data.drawing;
+  const all = data.coordinates.map((_, k) => k);
+  const sizes = (name, candidates) => candidates.map(k => {
+    const values = data.arrays[name].filter((value, place) => place % n === k && Number.isFinite(value));
+    return values.reduce((most, value) => Math.max(most, Math.abs(value - values[0])), 0);
+  });
+  const ofBodies = frames.length ? frames.flatMap(frame => frame.columns) : all;
+  const angles = frames.map(({ columns: [, , phi] }) => phi);
+  for (const [name, candidates] of [['q_ddot', angles], ['q_ddot', ofBodies], ['q', all]]) {
+    const found = sizes(name, candidates), largest = Math.max(0, ...found);
+    if (largest > 1e-9) return data.coordinates[candidates[found.indexOf(largest)]].name;
+  }
+  return data.coordinates[0].name;
+}
+
+/* Pieces of time [from, to] in which something was not found. */
+function failures() {
+  const { status } = player.data, pieces = [];
+  for (let k = 0; k < player.count; k++) {
+    if (status[k] === 0) continue;
+    const begin = player.t[Math.max(0, k - 1)];
+    while (k + 1 < player.count && status[k + 1] !== 0) k++;
+    pieces.push([begin, player.t[k]]);
+  }
+  return pieces;
+}

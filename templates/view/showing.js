@@ -1,0 +1,66 @@
+'use strict';
+/* How the page is shown: light or dark, degrees or radians, full screen, on paper. */
+
+const showing = {
+  connect() {
+    byId('theme').addEventListener('click', () => {
+      document.documentElement.dataset.theme = stage.palette.isDark ? 'light' : 'dark';
+      this.theme();
+    });
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.theme());
+    byId('angles').addEventListener('click', () => this.angles());
+    byId('project').addEventListener('click', () => this.project());
+    document.addEventListener('fullscreenchange', () => this.enlarge(Boolean(document.fullscreenElement)));
+    addEventListener('beforeprint', () => this.print(true));
+    addEventListener('afterprint', () => this.print(false));
+  },
+
+  theme() {
+    stage.palette = paletteNow();
+    byId('theme').textContent = stage.palette.isDark ? 'Light' : 'Dark';
+    if (hasBodies) tools.colour();
+    plots.redraw();
+    player.refresh();
+  },
+
+  angles() {
+    units.angle = units.angle === 'rad' ? 'deg' : 'rad';
+    byId('angles').textContent = units.angle === 'rad' ? 'deg' : 'rad';
+    plots.zoom(null);
+    player.refresh();
+  },
+
+  /* Full screen with large type; where a browser allows no full screen, as in a notebook, large type. */
+  async project() {
+    const isOn = !document.documentElement.classList.contains('projected');
+    this.enlarge(isOn);
+    try {
+      if (isOn) await document.documentElement.requestFullscreen();
+      else if (document.fullscreenElement) await document.exitFullscreen();
+    } catch { /* the type is large */ }
+  },
+
+  enlarge(isOn) {
+    document.documentElement.classList.toggle('projected', isOn);
+    byId('project').ariaPressed = String(isOn);
+    this.layOut();
+  },
+
+  layOut() {
+    stage.resize();
+    plots.redraw();
+    player.refresh();
+  },
+
+  /* Paper is light. */
+  print(isOn) {
+    const { dataset } = document.documentElement;
+    if (isOn) {
+      this.before = dataset.theme;
+      player.pause();
+      dataset.theme = 'light';
+    } else if (this.before) dataset.theme = this.before;
+    else delete dataset.theme;
+    this.theme();
+  },
+};

@@ -1,0 +1,64 @@
+'use strict';
+/* What is shown beside a point or a body that is pointed at. */
+
+function showTip(state) {
+  const tip = byId('tip'), target = stage.hovered || stage.selected;
+  tip.hidden = !target;
+  if (!target) return;
+  const parts = target.isBody ? bodyTip(target, state) : pointTip(target, state);
+  tip.replaceChildren(...parts);
+  const [left, top] = placeOfTip(tip, stage.view.toScreen(stage.where(target, state)), state);
+  tip.style.left = `${left}px`;
+  tip.style.top = `${top}px`;
+}
+
+function tipLine(text, className = '') {
+  const line = document.createElement('div');
+  Object.assign(line, { className, textContent: text });
+  return line;
+}
+
+function tipTitle(text) {
+  const title = document.createElement('strong');
+  title.textContent = text;
+  return title;
+}
+
+/* A point: every name at its place, then its position, velocity and acceleration. */
+function pointTip(point, state) {
+  const unit = player.data.lengthUnit, [x, y] = stage.where(point, state);
+  const here = stage.together(point, state);
+  const names = here.map(({ name, kind }) => tipLine(`${name}: ${kind}`));
+  const lines = [tipLine(`x = ${units.text(x, unit)}, y = ${units.text(y, unit)} ${unit}`)];
+  if (state.isFound) {
+    const rates = ratesInWorld(state, point.frame, point.point);
+    for (const [sign, kind, per] of [['v', 'velocity', '/s'], ['a', 'acceleration', '/s²']]) {
+      const own = unit + per, [a, b] = rates[kind].map(part => units.text(part, own));
+      lines.push(tipLine(`${sign} = (${a}, ${b}), ${units.full(Math.hypot(...rates[kind]), own)}`, kind));
+    }
+  }
+  return [tipTitle(here.map(({ name }) => name).join(', ')), ...names, ...lines];
+}
+
+/* A body: its angle and how it turns. */
+function bodyTip({ name, frame }, state) {
+  const [, , phi] = frame.columns, unit = player.data.coordinates[phi].unit;
+  const lines = [tipLine(`φ = ${units.full(state.q[phi], unit)}`)];
+  if (state.isFound) {
+    lines.push(tipLine(`ω = ${units.full(state.q_dot[phi], `${unit}/s`)}`, 'velocity'));
+    lines.push(tipLine(`α = ${units.full(state.q_ddot[phi], `${unit}/s²`)}`, 'acceleration'));
+  }
+  return [tipTitle(name), ' body', ...lines];
+}
+
+/* Beside the point or in a corner: the first place that hides the fewest other points. */
+function placeOfTip(tip, [x, y], state) {
+  const [wide, tall] = [tip.offsetWidth, tip.offsetHeight];
+  const [right, low] = [stage.width - wide - 4, stage.height - tall - 4];
+  const beside = [[x + 18, y + 14], [x - 18 - wide, y + 14], [x + 18, y - 14 - tall], [x - 18 - wide, y - 14 - tall]];
+  const inside = beside.filter(([a, b]) => a >= 4 && a <= right && b >= 4 && b <= low);
+  const others = stage.points.map(other => stage.view.toScreen(stage.where(other, state)));
+  const hidden = ([a, b]) => others.filter(([u, v]) => u > a && u < a + wide && v > b && v < b + tall).length;
+  const places = [...inside, [4, 4], [right, 4], [4, low], [right, low]];
+  return places.reduce((best, place) => (hidden(place) < hidden(best) ? place : best));
+}

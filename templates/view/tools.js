@@ -1,0 +1,216 @@
+'use strict';
+/* What helps to read the drawing: grid and scale, distances and angles, what is looked at. */
+
+const GRID = 70;  // pixels between lines of the grid, about
+const STEPS = [1, 2, 5, 10];
+
+/* The step 1, 2 or 5 times a power of ten that is next to a length. */
+function niceStep(length) {
+  const power = 10 ** Math.floor(Math.log10(length));
+  return power * STEPS.find(step => step * power >= 0.999 * length);
+}
+
+/* Multiples of a step between two numbers. */
+function multiples(step, low, high) {
+  const first = Math.ceil(low / step - 1e-9), count = Math.floor(high / step + 1e-9) - first + 1;
+  return Array.from({ length: Math.max(0, count) }, (_, k) => (first + k) * step);
+}
+
+/* A multiple of a step, without the digits that its rounding adds. */
+function stepText(value, step) {
+  const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(1);
+  return (size < step / 2 ? 0 : value).toFixed(Math.min(12, decimals));
+}
+
+const grid = {
+  isShown: false,
+
+  draw(ctx, view, palette) {
+    const pen = new Pen(ctx, null, { view, palette }, player.data.drawing.size);
+    if (this.isShown) this.drawLines(pen, niceStep(GRID / view.scale));
+    this.drawScale(pen, niceStep(0.12 * stage.width / view.scale));
+  },
+
+  drawLines(pen, step) {
+    const { view, palette, ctx } = pen, { width, height } = stage, unit = player.data.lengthUnit;
+    const [left, low] = view.toWorld([0, height]), [right, high] = view.toWorld([width, 0]);
+    const upright = multiples(step, left, right).map(x => [x, view.toScreen([x, 0])[0]]);
+    const level = multiples(step, low, high).map(y => [y, view.toScreen([0, y])[1]]);
+    const rule = (isAxis, line) => {
+      pen.path(line);
+      pen.stroke(isAxis ? palette.quiet : palette.line, isAxis ? 1.5 : 1);
+    };
+    for (const [x, at] of upright) rule(Math.abs(x) < step / 2, [[at, 0], [at, height]]);
+    for (const [y, at] of level) rule(Math.abs(y) < step / 2, [[0, at], [width, at]]);
+    Object.assign(ctx, { font: stage.font(), fillStyle: palette.quiet, textAlign: 'center', textBaseline: 'top' });
+    for (const [x, at] of upright) if (at > 40 && at < width - 70) ctx.fillText(stepText(x, step), at, 4);
+    ctx.textAlign = 'right';
+    ctx.fillText(`x [${unit}]`, width - 6, 4);
+    Object.assign(ctx, { textAlign: 'left', textBaseline: 'middle' });
+    for (const [y, at] of level) if (at > 40 && at < height - 40) ctx.fillText(stepText(y, step), 5, at);
+    ctx.textBaseline = 'top';
+    ctx.fillText(`y [${unit}]`, 5, 4);
+  },
+
+  /* A bar of a round length, at the lower right. */
+  drawScale(pen, length) {
+    const { view, palette } = pen, right = stage.width - 14, low = stage.height - 12;
+    const left = right - length * view.scale;
+    pen.path([[left, low - 5], [left, low], [right, low], [right, low - 5]]);
+    pen.stroke(palette.quiet, 1.8);
+    const text = `${stepText(length, length)} ${player.data.lengthUnit}`;
+    stage.write(text, [(left + right) / 2, low - 5], palette.quiet, '', 'center');
+  },
+};
+
+/* A distance between two points; with a third one, the angle at the second. */
+const measure = {
+  isOn: false,
+  points: [],  // { name, frame, point }: they move with their bodies
+
+  /* What was clicked: a point of the mechanism where one is near, else a place on the ground. */
+  down(world) {
+    if (!this.isOn) return false;
+    const near = stage.near(stage.view.toScreen(world), NEAR);
+    this.take(near ?? { name: '', frame: GROUND, point: world });
+    return true;
+  },
+
+  take(point) {
+    this.points = this.points.length > 2 ? [point] : [...this.points, point];
+    player.refresh();
+  },
+
+  /* What is measured at a state: lengths in the model's unit, angles in radians. */
+  found(state) {
+    const [a, b, c] = this.points.map(({ frame, point }) => inWorld(state.q, frame, point));
+    if (!b) return null;
+    const [x, y] = [b[0] - a[0], b[1] - a[1]];
+    const found = { x, y, distance: Math.hypot(x, y), slope: Math.atan2(y, x) };
+    if (!c) return found;
+    const turn = Math.atan2(c[1] - b[1], c[0] - b[0]) - Math.atan2(a[1] - b[1], a[0] - b[0]);
+    return { ...found, angle: Math.abs(Math.atan2(Math.sin(turn), Math.cos(turn))) };
+  },
+
+  text(state) {
+    const found = this.found(state), unit = player.data.lengthUnit;
+    if (!found) return this.points.length ? 'Choose a second point.' : 'Choose two points, or three for an angle.';
+    const { x, y, distance, slope, angle } = found;
+    const length = value => units.full(value, unit), turn = value => units.full(value, 'rad', Math.PI);
+    const line = `distance ${length(distance)}, Δx ${length(x)}, Δy ${length(y)}, slope ${turn(slope)}`;
+    return angle === undefined ? line : `angle ${turn(angle)}; first ${line}`;
+  },
+
+  draw(ctx, view, palette, state) {
+    if (!this.isOn || !this.points.length) return;
+    const pen = new Pen(ctx, state.q, { view, palette }, player.data.drawing.size);
+    const places = this.points.map(({ frame, point }) => pen.at(frame, point));
+    pen.path(places);
+    pen.stroke(palette.paper, 5);
+    pen.stroke(palette.measure, 2);
+    for (const place of places) {
+      pen.circle(place, 5);
+      pen.fill(palette.paper);
+      pen.stroke(palette.measure, 2);
+    }
+    const found = this.found(state);
+    if (!found) return;
+    const text = found.angle === undefined
+      ? units.full(found.distance, player.data.lengthUnit) : units.full(found.angle, 'rad', Math.PI);
+    const [x, y] = found.angle === undefined ? mixed(places[0], places[1], 0.5) : places[1];
+    stage.write(text, [x + 10, y - 8], palette.measure, 'bold');
+  },
+};
+
+/* A point between two, or beyond them. */
+function mixed([x0, y0], [x1, y1], part) {
+  return [x0 + part * (x1 - x0), y0 + part * (y1 - y0)];
+}
+
+/* ---- buttons and choices ---- */
+
+const tools = {
+  build() {
+    const pressed = (id, toggle) => {
+      const button = byId(id);
+      button.addEventListener('click', () => {
+        button.ariaPressed = String(button.ariaPressed !== 'true');
+        toggle(button.ariaPressed === 'true');
+        player.refresh();
+      });
+    };
+    pressed('names', isOn => { stage.showsNames = isOn; });
+    pressed('grid', isOn => { grid.isShown = isOn; });
+    pressed('measure', isOn => { measure.isOn = isOn; });
+    const acts = { fit: () => stage.fit(), closer: () => stage.zoom(1.4), wider: () => stage.zoom(1 / 1.4) };
+    for (const [id, act] of Object.entries(acts)) byId(id).addEventListener('click', act);
+    this.buildMeasure();
+    this.buildPoles();
+    this.buildLegend();
+    stage.underlays.push((...given) => grid.draw(...given));
+    stage.overlays.push((...given) => measure.draw(...given), (...given) => poles.draw(...given));
+    const next = stage.pointer;
+    stage.pointer = {
+      down: (world, event) => measure.down(world) || next?.down?.(world, event),
+      move: (world, event) => !measure.isOn && next?.move?.(world, event),
+      up: (world, event) => !measure.isOn && next?.up?.(world, event),
+    };
+  },
+
+  /* Points of the mechanism by name, for those who do not point. */
+  buildMeasure() {
+    const choice = byId('measured-point');
+    choice.append(new Option('a point …', ''), ...stage.points.map((point, k) => new Option(point.name, k)));
+    choice.addEventListener('change', () => {
+      if (choice.value) measure.take(stage.points[choice.value]);
+      choice.value = '';
+    });
+    byId('measure-again').addEventListener('click', () => {
+      measure.points = [];
+      player.refresh();
+    });
+  },
+
+  buildPoles() {
+    const choices = poles.choices(), choice = byId('poles'), centrodes = byId('centrodes');
+    choice.append(...[...choices.keys()].map(name => new Option(name, name)));
+    choice.addEventListener('change', () => {
+      poles.pairs = choices.get(choice.value);
+      centrodes.disabled = !poles.pairs.length;
+      player.refresh();
+    });
+    centrodes.disabled = true;
+    centrodes.addEventListener('change', () => {
+      poles.showsCentrodes = centrodes.checked;
+      player.refresh();
+    });
+  },
+
+  /* The bodies in their colours: each is a button that shows how it turns. */
+  buildLegend() {
+    this.chips = player.data.drawing.bodies.map((name, k) => {
+      const chip = document.createElement('button');
+      Object.assign(chip, { type: 'button', textContent: name });
+      const target = bodyTarget(player.data.drawing.frames[k]);
+      chip.addEventListener('click', () => stage.click(target));
+      chip.addEventListener('pointerenter', event => { if (event.pointerType !== 'touch') stage.hover(target); });
+      chip.addEventListener('pointerleave', () => stage.hover(null));
+      return chip;
+    });
+    byId('legend').replaceChildren(...this.chips);
+  },
+
+  colour() {
+    const { bodies } = stage.palette;
+    this.chips.forEach((chip, k) => { chip.style.setProperty('--body', bodies[k % bodies.length][0]); });
+  },
+
+  show(state) {
+    byId('measuring').hidden = !measure.isOn;
+    if (measure.isOn) byId('measured').textContent = measure.text(state);
+    const { selected } = stage;
+    this.chips.forEach((chip, k) => { chip.ariaPressed = String(Boolean(selected?.isBody) && selected.frame.index === k); });
+  },
+};

@@ -1,0 +1,71 @@
+'use strict';
+/* Numbers as they are read: angles in radians or degrees, as many digits as are significant.
+
+   units.text(value, unit)   a number of a unit of the model; what is rounding beside the largest
+                             number of that unit in the motion is 0
+   units.name(unit)          the unit it is shown in
+   units.factor(unit)        and the factor from one to the other */
+
+const DIGITS = 6;  // of the largest number of a unit; the others have as many decimals
+const ROUNDING_PART = 1e-11;  // of the largest number, below which a difference is rounding
+
+const units = {
+  angle: 'rad',
+  scales: null,  // of each unit: the largest number of the motion
+
+  name(unit) {
+    return this.angle === 'deg' ? unit.replace(/^rad\b/, 'deg') : unit;
+  },
+
+  factor(unit) {
+    return this.angle === 'deg' && /^rad\b/.test(unit) ? 180 / Math.PI : 1;
+  },
+
+  /* A name with the unit it is shown in. */
+  titled(name, unit) {
+    return unit ? `${name} [${this.name(unit)}]` : name;
+  },
+
+  text(value, unit = '', scale = this.scale(unit)) {
+    if (!Number.isFinite(value)) return '–';
+    const factor = this.factor(unit);
+    return Math.abs(value) <= ROUNDING_PART * scale ? '0' : digitsOf(value * factor, scale * factor);
+  },
+
+  /* A number with its unit. */
+  full(value, unit, scale = this.scale(unit)) {
+    return `${this.text(value, unit, scale)} ${this.name(unit)}`.trim();
+  },
+
+  scale(unit) {
+    if (!this.scales) this.scales = largestOfUnits(player.data);
+    return this.scales.get(unit) ?? 0;
+  },
+
+  forget() {
+    this.scales = null;
+  },
+};
+
+/* A number with the decimals that numbers of a scale have. */
+function digitsOf(value, scale) {
+  const size = Math.abs(value);
+  if (size < 1e-6 * scale || size >= 1e7 || size < 1e-5) return value.toExponential(3);
+  const largest = Math.max(size, scale), small = size < 1e-3 * scale ? 3 : 0;
+  const decimals = DIGITS - 1 - Math.floor(Math.log10(largest)) + small;
+  return value.toFixed(Math.max(0, Math.min(12, decimals)));
+}
+
+/* The largest number of each unit among coordinates, outputs and their rates. */
+function largestOfUnits({ coordinates, outputs, arrays, lengthUnit, drawing }) {
+  const scales = new Map([['s', Math.max(...player.t.map(Math.abs))]]);
+  const grow = (unit, value) => { if (value > (scales.get(unit) ?? 0)) scales.set(unit, value); };
+  for (const [owners, name] of [[coordinates, 'q'], [outputs, 'y']]) {
+    ['', '_dot', '_ddot'].forEach((order, k) => {
+      const per = ['', '/s', '/s²'][k], named = owners.map(({ unit }) => (unit ? unit + per : ''));
+      arrays[name + order]?.forEach((value, place) => grow(named[place % owners.length], Math.abs(value)));
+    });
+  }
+  grow(lengthUnit, drawing.size);
+  return scales;
+}
