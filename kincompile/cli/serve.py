@@ -34,6 +34,13 @@ class LivePage:
         self._html = ""
         self._error = ""
         self._version = secrets.token_hex(8)
+        self._has_ended = False
+
+    def end(self) -> None:
+        """Let go of those that wait for a change."""
+        with self._changed:
+            self._has_ended = True
+            self._changed.notify_all()
 
     def show(self, html: str) -> None:
         """Show a new page; there is no error now."""
@@ -63,10 +70,10 @@ class LivePage:
         return json.dumps({"version": self._version, "error": self._error})
 
     def state_after(self, last: str) -> str:
-        """Return the state when it differs from the last, or after a while the same one."""
+        """Return the state when it differs from the last, or after a while; "" at the end."""
         with self._changed:
-            self._changed.wait_for(lambda: self.state() != last, HEARTBEAT)
-            return self.state()
+            self._changed.wait_for(lambda: self._has_ended or self.state() != last, HEARTBEAT)
+            return "" if self._has_ended else self.state()
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -107,8 +114,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Send the state whenever it changes, until the browser goes away."""
         self._answer("text/event-stream", None)
         last = ""
-        while True:
-            state = self.server.page.state_after(last)
+        while state := self.server.page.state_after(last):
             self.wfile.write((f"data: {state}\n\n" if state != last else ":\n\n").encode())
             last = state
 
@@ -145,5 +151,6 @@ def served(page: LivePage) -> Iterator[str]:
     try:
         yield f"http://{HOST}:{server.server_port}/"
     finally:
+        page.end()
         server.shutdown()
         server.server_close()

@@ -33,6 +33,9 @@ WIDTH, HEIGHT = 960.0, 720.0
 THICK = 8.0
 """Size of marks [px] beside which lines have the widths of their looks."""
 
+DOT = "dot"
+"""The look of named points, which are drawn over paths."""
+
 DASHES: Mapping[str, str] = {"--": "5 4", ":": "1.5 3"}
 """Lengths of dashes and gaps, in widths of a line of the look."""
 
@@ -84,12 +87,13 @@ class _Motion:
         turned = "" if self.turn is None else f" rotate({_number(self.turn[0])})"
         return f"translate({_pair(self.shift[0])}){turned}"
 
-    def animation(self, timing: Timing) -> str:
-        """Return the elements that move a group."""
-        shifts = ";".join(map(_pair, self.shift))
-        elements = _transform("translate", "replace", shifts, timing)
+    def animation(self, clock: str) -> str:
+        """Return the elements that move a group by a clock; without one, nothing."""
+        if not clock:
+            return ""
+        elements = _transform("translate", "replace", map(_pair, self.shift), clock)
         if self.turn is not None:
-            elements += _transform("rotate", "sum", ";".join(map(_number, self.turn)), timing)
+            elements += _transform("rotate", "sum", map(_number, self.turn), clock)
         return elements
 
 
@@ -147,13 +151,11 @@ def as_svg(
     sheet = _Sheet(drawn, q, paths)
     unit = sheet.scale * drawn.size
     line = max(1.0, unit / THICK)
-    over = "".join(_trace(k, sheet.at(path), line) for k, path in enumerate(paths))
-    names = "".join(_name(dot.name, sheet.at(dot.place.at(q[0])), line) for dot in drawn.dots)
-    parts = "".join(_still(drawn, q[0], sheet, line)) + over + names
+    traces = "".join(_trace(k, sheet.at(path), line) for k, path in enumerate(paths))
+    parts = traces.join(_layers(drawn, q[:1], sheet, line, ""))
     style = _dark_rules()
     if timing is not None and len(q) > 1:
-        moving = "".join(_moving(drawn, q, sheet, line, timing)) + over
-        moving += "".join(_moving_names(drawn, q, sheet, line, timing))
+        moving = traces.join(_layers(drawn, q, sheet, line, timing.attributes))
         parts = f'<g class="still" display="none">{parts}</g>\n<g class="moving">{moving}</g>'
         style += STILL
     size = (sheet.width, sheet.height)
@@ -172,34 +174,29 @@ def as_svg(
     )
 
 
-def _still(drawn: Drawing, q: Array, sheet: _Sheet, line: float) -> Iterable[str]:
-    """Yield the strokes at one position."""
-    for item in _shown(drawn, q[None]):
-        yield _path(_outline(sheet.at(item.at(q)), item.is_area), item, line)
-
-
-def _moving(drawn: Drawing, q: Array, sheet: _Sheet, line: float, timing: Timing) -> Iterable[str]:
-    """Yield the strokes in motion; neighbours that move together are one group."""
-    strokes = [_stroke(item, q, sheet, line, timing) for item in _shown(drawn, q)]
-    for _, group in itertools.groupby(strokes, lambda item: item[0] and item[0].animation(timing)):
-        members = list(group)
-        yield _grouped(members[0][0], "".join(text for _, text in members), timing)
-
-
-def _moving_names(
-    drawn: Drawing, q: Array, sheet: _Sheet, line: float, timing: Timing
-) -> Iterable[str]:
-    """Yield the names of points in motion."""
+def _layers(drawn: Drawing, q: Array, sheet: _Sheet, line: float, clock: str) -> tuple[str, str]:
+    """Return what is below the paths, and above them: the named points with their names."""
+    strokes = _shown(drawn, q)
+    below = [_stroke(item, q, sheet, line, clock) for item in strokes if item.stroke.look != DOT]
+    above = [_stroke(item, q, sheet, line, clock) for item in strokes if item.stroke.look == DOT]
     for dot in drawn.dots:
         motion = _Motion(sheet.at(dot.place.at(q)), None)
-        yield _grouped(motion, _name(dot.name, np.zeros(2), line), timing)
+        above.append((motion, _name(dot.name, np.zeros(2), line)))
+    return _together(below, clock), _together(above, clock)
 
 
-def _grouped(motion: _Motion | None, text: str, timing: Timing) -> str:
-    """Return elements that move together."""
-    if motion is None:
-        return text
-    return f'<g transform="{motion.start}">{motion.animation(timing)}{text}</g>\n'
+def _together(strokes: Iterable[tuple[_Motion | None, str]], clock: str) -> str:
+    """Return elements; neighbours that move together are one group."""
+    found = []
+    for group, items in itertools.groupby(strokes, lambda item: _group(item[0], clock)):
+        text = "".join(text for _, text in items)
+        found.append(f"<g{group}{text}</g>\n" if group else text)
+    return "".join(found)
+
+
+def _group(motion: _Motion | None, clock: str) -> str:
+    """Return the attributes of a group, and the elements that move it."""
+    return f' transform="{motion.start}">{motion.animation(clock)}' if motion else ""
 
 
 def _shown(drawn: Drawing, q: Array) -> list[Polyline]:
@@ -213,7 +210,7 @@ def _shown(drawn: Drawing, q: Array) -> list[Polyline]:
 
 
 def _stroke(
-    item: Polyline, q: Array, sheet: _Sheet, line: float, timing: Timing
+    item: Polyline, q: Array, sheet: _Sheet, line: float, clock: str
 ) -> tuple[_Motion | None, str]:
     """Return how a stroke moves, and its element in what moves it."""
     points = [item.at(row) for row in q]
@@ -222,7 +219,7 @@ def _stroke(
         motion, own = moved
         return motion, _path(_outline(own, item.is_area), item, line)
     shapes = [_outline(sheet.at(shape), item.is_area) for shape in points]
-    values = f'<animate attributeName="d" values="{";".join(shapes)}" {timing.attributes}/>'
+    values = f'<animate attributeName="d" values="{";".join(shapes)}" {clock}/>'
     return None, _path(shapes[0], item, line, values)
 
 
@@ -282,10 +279,10 @@ def _name(name: str, place: Array, line: float) -> str:
     )
 
 
-def _transform(kind: str, additive: str, values: str, timing: Timing) -> str:
+def _transform(kind: str, additive: str, values: Iterable[str], clock: str) -> str:
     return (
         f'<animateTransform attributeName="transform" type="{kind}" additive="{additive}" '
-        f'values="{values}" {timing.attributes}/>'
+        f'values="{";".join(values)}" {clock}/>'
     )
 
 

@@ -1,6 +1,7 @@
 """Pictures as SVG, at a time and in motion: read as XML, frame by frame, against closed forms."""
 
 import re
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -10,6 +11,7 @@ import kincompile as kc
 from kincompile.view.drawing import drawing
 from kincompile.view.svg import as_svg
 
+EXAMPLES = Path(__file__).parents[3] / "examples"
 SVG = "{http://www.w3.org/2000/svg}"
 NUMBER = r"-?\d+(?:\.\d+)?"
 PIXELS = 0.02
@@ -209,6 +211,28 @@ def test_that_an_open_joint_is_drawn_as_such(arm):
     closed = ET.fromstring(as_svg(drawn, np.array([[1, 0, 0.0]]), ""))
     apart = ET.fromstring(as_svg(drawn, np.array([[2, 0, 0.0]]), ""))
     assert (len(shown(closed, "s-bad")), len(shown(apart, "s-bad"))) == (0, 1)
+
+
+@pytest.mark.parametrize(
+    "name", ["jansen", "gear_train", "wrecker_boom", "slot_follower", "shaper"]
+)
+def test_that_a_picture_in_motion_begins_as_the_still_one(name, tmp_path):
+    model = kc.read_model(EXAMPLES / f"{name}.toml")
+    solution = kc.solve(kc.compile(model), np.linspace(0, model.system().end, 9))
+    root = written(kc.animate, tmp_path, solution)
+    still = next(item for item in root.iter(f"{SVG}g") if item.get("class") == "still")
+    kinds = {item.get("class") for item in still.iter(f"{SVG}path")}
+    assert len(kinds) > 5
+    for kind in kinds:
+        moving = shown(root, kind)
+        fixed = [
+            points_of(item.get("d"))
+            for item in still.iter(f"{SVG}path")
+            if item.get("class") == kind
+        ]
+        assert len(moving) == len(fixed)
+        for one, other in zip(moving, fixed, strict=True):
+            np.testing.assert_allclose(one, other, rtol=0, atol=0.1)  # turns have two digits
 
 
 @pytest.mark.parametrize(
