@@ -125,10 +125,23 @@ def test_that_every_frame_is_a_position_of_the_solution(arm, tmp_path, times):
     shots = [dots(root, frame) for frame in range(count)]
     scale = scale_of(expected(2 * parts[0]), shots[0])
     fixed = shots[0][0] - scale * (expected(0.0)[0] @ (1, 1j))
+    # keyTimes have five digits, and nothing is faster than 9 units a second
+    allowed = 0.1 + 20 * 1e-5 * abs(scale)
     for part, pixels in zip(parts, shots, strict=True):
         places = fixed + scale * (expected(2 * part) @ (1, 1j))
-        # keyTimes have five digits, and nothing is faster than 9 units a second
-        assert np.abs(pixels - places).max() < 0.1 + 20 * 1e-5 * abs(scale)
+        assert np.abs(pixels - places).max() < allowed
+    hulls = [shown(root, "s-body0 f-pale-body0", frame)[0] @ (1, -1j) for frame in range(count)]
+    for part, hull in zip(parts, hulls, strict=True):
+        turned = fixed + np.exp(4j * part**2) * (hulls[0] - fixed)
+        assert np.abs(hull - turned).max() < allowed
+
+
+def test_that_what_does_not_change_its_shape_is_written_once(motion, tmp_path):
+    root = written(kc.animate, tmp_path, motion)
+    assert next(root.iter(f"{SVG}animate"), None) is None
+    moving = next(item for item in root.iter(f"{SVG}g") if item.get("class") == "moving")
+    still = next(item for item in root.iter(f"{SVG}g") if item.get("class") == "still")
+    assert len(list(moving.iter(f"{SVG}path"))) == len(list(still.iter(f"{SVG}path")))
 
 
 def test_that_the_playing_time_is_that_of_the_motion_or_as_given(motion, tmp_path):
