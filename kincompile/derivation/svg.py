@@ -11,11 +11,10 @@ import numpy as np
 from kincompile.derivation.mathml import index_text, letter_text
 from kincompile.derivation.notation import BODY_FIXED, split_name
 from kincompile.view.shapes import FILL
+from kincompile.view.svg import DASHES
 
 if TYPE_CHECKING:
     from kincompile.view.picture import Picture, PictureLabel, PicturePath
-
-DASHES = {"--": "5 4", ":": "1.5 3"}
 
 FONT = "'Kincompile Math','Latin Modern Math','STIX Two Math','Cambria Math',serif"
 """Fonts of labels; the first is that of the page."""

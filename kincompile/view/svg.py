@@ -67,10 +67,9 @@ class Timing:
     @property
     def attributes(self) -> str:
         """The attributes of an animation."""
-        even = np.linspace(0, 1, self.parts.size)
-        shown = dict.fromkeys((f"{part:.5g}" for part in self.parts), None)
-        uneven = np.abs(self.parts - even).max() > 1e-6 and len(shown) == self.parts.size
-        times = f' keyTimes="{";".join(shown)}"' if uneven else ""
+        uneven = np.abs(self.parts - np.linspace(0, 1, self.parts.size)).max() > 1e-6
+        shown = ";".join(f"{part:.5g}" for part in self.parts)
+        times = f' keyTimes="{shown}"' if uneven else ""
         return f'dur="{self.seconds:g}s" repeatCount="indefinite"{times}'
 
 

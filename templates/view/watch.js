@@ -14,11 +14,19 @@
     banner.hidden = !text;
   };
 
+  // The new page stands at the time of the old one.
+  const isMoving = typeof player !== 'undefined', moment = sessionStorage.getItem('moment');
+  if (isMoving && moment !== null) player.setTime(Number(moment));
+  const renew = () => {
+    if (isMoving) sessionStorage.setItem('moment', player.state.time);
+    location.reload();  // with its fragment
+  };
+
   const events = new EventSource('/events');
   events.onmessage = ({ data }) => {
     const state = JSON.parse(data);
     if (state.version === version) say(state.error);
-    else location.reload();  // with its fragment
+    else renew();
   };
   events.onerror = () => say('kincompile view --watch has ended: this page stays as it is.');
 }

@@ -73,18 +73,19 @@ def test_that_a_watched_page_follows_its_model(arm, open_file, tmp_path):
         assert "No page of this model" in shown.inner_text("body")
         live.fail("Error: no <b>model</b>\nline 2")
         shown.wait_for_function("!document.getElementById('watched').hidden")
-        live.show(kc.page(arm, t=[0.0, 1.0]).html)
+        live.show(kc.page(arm, t=[0.0, 0.5, 1.0]).html)
         shown.wait_for_function("document.title === 'arm' && !window.stays")
         assert shown.locator("#watched").is_hidden()
-        shown.evaluate("window.stays = true")
+        shown.evaluate("window.stays = true; player.setTime(0.5)")
         live.fail("Error: no <b>model</b>\nline 2")
         shown.wait_for_function("!document.getElementById('watched').hidden")
         assert shown.inner_text("#watched") == "Error: no <b>model</b>\nline 2"
         assert shown.locator("canvas").first.is_visible()
         assert shown.evaluate("window.stays")  # the last good page is still the same
-        live.show(kc.page(arm, t=[0.0, 2.0]).html)
+        live.show(kc.page(arm, t=[0.0, 0.5, 2.0]).html)
         shown.wait_for_function("document.title === 'arm' && !window.stays")
         assert shown.locator("#watched").is_hidden()
+        assert shown.evaluate("player.state.time") == 0.5
         assert shown.said == []
         assert {url.removeprefix(address) for url in shown.asked[1:]} <= {"", "events", "data:,"}
     shown.wait_for_function("!document.getElementById('watched').hidden")
