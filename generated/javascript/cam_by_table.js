@@ -1240,7 +1240,6 @@ const cam_by_table = (() => {
         };
     })();
 
-
     return {
         NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, COORDINATES, EQUATIONS, PARAMETERS,
         UNITS, DEFAULTS, GUESS, OUTPUTS, BODIES, CORNERS, PATTERN,

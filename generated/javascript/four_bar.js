@@ -1263,7 +1263,6 @@ const four_bar = (() => {
         };
     })();
 
-
     return {
         NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, COORDINATES, EQUATIONS, PARAMETERS,
         UNITS, DEFAULTS, GUESS, OUTPUTS, BODIES, CORNERS, PATTERN,

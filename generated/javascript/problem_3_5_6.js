@@ -1119,7 +1119,6 @@ const problem_3_5_6 = (() => {
         };
     })();
 
-
     return {
         NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, COORDINATES, EQUATIONS, PARAMETERS,
         UNITS, DEFAULTS, GUESS, OUTPUTS, BODIES, CORNERS, PATTERN,

@@ -1210,7 +1210,6 @@ const slider_crank = (() => {
         };
     })();
 
-
     return {
         NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, COORDINATES, EQUATIONS, PARAMETERS,
         UNITS, DEFAULTS, GUESS, OUTPUTS, BODIES, CORNERS, PATTERN,

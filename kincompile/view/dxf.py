@@ -60,8 +60,8 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
         If ezdxf is not installed.
     """
     with package_of_extra("ezdxf", "dxf"):
-        import ezdxf
-    document = ezdxf.new(VERSION, setup=["linetypes"], units=LENGTHS.get(length_unit, (0, 0))[0])
+        from ezdxf.filemanagement import new
+    document = new(VERSION, setup=["linetypes"], units=LENGTHS.get(length_unit, (0, 0))[0])
     layers = _layers(document, drawn)
     space = document.modelspace()
     for item in polylines(drawn):

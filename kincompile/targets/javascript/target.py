@@ -23,7 +23,7 @@ from kincompile.targets.javascript.functions import (
 from kincompile.targets.lines import indented, quoted, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.planned_solve import schedule_solve
-from kincompile.targets.templates import fill
+from kincompile.targets.templates import fill, read
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -47,6 +47,9 @@ CRITERIA = (
     "WILD",
 )  # fmt: skip
 """The numbers of `criteria` that the solver judges by."""
+
+PARTS = ("linear.js", "position.js", "march.js", "events.js")
+"""The parts of the solver, in order."""
 
 KEYWORDS = (
     "arguments", "await", "break", "case", "catch", "class", "const", "continue", "debugger",
@@ -141,7 +144,9 @@ def files(
 def _solver() -> str:
     """Return the script that solves for the motion, with the criteria of the runtime."""
     numbers = {name: json.dumps(getattr(criteria, name)) for name in CRITERIA}
-    return indented(fill("javascript/solver.js.jinja", numbers).split("\n"))
+    parts = "\n".join(read(f"javascript/{name}") for name in PARTS)
+    slots = {**numbers, "parts": indented(parts.rstrip().split("\n"))}
+    return indented(fill("javascript/solver.js.jinja", slots).rstrip().split("\n"))
 
 
 def _bodies(program: Program) -> list[str]:

@@ -1,0 +1,259 @@
+/* ---- scales: the size of the mechanism, and what the terms of its equations contribute ---- */
+
+/* Numbers of size 1/2 to 1 and either sign without a pattern. */
+function probeOf(n) {
+    return Float64Array.from({ length: n }, (_, k) => {
+        const part = (k + 1) * ((Math.sqrt(5) - 1) / 2) % 1;
+        return (part * 64 % 2 < 1 ? 1 : -1) * (1 + part) / 2;
+    });
+}
+
+/* The size of a mechanism as its equations show it at a guess or a position: the largest lever
+   arm, else the distance over which derivatives change; 0 where equations are linear. */
+function sizeOf(model, angular, evaluate, q) {
+    const finite = values => largest(values.filter(Number.isFinite));
+    const ofRows = (entries, isWanted) => {
+        const most = new Float64Array(model.N_EQUATIONS);
+        model.PATTERN.forEach(([i, j], k) => {
+            if (isWanted(j) && !(most[i] >= Math.abs(entries[k]))) most[i] = Math.abs(entries[k]);
+        });
+        return most;
+    };
+    const probe = probeOf(q.length);
+    const moved = (from, kind, length) => from.map((x, k) => x + (angular[k] === kind ? length * probe[k] : 0));
+    const { Phi_q } = evaluate(moved(q, true, 1));
+    const slopes = ofRows(Phi_q, j => !angular[j]), arms = ofRows(Phi_q, j => angular[j]);
+    const size = finite(arms.map((arm, i) => arm / slopes[i]).filter((_, i) => slopes[i] > 0));
+    if (size) return size;
+    const farthest = finite(q.filter((_, k) => !angular[k])) || 1;
+    const step = SMALL_PART * farthest;
+    const length = step * finite(probe.filter((_, k) => !angular[k]));
+    const bends = from => {
+        const here = evaluate(from), there = evaluate(moved(from, false, step));
+        const change = ofRows(here.Phi_q.map((x, k) => (there.Phi_q[k] - x) / length), () => true);
+        const own = ofRows(here.Phi_q, () => true);
+        const rows = [...own.keys()].filter(i => change[i] * length > CONSTANT * own[i]);
+        return rows.map(i => Math.max(own[i] / change[i], Math.sqrt(Math.abs(here.Phi[i]) / change[i])));
+    };
+    const near = bends(q);
+    if (!near.length) return 0;
+    let found = Math.min(Infinity, ...near.filter(bend => bend > 10 * step));
+    if (found < Infinity) {
+        const known = bends(moved(q, false, found)).filter(bend => bend > 0 && bend < Infinity);
+        found = known.length ? known.length / known.reduce((sum, bend) => sum + 1 / bend, 0) : 0;
+    }
+    return found > 10 * step && found < Infinity ? found : farthest;
+}
+
+/* A mechanism with its parameters, and the scales by which all is judged, found at q. */
+class Problem {
+    constructor(model, p, q, t) {
+        const { N_COORDINATES: n, N_EQUATIONS: m } = model;
+        Object.assign(this, { model, p, n, m });
+        this.angular = model.COORDINATES.map(name => model.UNITS[name] === "rad");
+        const isOwned = k => model.BODIES.some(([, first, count]) => k >= first && k < first + count);
+        this.mayTurn = model.COORDINATES.map((name, k) => {
+            return this.angular[k] || (model.UNITS[name] === "" && !isOwned(k));
+        });
+        this.size = sizeOf(model, this.angular, x => this.evaluate(x, t), Array.from(q)) || 1;
+        this.reference = Float64Array.from(this.angular, isAngle => (isAngle ? 1 : this.size));
+        this.place = Float64Array.from(q, Math.abs);
+        this.floor = ROUNDING * largest(this.place.filter((_, k) => !this.angular[k])) / this.size;
+        this.probe = probeOf(m);
+        this.magnitude = new Float64Array(m);
+        this.noise = new Float64Array(m);
+        this.limit = new Float64Array(m).fill(Infinity);
+        this.sums = new Float64Array(m);
+        const generic = this.evaluate(this.place.map((_, k) => q[k] + this.reference[k] * this.probe[k]), t);
+        if (!allFinite(generic.Phi) || !allFinite(generic.Phi_q)) return;
+        const own = this.terms(generic, this.reference).slice();
+        const here = this.terms(generic, this.reference.map((x, k) => x + this.place[k])).slice();
+        this.magnitude = own;
+        this.noise = here.map(x => ROUNDING * x);
+        this.limit = here.map(x => (x > 0 ? STEEP * x : Infinity));
+    }
+
+    /* A point with Phi and Phi_q. */
+    evaluate(q, t) {
+        const at = this.model.point(this.p);
+        at.q.set(q);
+        at.t = t;
+        this.model.position_at(at);
+        return at;
+    }
+
+    /* The factors of the dense matrix at a point, kept with it. */
+    factors(at) {
+        at.dense ??= factor(this.model.rows_of(at, "Phi_q"));
+        return at.dense;
+    }
+
+    determinants(at) {
+        this.model.factor_at(at);
+        return at.determinants;
+    }
+
+    weights(terms = this.magnitude) {
+        return terms.map(x => 1 / (x > 0 ? x : 1));
+    }
+
+    /* What the terms of each equation contribute at scales of the coordinates. */
+    terms(at, scale) {
+        const { sums, magnitude, limit } = this, { PATTERN } = this.model;
+        sums.fill(0);
+        for (let k = 0; k < PATTERN.length; k += 1) {
+            sums[PATTERN[k][0]] += Math.abs(at.Phi_q[k]) * scale[PATTERN[k][1]];
+        }
+        for (let i = 0; i < this.m; i += 1) {
+            sums[i] = Math.max(magnitude[i], Math.min(sums[i], limit[i]));
+        }
+        return sums;
+    }
+
+    holds(at, tolerance) {
+        const { magnitude, noise } = this;
+        if (at.Phi.every((value, i) => Math.abs(value) <= tolerance * magnitude[i])) return true;
+        const terms = this.terms(at, this.reference);
+        return at.Phi.every((value, i) => Math.abs(value) <= tolerance * terms[i] + noise[i]);
+    }
+
+    /* Whether every equation holds as well as floating point permits. */
+    holdsToRounding(at) {
+        const { reference, place } = this;
+        const scale = at.q.map((x, k) => Math.min(Math.max(Math.abs(x), reference[k]), WILD * reference[k] + place[k]));
+        const terms = this.terms(at, scale);
+        return at.Phi.every((value, i) => Math.abs(value) <= ROUNDING * terms[i]);
+    }
+
+    distance(q, other) {
+        let most = 0;
+        for (let k = 0; k < this.n; k += 1) {
+            const apart = Math.abs(q[k] - other[k]) / this.reference[k];
+            if (!(apart <= most)) most = apart;
+        }
+        return most;
+    }
+
+    isFar(q, guess) {
+        return this.mayTurn.some((may, k) => may && Math.abs(q[k] - guess[k]) > FAR);
+    }
+
+    /* Whether a guess shows a branch, and a position found from it lies on another. */
+    leavesBranch(guess, found) {
+        const wanted = this.determinants(guess), here = this.determinants(found);
+        return wanted.every(x => x !== 0) && wanted.some((x, k) => Math.sign(x) !== Math.sign(here[k]));
+    }
+}
+
+/* ---- Newton's method from a guess ---- */
+
+/* Whether corrections shrink no faster than towards a double root, by halves. */
+function crawls(corrections) {
+    const [before, last] = corrections.slice(-2);
+    return corrections.length > 1 && last > before / 4;
+}
+
+function hasConverged(equations, before, at, corrections) {
+    const allowed = k => Math.max(TOLERANCE, equations.floor) * equations.reference[k] + ROUNDING * Math.abs(at.q[k]);
+    const isSmall = at.q.every((x, k) => Math.abs(x - before.q[k]) <= allowed(k));
+    if (isSmall && equations.holds(at, ASSEMBLED)) return true;
+    return (isSmall || crawls(corrections)) && equations.holdsToRounding(at);
+}
+
+const whySingular = at => (allFinite(at.Phi_q) ? SINGULAR : NOT_FINITE);
+const moved = (equations, at, step, part = 1) => {
+    const following = equations.evaluate(at.q.map((x, k) => x + part * step[k]), at.t);
+    return allFinite(following.Phi) ? following : null;
+};
+
+/* The whole correction. */
+function plainStep(equations, at) {
+    const factors = equations.factors(at), step = solve(factors, at.Phi.map(value => -value));
+    if (factors.dependent.length || !allFinite(step)) return whySingular(at);
+    const following = moved(equations, at, step);
+    return following ? [following, norm(step)] : NOT_FINITE;
+}
+
+/* As much of the correction, bent towards the gradient while the residual is large, as keeps the
+   angles near and lowers the residual. */
+function safeguardedStep(equations, at) {
+    const { reference, angular } = equations;
+    const weights = Array.from(equations.weights(equations.terms(at, reference)));
+    const weighed = ({ Phi }) => norm(weights.map((x, i) => x * Phi[i]));
+    const before = weighed(at), bend = Math.sqrt(BEND * Math.min(1, before));
+    const rows = equations.model.rows_of(at, "Phi_q").map((row, i) => row.map((x, k) => weights[i] * x * reference[k]));
+    if (!rows.every(allFinite)) return NOT_FINITE;
+    rows.push(...rows[0].map((_, k) => rows[0].map((_, j) => (j === k ? bend : 0))));
+    const right = [...weights.map((x, i) => -x * at.Phi[i]), ...rows[0].map(() => 0)];
+    const step = leastSquares(rows, right).map((x, k) => x * reference[k]);
+    const excess = largest(step.map((x, k) => x / (reference[k] * (angular[k] ? LARGEST_ANGLE : 1))));
+    for (let part = Math.min(1, 1 / (excess || 1)); part >= SHORTEST_STEP; part /= 2) {
+        const following = moved(equations, at, step, part);
+        const after = following && weighed(following);
+        if (following && (after <= (1 - SUFFICIENT * part) * before || after <= ROUNDING)) {
+            return [following, part * norm(step)];
+        }
+    }
+    return NOT_CONVERGED;
+}
+
+/* All positions from a guess, and how they end. */
+function iterate(equations, t, guess, most = MAX_ITERATIONS, step = plainStep) {
+    const points = [equations.evaluate(guess, t)], corrections = [];
+    const ended = status => ({ status, points, corrections, last: points[points.length - 1] });
+    if (!allFinite(points[0].Phi)) return { ...ended(NOT_FINITE), last: null };
+    for (let k = 0; k < most; k += 1) {
+        const outcome = step(equations, points[k]);
+        if (typeof outcome === "number") return ended(outcome);
+        points.push(outcome[0]);
+        corrections.push(outcome[1]);
+        if (hasConverged(equations, points[k], outcome[0], corrections)) return ended(CONVERGED);
+    }
+    const creeps = crawls(corrections) && equations.holds(points[points.length - 1], ASSEMBLED);
+    return ended(creeps ? SINGULAR : NOT_CONVERGED);
+}
+
+/* A position from a guess: by plain steps, and by safeguarded ones where these fail or stray.
+   What is not far from the guess comes first, then what is on its branch, then the nearer. */
+function assemble(equations, t, guess) {
+    const plain = iterate(equations, t, guess);
+    const isFound = plain.status === CONVERGED;
+    const strays = () => equations.isFar(plain.last.q, guess) || equations.leavesBranch(plain.points[0], plain.last);
+    if (!plain.last || (isFound && !strays())) return plain;
+    const attempts = [plain], scale = equations.reference, probe = equations.probe;
+    for (let k = 0; k <= (isFound ? 0 : RESTARTS); k += 1) {
+        // With all bodies on a line no equation tells which way to bend.
+        const bend = j => (k ? k * NUDGE * scale[j] * probe[(j - (k - 1) + probe.length) % probe.length] : 0);
+        const begin = Float64Array.from(guess, (x, j) => x + bend(j));
+        attempts.push(iterate(equations, t, begin, MAX_ITERATIONS, safeguardedStep));
+        if (attempts[attempts.length - 1].status === CONVERGED) break;
+    }
+    const least = (list, orders) => list.reduce((best, one) => {
+        const [a, b] = [orders(one), orders(best)], k = a.findIndex((x, i) => x !== b[i]);
+        return k >= 0 && a[k] < b[k] ? one : best;
+    });
+    const missed = ({ last }) => (last ? norm(equations.weights().map((x, i) => x * last.Phi[i])) : Infinity);
+    const good = attempts.filter(attempt => attempt.status === CONVERGED);
+    if (!good.length) return least(attempts.slice(1), attempt => [missed(attempt)]);
+    for (const attempt of good) attempt.last = unwound(equations, t, attempt.last, guess);
+    return least(good, ({ last }) => {
+        const isFar = equations.isFar(last.q, guess);
+        const leaves = !isFar && equations.leavesBranch(plain.points[0], last);
+        return [Number(isFar), Number(leaves), +equations.distance(last.q, guess).toFixed(6)];
+    });
+}
+
+/* Turn angles by whole turns towards a guess, as far as the equations allow it. */
+function unwound(equations, t, at, guess) {
+    const { angular, mayTurn } = equations;
+    const columns = [...guess.keys()].filter(k => (angular[k] || mayTurn[k]) && Math.abs(at.q[k] - guess[k]) > Math.PI);
+    const each = columns.length <= MOST_TURNED ? columns.map(k => [k]) : [];
+    for (const some of [columns, ...each]) {
+        const q = at.q.slice();
+        for (const k of some) q[k] -= 2 * Math.PI * Math.round((q[k] - guess[k]) / (2 * Math.PI));
+        if (q.every((x, k) => x === at.q[k])) continue;
+        const turned = iterate(equations, t, q, MAX_CORRECTIONS);
+        if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME) at = turned.last;
+    }
+    return at;
+}
