@@ -52,6 +52,7 @@ from kincompile.runtime.status import Status as Status
 from kincompile.runtime.times import times_at as times_at
 from kincompile.verify.verify import verify as verify
 from kincompile.view.animation import animate as animate
+from kincompile.view.draw import draw as draw
 from kincompile.view.gallery import assembly_gallery as assembly_gallery
 from kincompile.view.gallery import gallery as gallery
 from kincompile.view.mechanism_plot import plot_mechanism as plot_mechanism

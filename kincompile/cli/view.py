@@ -10,19 +10,24 @@ import click
 import kincompile as kc
 from kincompile.cli.motion import motion_options, motion_times, set_values
 from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model
+from kincompile.cli.watch import follow
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
 
 
 @click.command("view")
 @click.argument("models", nargs=-1, required=True, metavar="MODEL...")
-@output_option("Page to write, .html; a folder gets a page of each model, and index.html.")
+@output_option(
+    "Page to write, .html; a folder gets a page of each model, and index.html.", required=False
+)
+@click.option("--watch", is_flag=True, help="Show the page, anew when the model is saved.")
 @motion_options
 @click.pass_context
 def command(
     context: click.Context,
     models: tuple[str, ...],
-    output: str,
+    output: str | None,
+    watch: bool,
     start: str,
     end: str | None,
     points: int | None,
@@ -36,7 +41,16 @@ def command(
     The page is one file that needs no network: open it in a browser. Of several models, each gets
     a page in a folder, whose index.html links them. Where the motion does not converge, the page
     shows what was found, or the start guess, and the exit code is 3.
+
+    With --watch the page of one model is shown on this machine alone, at the address that is said,
+    until Ctrl-C. It is made anew, by this command, when a file is saved that the model reads; an
+    error is shown on it.
     """
+    if watch:
+        _watch(context, models, output)
+        return
+    if output is None:
+        raise click.MissingParameter(ctx=context, param=_parameter(context, "output"))
     is_page = Path(output).suffix in (".html", ".htm")
     if is_page:
         require_writable(output)
@@ -57,3 +71,20 @@ def command(
         click.echo(f"Error: {item.message}", err=True)
     if failed:
         context.exit(NOT_CONVERGED)
+
+
+def _watch(context: click.Context, models: tuple[str, ...], output: str | None) -> None:
+    """Show the page of one model while it is written, with the options of this call."""
+    if len(models) > 1 or output is not None:
+        raise InputError("--watch shows one model and writes no page: give one MODEL, and no -o")
+    options = []
+    for item in context.command.params:
+        given = context.params[item.name or ""]
+        if item.param_type_name == "option" and item.name not in ("output", "watch"):
+            every = given if isinstance(given, tuple) else (given,)
+            options += [f"{item.opts[-1]}={value}" for value in every if value is not None]
+    follow(models[0], options)
+
+
+def _parameter(context: click.Context, name: str) -> click.Parameter:
+    return next(item for item in context.command.params if item.name == name)

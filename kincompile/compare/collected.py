@@ -30,10 +30,10 @@ from kincompile.calculus.expressions import (
     sum_of,
 )
 from kincompile.calculus.rotations import PlaneRotation, turned
-from kincompile.derivation.collected import factored, like_terms, power, rates_term
+from kincompile.derive.collected import factored, like_terms, power, rates_term
 
 if TYPE_CHECKING:
-    from kincompile.derivation.collected import Polynomial
+    from kincompile.derive.collected import Polynomial
 
 
 @dataclass(frozen=True, slots=True)

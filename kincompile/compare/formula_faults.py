@@ -53,7 +53,7 @@ from kincompile.compare.fault import (
 )
 from kincompile.compare.plain_text import described
 from kincompile.compare.vectors import Exchanged
-from kincompile.derivation.notation import is_rate
+from kincompile.derive.collected import is_rate
 from kincompile.names import rate
 
 if TYPE_CHECKING:

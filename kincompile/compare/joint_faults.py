@@ -78,7 +78,7 @@ from kincompile.compare.formula_faults import (
 )
 from kincompile.compare.plain_text import described
 from kincompile.compare.vectors import NumericExpansion, column_values, component_values
-from kincompile.derivation.notation import is_rate
+from kincompile.derive.collected import is_rate
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
 from kincompile.model.absolute import AbsoluteAngle

@@ -11,7 +11,6 @@ import sympy
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
-from kincompile.derivation.collected import collected
 from kincompile.derivation.document import Chapter, Display, Figure, Math, Verbatim, table, text
 from kincompile.derivation.formulas import (
     GAMMA_TERMS,
@@ -39,6 +38,7 @@ from kincompile.derivation.joint_terms import (
     telling,
 )
 from kincompile.derivation.steps import Steps
+from kincompile.derive.collected import collected
 from kincompile.derive.derivation import RowBlock, derive
 from kincompile.derive.partials import partials
 from kincompile.derive.rules import Rule

@@ -44,6 +44,7 @@ from kincompile.derivation.formulas import (
     Transposed,
     size,
 )
+from kincompile.derive.collected import is_rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -452,15 +453,3 @@ def _place(factor: Any) -> int:
     if isinstance(factor, Number | Decimal):
         return 0
     return 2 if is_rate(factor) else 1
-
-
-def is_rate(factor: Any) -> bool:
-    """Return whether a factor is the rate of a scalar, a power or a sum of such."""
-    match factor:
-        case Symbol(name):
-            return split_name(name)[2] > 0
-        case Power(base, _):
-            return is_rate(base)
-        case Sum(terms):
-            return all(is_rate(_signed(term)[1]) for term in terms)
-    return False

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.mathml import index_text, letter_text
 from kincompile.derivation.notation import BODY_FIXED, split_name
-from kincompile.view.still import svg_element
+from kincompile.view.picture import svg_element
 
 if TYPE_CHECKING:
     from kincompile.view.picture import Picture, PictureLabel

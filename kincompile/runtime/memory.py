@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import DTypeLike, NDArray
 
     Bytes = NDArray[np.uint8]
@@ -46,8 +48,8 @@ class _Loan:
             "typestr": kind.str,
         }
 
-    def __del__(self) -> None:
-        free.append(self._memory)
+    def __del__(self, give_back: Callable[[Bytes], None] = free.append) -> None:
+        give_back(self._memory)  # as an argument, it is there to the interpreter's end
 
 
 def empty(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""A motion as an animation by matplotlib: to be shown, or written as GIF or MP4."""
+"""A motion as an animation: by matplotlib to be shown, or written as GIF or MP4; or as SVG."""
 
 from __future__ import annotations
 
@@ -10,14 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError, UnsupportedError, package_of_extra
-from kincompile.model.mechanism import system_of
-from kincompile.model.origins import model_of
-from kincompile.names import listed, suggestion
 from kincompile.runtime.results.columns import TIME_UNIT
-from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.view.drawing import drawing
-from kincompile.view.marks import FramePoint
-from kincompile.view.mechanism_plot import NAME, draw, move, require_bodies
+from kincompile.view.mechanism_plot import NAME, draw, move
+from kincompile.view.svg import Timing, as_svg
+from kincompile.view.traces import described, moving_system, traced_places
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -30,10 +27,18 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.results.solution import Solution
     from kincompile.view.drawing import Drawing
+    from kincompile.view.marks import FramePoint
 
 WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
 """Matplotlib's writer for each kind of file."""
+
+SVG = ".svg"
+"""Ending of what is written without matplotlib."""
+
+WHAT = "an animation shows"
+"""For messages."""
 
 FRAME_RATE = 25
 """Largest number of frames a second."""
@@ -60,7 +65,8 @@ def animate(
     solution
         The motion of one set of parameters. Points without a solution are left out.
     path : path-like, optional
-        File to write, whole or not at all: ``.gif``, or ``.mp4``, which needs ffmpeg.
+        File to write, whole or not at all: ``.svg``, which moves in a browser and needs no
+        matplotlib, ``.gif``, or ``.mp4``, which needs ffmpeg.
     model
         The mechanism; needed only for a solution of a module that was loaded from a file.
     seconds
@@ -82,15 +88,17 @@ def animate(
     UnsupportedError
         If matplotlib, or for MP4 ffmpeg, is not installed.
     """
+    if path is not None and Path(path).suffix.lower() == SVG:
+        return _written_svg(solution, Path(path), model, seconds, trace)
     with package_of_extra("matplotlib", "plot"):
         from matplotlib import animation
         from matplotlib import pyplot as plt
     if path is not None:
         _require_writer(Path(path), animation.writers.is_available)
-    system = _moving(solution, model)
+    system = moving_system(solution, model, WHAT)
     rows, interval = frame_rows(solution, seconds)
     drawn = drawing(system, solution.parameters, solution.q[solution.good])
-    traced = _traced(drawn, trace)
+    traced = traced_places(drawn, trace)
     figure, ax = plt.subplots(layout="constrained")
     show = _first_frame(ax, system, drawn, solution, rows, traced)
     figure.draw_without_rendering()
@@ -146,64 +154,54 @@ def frame_rows(solution: Solution, seconds: float | None) -> tuple[NDArray[np.in
     """
     good = np.flatnonzero(solution.good)
     t = solution.t[good]
-    duration = abs(float(t[-1] - t[0]))
-    length = min(max(duration, SHORTEST), LONGEST) if seconds is None else float(seconds)
-    if not (math.isfinite(length) and length > 0):
-        raise InputError(f"seconds is {seconds!r}: give the length of the animation, above 0.")
+    length = _playing_time(t, seconds)
     count = max(min(good.size, round(length * FRAME_RATE)), 1)
     interval = max(round(1000 * length / count / TICK) * TICK, TICK)
     shown = [int(np.abs(t - time).argmin()) for time in np.linspace(t[0], t[-1], count)]
     return good[shown], interval
 
 
-def _moving(solution: Solution, model: Mechanism | ConstraintSystem | None) -> ConstraintSystem:
-    """Return the system that moves in a solution, after checking that it can be shown."""
-    require_solution(solution)
-    name = solution.name
-    solution.require_one_motion("an animation shows", "solve with one of the parameter sets")
-    if not solution.good.any():
-        raise InputError(f"{name} has no position that could be shown. {solution.message}")
-    found = model_of(solution.module) if model is None else system_of(model)
-    if found is None:
-        raise InputError(
-            f"the shapes of {name} are unknown, because its module was loaded from a file; give "
-            "its mechanism too: kc.animate(solution, path, model=m)"
-        )
-    names = tuple(item.name for item in found.coordinates)
-    if names != solution.coordinates:
-        raise InputError(
-            f"{found.name} is not the model of this solution of {name}: the coordinates differ"
-        )
-    return require_bodies(found)
+def _playing_time(t: NDArray[np.float64], seconds: float | None) -> float:
+    """Return how long an animation of these times lasts [s]."""
+    duration = abs(float(t[-1] - t[0]))
+    length = min(max(duration, SHORTEST), LONGEST) if seconds is None else float(seconds)
+    if not (math.isfinite(length) and length > 0):
+        raise InputError(f"seconds is {seconds!r}: give the length of the animation, above 0.")
+    return length
+
+
+def _written_svg(
+    solution: Solution,
+    path: Path,
+    model: Mechanism | ConstraintSystem | None,
+    seconds: float | None,
+    trace: Iterable[str] | None,
+) -> Path:
+    """Write a motion as SVG; browsers draw what is between its frames."""
+    require_writable(path)
+    system = moving_system(solution, model, WHAT)
+    q, t = solution.q[solution.good], solution.t[solution.good]
+    length = _playing_time(t, seconds)
+    step = max(1, round(t.size / (length * FRAME_RATE)))
+    rows = np.append(np.arange(0, t.size - 1, step), t.size - 1)
+    shapes = drawing(system, solution.parameters, q)
+    timing = Timing(length, (t[rows] - t[0]) / ((t[-1] - t[0]) or 1.0))
+    description = described(shapes, f"in motion from t = {t[0]:g} to {t[-1]:g} {TIME_UNIT}")
+    paths = [place.at(solution.q) for place in traced_places(shapes, trace)]
+    return write_atomically(path, as_svg(shapes, q[rows], description, paths=paths, timing=timing))
 
 
 def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
     """Check that the file can be written, before the frames are drawn."""
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise InputError(f"cannot write {path}: end its name in {' or '.join(WRITERS)}.")
+        raise InputError(f"cannot write {path}: end its name in {', '.join(WRITERS)} or {SVG}.")
     if not is_available(writer):
         raise UnsupportedError(
             f"cannot write {path}: {writer} is not installed. Install it (apt-get install ffmpeg, "
             "brew install ffmpeg, or from ffmpeg.org), or write a .gif, which needs nothing more."
         )
     require_writable(path)
-
-
-def _traced(drawn: Drawing, names: Iterable[str] | None) -> list[FramePoint]:
-    """Return the points to be traced."""
-    frames = zip(drawn.bodies, drawn.frames, strict=True)
-    places = {body: FramePoint(frame, (0.0, 0.0)) for body, frame in frames}
-    places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
-    dots = {dot.name: dot.place for dot in drawn.dots}
-    places |= dots
-    for name in (chosen := list(dots if names is None else names)):
-        if name not in places:
-            raise InputError(
-                f"{drawn.name} has nothing called {name!r} to trace{suggestion(name, places)}; "
-                f"bodies, constraints and points are: {listed(places)}"
-            )
-    return [places[name] for name in chosen]
 
 
 def _captions(solution: Solution, rows: NDArray[np.intp]) -> list[str]:

@@ -7,17 +7,11 @@ import operator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from kincompile.ir.graph import Graph
-from kincompile.targets.javascript.dialect import JAVASCRIPT
-from kincompile.targets.javascript.target import RESERVED
-from kincompile.targets.lines import indented, wrapped
-from kincompile.targets.naming import NameTable
-from kincompile.targets.printer import Printer
-from kincompile.targets.schedule import Scheduler
-
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from typing import TypeAlias
+
+    from kincompile.ir.graph import Graph
 
     Place: TypeAlias = tuple[str | int, ...]
 
@@ -120,38 +114,3 @@ def live_places(data: Any, place: Place = ()) -> Iterator[tuple[Place, LiveNumbe
     elif isinstance(data, list | tuple):
         for key, value in enumerate(data):
             yield from live_places(value, (*place, key))
-
-
-def function_text(
-    name: str, numbers: Sequence[LiveNumber], parameters: Sequence[str], tables: Sequence[str]
-) -> str:
-    """Return a JavaScript function of an angle and of parameters that gives numbers as an array.
-
-    Parameters
-    ----------
-    name
-        Its name.
-    numbers
-        What it gives.
-    parameters
-        Names of the parameters, in order.
-    tables
-        Names of splines, which are taken.
-    """
-    table = NameTable((*RESERVED, *tables))
-    graph = numbers[0].graph if numbers else Graph()
-    outputs = [item.node for item in numbers]
-    scheduler = Scheduler(graph.nodes, outputs, {}, table, {})
-    lines = []
-    for node in scheduler.uses:
-        if graph.nodes[node][0] == "input":
-            wanted = str(graph.nodes[node][1])
-            scheduler.names[node] = ANGLE if wanted == ANGLE else table.take(wanted)
-            if wanted != ANGLE:
-                place = f"p[{parameters.index(wanted)}]"
-                lines.append(f"const {scheduler.names[node]} = {place};")
-    steps = scheduler.assign("g", scheduler.operands_first(outputs))
-    printer = Printer(JAVASCRIPT, graph.nodes, scheduler.names)
-    lines += [f"const {item.name} = {printer.definition(item.node)};" for item in steps]
-    lines += ["return [", *(f"    {line}" for line in wrapped(map(printer.text, outputs))), "];"]
-    return f"function {name}({ANGLE}, p) {{\n{indented(lines)}\n}}\n"

@@ -14,8 +14,7 @@ from kincompile.runtime.singular.events import DOUBTS, SENTENCES
 from kincompile.runtime.status import Status
 from kincompile.runtime.verdict import WORDS
 from kincompile.view.drawing import drawing
-from kincompile.view.picture import picture
-from kincompile.view.still import svg_element
+from kincompile.view.picture import picture, svg_element
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

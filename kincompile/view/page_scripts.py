@@ -7,14 +7,22 @@ from typing import TYPE_CHECKING
 
 import kincompile.compiler as compiler
 from kincompile.errors import UnsupportedError
-from kincompile.view.live_numbers import function_text, live_places
+from kincompile.ir.graph import Graph
+from kincompile.targets.javascript.dialect import JAVASCRIPT
+from kincompile.targets.javascript.target import RESERVED
+from kincompile.targets.lines import indented, wrapped
+from kincompile.targets.naming import NameTable
+from kincompile.targets.printer import Printer
+from kincompile.targets.schedule import Scheduler
+from kincompile.view.live_numbers import ANGLE, live_places
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from typing import Any
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
+    from kincompile.view.live_numbers import LiveNumber
 
 MOST_COORDINATES = 150
 """Coordinates up to which a page solves the mechanism itself."""
@@ -73,6 +81,41 @@ def geometry_script(system: ConstraintSystem, drawing: Mapping[str, Any]) -> str
         + f"{functions}return {{ places: {json.dumps([place for place, _ in numbers])}, numbers, "
         f"profiles: [{', '.join(profiles)}] }};\n}})();\n"
     )
+
+
+def function_text(
+    name: str, numbers: Sequence[LiveNumber], parameters: Sequence[str], tables: Sequence[str]
+) -> str:
+    """Return a JavaScript function of an angle and of parameters that gives numbers as an array.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    numbers
+        What it gives.
+    parameters
+        Names of the parameters, in order.
+    tables
+        Names of splines, which are taken.
+    """
+    table = NameTable((*RESERVED, *tables))
+    graph = numbers[0].graph if numbers else Graph()
+    outputs = [item.node for item in numbers]
+    scheduler = Scheduler(graph.nodes, outputs, {}, table, {})
+    lines = []
+    for node in scheduler.uses:
+        if graph.nodes[node][0] == "input":
+            wanted = str(graph.nodes[node][1])
+            scheduler.names[node] = ANGLE if wanted == ANGLE else table.take(wanted)
+            if wanted != ANGLE:
+                place = f"p[{parameters.index(wanted)}]"
+                lines.append(f"const {scheduler.names[node]} = {place};")
+    steps = scheduler.assign("g", scheduler.operands_first(outputs))
+    printer = Printer(JAVASCRIPT, graph.nodes, scheduler.names)
+    lines += [f"const {item.name} = {printer.definition(item.node)};" for item in steps]
+    lines += ["return [", *(f"    {line}" for line in wrapped(map(printer.text, outputs))), "];"]
+    return f"function {name}({ANGLE}, p) {{\n{indented(lines)}\n}}\n"
 
 
 def _without(reason: str) -> str:

@@ -36,6 +36,9 @@ HUES: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Colours of bodies and of paths, on light and on dark paper."""
 
+DASHES: Mapping[str, str] = {"--": "5 4", ":": "1.5 3"}
+"""Lengths of dashes and gaps, in widths of a line of the look."""
+
 FILL = 0.22
 """Opacity of the areas of bodies."""
 

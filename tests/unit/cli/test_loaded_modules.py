@@ -37,6 +37,10 @@ NOT_LOADED = {
         f"{EXTRA} {LARGE} kincompile.view.page kincompile.view.mechanism_plot kincompile.compare "
         "kincompile.verify"
     ),
+    "draw MODEL -o DRAWING.svg": (
+        f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify "
+        "kincompile.view.page ezdxf watchfiles"
+    ),
     "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
@@ -63,6 +67,7 @@ def test_that_a_command_loads_what_it_uses(line, pendulum, tmp_path):
     hand = tmp_path / "hand.txt"
     hand.write_text("nu = [0, 0, 2]\n", encoding="utf-8")
     places = {"MODEL": pendulum, "HAND": hand, "PAGE.html": tmp_path / "page.html"}
+    places |= {"DRAWING.svg": tmp_path / "drawing.svg"}
     places |= {"FOLDER": tmp_path / "new", "KIT": tmp_path / "kit"}
     if "KIT" in line:
         kc.exercise(kc.read_model(pendulum)).write(places["KIT"])

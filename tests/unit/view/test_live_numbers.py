@@ -11,7 +11,8 @@ import sympy
 
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
-from kincompile.view.live_numbers import LiveNumber, function_text, length_of, live_places
+from kincompile.view.live_numbers import LiveNumber, length_of, live_places
+from kincompile.view.page_scripts import function_text
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 AT = {"a": 0.7, "b": -1.3}

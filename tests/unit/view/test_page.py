@@ -199,8 +199,9 @@ def test_that_text_cannot_end_the_script_it_is_in(example_named):
 def test_that_every_script_and_style_sheet_is_used():
     folder = template_root() / "view"
     here = {item.name for item in folder.iterdir() if item.name.endswith((".js", ".css"))}
-    gallery = {"gallery.js", "gallery.css"}
-    assert here == {name for name in (*SCRIPTS, *STYLES) if "/" not in name} | gallery
+    others = {"gallery.js", "gallery.css", "watch.js"}  # of other pages
+    assert here == {name for name in (*SCRIPTS, *STYLES) if "/" not in name} | others
+    assert "EventSource" not in kc.page(pendulum()).html
 
 
 def test_that_a_page_shows_itself_in_a_frame_of_a_notebook():

@@ -41,7 +41,6 @@ from kincompile.calculus.expressions import (
     vector_sum,
 )
 from kincompile.calculus.rotations import PlaneRotation
-from kincompile.derivation.notation import is_rate
 from kincompile.errors import InternalError
 
 if TYPE_CHECKING:
@@ -53,7 +52,9 @@ if TYPE_CHECKING:
         TimeFunction,
         VectorSymbol,
     )
-    from kincompile.derivation.formulas import Glyph
+
+RATES = ("_dot", "_ddot")
+"""Ends of the names of rates."""
 
 Monomial: TypeAlias = tuple[tuple[Scalar, int], ...]
 """Scalars with their exponents."""
@@ -70,7 +71,7 @@ AGREEMENT = 1e-9
 """Difference, relative to the terms, up to which two forms are equal at random numbers."""
 
 
-def collected(expression: Expression, names: Mapping[Expression, Glyph]) -> Expression:
+def collected(expression: Expression, names: Mapping[Expression, object]) -> Expression:
     """Return gamma with like terms joined, equal to it at random numbers.
 
     Parameters
@@ -96,7 +97,7 @@ def collected(expression: Expression, names: Mapping[Expression, Glyph]) -> Expr
 
 
 def like_terms(
-    expression: Expression, names: Mapping[Expression, Glyph]
+    expression: Expression, names: Mapping[Expression, object]
 ) -> list[tuple[Monomial, Core, Polynomial]]:
     """Return an expression multiplied out: scalars, vector, and the rates that stand with them.
 
@@ -132,7 +133,7 @@ def _over_divisors(parts: list[tuple[Monomial, Core, Polynomial]]) -> Scalar:
 class _Atoms:
     """What is not multiplied out: the abbreviations, and products of scalars that are one."""
 
-    def __init__(self, names: Mapping[Expression, Glyph]) -> None:
+    def __init__(self, names: Mapping[Expression, object]) -> None:
         self.whole = frozenset(names)
         self.products = [item for item in names if isinstance(item, Product)]
 
@@ -355,6 +356,21 @@ def _sum(terms: list[Scalar]) -> Scalar:
     """Return a sum, flat; unlike `sum_of` it leaves numbers before brackets."""
     flat = tuple(part for item in terms for part in getattr(item, "terms", (item,)))
     return Sum(flat) if len(flat) != 1 else flat[0]
+
+
+def is_rate(factor: Any) -> bool:
+    """Return whether a factor is the rate of a scalar, a power or a sum of such."""
+    match factor:
+        case Symbol(name):
+            return name.endswith(RATES)
+        case Power(base, _):
+            return is_rate(base)
+        case Sum(terms):
+            parts = map(split_coefficient, terms)
+            return all(
+                abs(number) == 1 and list(map(is_rate, rest)) == [True] for number, rest in parts
+            )
+    return False
 
 
 class _AtRandom:

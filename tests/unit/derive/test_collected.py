@@ -10,11 +10,11 @@ import pytest
 import kincompile as kc
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Number, Product, Symbol
-from kincompile.derivation import collected as collecting
-from kincompile.derivation.collected import collected
 from kincompile.derivation.formulas import size
 from kincompile.derivation.joint_terms import abbreviations
 from kincompile.derivation.tex import TexPrinter
+from kincompile.derive import collected as collecting
+from kincompile.derive.collected import collected
 from kincompile.derive.derivation import derive
 from kincompile.errors import InternalError
 from kincompile.model.catalogue import CONSTRAINTS

@@ -1,0 +1,359 @@
+"""A mechanism as SVG: at a position, or in motion by SMIL. There is no script in it.
+
+Each stroke is written once, in the frame it moves with; the frame's motion is that of the body's
+coordinates, so that a picture of many frames stays small. What changes its shape, such as a
+cylinder, has a shape for each frame.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import dataclass
+from functools import cache
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.targets.templates import read
+from kincompile.view.marks import GROUND_FRAME, moves_with
+from kincompile.view.polylines import Polyline, polylines
+from kincompile.view.shapes import DASHES, FILL, HUES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from kincompile.view.drawing import Drawing
+    from kincompile.view.marks import Array, PlaneFrame
+
+WIDTH, HEIGHT = 960.0, 720.0
+"""Largest sides of a picture [px]."""
+
+THICK = 8.0
+"""Size of marks [px] beside which lines have the widths of their looks."""
+
+DOT = "dot"
+"""The look of named points, which are drawn over paths."""
+
+DARK_FILL = 0.32
+"""Opacity of the areas of bodies on dark paper."""
+
+SAME = 1e-9
+"""Distance, in sizes of the mechanism, up to which a stroke does not change its shape."""
+
+STILL = "@media(prefers-reduced-motion:reduce){.moving{display:none}.still{display:inline}}"
+"""Shows the first frame alone to those who do not want motion."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """When the frames of a motion are shown.
+
+    Attributes
+    ----------
+    seconds
+        Playing time.
+    parts : ndarray, shape (F,)
+        The part of it at which each frame is shown, from 0 to 1.
+    """
+
+    seconds: float
+    parts: Array
+
+    @property
+    def attributes(self) -> str:
+        """The attributes of an animation."""
+        uneven = np.abs(self.parts - np.linspace(0, 1, self.parts.size)).max() > 1e-6
+        shown = ";".join(f"{part:.5g}" for part in self.parts)
+        times = f' keyTimes="{shown}"' if uneven else ""
+        return f'dur="{self.seconds:g}s" repeatCount="indefinite"{times}'
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """How a group of strokes moves: shifts [px], shape (F, 2), and turns [degrees], shape (F,)."""
+
+    shift: Array
+    turn: Array | None
+
+    @property
+    def start(self) -> str:
+        """The transform of the first frame."""
+        turned = "" if self.turn is None else f" rotate({_number(self.turn[0])})"
+        return f"translate({_pair(self.shift[0])}){turned}"
+
+    def animation(self, clock: str) -> str:
+        """Return the elements that move a group by a clock; without one, nothing."""
+        if not clock:
+            return ""
+        elements = _transform("translate", "replace", map(_pair, self.shift), clock)
+        if self.turn is not None:
+            elements += _transform("rotate", "sum", map(_number, self.turn), clock)
+        return elements
+
+
+class _Sheet:
+    """From the lengths of a model to pixels, y downwards."""
+
+    def __init__(self, drawn: Drawing, q: Array, paths: Iterable[Array]) -> None:
+        left, right, low, high = drawn.extent(q)
+        room = 2 * drawn.size  # stands and arrows reach beyond the extent
+        corners = [np.array(((left - room, low - room), (right + room, high + room)))]
+        points = np.concatenate([*corners, *paths])
+        low_corner, high_corner = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+        wide, tall = high_corner - low_corner
+        self.scale = float(min(WIDTH / wide, HEIGHT / tall))
+        self.width, self.height = self.scale * float(wide), self.scale * float(tall)
+        self._corner = np.array((low_corner[0], high_corner[1]))
+
+    def at(self, points: Array) -> Array:
+        """Return where points of the ground are."""
+        return self.along(points - self._corner)
+
+    def along(self, points: Array) -> Array:
+        """Return points of a frame, or directions, as lengths on the sheet."""
+        return np.asarray(self.scale * points * (1.0, -1.0), dtype=np.float64)
+
+
+def as_svg(
+    drawn: Drawing,
+    q: Array,
+    description: str,
+    *,
+    paths: Sequence[Array] = (),
+    timing: Timing | None = None,
+    millimetres: float | None = None,
+) -> str:
+    """Return a mechanism as the text of an SVG file.
+
+    Its colours are those of the page, on light and on dark paper.
+
+    Parameters
+    ----------
+    drawn
+        Its shapes.
+    q : ndarray, shape (F, n)
+        Positions; of several the first is shown where nothing moves.
+    description
+        What is shown, for those who cannot see it.
+    paths
+        Lines over the mechanism, each of shape (k, 2).
+    timing
+        When the positions are shown; without, the first one is.
+    millimetres
+        Length of the model's unit where the picture has its true size.
+    """
+    sheet = _Sheet(drawn, q, paths)
+    unit = sheet.scale * drawn.size
+    line = max(1.0, unit / THICK)
+    traces = "".join(_trace(k, sheet.at(path), line) for k, path in enumerate(paths))
+    parts = traces.join(_layers(drawn, q[:1], sheet, line, ""))
+    style = _dark_rules()
+    if timing is not None and len(q) > 1:
+        moving = traces.join(_layers(drawn, q, sheet, line, timing.attributes))
+        parts = f'<g class="still" display="none">{parts}</g>\n<g class="moving">{moving}</g>'
+        style += STILL
+    size = (sheet.width, sheet.height)
+    wide, tall = map(_number, size)
+    if millimetres is not None:
+        wide, tall = (f"{side / sheet.scale * millimetres:.7g}mm" for side in size)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_pair(size)}" width="{wide}" '
+        f'height="{tall}" role="img" aria-labelledby="title description" '
+        f'stroke-linecap="round" stroke-linejoin="round" '
+        f'font-family="system-ui,sans-serif" font-size="{_number(1.4 * unit)}">\n'
+        f'<title id="title">{escape(drawn.name)}</title>\n'
+        f'<desc id="description">{escape(description)}</desc>\n'
+        f"<style>{style}</style>\n"
+        f'<rect width="100%" height="100%"{_paint("", "paper")}/>\n{parts}\n</svg>\n'
+    )
+
+
+def _layers(drawn: Drawing, q: Array, sheet: _Sheet, line: float, clock: str) -> tuple[str, str]:
+    """Return what is below the paths, and above them: the named points with their names."""
+    strokes = _shown(drawn, q)
+    below = [_stroke(item, q, sheet, line, clock) for item in strokes if item.stroke.look != DOT]
+    above = [_stroke(item, q, sheet, line, clock) for item in strokes if item.stroke.look == DOT]
+    for dot in drawn.dots:
+        motion = _Motion(sheet.at(dot.place.at(q)), None)
+        above.append((motion, _name(dot.name, np.zeros(2), line)))
+    return _together(below, clock), _together(above, clock)
+
+
+def _together(strokes: Iterable[tuple[_Motion | None, str]], clock: str) -> str:
+    """Return elements; neighbours that move together are one group."""
+    found = []
+    for group, items in itertools.groupby(strokes, lambda item: _group(item[0], clock)):
+        text = "".join(text for _, text in items)
+        found.append(f"<g{group}{text}</g>\n" if group else text)
+    return "".join(found)
+
+
+def _group(motion: _Motion | None, clock: str) -> str:
+    """Return the attributes of a group, and the elements that move it."""
+    return f' transform="{motion.start}">{motion.animation(clock)}' if motion else ""
+
+
+def _shown(drawn: Drawing, q: Array) -> list[Polyline]:
+    """Return the strokes from back to front, without the gaps of joints that are closed."""
+    return [
+        item
+        for item in polylines(drawn)
+        if item.stroke.look != "gap"
+        or max(np.ptp(item.at(row), axis=0).max() for row in q) > 1e-3 * drawn.size
+    ]
+
+
+def _stroke(
+    item: Polyline, q: Array, sheet: _Sheet, line: float, clock: str
+) -> tuple[_Motion | None, str]:
+    """Return how a stroke moves, and its element in what moves it."""
+    points = [item.at(row) for row in q]
+    moved = _rigid(item, points, q, sheet)
+    if moved is not None:
+        motion, own = moved
+        return motion, _path(_outline(own, item.is_area), item, line)
+    shapes = [_outline(sheet.at(shape), item.is_area) for shape in points]
+    values = f'<animate attributeName="d" values="{";".join(shapes)}" {clock}/>'
+    return None, _path(shapes[0], item, line, values)
+
+
+def _rigid(
+    item: Polyline, points: Sequence[Array], q: Array, sheet: _Sheet
+) -> tuple[_Motion | None, Array] | None:
+    """Return the rigid motion of a stroke and its points [px] in it; None where it has none."""
+    if len({shape.shape for shape in points}) > 1:
+        return None
+    found = np.stack(points)
+    tolerance = SAME * np.nanmax(np.abs(found)) + SAME * item.size
+
+    def is_constant(shape: Array) -> bool:
+        return bool(np.nanmax(np.abs(shape - shape[0])) <= tolerance)
+
+    if is_constant(found):
+        return None, sheet.at(found[0])
+    for frame in sorted({item.frame, *moves_with(item.mark)} - {GROUND_FRAME}):
+        origin, turn = q[:, frame.columns[:2]], q[:, frame.columns[2]]
+        c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
+        x, y = np.moveaxis(found - origin[:, None], -1, 0)
+        local = np.stack((c * x + s * y, c * y - s * x), axis=-1)
+        if is_constant(local):
+            return _Motion(sheet.at(origin), -np.degrees(turn)), sheet.along(local[0])
+    middle = np.nanmean(found, axis=1)
+    apart = found - middle[:, None]
+    return (_Motion(sheet.at(middle), None), sheet.along(apart[0])) if is_constant(apart) else None
+
+
+def _path(shape: str, item: Polyline, line: float, inside: str = "") -> str:
+    """Return the element of a stroke, in the colours of its look."""
+    look = item.look
+    hue = "quiet" if item.frame == GROUND_FRAME else _hue(item.frame)
+    stroke = look.line or hue
+    fill = (look.face or f"pale-{hue}") if item.is_area else ""
+    width = f' stroke-width="{_number(line * look.width)}"' if look.width else ""
+    dash = _dash(look.dash, line)
+    content = f">{inside}</path>" if inside else "/>"
+    return f'<path d="{shape}"{_paint(stroke if look.width else "", fill)}{width}{dash}{content}\n'
+
+
+def _trace(index: int, points: Array, line: float) -> str:
+    """Return the elements of a path: in a colour of its own, on a rim of paper."""
+    shape, hue = _outline(points, False), f"body{(index + 4) % len(HUES['light'])}"
+    return "".join(
+        f'<path d="{shape}"{_paint(colour, "")} stroke-width="{_number(width * line)}"/>\n'
+        for colour, width in (("paper", 3), (hue, 1.5))
+    )
+
+
+def _name(name: str, place: Array, line: float) -> str:
+    """Return the element of a name, beside its point, on a rim of paper."""
+    x, y = place[0] + 6 * line, place[1] - 6 * line
+    return (
+        f'<text x="{_number(x)}" y="{_number(y)}"{_paint("paper", "ink")} '
+        f'stroke-width="{_number(2 * line)}" paint-order="stroke">{escape(name)}</text>\n'
+    )
+
+
+def _transform(kind: str, additive: str, values: Iterable[str], clock: str) -> str:
+    return (
+        f'<animateTransform attributeName="transform" type="{kind}" additive="{additive}" '
+        f'values="{";".join(values)}" {clock}/>'
+    )
+
+
+def _outline(points: Array, is_closed: bool) -> str:
+    """Return the data of a path; NaN interrupts it."""
+    pieces: list[str] = []
+    is_down = False
+    for point in points:
+        if np.isnan(point).any():
+            is_down = False
+            continue
+        pieces.append(f"{'L' if is_down else 'M'}{_pair(point)}")
+        is_down = True
+    return "".join(pieces) + ("Z" if is_closed else "")
+
+
+def _pair(point: Iterable[float]) -> str:
+    x, y = point
+    return f"{_number(x)} {_number(y)}"
+
+
+def _number(value: float) -> str:
+    """Return a number of pixels or degrees, without what nobody sees."""
+    text = f"{value:.2f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def _dash(dash: str, line: float) -> str:
+    lengths = " ".join(_number(line * float(part)) for part in DASHES.get(dash, "").split())
+    return f' stroke-dasharray="{lengths}"' if lengths else ""
+
+
+# ---- colours ----
+
+
+def _hue(frame: PlaneFrame) -> str:
+    return f"body{frame.index % len(HUES['light'])}"
+
+
+def _paint(stroke: str, fill: str) -> str:
+    """Return the attributes of colours by name: those on light paper, and classes for dark."""
+    light = _palettes()["light"]
+    names = [f"{kind}-{name}" for kind, name in (("s", stroke), ("f", fill)) if name]
+    stroked = f' stroke="{light[stroke]}"' if stroke else ""
+    return f'{stroked} fill="{light[fill] if fill else "none"}" class="{" ".join(names)}"'
+
+
+def _dark_rules() -> str:
+    """Return the style sheet that gives every colour on dark paper."""
+    rules = "".join(
+        f".s-{name}{{stroke:{colour}}}.f-{name}{{fill:{colour}}}"
+        for name, colour in _palettes()["dark"].items()
+    )
+    return f"@media(prefers-color-scheme:dark){{{rules}}}"
+
+
+@cache
+def _palettes() -> Mapping[str, Mapping[str, str]]:
+    """Return the colours on light and on dark paper by name: those of the page's style sheet."""
+    found = re.findall(
+        r"--(\w+): light-dark\((#\w+), (#\w+)\);", read("view/style.css").partition("}")[0]
+    )
+    palettes = {scheme: {name: pair[k] for name, *pair in found} for k, scheme in enumerate(HUES)}
+    for scheme, part in (("light", FILL), ("dark", DARK_FILL)):
+        palette = palettes[scheme]
+        hues = {f"body{k}": hue for k, hue in enumerate(HUES[scheme])}
+        hues["quiet"] = palette["quiet"]
+        palette |= hues
+        for name, hue in hues.items():
+            palette[f"pale-{name}"] = _blended(hue, palette["paper"], part)
+    return palettes
+
+
+def _blended(colour: str, paper: str, part: float) -> str:
+    """Return a colour on paper through which a part of it is seen."""
+    over, under = ([int(text[k : k + 2], 16) for k in (1, 3, 5)] for text in (colour, paper))
+    mixed = (round(part * a + (1 - part) * b) for a, b in zip(over, under, strict=True))
+    return "#" + "".join(f"{value:02x}" for value in mixed)
