@@ -23,6 +23,9 @@ PLACE = "_code"
 JOINT_POINTS = "_joint_points"
 """Where a module keeps the function that compiles the points of its joints, on request."""
 
+SENSITIVITIES = "_sensitivities"
+"""Where a module keeps the function that compiles it with its sensitivities, on request."""
+
 DRIVERS = "_drivers"
 """Where a module keeps the function that describes its drivers at a time and parameters."""
 
