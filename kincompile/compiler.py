@@ -234,7 +234,8 @@ def compile(  # noqa: A001 - the public name kc.compile
             module = _native(module, code)
     vars(module)[JOINT_POINTS] = partial(_joint_points, system)
     vars(module)[DRIVERS] = system.drivers_at
-    vars(module)[SENSITIVITIES] = cache(partial(_sensitive_module, code.program))
+    if isinstance(code, InlineProgram):  # the program of a large mechanism is not worth its memory
+        vars(module)[SENSITIVITIES] = cache(partial(_sensitive_module, code.program))
     return remember_model(module, system)
 
 

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 from kincompile.errors import InputError, ModelError
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.graph import Graph
-from kincompile.ir.kernels import differentiated, pruned_kernel
+from kincompile.ir.kernels import pruned_kernel
 from kincompile.ir.program import Instance, OutputDerivatives
 from kincompile.model.bodies import Coordinate
 from kincompile.model.points import OutputColumn
@@ -135,7 +135,7 @@ class _Part:
         """Return the derivative of a constraint."""
         Phi = [node for _, node in sorted(self._nodes(instance, "Phi").items())]
         columns = self._columns(instance)
-        kernel = differentiated(self._graph, tangents(self._graph, Phi, self._direction), columns)
+        kernel = self._derivative(Phi, columns)
         own = instance.constraint
         source = f"{own.name} by {self._parameter.name}"
         first = instance.first_row
@@ -145,6 +145,53 @@ class _Part:
             own.corners,
         )  # fmt: skip
         return self._instance(kernel, rows, columns, first)
+
+    def _derivative(self, Phi: Sequence[int], columns: Sequence[str]) -> Kernel:
+        r"""Return the kernel of :math:`\Phi_q s + \Phi_a`.
+
+        It is linear in s: its derivatives are those of Phi_q and Phi_a, which are the same for all
+        parameters, times s and its rate.
+        """
+        graph, own = self._graph, columns[: len(columns) // 2]
+        one, two, t = graph.const(1), graph.const(2), graph.input("t")
+        s = [[graph.input(rate(name, k)) for name in columns[len(own) :]] for k in range(2)]
+        by = [{graph.input(name): one} for name in (*own, self._parameter.name)]
+        motion = {graph.input(name): graph.input(rate(name)) for name in own} | {t: one}
+
+        def along(nodes: Sequence[list[int]], direction: Mapping[int, int]) -> list[list[int]]:
+            return [tangents(graph, column, direction) for column in nodes]
+
+        slopes = [tangents(graph, Phi, direction) for direction in by]
+        first = along(slopes, motion)
+        at_rest = self._combined(along(first, motion), [*s[0], one])
+        moving = self._combined(first[:-1], [graph.mul(two, x) for x in s[1]])
+        vectors = {
+            "Phi": self._combined(slopes, [*s[0], one]),
+            "nu": [graph.neg(x) for x in self._combined(along(slopes, {t: one}), [*s[0], one])],
+            "gamma": [graph.neg(graph.add(*x)) for x in zip(at_rest, moving, strict=True)],
+        }
+        matrix = [self._combined(along(slopes, direction), [*s[0], one]) for direction in by[:-1]]
+        outputs = {
+            name: [(row, 0, node) for row, node in enumerate(found)]
+            for name, found in vectors.items()
+        }
+        outputs["Phi_q"] = [
+            (row, column, found[row])
+            for row in range(len(Phi))
+            for column, found in enumerate((*matrix, *slopes[:-1]))
+            if graph.value_of(found[row]) != 0
+        ]
+        return pruned_kernel("Sensitivity", graph, outputs)
+
+    def _combined(self, columns: Sequence[Sequence[int]], factors: Sequence[int]) -> list[int]:
+        """Return the sum of columns times their factors, row by row."""
+        graph, sums = self._graph, []
+        for row in zip(*columns, strict=True):
+            total = graph.const(0)
+            for node, factor in zip(row, factors, strict=True):
+                total = graph.add(total, graph.mul(node, factor))
+            sums.append(total)
+        return sums
 
     def output(self, instance: Instance) -> Instance:
         """Return the derivatives of an output, or of those of a point."""

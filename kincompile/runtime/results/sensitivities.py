@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import SMALLEST_DETERMINANT
-from kincompile.errors import InputError
+from kincompile.errors import InputError, UnsupportedError
 from kincompile.html import Shown
 from kincompile.names import (
     column_name,
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     Solver = Callable[[Lanes], Lanes]
     Coupling = Sequence[tuple[int, int, Any]]
 
-BLOCK = 3000
+BLOCK = 2000
 """Points at a time, so that intermediate arrays stay in the cache."""
 
 
@@ -237,6 +237,11 @@ def _of_outputs(
 def _compiled(module: ModuleType, names: tuple[str, ...]) -> ModuleType:
     """Return the module of a mechanism with its sensitivities."""
     compiled = vars(module).get(SENSITIVITIES)
+    if compiled is None and code_of(module).evaluate is not None:
+        raise UnsupportedError(
+            f"{module.NAME} is in grouped form, as large mechanisms are, and that has no "
+            "sensitivities: differentiate a part of it, or use form='inline'."
+        )
     if compiled is None:
         raise InputError(
             f"the module of {module.NAME} was loaded from a file, which knows no more than its "
@@ -260,7 +265,8 @@ def _over_motion(solution: Solution, code: Code, larger: Code, p: Array, k: int)
             parameters = p if p.ndim == 1 else sets[:, own]
             states = [state[:, own] for state in motion]
             _fill(code, _Points(larger, parameters, times[own], *states), found[..., own])
-    found[..., ~finite] = np.nan
+    if not finite.all():
+        found[..., ~finite] = np.nan
     return found.reshape(3, k, n, *shape)
 
 
@@ -280,6 +286,44 @@ def _fill(code: Code, points: _Points, found: Array) -> None:
         found[..., left] = part
 
 
+class _Zero:
+    """A lane that is zero at all points: what is multiplied by it costs nothing.
+
+    Most parameters move few coordinates, and which ones is found while the lanes are computed.
+    """
+
+    __array_ufunc__ = None  # so that arrays leave the operation to it
+
+    def __float__(self) -> float:
+        """Return zero, where it is put into an array."""
+        return 0.0
+
+    def _itself(self, _: object = None) -> _Zero:
+        return self
+
+    def _other(self, other: Any) -> Any:
+        return other
+
+    def __rsub__(self, other: Any) -> Any:
+        """Return the other."""
+        return other
+
+    def __sub__(self, other: Any) -> Any:
+        """Return the other with its sign changed."""
+        return -other
+
+    __mul__ = __rmul__ = __truediv__ = __neg__ = _itself
+    __add__ = __radd__ = _other
+
+
+ZERO = _Zero()
+
+
+def _is_zero(lane: Any) -> bool:
+    """Return whether a lane is the plain number zero."""
+    return not isinstance(lane, np.ndarray | _Zero) and lane == 0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Points:
     """A batch of points, a lane each coordinate, and the larger mechanism there."""
@@ -295,17 +339,14 @@ class _Points:
         """Fill in the derivatives, shape (3, k, n, N), by a solve with Phi_q of m equations."""
         lanes, k = self.larger.module.LANES, found.shape[1]
         f, n = self.larger.arrays, len(self.q)
-        rows = [slice(m * part, m * (part + 1)) for part in range(1, k + 1)]
-        Phi_a = lanes["position"](f, [*self.q, *([0.0] * (k * n))], self.t, self.p)
-        for place, row in zip(found[0], rows, strict=True):
-            _put(place, solve([-x for x in Phi_a[row]]))
-        q = [*self.q, *found[0].reshape(k * n, -1)]
+        Phi_a = lanes["position"](f, [*self.q, *([ZERO] * (k * n))], self.t, self.p)
+        sides = [-x for x in Phi_a[: m * (k + 1)]]
+        q = [*self.q, *_solved(found[0], solve, sides)]
         coupling = self._coupling(q, m, n)
-        nu = lanes["nu"](f, q, self.t, self.p)
-        _rates(found[1], solve, nu, coupling, self.q_dot)
-        q_dot = [*self.q_dot, *found[1].reshape(k * n, -1)]
+        nu = _reduced(lanes["nu"](f, q, self.t, self.p), coupling, self.q_dot)
+        q_dot = [*self.q_dot, *_solved(found[1], solve, nu)]
         gamma = lanes["gamma"](f, q, q_dot, self.t, self.p)
-        _rates(found[2], solve, gamma, coupling, self.q_ddot)
+        _solved(found[2], solve, _reduced(gamma, coupling, self.q_ddot))
 
     def _coupling(self, q: Lanes, m: int, n: int) -> list[tuple[int, int, Any]]:
         """Return row, column and value of the entries left of the diagonal blocks."""
@@ -322,18 +363,25 @@ class _Points:
         return entries
 
 
-def _rates(found: Array, solve: Solver, sides: Lanes, coupling: Coupling, rates: Array) -> None:
-    """Fill in the derivatives of rates, shape (k, n, N), given the rates themselves."""
-    sides, m = list(sides), len(sides) // (len(found) + 1)
+def _reduced(sides: Lanes, coupling: Coupling, rates: Array) -> Lanes:
+    """Return right sides without the part of the rates that are known."""
+    sides = list(sides)
     for row, column, value in coupling:
         sides[row] = sides[row] - value * rates[column]
+    return sides
+
+
+def _solved(found: Array, solve: Solver, sides: Lanes) -> Lanes:
+    """Fill in derivatives, shape (k, n, N), and return their lanes; `sides` has q's own first."""
+    lanes: list[Any] = []
+    m = len(sides) // (len(found) + 1)
     for part, place in enumerate(found, start=1):
-        _put(place, solve(sides[m * part : m * (part + 1)]))
-
-
-def _put(place: Array, lanes: Lanes) -> None:
-    for row, lane in zip(place, lanes, strict=True):
-        row[:] = lane
+        own = [ZERO if _is_zero(x) else x for x in sides[m * part : m * (part + 1)]]
+        solution = solve(own)
+        for row, lane in zip(place, solution, strict=True):
+            row[:] = lane
+        lanes.extend(solution)
+    return lanes
 
 
 def _planned(code: Code, points: _Points) -> tuple[Solver, NDArray[np.bool_]]:
