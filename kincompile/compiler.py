@@ -20,7 +20,7 @@ import logging
 import warnings
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,7 +41,7 @@ from kincompile.targets.emission import emit_program
 from kincompile.targets.registry import TARGETS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -63,7 +63,11 @@ more equations than coordinates."""
 
 
 def emit(
-    model: Mechanism | ConstraintSystem, target: str = "numpy", form: str | None = None
+    model: Mechanism | ConstraintSystem,
+    target: str = "numpy",
+    form: str | None = None,
+    *,
+    sensitivities: Sequence[str] = (),
 ) -> Emitted:
     """Compile a mechanism to source files.
 
@@ -78,6 +82,10 @@ def emit(
         ``"inline"`` writes every constraint out, with names and comments; ``"grouped"`` writes one
         function per type of constraint, for mechanisms of any size. Without a choice the size
         decides.
+    sensitivities
+        Names of parameters: the files are then those of the mechanism together with the derivatives
+        by them, coordinates and outputs of their own, ``phi_rod_by_a``, whose rates are the
+        derivatives of the rates.
 
     Returns
     -------
@@ -89,18 +97,25 @@ def emit(
     ------
     ModelError
         If the model cannot be used as written; every problem is listed.
+    InputError
+        If it has no parameter of a name.
     UnsupportedError
         If there is no such target, or it cannot print the mechanism: only ``"numpy"`` has the
-        grouped form.
+        grouped form, and that has no sensitivities.
     """
     _check_target(target, form)
     with _without_collector():
         system = system_of(model)
+        if form == "grouped" and sensitivities:
+            raise UnsupportedError("the grouped form has no sensitivities; use form='inline'")
         if _is_grouped(system, form) and not TARGETS[target].has_grouped_form:
             raise UnsupportedError(
                 f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
             )
-        return emit_program(target, _lowered(system, form))
+        code = _lowered(system, form)
+        if sensitivities:
+            code = _sensitive(code.program, sensitivities)
+        return emit_program(target, code)
 
 
 @contextmanager
@@ -196,7 +211,7 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    from kincompile.runtime.engine.code import DRIVERS, JOINT_POINTS
+    from kincompile.runtime.engine.code import DRIVERS, JOINT_POINTS, SENSITIVITIES
     from kincompile.runtime.load import from_source
 
     loadable = [name for name, item in TARGETS.items() if item.is_loadable]
@@ -219,6 +234,8 @@ def compile(  # noqa: A001 - the public name kc.compile
             module = _native(module, code)
     vars(module)[JOINT_POINTS] = partial(_joint_points, system)
     vars(module)[DRIVERS] = system.drivers_at
+    if isinstance(code, InlineProgram):  # the program of a large mechanism is not worth its memory
+        vars(module)[SENSITIVITIES] = cache(partial(_sensitive_module, code.program))
     return remember_model(module, system)
 
 
@@ -228,6 +245,25 @@ def _joint_points(system: ConstraintSystem) -> ModuleType:
 
     program = lower(system.observing(system.joint_points()))
     return from_source(emit_program("numpy", inline(program)).source, system.name)
+
+
+def _sensitive(program: Program, names: Sequence[str]) -> InlineProgram:
+    """Return the program of a mechanism with its sensitivities, written out."""
+    from kincompile.ir.sensitive import with_sensitivities
+
+    if len(program.coordinates) > LARGEST_INLINE:
+        raise UnsupportedError(
+            f"{program.name!r} has {len(program.coordinates)} coordinates, and sensitivities are "
+            f"compiled for up to {LARGEST_INLINE}: differentiate a part of the mechanism."
+        )
+    return inline(with_sensitivities(program, names))
+
+
+def _sensitive_module(program: Program, names: tuple[str, ...]) -> ModuleType:
+    """Return the module of a mechanism with its sensitivities, for `kc.sensitivities`."""
+    from kincompile.runtime.load import from_source
+
+    return from_source(emit_program("numpy", _sensitive(program, names)).source, program.name)
 
 
 def _native(module: ModuleType, code: InlineProgram) -> ModuleType:

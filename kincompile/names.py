@@ -8,7 +8,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 RESERVED = frozenset({"t", "pi", "alpha", "deg"})
 """Names with a meaning of their own in every expression."""
@@ -129,3 +129,34 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     """
     close = get_close_matches(name[:40], list(islice(known, 1000)), n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def sensitivity(name: str, parameter: str) -> str:
+    """Return the name of the derivative of a coordinate, an equation or an output."""
+    return f"{name}_by_{parameter}"
+
+
+def quotient_unit(unit: str, per: str) -> str:
+    """Return the unit of a derivative: of rad by m, rad/m; "" where both are the same."""
+    if unit == per or not per:
+        return "" if unit == per else unit
+    return f"{unit or 1}/({per})" if "/" in per else f"{unit or 1}/{per}"
+
+
+def parameters_problem(names: Sequence[str], known: Sequence[str], mechanism: str) -> str | None:
+    """Return a message about names that are no parameters, are there twice or not at all, or None.
+
+    A mechanism is to be differentiated by these parameters.
+    """
+    for name in names:
+        if name not in known:
+            near = suggestion(str(name), known) or "."
+            return (
+                f"{mechanism} has no parameter {name!r}{near} The parameters are {listed(known)}."
+            )
+    if names and len(set(names)) == len(names):
+        return None
+    return (
+        f"sensitivities of {mechanism} are asked for by {listed(names)}: name each parameter once; "
+        f"there are {listed(known)}."
+    )

@@ -428,7 +428,7 @@ def _observing(
     outputs["outputs_q"] = [
         (0, column, node) for column, node in enumerate(slopes) if graph.value_of(node) != 0
     ]
-    return _pruned_kernel("Output", graph, outputs)
+    return pruned_kernel("Output", graph, outputs)
 
 
 def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> Kernel:
@@ -453,10 +453,10 @@ def differentiated(graph: Graph, Phi: Sequence[int], columns: Sequence[str]) -> 
         name: [(row, 0, node) for row, node in enumerate(found)] for name, found in vectors.items()
     }
     outputs["Phi_q"] = entries
-    return _pruned_kernel("Equation", graph, outputs)
+    return pruned_kernel("Equation", graph, outputs)
 
 
-def _pruned_kernel(
+def pruned_kernel(
     name: str, graph: Graph, outputs: Mapping[str, Sequence[tuple[int, int, int]]]
 ) -> Kernel:
     """Return the kernel of what outputs need of a graph; its inputs are names."""

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from kincompile.ir.graph import Node
-    from kincompile.model.bodies import Coordinate, Parameter
+    from kincompile.model.bodies import Body, Coordinate, Parameter
     from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.points import OutputColumn, PlacedPoint
     from kincompile.model.resolve import FreeEquation, Joint
@@ -158,6 +158,16 @@ class Kernel:
 
 
 @dataclass(frozen=True, slots=True)
+class OutputDerivatives(Observed):
+    """The derivatives of outputs by a parameter: what stands for them in names and comments."""
+
+    name: str
+    columns: tuple[str, ...]
+    rows: tuple[OutputColumn, ...]
+    bodies: tuple[Body, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Instance:
     """One constraint, or one output: a kernel bound to rows, columns and attribute values.
 
@@ -176,7 +186,7 @@ class Instance:
     """
 
     kernel: Kernel
-    constraint: Joint | FreeEquation | ResolvedOutput | PlacedPoint
+    constraint: Joint | FreeEquation | ResolvedOutput | PlacedPoint | OutputDerivatives
     first_row: int
     columns: tuple[int | None, ...]
     bindings: tuple[int, ...]

@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import DTypeLike, NDArray
 
     Bytes = NDArray[np.uint8]
@@ -39,7 +37,7 @@ class _Loan:
     """
 
     def __init__(self, memory: Bytes, shape: tuple[int, ...], kind: np.dtype[Any]) -> None:
-        self._memory = memory
+        self._memory, self._free = memory, free  # there to the interpreter's end
         start = memory.ctypes.data
         self.__array_interface__ = {
             "version": 3,
@@ -48,8 +46,8 @@ class _Loan:
             "typestr": kind.str,
         }
 
-    def __del__(self, give_back: Callable[[Bytes], None] = free.append) -> None:
-        give_back(self._memory)  # as an argument, it is there to the interpreter's end
+    def __del__(self) -> None:
+        self._free.append(self._memory)
 
 
 def empty(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:

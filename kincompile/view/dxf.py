@@ -60,8 +60,10 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
         If ezdxf is not installed.
     """
     with package_of_extra("ezdxf", "dxf"):
-        from ezdxf.filemanagement import new
-    document = new(VERSION, setup=["linetypes"], units=LENGTHS.get(length_unit, (0, 0))[0])
+        import ezdxf.filemanagement
+    document = ezdxf.filemanagement.new(
+        VERSION, setup=["linetypes"], units=LENGTHS.get(length_unit, (0, 0))[0]
+    )
     layers = _layers(document, drawn)
     space = document.modelspace()
     for item in polylines(drawn):

@@ -26,6 +26,9 @@ JOINT_POINTS = "_joint_points"
 WRITTEN = "_written_position"
 """Where a compiled module keeps the `position` that was emitted in Python."""
 
+SENSITIVITIES = "_sensitivities"
+"""Where a module keeps the function that compiles it with its sensitivities, on request."""
+
 DRIVERS = "_drivers"
 """Where a module keeps the function that describes its drivers at a time and parameters."""
 

@@ -70,7 +70,8 @@ def test_that_all_files_and_the_summary_have_degrees(model, kincompile, tmp_path
     for name in ("motion.json", "motion.npz"):
         assert kincompile("run", model, "--deg", "-o", str(tmp_path / name)).exit_code == 0
     data = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
-    arrays = np.load(tmp_path / "motion.npz")
+    with np.load(tmp_path / "motion.npz") as file:
+        arrays = dict(file)
     column = data["coordinates"].index("phi_crank")
     assert (data["units"]["phi_crank"], arrays["units"][column]) == ("deg", "deg")
     assert data["units"]["phi0"] == "rad"
