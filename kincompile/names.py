@@ -148,6 +148,8 @@ def parameters_problem(names: Sequence[str], known: Sequence[str], mechanism: st
 
     A mechanism is to be differentiated by these parameters.
     """
+    if not known:
+        return f"{mechanism} has no parameters: declare the dimension with m.parameter, and use it."
     for name in names:
         if name not in known:
             near = suggestion(str(name), known) or "."

@@ -88,7 +88,7 @@ for k = 1:points
 
     % Angles turn back by whole turns, as far as the equations allow it: together, and each alone
     q = found;
-    for some = [{angles}, num2cell(angles')]
+    for some = [{angles}, num2cell(angles.')]
         turned = q;
         turned(some{1}) = q(some{1}) - 2 * pi * round((q(some{1}) - start(some{1})) / (2 * pi));
         if all(abs(slider_crank_Phi(turned, t, p)) <= bounds)

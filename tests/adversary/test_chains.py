@@ -176,6 +176,7 @@ def _quiet():
 
 
 @pytest.mark.parametrize("way", SEEDS)
+@pytest.mark.slow
 def test_a_few_random_chains(way, record, request):
     if way == "c":
         request.getfixturevalue("quick_compiler")

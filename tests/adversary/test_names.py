@@ -146,6 +146,7 @@ CHECKS = {"c": check_c, "javascript": check_javascript, "octave": check_octave}
 
 
 @pytest.mark.parametrize("target", ["numpy", *CHECKS])
+@pytest.mark.slow
 def test_a_few_names(target, tmp_path, record):
     check_names(target, 80, tmp_path, record)
 

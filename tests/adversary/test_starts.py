@@ -77,6 +77,7 @@ def compare(count, record):
     assert other == 0
 
 
+@pytest.mark.slow
 def test_a_few_bad_starts_in_c(quick_compiler, record):
     compare(40, record)
 

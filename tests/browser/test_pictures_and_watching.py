@@ -8,7 +8,7 @@ import pytest
 import kincompile as kc
 from kincompile.cli.serve import LivePage, served
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PLACES = """seconds => {
   const svg = document.documentElement;

@@ -199,6 +199,7 @@ def test_that_the_block_on_imports_does_block():
 @pytest.mark.parametrize(
     "seed", ["4242", *(pytest.param(seed, marks=pytest.mark.slow) for seed in ("0", "1"))]
 )
+@pytest.mark.slow
 def test_that_the_bytes_do_not_depend_on_the_hash_seed(example_named, seed):
     paths = [str(example_named(name).path) for name in EXAMPLES]
     printed = run("-c", EMIT, *paths, PYTHONHASHSEED=seed)

@@ -126,6 +126,7 @@ def coupled(n: int) -> kc.ConstraintSystem:
 
 @pytest.mark.usefixtures("quick_compiler")
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 7])
+@pytest.mark.slow
 def test_blocks_of_every_size(n):
     native, module = kc.compile(coupled(n), target="c"), kc.compile(coupled(n))
     rng = np.random.default_rng(n)

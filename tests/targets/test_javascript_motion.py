@@ -95,6 +95,7 @@ def test_that_motions_of_examples_are_those_of_the_runtime(solved, example):
             compare(found, event, kc.solve(example.module, t, p))
 
 
+@pytest.mark.slow
 def test_that_lock_ups_are_among_them(example_named):
     """Else the comparison above would not see one."""
     kinds = set()

@@ -57,6 +57,7 @@ def test_the_cases_of_the_textbook(
     assert np.all(solution.status[~before] != Status.CONVERGED)
 
 
+@pytest.mark.slow
 def test_that_a_variant_ends_where_it_does_alone(example_named, compiled_for):
     module = compiled_for(example_named("example_3_7_5").model)
     rods = np.array([0.5, 0.8, 1.0, 1.5])

@@ -51,6 +51,7 @@ def test_that_problem_3_5_6_locks_up(r3, method, points):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.slow
 def test_the_lock_up_backwards_in_time(r3, method):
     event = the_event(kc.solve(r3, -np.linspace(0, 1, 40), method=method))
     assert event.kind == "lock-up"
@@ -83,6 +84,7 @@ def test_that_a_long_rod_is_regular(r4, method):
 
 
 @pytest.mark.parametrize("rod", [0.9999, 0.99, 0.3])
+@pytest.mark.slow
 def test_the_time_of_a_lock_up_against_its_formula(r4, rod):
     event = the_event(kc.solve(r4, np.linspace(0, 10, 101), p={"l": rod}))
     assert event.kind == "lock-up"

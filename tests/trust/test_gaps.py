@@ -23,6 +23,7 @@ def pendulum():
 
 
 @pytest.mark.parametrize("form", FORMS, ids=str)
+@pytest.mark.slow
 def test_a_gap_is_no_lock_up(form, quick_compiler):
     x = sympy.Symbol("x")
     wave = kc.ConstraintSystem("wave", [x], [x - sympy.sin(kc.t)], guess=(0,))
@@ -39,6 +40,7 @@ def test_a_time_beyond_all_angles_is_a_status(pendulum):
 
 
 @pytest.mark.parametrize("form", FORMS, ids=str)
+@pytest.mark.slow
 def test_a_gap_of_many_turns_is_followed_and_counted(form, quick_compiler):
     module = kc.compile(linkages.four_bar().mechanism, **form)
     solution = kc.solve(module, [0, 100.0])
@@ -103,6 +105,7 @@ def test_that_tiny_and_huge_free_lengths_are_solved_alike(form, length, quick_co
 
 @pytest.mark.parametrize("end", [LOCKS + 1e-6, LOCKS + 0.1, 6.0])
 @pytest.mark.parametrize("points", [2, 13, 60])
+@pytest.mark.slow
 def test_that_what_lies_beyond_a_lock_up_has_one_status(end, points, quick_compiler):
     t = np.linspace(0, end, points)
     modules = [kc.compile(linkages.peaucellier().mechanism, **form) for form in FORMS]

@@ -323,6 +323,7 @@ def test_free_equations_without_a_solution():
     assert "equation_1 by 1. There: x = " in found.to_text()
 
 
+@pytest.mark.slow
 def test_that_a_hundred_bodies_are_readable_and_analysed_in_few_steps(monkeypatch):
     """Neither a wide pattern nor long lists; and the work does not grow with the redundancy."""
     calls = []

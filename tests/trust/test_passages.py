@@ -59,12 +59,14 @@ def check(modules, path, t, flat=FLAT):
         pytest.param(10_000, 3.034, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_that_the_flat_parallelogram_is_noticed(parallelograms, path, points, end):
     check(parallelograms, path, np.linspace(0, end, points))
 
 
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("seed", range(6))
+@pytest.mark.slow
 def test_that_points_close_to_the_bifurcation_do_not_lead_past_it(parallelograms, path, seed):
     random = np.random.default_rng(seed)
     for _ in range(4):
@@ -145,6 +147,7 @@ def test_that_of_loops_that_fold_one_after_the_other_the_first_is_found(form):
     assert solution.success
 
 
+@pytest.mark.slow
 def test_that_a_large_mechanism_names_its_bifurcation():
     module = kc.compile(row_of_parallelograms(34, 0.005))
     assert module.FORM == "grouped"

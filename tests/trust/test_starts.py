@@ -21,6 +21,7 @@ def test_the_assembly_beside_a_guess_is_found(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.slow
 def test_all_targets_begin_at_the_same_position_from_any_guess(seed, quick_compiler):
     rng = np.random.default_rng(100 + seed)
     linkage = random_linkage(rng, 1 + seed % 2)

@@ -43,9 +43,9 @@ KEYWORDS = (
 """Words of MATLAB and of Octave."""
 
 CALLED = (
-    *NAMES.values(), "abs", "all", "either", "error", "find", "in_reals", "isempty", "isreal",
-    "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell", "numel", "pi", "polyval",
-    "round", "size", "sum", "zeros",
+    *NAMES.values(), "abs", "all", "either", "error", "false", "find", "in_reals", "Inf",
+    "isempty", "isreal", "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell",
+    "numel", "pi", "polyval", "round", "size", "sum", "true", "zeros",
 )  # fmt: skip
 """Functions that the files call; a script of such a name would be called in their place."""
 

@@ -63,6 +63,7 @@ def test_that_every_command_is_here():
 
 
 @pytest.mark.parametrize("line", NOT_LOADED)
+@pytest.mark.slow
 def test_that_a_command_loads_what_it_uses(line, pendulum, tmp_path):
     hand = tmp_path / "hand.txt"
     hand.write_text("nu = [0, 0, 2]\n", encoding="utf-8")

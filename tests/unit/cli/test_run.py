@@ -163,6 +163,7 @@ m.add(kc.AbsoluteAngle("motor", i, 1 + kc.t))
 """
 
 
+@pytest.mark.slow
 def test_that_a_motion_goes_through_a_bifurcation_where_it_is_told_to(process, tmp_path):
     model, table, page = (tmp_path / name for name in ("model.py", "motion.csv", "page.html"))
     model.write_text(PARALLELOGRAM)

@@ -92,6 +92,7 @@ def watching():
         process.communicate()
 
 
+@pytest.mark.slow
 def test_that_the_page_follows_the_model_and_what_it_imports(watching, model, process, tmp_path):
     watcher, line = watching(model, "--end", "1", "--points", "3")
     assert line.startswith(f"{model} is shown at http://127.0.0.1:")

@@ -115,6 +115,7 @@ SWAPPED = [3, 4, 5, 0, 1, 2]
 
 @pytest.mark.parametrize("strict", [False, True])
 @pytest.mark.parametrize("kind", ["Revolute", "Translational", "Distance", "Gear"])
+@pytest.mark.slow
 def test_that_blocks_exchanged_in_one_constraint_are_no_order(
     kind: str, strict: bool, joint_types: Any
 ) -> None:

@@ -222,6 +222,7 @@ def test_that_a_root_may_exist_near_the_motion_only() -> None:
         assert kc.compare(driven(t**2 / 3), **derived([equation], "x_arm y_arm phi_arm")).equal
 
 
+@pytest.mark.slow
 def test_numbers_for_parameters() -> None:
     number = {a: 200}
     Phi_q, gamma = MODEL.Phi_q.subs(number), MODEL.gamma.subs(number)

@@ -103,6 +103,7 @@ def test_two_of_three_rows_that_are_swapped(joint_types: Models) -> None:
     ("factor", "name"),
     [(0, "missing term"), (-1, "sign"), (sympy.Rational(1, 2), "factor 2 or 1/2")],
 )
+@pytest.mark.slow
 def test_the_part_of_gamma_with_a_product_of_rates(
     kind: str, rates: str, factor: Any, name: str, joint_types: Models
 ) -> None:

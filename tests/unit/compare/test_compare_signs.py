@@ -43,6 +43,7 @@ def reference(joint: kc.Mechanism) -> Reference:
     return REFERENCES.setdefault(kind, Reference(joint))
 
 
+@pytest.mark.slow
 def test_that_a_sign_of_phi_q_nu_or_gamma_alone_is_a_mistake(
     joint: kc.Mechanism, reference: Reference
 ) -> None:

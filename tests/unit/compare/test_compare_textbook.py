@@ -450,6 +450,7 @@ def test_that_a_textbook_formula_is_equal(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [pytest.param("cam", marks=pytest.mark.slow), "flat", "pin"])
+@pytest.mark.slow
 def test_that_a_fault_in_the_formulas_of_a_cam_is_named(kind: str, tmp_path: Path) -> None:
     gamma = [f"2*({row})" for row in FORMULAS[kind]["gamma"]]
     report = checked(kind, {"Phi_q": FORMULAS[kind]["Phi_q"], "gamma": gamma}, tmp_path)

@@ -77,6 +77,7 @@ def test_that_the_page_of_the_wrecker_boom_is_small(example_named: Any) -> None:
     assert len(text.encode()) < MOST_BYTES
 
 
+@pytest.mark.slow
 def test_that_the_page_of_a_long_chain_grows_with_its_length() -> None:
     sizes = []
     for length in (12, 24):

@@ -112,6 +112,7 @@ def test_that_links_lead_somewhere_at_every_level(gallery: Any) -> None:
         assert links <= set(re.findall(r'id="([^"]*)"', text))
 
 
+@pytest.mark.slow
 def test_that_only_a_prescribed_angle_is_folded_away(gallery: Any, sections_of: Any) -> None:
     derivation = kc.derivation(gallery)
     folded = {item.anchor for item in sections_of(derivation) if item.is_folded}

@@ -99,6 +99,7 @@ IN_SHORT = ("inverted_slider_crank.toml", "gear_train.toml", "exercises/relative
 @pytest.mark.parametrize(
     "name", [pytest.param(x, marks=() if x in IN_SHORT else pytest.mark.slow) for x in ready()]
 )
+@pytest.mark.slow
 def test_that_right_answers_have_all_points(name: str, tmp_path: Path) -> None:
     folder = kc.exercise(read(name), 1, 2, signs=True).write(tmp_path / "kit")
     fill(folder, "01", {})
@@ -220,6 +221,7 @@ def test_that_a_page_has_hints_and_no_solution(four_bar: Path) -> None:
     assert lines[0] not in page
 
 
+@pytest.mark.slow
 def test_that_the_same_seed_gives_the_same_bytes_and_another_other_ones() -> None:
     model = read("four_bar.toml")
     first = kc.exercise(model, 2, 8, signs=True).files()

@@ -335,6 +335,7 @@ def test_that_read_does_not_run_python(tmp_path):
         kc.read(path)
 
 
+@pytest.mark.slow
 def test_that_the_schema_agrees_with_the_reader(example):
     jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed")
     data = json.loads(example.model.to_json())

@@ -56,6 +56,7 @@ def sines(title: str, at: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("target", ["numpy", "c"])
 @pytest.mark.parametrize("title", PEAKS)
+@pytest.mark.slow
 def test_the_published_peaks(title, target):
     """A motion of lift 0.4 rad in 2 s; each number is right to the digits that are printed."""
     m = kc.Mechanism("cam")

@@ -162,6 +162,7 @@ def test_a_compiler_that_compiles_something_else_is_found_out(compiler, cache):
     assert not cache.exists()
 
 
+@pytest.mark.slow
 def test_arguments_beside_the_name_reach_the_compiler(monkeypatch, compiler, cache, tmp_path):
     compiler(f'echo "$@" > {tmp_path}/seen; exec REAL "$@"')
     monkeypatch.setenv("CC", f"{os.environ['CC']} -DEXTRA=1")
@@ -179,6 +180,7 @@ def test_large_sources_are_not_optimized_for_minutes(monkeypatch, compiler, cach
 # ---------------------------------------------------------------- the cache
 
 
+@pytest.mark.slow
 def test_the_second_time_the_compiler_is_not_needed(compiler, cache, tmp_path):
     compiler(f'echo x >> {tmp_path}/calls; exec REAL "$@"')
     for _ in range(2):
@@ -246,6 +248,7 @@ def test_what_does_not_agree_with_its_checksum_is_built_again(cache, damage):
     assert_intact(cache, 1)
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_made_is_no_obstacle(monkeypatch, cache, tmp_path):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
@@ -253,6 +256,7 @@ def test_a_cache_that_cannot_be_made_is_no_obstacle(monkeypatch, cache, tmp_path
     assert (tmp_path / "file").read_text() == "in the way"
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written_to_is_no_obstacle(cache):
     cache.mkdir(parents=True)
     cache.chmod(0o500)
@@ -280,6 +284,7 @@ def test_a_temporary_folder_that_cannot_be_written_to_is_named(monkeypatch, cach
         kc.compile(tiny(), target="c")
 
 
+@pytest.mark.slow
 def test_nothing_is_left_in_the_temporary_folder(monkeypatch, cache, tmp_path):
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
@@ -293,6 +298,7 @@ def modes(folder: Path) -> set[int]:
 
 
 @pytest.mark.parametrize("umask", [0, 0o077])
+@pytest.mark.slow
 def test_the_cache_is_its_users_alone_whatever_the_umask(cache, umask):
     before = os.umask(umask)
     try:

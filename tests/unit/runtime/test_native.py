@@ -48,6 +48,7 @@ def four_bar(example_named):
 
 
 @pytest.mark.parametrize("shape", [(), (1,), (33,), (2, 40)])
+@pytest.mark.slow
 def test_every_function_agrees(example, shape):
     q, q_dot, t = states(example.module, *shape)
     assert_functions_agree(example.native, example.module, q, q_dot, t if shape else 0.7)

@@ -63,6 +63,7 @@ def test_no_unit_of_length_is_judged_otherwise_or_takes_more_work(modules, way, 
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("method", ["grid", "march"])
+@pytest.mark.slow
 def test_a_lock_up_is_the_same_event_in_all_units(modules, size, method):
     t = np.linspace(0, 4, 101)
     (ours, _), (theirs, _) = (

@@ -11,6 +11,7 @@ from PIL import Image
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 
+@pytest.mark.slow
 def test_that_the_programs_run_and_draw_the_picture(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = (DOCS / "plots.md").read_text(encoding="utf-8")

@@ -56,6 +56,7 @@ def test_that_a_plot_names_points_and_no_joints_unless_asked(model):
     assert {text.get_text() for text in ax.texts} == {"P", "O, motor"}
 
 
+@pytest.mark.slow
 def test_that_an_animation_traces_points_and_their_names_go_with_them(solution):
     plt = pytest.importorskip("matplotlib.pyplot", reason="matplotlib is not installed")
     from matplotlib.animation import AbstractMovieWriter

@@ -65,6 +65,7 @@ def test_that_the_page_draws_the_points_that_python_draws(example, in_the_page):
     assert found["owners"] == [line.frame.index for line in polylines(drawn)]
 
 
+@pytest.mark.slow
 def test_that_rails_and_barrels_are_fitted_to_a_motion_as_python_fits_them(example, in_the_page):
     q = example.solution.q[example.solution.good]
     drawn = drawing(example.model, q=q)
