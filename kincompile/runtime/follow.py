@@ -170,7 +170,7 @@ class _Way:
     def _doubt(self, outcome: Outcome, time: float) -> str:
         """Say that the position found from the guess may not be the one that is meant."""
         said, bodies = DOUBTS["strays"], ""
-        if outcome.other is not None and outcome.position is not None:
+        if not outcome.strays and outcome.other is not None and outcome.position is not None:
             away = outcome.other.q - outcome.position.q
             said = DOUBTS["other"]
             bodies = listed(involved(self._inputs.code, away / self._march.equations.reference))

@@ -117,7 +117,7 @@ function listed(bodies) {
 
 /* What is to be said of a start that may not be the one that is meant. */
 function doubtOf({ t, other, strays }) {
-  const { words } = player.data, said = other ? words.other : words.strays;
+  const { words } = player.data, said = strays ? words.strays : words.other;
   if (!other && !strays) return '';
   return filled(said, { t: brieflyNumber(t[0]), bodies: other && listed(other) }) + words.remedy;
 }
