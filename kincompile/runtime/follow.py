@@ -169,12 +169,13 @@ class _Way:
 
     def _doubt(self, outcome: Outcome, time: float) -> str:
         """Say that the position found from the guess may not be the one that is meant."""
-        said, bodies = DOUBTS["strays"], ""
-        if not outcome.strays and outcome.other is not None and outcome.position is not None:
+        said, bodies = [DOUBTS["strays"]] if outcome.strays else [], ""
+        if outcome.other is not None and outcome.position is not None:
             away = outcome.other.q - outcome.position.q
-            said = DOUBTS["other"]
+            said.append(DOUBTS["other"])
             bodies = listed(involved(self._inputs.code, away / self._march.equations.reference))
-        return f" {said.format(t=f'{time:.10g}', bodies=bodies)}{DOUBTS['remedy']}"
+        t = f"{time:.10g}"
+        return "".join(f" {x.format(t=t, bodies=bodies)}{DOUBTS['remedy']}" for x in said)
 
     def march_compiled(self, outcome: Outcome) -> bool:
         """Let a compiled module follow the motion from its start; say whether all went well.

@@ -117,9 +117,9 @@ function listed(bodies) {
 
 /* What is to be said of a start that may not be the one that is meant. */
 function doubtOf({ t, other, strays }) {
-  const { words } = player.data, said = strays ? words.strays : words.other;
-  if (!other && !strays) return '';
-  return filled(said, { t: brieflyNumber(t[0]), bodies: other && listed(other) }) + words.remedy;
+  const { words } = player.data, said = [strays && words.strays, other && words.other].filter(Boolean);
+  const values = { t: brieflyNumber(t[0]), bodies: other && listed(other) };
+  return said.map(text => filled(text, values) + words.remedy).join(' ');
 }
 
 /* The event that ended a motion, with its sentence. */
