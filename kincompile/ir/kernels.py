@@ -41,7 +41,7 @@ from kincompile.names import rate
 from kincompile.quantities import TOGETHER
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from fractions import Fraction
 
     import sympy
@@ -201,19 +201,36 @@ def constraint_kernel(template: Template) -> Kernel:
     outputs: dict[str, list[tuple[int, int, int]]] = {}
     first = 0
     for block in derive(template):
-        columns = [expansion.components(column) for column in block.Phi_q]
-        outputs.setdefault("Phi_q", []).extend(
-            (first + row, column, item.node)
-            for column, items in enumerate(columns)
-            for row, item in enumerate(items)
-            if environment.graph.value_of(item.node) != 0
-        )
+        found = _nonzeros(expansion, block.Phi_q, first)
+        outputs.setdefault("Phi_q", []).extend(found)
         vectors = {"Phi": block.Phi, "nu": block.nu, "gamma": block.gamma}
         for name, vector in vectors.items():
             outputs.setdefault(name, []).extend(
                 (first + row, 0, item.node) for row, item in enumerate(expansion.components(vector))
             )
         first = len(outputs["Phi"])
+    return _kernel(template, environment, expansion, outputs)
+
+
+def _nonzeros(
+    expansion: Expansion, columns: Iterable[Expression], first: int = 0
+) -> list[tuple[int, int, int]]:
+    """Return row, column and node of the entries of a matrix that are not identically zero."""
+    return [
+        (first + row, column, item.node)
+        for column, vector in enumerate(columns)
+        for row, item in enumerate(expansion.components(vector))
+        if item.graph.value_of(item.node) != 0
+    ]
+
+
+def _kernel(
+    template: Template,
+    environment: KernelEnvironment,
+    expansion: Expansion,
+    outputs: Mapping[str, Sequence[tuple[int, int, int]]],
+) -> Kernel:
+    """Return the kernel of what was expanded in an environment."""
     return Kernel(
         template.type_name,
         tuple(environment.inputs),
@@ -296,19 +313,8 @@ def point_kernel() -> Kernel:
             (row, 0, item.node) for row, item in enumerate(expansion.components(found))
         ]
         found = along(found, motion)
-    outputs["outputs_q"] = [
-        (row, column, item.node)
-        for column, vector in enumerate(by_column)
-        for row, item in enumerate(expansion.components(vector))
-        if environment.graph.value_of(item.node) != 0
-    ]
-    return Kernel(
-        POINT.type_name,
-        tuple(environment.inputs),
-        tuple(environment.graph.nodes),
-        {name: tuple(sorted(entries)) for name, entries in outputs.items()},
-        _hints(POINT, expansion),
-    )
+    outputs["outputs_q"] = _nonzeros(expansion, by_column)
+    return _kernel(POINT, environment, expansion, outputs)
 
 
 class _OutputConverter(Converter):

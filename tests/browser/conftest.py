@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+import kincompile as kc
+
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 
@@ -33,3 +35,20 @@ def open_file() -> Iterator[Callable[..., Any]]:
 
         yield opened
         browser.close()
+
+
+@pytest.fixture(scope="module")
+def open_page(
+    open_file: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory, example_named: Any
+) -> Callable[..., Any]:
+    """Return a function that opens the page of a model, or of an example by name."""
+    folder = tmp_path_factory.mktemp("pages")
+
+    def opened(model: Any, width: int = 1280, scheme: str = "light") -> Any:
+        model = example_named(model).model if isinstance(model, str) else model
+        path = folder / f"{model.name}.html"
+        if not path.exists():
+            kc.page(model).write(path)
+        return open_file(path, width, scheme)
+
+    return opened

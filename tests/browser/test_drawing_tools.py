@@ -2,7 +2,6 @@
 
 import csv
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -23,23 +22,6 @@ TOO_SMALL = """() => [...document.querySelectorAll('button, select, summary, inp
   .filter(element => element.offsetParent !== null && !element.matches('[type=checkbox]'))
   .map(element => [element.id || element.textContent, element.getBoundingClientRect()])
   .filter(([, box]) => box.height < 44 || box.width < 44).map(([name]) => name)"""
-
-
-@pytest.fixture(scope="module")
-def opened(
-    open_file: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory, example_named: Any
-) -> Callable[..., Any]:
-    """Return a function that opens the page of a mechanism, or of an example."""
-    folder = tmp_path_factory.mktemp("pages")
-
-    def opened(model: Any, width: int = 1280, scheme: str = "light") -> Any:
-        model = example_named(model).model if isinstance(model, str) else model
-        path = folder / f"{model.name}.html"
-        if not path.exists():
-            kc.page(model).write(path)
-        return open_file(path, width, scheme)
-
-    return opened
 
 
 def slider_crank() -> kc.Mechanism:
@@ -76,8 +58,8 @@ def numbers(text: str) -> list[float]:
     return [float(found) for found in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)]
 
 
-def test_that_the_wheel_zooms_around_the_pointer_and_a_drag_moves(opened: Any) -> None:
-    page = opened(slider_crank())
+def test_that_the_wheel_zooms_around_the_pointer_and_a_drag_moves(open_page: Any) -> None:
+    page = open_page(slider_crank())
     place = np.array((1.5, 0.5))
     x, y = on_page(page, place)
     scale = page.evaluate("stage.view.scale")
@@ -103,8 +85,8 @@ def test_that_the_wheel_zooms_around_the_pointer_and_a_drag_moves(opened: Any) -
     page.close()
 
 
-def test_that_two_fingers_zoom_and_what_is_between_them_stays(opened: Any) -> None:
-    page = opened(slider_crank(), 390)
+def test_that_two_fingers_zoom_and_what_is_between_them_stays(open_page: Any) -> None:
+    page = open_page(slider_crank(), 390)
     x, y = on_page(page, (1, 0))
     touch = page.context.new_cdp_session(page)
     scale = page.evaluate("stage.view.scale")
@@ -123,8 +105,8 @@ def test_that_two_fingers_zoom_and_what_is_between_them_stays(opened: Any) -> No
     page.close()
 
 
-def test_that_a_body_that_is_pointed_at_tells_how_it_turns(opened: Any) -> None:
-    page = opened(slider_crank())
+def test_that_a_body_that_is_pointed_at_tells_how_it_turns(open_page: Any) -> None:
+    page = open_page(slider_crank())
     middle = (crank_pin() + block_pin()) / 2
     page.mouse.move(*on_page(page, middle))
     tip = page.inner_text("#tip")
@@ -145,16 +127,16 @@ def test_that_a_body_that_is_pointed_at_tells_how_it_turns(opened: Any) -> None:
     page.close()
 
 
-def test_that_every_joint_of_a_place_is_listed(opened: Any) -> None:
-    page = opened(slider_crank())
+def test_that_every_joint_of_a_place_is_listed(open_page: Any) -> None:
+    page = open_page(slider_crank())
     page.mouse.move(*on_page(page, block_pin()))
     tip = page.inner_text("#tip")
     assert {"B: Revolute", "guide: Translational"} <= set(tip.splitlines())
     page.close()
 
 
-def test_that_distances_and_angles_are_measured_and_move_with_the_bodies(opened: Any) -> None:
-    page = opened(slider_crank())
+def test_that_distances_and_angles_are_measured_and_move_with_the_bodies(open_page: Any) -> None:
+    page = open_page(slider_crank())
     page.keyboard.press("m")
     for point in ((0, 0), crank_pin(), block_pin()):
         page.mouse.click(*on_page(page, point))
@@ -176,8 +158,8 @@ def test_that_distances_and_angles_are_measured_and_move_with_the_bodies(opened:
     page.close()
 
 
-def test_that_poles_are_where_velocities_meet_and_centrodes_go_through_them(opened: Any) -> None:
-    page = opened(slider_crank())
+def test_that_poles_are_where_velocities_meet_and_centrodes_go_through_them(open_page: Any) -> None:
+    page = open_page(slider_crank())
     # Of the rod: above the block, on the line through the crank.
     expected = (block_pin()[0], block_pin()[0] * np.tan(ANGLE))
     rod, crank = (f"player.data.drawing.frames[{k}]" for k in (1, 0))
@@ -201,8 +183,8 @@ def test_that_poles_are_where_velocities_meet_and_centrodes_go_through_them(open
     page.close()
 
 
-def test_that_dots_of_a_path_are_equal_times_of_its_first_round(opened: Any) -> None:
-    page = opened(slider_crank())
+def test_that_dots_of_a_path_are_equal_times_of_its_first_round(open_page: Any) -> None:
+    page = open_page(slider_crank())
     # The crank turns steadily, once in 2 pi s of 7: 24 dots are 15 degrees apart.
     dots = np.array(page.evaluate("pathOf(stage.points.find(point => point.name === 'A')).dots"))
     angles = np.unwrap(np.arctan2(dots[:, 1], dots[:, 0]))
@@ -215,8 +197,8 @@ def test_that_dots_of_a_path_are_equal_times_of_its_first_round(opened: Any) -> 
 
 
 @pytest.mark.parametrize("length", [0.0031, 0.12, 4.4, 7600.0])
-def test_that_steps_of_the_grid_are_round_and_not_smaller(opened: Any, length: float) -> None:
-    page = opened(slider_crank())
+def test_that_steps_of_the_grid_are_round_and_not_smaller(open_page: Any, length: float) -> None:
+    page = open_page(slider_crank())
     step = page.evaluate(f"niceStep({length})")
     mantissa = step / 10 ** np.floor(np.log10(step) + 1e-9)
     assert round(mantissa, 9) in {1, 2, 5}
@@ -227,8 +209,8 @@ def test_that_steps_of_the_grid_are_round_and_not_smaller(opened: Any, length: f
     page.close()
 
 
-def test_that_rounding_beside_the_numbers_of_its_unit_is_zero(opened: Any) -> None:
-    page = opened("double_pendulum")
+def test_that_rounding_beside_the_numbers_of_its_unit_is_zero(open_page: Any) -> None:
+    page = open_page("double_pendulum")
     page.get_by_role("tab", name="Numbers").click()
     for index in (0, 20, 77):
         page.evaluate(f"player.setIndex({index})")
@@ -240,8 +222,8 @@ def test_that_rounding_beside_the_numbers_of_its_unit_is_zero(opened: Any) -> No
     page.close()
 
 
-def test_that_degrees_are_shown_everywhere(opened: Any, example_named: Any) -> None:
-    page = opened("four_bar")
+def test_that_degrees_are_shown_everywhere(open_page: Any, example_named: Any) -> None:
+    page = open_page("four_bar")
     page.keyboard.press("d")
     solution = example_named("four_bar").solution
     np.testing.assert_allclose(
@@ -258,13 +240,13 @@ def test_that_degrees_are_shown_everywhere(opened: Any, example_named: Any) -> N
     page.close()
 
 
-def test_that_angles_among_parameters_are_typed_and_measured_in_degrees(opened: Any) -> None:
+def test_that_angles_among_parameters_are_typed_and_measured_in_degrees(open_page: Any) -> None:
     m = kc.Mechanism("swing", end=1.0, points=21)
     start, arm = m.parameter("start", 0.5, unit="rad"), m.body("arm", guess=(0, 0, 0.5))
     m.add(kc.Revolute("O", m.ground, (0, 0), arm, (0, 0)))
     m.add(kc.AbsoluteAngle("motor", arm, start + sympy.sin(kc.t)))
     m.output("lean", arm.phi, "rad")
-    page = opened(m)
+    page = open_page(m)
     assert page.get_by_label("start in rad").input_value() == "0.5"
     page.keyboard.press("d")
     box = page.get_by_label("start in deg")
@@ -279,9 +261,9 @@ def test_that_angles_among_parameters_are_typed_and_measured_in_degrees(opened: 
     page.close()
 
 
-def test_that_plots_go_over_an_angle_are_zoomed_and_show_paths(opened: Any) -> None:
+def test_that_plots_go_over_an_angle_are_zoomed_and_show_paths(open_page: Any) -> None:
     m = slider_crank()
-    page = opened(m)
+    page = open_page(m)
     page.locator("#over").select_option("phi_crank")
     solution = kc.solve(kc.compile(m), np.linspace(0, m.end, m.points))
     np.testing.assert_allclose(page.evaluate("plots.list[0].x"), solution["phi_crank"], atol=1e-12)
@@ -311,9 +293,9 @@ def test_that_plots_go_over_an_angle_are_zoomed_and_show_paths(opened: Any) -> N
     page.close()
 
 
-def test_that_what_is_shown_is_saved(opened: Any, tmp_path: Path) -> None:
+def test_that_what_is_shown_is_saved(open_page: Any, tmp_path: Path) -> None:
     m = slider_crank()
-    page = opened(m)
+    page = open_page(m)
     solution = kc.solve(kc.compile(m), np.linspace(0, m.end, m.points))
     page.get_by_label("What is plotted").first.select_option("x_block")
     page.evaluate("plots.zoom([1, 2])")
@@ -340,8 +322,8 @@ def test_that_what_is_shown_is_saved(opened: Any, tmp_path: Path) -> None:
     page.close()
 
 
-def test_that_the_page_fills_the_screen_with_large_type(opened: Any) -> None:
-    page = opened("wrecker_boom")
+def test_that_the_page_fills_the_screen_with_large_type(open_page: Any) -> None:
+    page = open_page("wrecker_boom")
     size = "parseFloat(getComputedStyle(document.body).fontSize)"
     before, height = page.evaluate(size), page.evaluate("stage.height")
     page.keyboard.press("f")
@@ -356,8 +338,8 @@ def test_that_the_page_fills_the_screen_with_large_type(opened: Any) -> None:
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("name", ["wrecker_boom", "jansen", "example_3_7_5"])
-def test_that_every_width_is_filled_and_not_exceeded(opened: Any, name: str, width: int) -> None:
-    page = opened(name, width)
+def test_that_every_width_is_filled_and_not_exceeded(open_page: Any, name: str, width: int) -> None:
+    page = open_page(name, width)
     tabs = page.get_by_role("tab")
     for k in range(tabs.count()):
         if tabs.nth(k).is_visible():
@@ -371,8 +353,8 @@ def test_that_every_width_is_filled_and_not_exceeded(opened: Any, name: str, wid
     page.close()
 
 
-def test_that_paper_is_light_and_has_no_buttons(opened: Any) -> None:
-    page = opened("four_bar", scheme="dark")
+def test_that_paper_is_light_and_has_no_buttons(open_page: Any) -> None:
+    page = open_page("four_bar", scheme="dark")
     page.emulate_media(media="print")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.evaluate("stage.palette.isDark") is False
@@ -385,8 +367,8 @@ def test_that_paper_is_light_and_has_no_buttons(opened: Any) -> None:
     page.close()
 
 
-def test_that_everything_is_reached_by_the_tab_key(opened: Any) -> None:
-    page = opened(slider_crank())
+def test_that_everything_is_reached_by_the_tab_key(open_page: Any) -> None:
+    page = open_page(slider_crank())
     wanted = {"angles", "project", "theme", "canvas", "closer", "wider", "fit", "play", "time"}
     wanted |= {"speed", "names", "grid", "measure", "poles", "tab-plots", "over", "another"}
     found = set()
@@ -397,9 +379,9 @@ def test_that_everything_is_reached_by_the_tab_key(opened: Any) -> None:
     page.close()
 
 
-def test_that_nothing_that_was_computed_outlives_a_motion(opened: Any) -> None:
+def test_that_nothing_that_was_computed_outlives_a_motion(open_page: Any) -> None:
     m = slider_crank()
-    page = opened(m)
+    page = open_page(m)
     page.get_by_label("What is plotted").first.select_option("path of B")
     page.evaluate("stage.toggleTrace(stage.points.find(point => point.name === 'B'))")
     # Twice the lengths of everything, as another set of parameters would give.

@@ -2,7 +2,6 @@
 
 import dataclasses
 import re
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,23 +39,6 @@ MIDDLE_OF_INK = """([x, y]) => {
 }"""
 
 PIXELS = "stage.canvas.toDataURL()"
-
-
-@pytest.fixture(scope="module")
-def open_page(
-    open_file: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory, example_named: Any
-) -> Callable[..., Any]:
-    """Return a function that opens the page of a model, or of an example by name."""
-    folder = tmp_path_factory.mktemp("pages")
-
-    def opened(model: Any, width: int = 1280, scheme: str = "light") -> Any:
-        model = example_named(model).model if isinstance(model, str) else model
-        path = folder / f"{model.name}.html"
-        if not path.exists():
-            kc.page(model).write(path)
-        return open_file(path, width, scheme)
-
-    return opened
 
 
 def four_bar(name: str, crank: float, *, driven: bool = True) -> kc.Mechanism:

@@ -18,18 +18,11 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def open_panel(
-    open_file: Any, tmp_path_factory: pytest.TempPathFactory, example_named: Any
-) -> Callable[..., Any]:
+def open_panel(open_page: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that opens the page of a mechanism, or of an example, at Newton's panel."""
-    folder = tmp_path_factory.mktemp("pages")
 
     def opened(model: Any, width: int = 1280, scheme: str = "light") -> Any:
-        model = example_named(model).model if isinstance(model, str) else model
-        path = folder / f"{model.name}.html"
-        if not path.exists():
-            kc.page(model).write(path)
-        page = open_file(path, width, scheme)
+        page = open_page(model, width, scheme)
         page.get_by_role("tab", name="Newton").click()
         return page
 
