@@ -106,6 +106,8 @@ class Attempt:
 
     Attributes
     ----------
+    equations : Problem
+        What evaluated its points.
     status : Status
         How it ended.
     points : list of Point
@@ -118,6 +120,7 @@ class Attempt:
         Another assembly that is as near to the guess, where one was met.
     """
 
+    equations: Problem
     status: Status = Status.NOT_CONVERGED
     points: list[Point] = field(default_factory=list)
     corrections: list[float] = field(default_factory=list)
@@ -195,8 +198,10 @@ def start(march: March, t: float, inputs: Inputs) -> Outcome:
     iterations = len(attempt.corrections)
     if attempt.status is not Status.CONVERGED:
         return Outcome(attempt.status, iterations, None, nearest=attempt.found)
-    here = [march.equations.at(q, t) for q in (inputs.guess, attempt.last.q)]
-    guess, point = (known for known in here if known is not None)
+    guess, point = attempt.points[0], attempt.last
+    if attempt.equations is not march.equations or guess.q is not inputs.guess:
+        here = [march.equations.at(q, t) for q in (inputs.guess, point.q)]
+        guess, point = (known for known in here if known is not None)
     left = march.equations.leaves_branch(guess, point)
     folded = march.equations.is_folded(guess, point)
     state = march.state(point)
@@ -340,7 +345,7 @@ def iterate(
 ) -> Attempt:
     """Run Newton's method from a guess, with `plain_step` or another kind of step."""
     step = step or plain_step
-    attempt = Attempt()
+    attempt = Attempt(equations)
     point = equations.at(guess, t)
     if point is None:
         attempt.status = Status.NOT_FINITE
