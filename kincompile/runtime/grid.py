@@ -52,7 +52,7 @@ CORRECTIONS_ON_GRID = 2
 TARGET_ERROR = 0.0006
 """Error of the coarse march's prediction aimed at, in radians or sizes of the mechanism. It falls
 with the third power of the step, the interpolation's with the sixth: this one leaves the points of
-the grid about 3e-6 from their place."""
+the grid about 1e-6 from their place."""
 
 LARGEST_ERROR = 0.0015
 """Error of the prediction above which a coarse step is not trusted."""

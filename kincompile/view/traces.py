@@ -48,7 +48,7 @@ def moving_system(
     if found is None:
         raise InputError(
             f"the shapes of {name} are unknown, because its module was loaded from a file; give "
-            "its mechanism too: kc.animate(solution, path, model=m)"
+            "its mechanism too, as model=m"
         )
     names = tuple(item.name for item in found.coordinates)
     if names != solution.coordinates:
