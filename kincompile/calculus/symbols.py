@@ -30,6 +30,8 @@ class Frame:
     index: str
     letters: ClassVar[tuple[str, ...]] = ("x", "y", "phi")
     """Letters of the coordinates, one a component."""
+    ground: ClassVar[tuple[int, ...]] = (0, 0, 0)
+    """Values of the ground's."""
 
     @property
     def r(self) -> VectorSymbol:
@@ -76,6 +78,7 @@ class Contact:
 
     index: str
     letters: ClassVar[tuple[str, ...]] = ("alpha",)
+    ground: ClassVar[tuple[int, ...]] = (0,)
 
     @property
     def alpha(self) -> Symbol:

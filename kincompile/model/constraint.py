@@ -19,9 +19,10 @@ from kincompile.model.bodies import GROUND, PLANAR, BodyKind
 from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
+    from kincompile.model.expressions import Scalar
 
     Numbers = Callable[[str], tuple[float | None, ...]]
     """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
@@ -75,6 +76,14 @@ class Constraint(Shown):
         """Return what is wrong with several arguments together; each alone is good."""
         del numbers
         return None
+
+    @staticmethod
+    def completed(
+        points: Mapping[str, tuple[Scalar, ...]], defaults: Mapping[str, float]
+    ) -> Mapping[str, tuple[Scalar, ...]]:
+        """Return points and directions as the template has them, from those that were given."""
+        del defaults
+        return points
 
     @classmethod
     @cache

@@ -164,6 +164,9 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
     title = _title(constraint)
+    if constraint.bodies is not scope.ground.kind:
+        scope.problems.append(f"{title}: {_KIND_PROBLEM[len(scope.ground.kind.axes)]}")
+        return None
     corners = _corners(constraint.corners, title, scope)
     for name, item in constraint.arguments().items():
         given, where = getattr(constraint, name), f"{title}, {name}"
@@ -192,10 +195,16 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
         constraint.template(),
         tuple(known),
         scalars,
-        points,
+        constraint.completed(points, scope.defaults),
         profiles,
         (*(name for body in known for name in scope.columns[body.name]), *constraint.contact_names),
     )
+
+
+_KIND_PROBLEM = {
+    2: "it is a constraint of bodies in space; take the one of kincompile for bodies in the plane",
+    3: "it is a constraint of bodies in the plane; take the one of kincompile.spatial",
+}
 
 
 def _title(constraint: Constraint) -> str:

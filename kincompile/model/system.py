@@ -9,7 +9,7 @@ import sympy
 
 from kincompile.errors import ModelError
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import Body, Coordinate, Parameter, body_columns
+from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter, body_columns
 from kincompile.model.declarations import (
     body_coordinates,
     check_names,
@@ -65,6 +65,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         Bodies, whose coordinates come first.
     outputs
         `Output` and `BodyPoint`, as `Mechanism.output` and `Mechanism.point` make them.
+    ground
+        The fixed frame of the bodies.
     length_unit, end, points
         As for `Mechanism`.
 
@@ -94,7 +96,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
-        "length_unit", "name", "observers", "parameters", "points",
+        "ground", "length_unit", "name", "observers", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -103,6 +105,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     parameters: tuple[Parameter, ...]
     constraints: tuple[Joint | FreeEquation, ...]
     equations: tuple[str, ...]
+    ground: Body
     body_points: tuple[BodyPoint, ...]
     observers: tuple[PlacedPoint | ResolvedOutput, ...]
     length_unit: str
@@ -120,6 +123,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         guess: Sequence[float] | Mapping[Any, float] | None = None,
         bodies: Iterable[Body] = (),
         outputs: Iterable[BodyPoint | Output] = (),
+        ground: Body = GROUND,
         length_unit: str = "m",
         end: Scalar = 1.0,
         points: int = 101,
@@ -143,7 +147,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         asked = [item for item in wanted if isinstance(item, Output)]
         named = [*chain(*(item.output_names for item in body_points)), *(x.name for x in asked)]
         check_names(name, bodies, found, declared, written, named, problems)
-        scope = _scope(bodies, found, declared, problems)
+        scope = _scope(bodies, found, declared, problems, ground)
         constraints = _resolved(written, scope)
         observers = resolved_observers(body_points, asked, scope, length_unit)
         if not written:
@@ -156,7 +160,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
-            "observers": observers, "length_unit": length_unit, "end": last, "end_given": end,
+            "observers": observers, "ground": ground, "length_unit": length_unit, "end": last, "end_given": end,
             "points": points,
         }  # fmt: skip
         _fill(self, values)
@@ -170,7 +174,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
         """Return the same system with these points as its outputs, and no others."""
-        scope = _scope(self.bodies, self.coordinates, self.parameters, [])
+        scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
         observers = resolved_observers(points, (), scope, self.length_unit)
         values = {key: getattr(self, key) for key in self.__slots__}
         other = ConstraintSystem.__new__(ConstraintSystem)
@@ -243,6 +247,7 @@ def _scope(
     coordinates: Iterable[Coordinate],
     parameters: Iterable[Parameter],
     problems: list[str],
+    ground: Body,
 ) -> Scope:
     """Return the names that may be used in a system."""
     return Scope(
@@ -250,6 +255,7 @@ def _scope(
         [item.name for item in coordinates],
         {item.name: item for item in parameters},
         problems,
+        ground,
     )
 
 
