@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from kincompile.calculus.expressions import Rotated, VectorSymbol, dot, rotated
+from kincompile.calculus.expressions import Rotated, VectorSymbol, dot
+from kincompile.calculus.symbols import Frame
+from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,6 +35,7 @@ class EulerRotation:
     p: VectorSymbol
 
     letters: ClassVar[str] = "ABB"
+    formula: ClassVar[str] = "(e0^2 - e^T e) I + 2 e e^T + 2 e0 e~"
     names: ClassVar[tuple[str, ...]] = tuple(f"A{row}{column}" for row in "123" for column in "123")
     symbols: ClassVar[tuple[str, ...]] = names
 
@@ -79,7 +82,8 @@ class EulerRotation:
             rows = entries[:3], entries[3:6], entries[6:]
             return tuple(_dot(row, vector) for row in rows)
         p, w = along if len(along) == 2 else (expand(self.p), *along)
-        (p0, *e), (w0, *f) = p, [item + item for item in w]
+        p0, w0 = p[0], w[0] + w[0]
+        e, f = p[1:], tuple(item + item for item in w[1:])
         same, by_e, by_f = p0 * w0 - _dot(e, f), _dot(f, vector), _dot(e, vector)
         turns = zip(_cross(e, vector), _cross(f, vector), strict=True)
         return tuple(
@@ -101,54 +105,24 @@ def _cross(left: Components, right: Components) -> Components:
 
 
 @dataclass(frozen=True, slots=True)
-class SpatialFrame:
+class SpatialFrame(Frame):
     """The frame of a body in space: position r, Euler parameters p, and its rotation."""
 
-    index: str
     letters: ClassVar[tuple[str, ...]] = ("x", "y", "z", "e0", "e1", "e2", "e3")
-    """Letters of the coordinates, one a component."""
     ground: ClassVar[tuple[int, ...]] = (0, 0, 0, 1, 0, 0, 0)
-    """Values of the ground's."""
-
-    def _motion(self, order: int) -> tuple[CoordinateSymbol, ...]:
-        ending = ("", "_dot", "_ddot")[order]
-        r, p = (f"{letter}_{self.index}{ending}" for letter in "rp")
-        return VectorSymbol(r, 3), VectorSymbol(p, 4)
-
-    @property
-    def r(self) -> VectorSymbol:
-        """The position of the body's origin."""
-        return VectorSymbol(f"r_{self.index}", 3)
+    size: ClassVar[int] = 3
 
     @property
     def p(self) -> VectorSymbol:
         """The Euler parameters of the body."""
         return VectorSymbol(f"p_{self.index}", 4)
 
-    @property
-    def coordinates(self) -> tuple[CoordinateSymbol, ...]:
-        """Its generalised coordinates, in order."""
-        return self._motion(0)
-
-    @property
-    def rates(self) -> tuple[CoordinateSymbol, ...]:
-        """Their rates, in the same order."""
-        return self._motion(1)
-
-    @property
-    def second_rates(self) -> tuple[CoordinateSymbol, ...]:
-        """Their second rates, in the same order."""
-        return self._motion(2)
+    def motion(self, order: int) -> tuple[CoordinateSymbol, ...]:
+        """Return r and p, or their time derivatives of the given order."""
+        r, p = (rate(f"{letter}_{self.index}", order) for letter in "rp")
+        return VectorSymbol(r, self.size), VectorSymbol(p, 4)
 
     @property
     def rotation(self) -> Rotation:
-        """The rotation matrix A as a function of the coordinates."""
+        """The rotation by p."""
         return EulerRotation(self.p)
-
-    def A(self, vector: Vector) -> Vector:  # noqa: N802 - the rotation matrix of the textbook
-        """Turn a body-fixed vector into the global frame."""
-        return rotated(self.rotation, vector)
-
-    def point(self, fixed: Vector) -> Vector:
-        """Return the global position of a body-fixed point, r + A s."""
-        return self.r + self.A(fixed)

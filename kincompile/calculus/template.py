@@ -43,7 +43,7 @@ class Template:
     @property
     def dimension(self) -> int:
         """Number of components of a vector: 2 in the plane, 3 in space."""
-        return self.frames[0].r.size if self.frames else 2
+        return self.frames[0].size if self.frames else 2
 
     @property
     def coordinates(self) -> tuple[CoordinateSymbol, ...]:

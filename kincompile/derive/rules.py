@@ -115,10 +115,9 @@ def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[R
                 left, along(right, direction, record)
             )
         case Angle(sine, cosine):
-            change = cosine * along(sine, direction, record) - sine * along(
-                cosine, direction, record
-            )
-            return Rule.ANGLE, change / (sine**2 + cosine**2)
+            by_sine, by_cosine = (along(item, direction, record) for item in (sine, cosine))
+            turn = cosine * by_sine - sine * by_cosine
+            return Rule.ANGLE, turn / (sine**2 + cosine**2)
         case ProfileFunction(name, argument, order):
             inner = along(argument, direction, record)
             return Rule.PROFILE, ProfileFunction(name, argument, order + 1) * inner

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.calculus.symbols import Frame
+from kincompile.calculus.symbols import Frame, PlaneFrame
 from kincompile.html import Shown
 from kincompile.model.expressions import NotAnExpressionError, as_expression, number_in
 from kincompile.names import rate
@@ -46,7 +46,7 @@ class BodyKind:
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the coordinates of a point in the body's frame."""
-        return ("xi", "eta", "zeta")[: self.frame("i").r.size]
+        return ("xi", "eta", "zeta")[: self.frame.size]
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -55,7 +55,7 @@ class BodyKind:
 
 
 PLANAR = BodyKind(
-    frame=Frame,
+    frame=PlaneFrame,
     units=(None, None, "rad"),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteAngle"),
 )

@@ -43,7 +43,7 @@ class Bound(Protocol):
         """Scalar attributes by symbol."""
 
     @property
-    def points(self) -> Mapping[str, tuple[Scalar, Scalar]]:
+    def points(self) -> Mapping[str, tuple[Scalar, ...]]:
         """Points and directions by symbol."""
 
     @property

@@ -160,8 +160,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
-            "observers": observers, "ground": ground, "length_unit": length_unit, "end": last, "end_given": end,
-            "points": points,
+            "observers": observers, "ground": ground, "length_unit": length_unit, "end": last,
+            "end_given": end, "points": points,
         }  # fmt: skip
         _fill(self, values)
 

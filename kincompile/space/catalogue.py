@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.spatial.joints import (
+from kincompile.space.joints import (
     ConstantVelocity,
     Cylindrical,
     Fixed,
@@ -22,7 +22,7 @@ from kincompile.spatial.joints import (
     Translational,
     Universal,
 )
-from kincompile.spatial.primitives import (
+from kincompile.space.primitives import (
     AbsoluteDistance,
     AbsoluteOrientation,
     AbsoluteX,

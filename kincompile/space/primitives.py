@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from kincompile.calculus.expressions import Basis, Expression, dot
+from kincompile.calculus.symbols import C
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
-from kincompile.calculus.symbols import C
-from kincompile.spatial import arguments as spatial
-from kincompile.spatial.constraint import SpatialConstraint, SpatialPoints
-from kincompile.spatial.symbols import AXES, a_i, a_j, c, i, j, s_i, separation, u
+from kincompile.space.constraint import SpatialConstraint, SpatialPoints
+from kincompile.space.symbols import AXES, a_i, a_j, c, i, j, s_i, separation, u
 
 
 @constraint_type
@@ -31,9 +30,9 @@ class Dot1(SpatialConstraint):
 
     source = "Haug 9.4"
     i: BodyLike = argument.body("i")
-    vector_i: PointLike = spatial.direction("a_i", on="i")
+    vector_i: PointLike = argument.vector("a_i", on="i")
     j: BodyLike = argument.body("j")
-    vector_j: PointLike = spatial.direction("a_j", on="j")
+    vector_j: PointLike = argument.vector("a_j", on="j")
     value: ValueLike = argument.value("")
 
     @staticmethod
@@ -48,10 +47,10 @@ class Dot2(SpatialConstraint):
 
     source = "Haug 9.4"
     i: BodyLike = argument.body("i")
-    point_i: PointLike = spatial.point("s_i", on="i")
-    vector_i: PointLike = spatial.direction("a_i", on="i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    vector_i: PointLike = argument.vector("a_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = spatial.point("s_j", on="j")
+    point_j: PointLike = argument.point("s_j", on="j")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -119,7 +118,7 @@ class AbsoluteX(SpatialConstraint):
 
     source = "Haug 9.4"
     body: BodyLike = argument.body("i")
-    point: PointLike = spatial.point("s_i", on="i")
+    point: PointLike = argument.point("s_i", on="i")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -134,7 +133,7 @@ class AbsoluteY(SpatialConstraint):
 
     source = "Haug 9.4"
     body: BodyLike = argument.body("i")
-    point: PointLike = spatial.point("s_i", on="i")
+    point: PointLike = argument.point("s_i", on="i")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -149,7 +148,7 @@ class AbsoluteZ(SpatialConstraint):
 
     source = "Haug 9.4"
     body: BodyLike = argument.body("i")
-    point: PointLike = spatial.point("s_i", on="i")
+    point: PointLike = argument.point("s_i", on="i")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -164,8 +163,8 @@ class AbsoluteDistance(SpatialConstraint):
 
     source = "Haug 9.4"
     body: BodyLike = argument.body("i")
-    point: PointLike = spatial.point("s_i", on="i")
-    ground_point: PointLike = spatial.point("c", on="ground")
+    point: PointLike = argument.point("s_i", on="i")
+    ground_point: PointLike = argument.point("c", on="ground")
     distance: ValueLike = argument.distance()
 
     @staticmethod
@@ -185,7 +184,7 @@ class AbsoluteOrientation(SpatialConstraint):
     source = "Haug 9.4"
     row_names = ("e1", "e2", "e3")
     body: BodyLike = argument.body("i")
-    vector: PointLike = spatial.direction("u", on="i")
+    vector: PointLike = argument.vector("u", on="i")
     value: ValueLike = argument.value("")
 
     @staticmethod

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike
 from kincompile.model.constraint import Constraint, constraint_type
-from kincompile.spatial import arguments as spatial
-from kincompile.spatial.bodies import SPATIAL
+from kincompile.space.bodies import SPATIAL
+from kincompile.space.triads import with_triads
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,7 +26,7 @@ class SpatialConstraint(Constraint):
         points: Mapping[str, tuple[Scalar, ...]], defaults: Mapping[str, float]
     ) -> Mapping[str, tuple[Scalar, ...]]:
         """Return the points and directions with the triads about the axes."""
-        return spatial.with_triads(points, defaults)
+        return with_triads(points, defaults)
 
 
 @constraint_type
@@ -34,6 +34,6 @@ class SpatialPoints(SpatialConstraint):
     """A constraint of a point on body i and a point on body j; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = spatial.point("s_i", on="i")
+    point_i: PointLike = argument.point("s_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = spatial.point("s_j", on="j")
+    point_j: PointLike = argument.point("s_j", on="j")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from kincompile.model.mechanism import Mechanism as PlanarMechanism
-from kincompile.spatial.bodies import GROUND, SpatialBody, euler_parameters
-from kincompile.spatial.primitives import Normalization
+from kincompile.space.bodies import GROUND, SpatialBody, euler_parameters
+from kincompile.space.primitives import Normalization
 
 if TYPE_CHECKING:
     from kincompile.model.constraint import Constraint
@@ -23,7 +23,7 @@ class Mechanism(PlanarMechanism):
 
     fixed = GROUND
 
-    def body(  # type: ignore[override]
+    def body(
         self, name: str, position: Scalars = (0, 0, 0), orientation: Any = (1, 0, 0, 0)
     ) -> SpatialBody:
         """Add a body and return it.

@@ -21,9 +21,8 @@ from kincompile.calculus.symbols import C
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
-from kincompile.spatial import arguments as spatial
-from kincompile.spatial.constraint import SpatialConstraint, SpatialPoints
-from kincompile.spatial.symbols import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
+from kincompile.space.constraint import SpatialConstraint, SpatialPoints
+from kincompile.space.symbols import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
 
 XYZ = ("x", "y", "z")
 
@@ -66,9 +65,9 @@ class Axes(SpatialConstraint):
     """A constraint of two axes, given by direction; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    axis_i: PointLike = spatial.axis("h_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
-    axis_j: PointLike = spatial.axis("h_j", on="j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
 
 
 @constraint_type
@@ -91,10 +90,10 @@ class PointOnLine(SpatialConstraint):
     source = "Haug 9.4"
     row_names = ("f", "g")
     i: BodyLike = argument.body("i")
-    point_i: PointLike = spatial.point("s_i", on="i")
-    axis_i: PointLike = spatial.axis("h_i", on="i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = spatial.point("s_j", on="j")
+    point_j: PointLike = argument.point("s_j", on="j")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -108,10 +107,10 @@ class InPlane(SpatialConstraint):
 
     source = "Haug 9.4"
     i: BodyLike = argument.body("i")
-    point_i: PointLike = spatial.point("s_i", on="i")
-    normal_i: PointLike = spatial.axis("h_i", on="i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    normal_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = spatial.point("s_j", on="j")
+    point_j: PointLike = argument.point("s_j", on="j")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -125,10 +124,10 @@ class RelativeTranslation(SpatialConstraint):
 
     source = "Haug 9.4"
     i: BodyLike = argument.body("i")
-    point_i: PointLike = spatial.point("s_i", on="i")
-    axis_i: PointLike = spatial.axis("h_i", on="i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = spatial.point("s_j", on="j")
+    point_j: PointLike = argument.point("s_j", on="j")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -144,10 +143,10 @@ class RevoluteSpherical(SpatialConstraint):
     source = "Haug 9.4"
     row_names = ("plane", "distance")
     i: BodyLike = argument.body("i")
-    point_i: PointLike = spatial.point("s_i", on="i")
-    axis_i: PointLike = spatial.axis("h_i", on="i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = spatial.point("s_j", on="j")
+    point_j: PointLike = argument.point("s_j", on="j")
     distance: ValueLike = argument.distance()
 
     @staticmethod
@@ -162,11 +161,11 @@ class PointsAndAxes(SpatialConstraint):
     """A joint of an axis of body i and an axis of body j; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = spatial.point("s_i", on="i")
-    axis_i: PointLike = spatial.axis("h_i", on="i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = spatial.point("s_j", on="j")
-    axis_j: PointLike = spatial.axis("h_j", on="j")
+    point_j: PointLike = argument.point("s_j", on="j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
 
 
 @constraint_type
@@ -240,13 +239,13 @@ class Triads(SpatialConstraint):
     """A joint of a triad of body i and a triad of body j; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = spatial.point("s_i", on="i")
-    axis_i: PointLike = spatial.axis("h_i", on="i")
-    cross_i: PointLike = spatial.cross("f_i", on="i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    cross_i: PointLike = argument.cross("f_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = spatial.point("s_j", on="j")
-    axis_j: PointLike = spatial.axis("h_j", on="j")
-    cross_j: PointLike = spatial.cross("f_j", on="j")
+    point_j: PointLike = argument.point("s_j", on="j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
+    cross_j: PointLike = argument.cross("f_j", on="j")
 
 
 @constraint_type
@@ -313,11 +312,11 @@ class RelativeRotation(SpatialConstraint):
 
     source = "Haug 9.4"
     i: BodyLike = argument.body("i")
-    axis_i: PointLike = spatial.axis("h_i", on="i")
-    cross_i: PointLike = spatial.cross("f_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    cross_i: PointLike = argument.cross("f_i", on="i")
     j: BodyLike = argument.body("j")
-    axis_j: PointLike = spatial.axis("h_j", on="j")
-    cross_j: PointLike = spatial.cross("f_j", on="j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
+    cross_j: PointLike = argument.cross("f_j", on="j")
     angle: ValueLike = argument.value("rad")
 
     @staticmethod
