@@ -324,7 +324,8 @@ class _Points:
         def solved(sides: Array) -> Array:
             """Return derivatives, (L, k n), for right sides below the mechanism's own."""
             own = sides[:, m:].reshape(-1, k, m)
-            return np.einsum("lij,lkj->lki", inverses, own).reshape(-1, k * n)
+            found: Array = np.einsum("lij,lkj->lki", inverses, own).reshape(-1, k * n)
+            return found
 
         held = np.concatenate((q, np.zeros((len(q), k * n))), axis=1)
         every_q = np.concatenate((q, solved(-larger.Phi(held, t, p))), axis=1)
