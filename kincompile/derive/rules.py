@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from fractions import Fraction
 from typing import overload
 
 from kincompile.calculus.expressions import (
@@ -16,10 +17,13 @@ from kincompile.calculus.expressions import (
     ZERO_VECTOR,
     Dot,
     Expression,
+    Norm,
+    Number,
     Perpendicular,
     Power,
     Product,
     ProfileFunction,
+    Root,
     Rotated,
     Scalar,
     Scaled,
@@ -112,6 +116,11 @@ def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[R
             return Rule.PRODUCT, dot(along(left, direction, record), right) + dot(
                 left, along(right, direction, record)
             )
+        case Norm(vector) if along(vector, direction) != ZERO_VECTOR:
+            return Rule.CHAIN, dot(vector, along(vector, direction, record)) * expression**-1
+        case Root(square):
+            half = Number(Fraction(1, 2))
+            return Rule.CHAIN, half * along(square, direction, record) * expression**-1
         case ProfileFunction(name, argument, order):
             inner = along(argument, direction, record)
             return Rule.PROFILE, ProfileFunction(name, argument, order + 1) * inner

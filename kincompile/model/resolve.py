@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from kincompile.calculus.template import Template
     from kincompile.model.arguments import Argument
-    from kincompile.model.constraint import Constraint
+    from kincompile.model.constraint import Constraint, Element
     from kincompile.model.equation import Equation
 
 Point = tuple[Scalar, Scalar]
@@ -94,7 +94,7 @@ class Joint:
     @property
     def text(self) -> str:
         """The constraint in words, for comments: bodies, points, values."""
-        return _text(self.written)
+        return text_of(self.written)
 
     @property
     def corners(self) -> bool:
@@ -215,7 +215,7 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     scalars: dict[str, Scalar] = {}
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
-    title = _title(constraint)
+    title = title_of(constraint)
     corners = _corners(constraint.corners, title, scope)
     for name, item in constraint.arguments().items():
         given, where = getattr(constraint, name), f"{title}, {name}"
@@ -235,8 +235,8 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
         )
     known = [body for body in bodies if body is not None]
     if len(known) == len(bodies):
-        _check_bodies(constraint, known, scope)
-    _check_whole(constraint, scalars, points, scope)
+        check_bodies(constraint, known, scope)
+    check_whole(constraint, scalars, points, scope)
     if len(scope.problems) > before:
         return None
     return Joint(
@@ -250,7 +250,8 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     )
 
 
-def _title(constraint: Constraint) -> str:
+def title_of(constraint: Element) -> str:
+    """Return the type and the name of a constraint or a load, for messages."""
     return f"{type(constraint).__name__} {constraint.name!r}"
 
 
@@ -276,18 +277,17 @@ def body_named(given: Any, where: str, scope: Scope) -> Body | None:
     return scope.bodies[name]
 
 
-def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> None:
-    """Check that a joint has something to constrain."""
-    what = _title(constraint)
+def check_bodies(constraint: Element, bodies: list[Body], scope: Scope) -> None:
+    """Check that a joint or a load has something to act on."""
+    what = title_of(constraint)
     if len(bodies) == 2 and bodies[0] == bodies[1]:
+        kind = "load between two bodies needs" if constraint.is_load else "joint connects"
         scope.problems.append(
-            f"{what}: bodies i and j are both {bodies[0].name!r}; a joint connects two different "
-            "bodies"
+            f"{what}: bodies i and j are both {bodies[0].name!r}; a {kind} two different bodies"
         )
     elif len(bodies) == 1 and bodies[0].is_ground:
-        scope.problems.append(
-            f"{what}: the ground cannot be constrained; name a body of the mechanism"
-        )
+        done = "feels no force" if constraint.is_load else "cannot be constrained"
+        scope.problems.append(f"{what}: the ground {done}; name a body of the mechanism")
 
 
 def checked_expression(
@@ -358,7 +358,7 @@ def named_tables(value: Any, name: str) -> Any:
     return value.xreplace(named)
 
 
-def _attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar:
+def checked_attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar:
     """Return an attribute: a number or an expression of parameters."""
     if type(given) is float and isfinite(given):
         return given  # of a large mechanism nearly all
@@ -380,7 +380,7 @@ def _attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar:
 def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bool) -> Scalar:
     kind, unit = item.kind, item.unit
     if kind in (Kind.SCALAR, Kind.RADIUS):
-        value = _attribute(given, where, scope, unit)
+        value = checked_attribute(given, where, scope, unit)
         if kind is Kind.RADIUS and evaluate(value, scope.defaults) == 0:
             scope.problems.append(
                 f"{where}: the radius is zero; give the pitch radius "
@@ -424,7 +424,7 @@ def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
         )
         return 1, 1
     unit = "" if kind is Kind.AXIS else "length"
-    point = _attribute(xi, where, scope, unit), _attribute(eta, where, scope, unit)
+    point = checked_attribute(xi, where, scope, unit), checked_attribute(eta, where, scope, unit)
     if kind is Kind.AXIS and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
         scope.problems.append(f"{where}: the axis has length zero; give a direction such as (1, 0)")
     return point
@@ -469,10 +469,10 @@ def _of_alpha(rho: sympy.Expr, scope: Scope) -> sympy.Expr:
     return cast("sympy.Expr", rho.xreplace(named))
 
 
-def _check_whole(
-    constraint: Constraint, scalars: Mapping[str, Scalar], points: Mapping[str, Point], scope: Scope
+def check_whole(
+    constraint: Element, scalars: Mapping[str, Scalar], points: Mapping[str, Point], scope: Scope
 ) -> None:
-    """Check what involves several arguments of a constraint."""
+    """Check what involves several arguments of a constraint or a load."""
 
     def numbers(symbol: str) -> tuple[float | None, ...]:
         given = points[symbol] if symbol in points else (scalars[symbol],)
@@ -480,11 +480,11 @@ def _check_whole(
 
     problem = constraint.problem(numbers)
     if problem is not None:
-        scope.problems.append(f"{_title(constraint)}: {problem}")
+        scope.problems.append(f"{title_of(constraint)}: {problem}")
 
 
-def _text(constraint: Constraint) -> str:
-    """Return a constraint's arguments in a line, for instance `ground (0, 0) - crank (-a/2, 0)`."""
+def text_of(constraint: Element) -> str:
+    """Return arguments in a line, for instance `ground (0, 0) - crank (-a/2, 0)`."""
     parts: list[str] = []
     for name, item in constraint.arguments().items():
         given = getattr(constraint, name)
@@ -496,6 +496,8 @@ def _text(constraint: Constraint) -> str:
             parts.append(text if item.kind is Kind.POINT else f"axis {text}")
         elif item.kind is Kind.PROFILE:
             parts.append("profile table" if isinstance(given, tuple | list) else "profile")
-        else:
+        elif item.kind is Kind.LOADS:
+            parts.append("({}, {})".format(*given))
+        elif not constraint.is_load or given != 0:  # most springs have no damper
             parts.append(f"{name} {given}")
     return " ".join(parts)

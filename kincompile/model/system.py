@@ -6,14 +6,14 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy
 
 from kincompile.errors import ModelError
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter, body_columns
-from kincompile.model.constraint import CamConstraint, Constraint
+from kincompile.model.constraint import CamConstraint, Constraint, Element
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import (
     NotAnExpressionError,
@@ -34,6 +34,10 @@ from kincompile.model.points import BodyPoint, PlacedPoint
 from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
 from kincompile.model.text_views import TextViews
 from kincompile.names import listed, name_problem, rate, unit_problem
+
+if TYPE_CHECKING:
+    from kincompile.model.expressions import Scalars
+    from kincompile.model.resolve_loads import AppliedLoad
 
 
 class ConstraintSystem(MatrixViews, TextViews):
@@ -56,7 +60,9 @@ class ConstraintSystem(MatrixViews, TextViews):
         Bodies, whose coordinates come first.
     outputs
         `Output` and `BodyPoint`, as `Mechanism.output` and `Mechanism.point` make them.
-    length_unit, end, points
+    loads
+        Springs, forces and the like.
+    gravity, length_unit, end, points
         As for `Mechanism`.
 
     Attributes
@@ -76,6 +82,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         The named points.
     observers : tuple of PlacedPoint or ResolvedOutput
         The points, whose coordinates are outputs, then the other outputs, in order.
+    loads : tuple of AppliedLoad
+        The masses of bodies, then the loads in order.
 
     Raises
     ------
@@ -85,7 +93,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
-        "length_unit", "name", "observers", "parameters", "points",
+        "gravity", "length_unit", "loads", "name", "observers", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -96,6 +104,8 @@ class ConstraintSystem(MatrixViews, TextViews):
     equations: tuple[str, ...]
     body_points: tuple[BodyPoint, ...]
     observers: tuple[PlacedPoint | ResolvedOutput, ...]
+    loads: tuple[AppliedLoad, ...]
+    gravity: Scalars
     length_unit: str
     end: float
     end_given: Scalar
@@ -111,6 +121,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         guess: Sequence[float] | Mapping[Any, float] | None = None,
         bodies: Iterable[Body] = (),
         outputs: Iterable[BodyPoint | Output] = (),
+        loads: Iterable[Element] = (),
+        gravity: Scalars = (0, 0),
         length_unit: str = "m",
         end: Scalar = 1.0,
         points: int = 101,
@@ -135,6 +147,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         scope = _scope(bodies, found, declared, problems)
         constraints = _resolved(written, scope)
         observers = resolved_observers(body_points, asked, scope, length_unit)
+        applied = _loads(bodies, _items(loads, "loads", problems), gravity, scope, written)
         if not written:
             problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
         if not found and not bodies:
@@ -145,8 +158,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
-            "observers": observers, "length_unit": length_unit, "end": last, "end_given": end,
-            "points": points,
+            "observers": observers, "loads": applied, "gravity": gravity,
+            "length_unit": length_unit, "end": last, "end_given": end, "points": points,
         }  # fmt: skip
         _fill(self, values)
 
@@ -158,12 +171,12 @@ class ConstraintSystem(MatrixViews, TextViews):
         return self
 
     def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
-        """Return the same system with these points as its outputs, and no others."""
+        """Return the same system with these points as its outputs, no others, and no loads."""
         scope = _scope(self.bodies, self.coordinates, self.parameters, [])
         observers = resolved_observers(points, (), scope, self.length_unit)
         values = {key: getattr(self, key) for key in self.__slots__}
         other = ConstraintSystem.__new__(ConstraintSystem)
-        _fill(other, {**values, "body_points": tuple(points), "observers": observers})
+        _fill(other, {**values, "body_points": tuple(points), "observers": observers, "loads": ()})
         return other
 
     def joint_points(self) -> tuple[BodyPoint, ...]:
@@ -219,6 +232,22 @@ class ConstraintSystem(MatrixViews, TextViews):
         """Return name and sizes."""
         sizes = f"{len(self.coordinates)} coordinates, {len(self.equations)} equations"
         return f"<ConstraintSystem {self.name!r}: {sizes}>"
+
+
+def _loads(
+    bodies: Iterable[Body],
+    loads: Sequence[Any],
+    gravity: Scalars,
+    scope: Scope,
+    constraints: Iterable[Constraint | Equation],
+) -> tuple[AppliedLoad, ...]:
+    """Return the masses and the loads, for which a model without any loads nothing."""
+    if not loads and not any(body.is_heavy for body in bodies):
+        return ()
+    from kincompile.model.resolve_loads import check_named, resolved_loads
+
+    check_named(loads, (item.name for item in constraints), scope.problems)
+    return resolved_loads(bodies, loads, gravity, scope)
 
 
 def _fill(system: ConstraintSystem, values: Mapping[str, Any]) -> None:
