@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from kincompile.model.bodies import Body
-    from kincompile.model.resolve import Scope
+    from kincompile.model.scope import Scope
 
 
 def mass_of(body: Body, gravity: Any, scope: Scope) -> Mass | None:

@@ -17,16 +17,13 @@ from kincompile.model.expressions import as_sympy, symbol_names
 from kincompile.model.load import Load
 from kincompile.model.masses import mass_of
 from kincompile.model.outputs import Output, ResolvedOutput, highest_rate
-from kincompile.model.resolve import (
+from kincompile.model.resolve import check_bodies, check_whole, text_of, title_of
+from kincompile.model.scope import (
     body_named,
-    check_bodies,
-    check_whole,
     checked_attribute,
     checked_expression,
     checked_point,
     named_tables,
-    text_of,
-    title_of,
 )
 from kincompile.names import listed, name_problem
 
@@ -37,7 +34,7 @@ if TYPE_CHECKING:
     from kincompile.derive.loads import LoadTemplate
     from kincompile.model.bodies import Body
     from kincompile.model.expressions import Scalar
-    from kincompile.model.resolve import Point, Scope
+    from kincompile.model.scope import Point, Scope
 
 
 @dataclass(frozen=True, slots=True)
