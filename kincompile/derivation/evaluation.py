@@ -188,7 +188,6 @@ def evaluation(system: ConstraintSystem, state: Mapping[str, float] | float | No
     InputError
         If a name is unknown or a number not finite, or the formulas have no finite values there.
     """
-    system = system.observing(())  # outputs and loads have no rows of Phi
     code = inline(lower(system))
     source = emit_program("numpy", code).source
     module = from_source(source, system.name)
