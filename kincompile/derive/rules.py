@@ -15,6 +15,7 @@ from typing import overload
 from kincompile.calculus.expressions import (
     ZERO,
     ZERO_VECTOR,
+    Angle,
     Dot,
     Expression,
     Norm,
@@ -57,6 +58,7 @@ class Rule(Enum):
     CHAIN = "chain rule"
     A_TO_B = "dA/dphi = B"
     B_TO_A = "dB/dphi = -A"
+    ANGLE = "d atan2(s, c) = (c ds - s dc)/(s^2 + c^2)"
     CONSTANT = "constant"
     COORDINATE = "coordinate"
     DRIVER = "driver: C(t) to its time derivative"
@@ -121,6 +123,10 @@ def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[R
         case Root(square):
             half = Number(Fraction(1, 2))
             return Rule.CHAIN, half * along(square, direction, record) * expression**-1
+        case Angle(sine, cosine):
+            by_sine, by_cosine = (along(item, direction, record) for item in (sine, cosine))
+            turn = cosine * by_sine - sine * by_cosine
+            return Rule.ANGLE, turn / (sine**2 + cosine**2)
         case ProfileFunction(name, argument, order):
             inner = along(argument, direction, record)
             return Rule.PROFILE, ProfileFunction(name, argument, order + 1) * inner

@@ -19,10 +19,11 @@ from kincompile.model.bodies import GROUND, PLANAR, BodyKind
 from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
     from kincompile.calculus.symbols import Frame
+    from kincompile.model.expressions import Scalar
 
     Numbers = Callable[[str], tuple[float | None, ...]]
     """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
@@ -64,6 +65,14 @@ class Element(Shown):
         """Return what is wrong with several arguments together; each alone is good."""
         del numbers
         return None
+
+    @staticmethod
+    def completed(
+        points: Mapping[str, tuple[Scalar, ...]], defaults: Mapping[str, float]
+    ) -> Mapping[str, tuple[Scalar, ...]]:
+        """Return points and directions as the template has them, from those that were given."""
+        del defaults
+        return points
 
     @classmethod
     @cache
@@ -187,9 +196,9 @@ class Constraint(Element):
 @dataclass_transform(
     frozen_default=True,
     field_specifiers=(
-        argument.angle, argument.attribute, argument.axis, argument.body, argument.distance,
-        argument.load, argument.loads, argument.point, argument.profile, argument.radius,
-        argument.value, field,
+        argument.angle, argument.attribute, argument.axis, argument.body, argument.cross,
+        argument.distance, argument.load, argument.loads, argument.point, argument.profile,
+        argument.radius, argument.value, argument.vector, field,
     ),
 )  # fmt: skip
 def constraint_type(cls: type[Type]) -> type[Type]:
@@ -225,12 +234,21 @@ def _documentation(cls: type[Element]) -> str:
     further = cls.further()
     entries = {"name": further.pop("name")}
     for name, item in given.items():
-        entries[name] = item.text.format(on=bodies.get(item.on, ""), ground=ground)
+        on = bodies.get(item.on, "")
+        place = _place(cls.bodies, item.on, on)
+        entries[name] = item.text.format(on=on, ground=ground, place=place)
     entries |= further
     lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]
     for name, text in entries.items():
         lines += [name, textwrap.fill(text, 92, initial_indent="    ", subsequent_indent="    ")]
     return "\n".join(lines)
+
+
+def _place(kind: BodyKind, on: str, body: str) -> str:
+    """Return the coordinates of a point or a direction, and whose they are, in words."""
+    if on == GROUND.name:
+        return f"({', '.join('xyz'[: len(kind.axes)])}) of the ground"
+    return f"({', '.join(kind.axes)}) in the frame of {body}"
 
 
 def _listed(what: str, names: Sequence[str]) -> str:

@@ -164,6 +164,9 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
     title = title_of(constraint)
+    if problem := kind_problem(constraint, scope):
+        scope.problems.append(f"{title}: {problem}")
+        return None
     corners = _corners(constraint.corners, title, scope)
     for name, item in constraint.arguments().items():
         given, where = getattr(constraint, name), f"{title}, {name}"
@@ -192,10 +195,24 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
         constraint.template(),
         tuple(known),
         scalars,
-        points,
+        constraint.completed(points, scope.defaults),
         profiles,
         (*(name for body in known for name in scope.columns[body.name]), *constraint.contact_names),
     )
+
+
+_KIND_PROBLEM = {
+    2: "it is a {} of bodies in space; take the one of kincompile for bodies in the plane",
+    3: "it is a {} of bodies in the plane; take the one of kincompile.spatial",
+}
+
+
+def kind_problem(constraint: Element, scope: Scope) -> str | None:
+    """Return a message about a constraint or a load of another kind of bodies, or None."""
+    if constraint.bodies is scope.ground.kind:
+        return None
+    what = "load" if constraint.is_load else "constraint"
+    return _KIND_PROBLEM[len(scope.ground.kind.axes)].format(what)
 
 
 def title_of(constraint: Element) -> str:

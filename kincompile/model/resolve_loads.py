@@ -17,7 +17,13 @@ from kincompile.model.expressions import as_sympy, symbol_names
 from kincompile.model.load import Load
 from kincompile.model.masses import mass_of
 from kincompile.model.outputs import Output, ResolvedOutput, highest_rate
-from kincompile.model.resolve import check_bodies, check_whole, text_of, title_of
+from kincompile.model.resolve import (
+    check_bodies,
+    check_whole,
+    kind_problem,
+    text_of,
+    title_of,
+)
 from kincompile.model.scope import (
     body_named,
     checked_attribute,
@@ -120,6 +126,9 @@ def _resolved(load: Any, scope: Scope) -> AppliedLoad | None:
         scope.problems.append(f"{load!r} is not a load; make one with kc.Force or kc.Spring")
         return None
     before, title = len(scope.problems), title_of(load)
+    if problem := kind_problem(load, scope):
+        scope.problems.append(f"{title}: {problem}")
+        return None
     bodies: list[Body | None] = []
     scalars: dict[str, Scalar] = {}
     points: dict[str, Point] = {}
@@ -177,16 +186,17 @@ def _value(given: Any, where: str, name: str, occurring: set[str], scope: Scope)
 def _values(given: Any, where: str, name: str, occurring: set[str], scope: Scope) -> Point:
     """Return the components of a force."""
     try:
-        x, y = tuple(given)
-    except (TypeError, ValueError):
+        components = tuple(given)
+    except TypeError:
+        components = ()
+    size = len(scope.ground.kind.axes)
+    if len(components) != size or isinstance(given, str):
         scope.problems.append(
-            f"{where}: {given!r} is not a pair of components; give two numbers or expressions"
+            f"{where}: {given!r} is not a force of {size} components; give {size} numbers or "
+            "expressions"
         )
-        return 0, 0
-    return (
-        _value(x, where, name, occurring, scope),
-        _value(y, where, name, occurring, scope),
-    )
+        return (0,) * size
+    return tuple(_value(item, where, name, occurring, scope) for item in components)
 
 
 def check_named(loads: Sequence[Any], taken: Iterable[str], problems: list[str]) -> None:

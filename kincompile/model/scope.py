@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
 
-Point = tuple[Scalar, Scalar]
+Point = tuple[Scalar, ...]
+"""A place or direction in a frame: two or three components."""
 
 
 @dataclass
@@ -48,6 +49,7 @@ class Scope:
     coordinates: Sequence[str]
     parameters: Mapping[str, Parameter]
     problems: list[str] = field(default_factory=list)
+    ground: Body = GROUND
 
     @cached_property
     def declared(self) -> frozenset[str]:
@@ -71,7 +73,7 @@ class Scope:
         found: dict[str, tuple[str | None, ...]] = {
             name: body.coordinates for name, body in self.bodies.items()
         }
-        return found | {GROUND.name: (None,) * len(GROUND.coordinates)}
+        return found | {GROUND.name: (None,) * len(self.ground.coordinates)}
 
     @cached_property
     def coordinate_names(self) -> frozenset[str]:
@@ -89,7 +91,7 @@ def body_named(given: Any, where: str, scope: Scope) -> Body | None:
     """Return the body with the given name, None where there is none."""
     name = given.name if isinstance(given, Body) else given
     if isinstance(name, str) and name == GROUND.name:
-        return GROUND
+        return scope.ground
     if not isinstance(name, str) or name not in scope.bodies:
         hint = suggestion(name, scope.bodies) if isinstance(name, str) else ""
         scope.problems.append(
@@ -188,21 +190,28 @@ def checked_attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar
 
 
 def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
-    """Return a pair (xi, eta) of numbers or expressions of parameters."""
+    """Return a place or a direction: numbers or expressions of parameters, as many as axes."""
     # A generator would be used up here, a set has no order.
     is_list = type(given) is tuple or (
         isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
     )
+    axes = scope.ground.kind.axes
     try:
-        xi, eta = tuple(given) if is_list else ()
+        components = tuple(given) if is_list else ()
     except (TypeError, ValueError):
+        components = ()
+    if len(components) != len(axes):
+        group, number = {2: ("pair", "two"), 3: ("triple", "three")}[len(axes)]
         scope.problems.append(
-            f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame; "
-            "give two numbers, or expressions of parameters"
+            f"{where}: {given!r} is not a {group} ({', '.join(axes)}) of coordinates in the body's "
+            f"frame; give {number} numbers, or expressions of parameters"
         )
-        return 1, 1
+        return (1,) * len(axes)
     unit = "" if kind is Kind.AXIS else "length"
-    point = checked_attribute(xi, where, scope, unit), checked_attribute(eta, where, scope, unit)
-    if kind is Kind.AXIS and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
-        scope.problems.append(f"{where}: the axis has length zero; give a direction such as (1, 0)")
+    point = tuple(checked_attribute(value, where, scope, unit) for value in components)
+    if kind is Kind.AXIS and not any(evaluate(value, scope.defaults) != 0 for value in point):
+        example = (1, *(0,) * (len(axes) - 1))
+        scope.problems.append(
+            f"{where}: the axis has length zero; give a direction such as {example}"
+        )
     return point

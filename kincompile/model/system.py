@@ -9,7 +9,7 @@ import sympy
 
 from kincompile.errors import ModelError
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import Body, Coordinate, Parameter, body_columns
+from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter, body_columns
 from kincompile.model.declarations import (
     body_coordinates,
     check_names,
@@ -69,6 +69,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         `Output` and `BodyPoint`, as `Mechanism.output` and `Mechanism.point` make them.
     loads
         Springs, forces and the like.
+    ground
+        The fixed frame of the bodies.
     gravity, length_unit, end, points
         As for `Mechanism`.
 
@@ -100,7 +102,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
-        "gravity", "length_unit", "loads", "name", "observers", "parameters", "points",
+        "gravity", "ground", "length_unit", "loads", "name", "observers", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -109,6 +111,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     parameters: tuple[Parameter, ...]
     constraints: tuple[Joint | FreeEquation, ...]
     equations: tuple[str, ...]
+    ground: Body
     body_points: tuple[BodyPoint, ...]
     observers: tuple[PlacedPoint | ResolvedOutput, ...]
     loads: tuple[AppliedLoad, ...]
@@ -130,6 +133,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         outputs: Iterable[BodyPoint | Output] = (),
         loads: Iterable[Element] = (),
         gravity: Scalars = (0, 0),
+        ground: Body = GROUND,
         length_unit: str = "m",
         end: Scalar = 1.0,
         points: int = 101,
@@ -153,7 +157,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         asked = [item for item in wanted if isinstance(item, Output)]
         named = [*chain(*(item.output_names for item in body_points)), *(x.name for x in asked)]
         check_names(name, bodies, found, declared, written, named, problems)
-        scope = _scope(bodies, found, declared, problems)
+        scope = _scope(bodies, found, declared, problems, ground)
         constraints = _resolved(written, scope)
         observers = resolved_observers(body_points, asked, scope, length_unit)
         applied = _loads(bodies, members(loads, "loads", problems), gravity, scope, written)
@@ -167,7 +171,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
-            "observers": observers, "loads": applied, "gravity": gravity,
+            "observers": observers, "loads": applied, "gravity": gravity, "ground": ground,
             "length_unit": length_unit, "end": last, "end_given": end, "points": points,
         }  # fmt: skip
         _fill(self, values)
@@ -181,7 +185,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
         """Return the same system with these points as its outputs, no others, and no loads."""
-        scope = _scope(self.bodies, self.coordinates, self.parameters, [])
+        scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
         observers = resolved_observers(points, (), scope, self.length_unit)
         values = {key: getattr(self, key) for key in self.__slots__}
         other = ConstraintSystem.__new__(ConstraintSystem)
@@ -270,6 +274,7 @@ def _scope(
     coordinates: Iterable[Coordinate],
     parameters: Iterable[Parameter],
     problems: list[str],
+    ground: Body,
 ) -> Scope:
     """Return the names that may be used in a system."""
     return Scope(
@@ -277,6 +282,7 @@ def _scope(
         [item.name for item in coordinates],
         {item.name: item for item in parameters},
         problems,
+        ground,
     )
 
 

@@ -58,7 +58,7 @@ def bad_loads():
     g = m.ground
     yield kc.Force("f", "rod", (0, 0), (1, 0)), "there is no body 'rod' in this mechanism"
     yield kc.Force("f", g, (0, 0), (1, 0)), "the ground feels no force; name a body"
-    yield kc.Force("f", body, (0, 0), 3), "force: 3 is not a pair of components"
+    yield kc.Force("f", body, (0, 0), 3), "force: 3 is not a force of 2 components"
     yield kc.Force("f", body, (0, 0), (sympy.Symbol("u"), 0)), "contains u, which is not declared"
     yield kc.Torque("f", body, sympy.Abs(body.phi)), "has no continuous derivative"
     yield kc.Torque("f", body, sympy.Symbol("phi_arm_ddot")), "depends on accelerations"
