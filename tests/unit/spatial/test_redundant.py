@@ -38,8 +38,8 @@ def bennett(theta_2: float = 2.94580363520431) -> spatial.Mechanism:
         (length, twist), i = shapes[k - 1], bodies[k]
         axis = Rotation.from_rotvec(twist * X).apply(Z)
         point = length * X
-        given: Any = (np.zeros(3), Z) if k == 0 else (point, axis)
-        m.add(spatial.Revolute(f"hinge_{k + 1}", i, *given, bodies[k + 1], (0, 0, 0), Z))
+        at, along = (np.zeros(3), Z) if k == 0 else (point, axis)
+        m.add(spatial.Revolute(f"hinge_{k + 1}", i, at, along, bodies[k + 1], (0, 0, 0), Z))
     # the last hinge is on the ground, at the end of the third link
     (length, twist), last = shapes[2], bodies[3]
     m.add(
