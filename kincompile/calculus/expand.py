@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 from kincompile.calculus.expressions import (
     Angle,
     Basis,
+    Circular,
     Dot,
     Expression,
     Norm,
@@ -128,6 +129,8 @@ class Expansion:
                 return environment.call("sqrt", reduce(add, squares))
             case Root(square):
                 return environment.call("sqrt", self.scalar(square))
+            case Circular(name, argument):
+                return environment.call(name, self.scalar(argument))
             case Angle(sine, cosine):
                 return environment.call("atan2", self.scalar(sine), self.scalar(cosine))
             case Dot(left, right):

@@ -155,6 +155,14 @@ class Root(Scalar):
 
 
 @dataclass(frozen=True, slots=True)
+class Circular(Scalar):
+    """Cosine (``"cos"``) or sine of an angle that is no coordinate."""
+
+    name: str
+    argument: Scalar
+
+
+@dataclass(frozen=True, slots=True)
 class Angle(Scalar):
     """The angle of the point (cosine, sine) of the plane, in (-pi, pi]."""
 
@@ -257,6 +265,22 @@ class Rotated(Vector):
     def order(self) -> int:
         """How many times A is differentiated."""
         return len(self.along)
+
+
+@dataclass(frozen=True, slots=True)
+class RotationSlope(Vector):
+    """B(p, v), the derivative of A v by Euler parameters p: a matrix, where it is shown."""
+
+    rotation: Rotation
+    vector: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class RowOfSlope(Vector):
+    """left^T B(p, v): a row, where it is shown."""
+
+    left: Vector
+    slope: RotationSlope
 
 
 @dataclass(frozen=True, slots=True)

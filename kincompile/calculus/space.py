@@ -29,10 +29,12 @@ class EulerRotation:
 
     This is A = E G^T of Haug, chapter 9: homogeneous of degree 2 in p. So A v is a symmetric
     bilinear form of p and p, its derivative along w is twice that form of p and w, and its second
-    derivative along w and u twice that of w and u; a third is zero.
+    derivative along w and u twice that of w and u; a third is zero. `is_back` is the rotation
+    back, A^T, of the conjugate parameters.
     """
 
     p: VectorSymbol
+    is_back: bool = False
 
     letters: ClassVar[str] = "ABB"
     formula: ClassVar[str] = "(e0^2 - e^T e) I + 2 e e^T + 2 e0 e~"
@@ -59,6 +61,8 @@ class EulerRotation:
         """Return the nine entries of A, row by row."""
         del call
         ((e0, e1, e2, e3),) = coordinates
+        if self.is_back:
+            e1, e2, e3 = -e1, -e2, -e3
         f1, f2, f3 = e1 + e1, e2 + e2, e3 + e3
         same, other = e0**2 - e3**2, e1**2 - e2**2
         p12, p13, p23 = f1 * e2, f1 * e3, f2 * e3
@@ -82,6 +86,8 @@ class EulerRotation:
             rows = entries[:3], entries[3:6], entries[6:]
             return tuple(_dot(row, vector) for row in rows)
         p, w = along if len(along) == 2 else (expand(self.p), *along)
+        if self.is_back:
+            p, w = ((x[0], *(-item for item in x[1:])) for x in (p, w))
         p0, w0 = p[0], w[0] + w[0]
         e, f = p[1:], tuple(item + item for item in w[1:])
         same, by_e, by_f = p0 * w0 - _dot(e, f), _dot(f, vector), _dot(e, vector)

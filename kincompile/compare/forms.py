@@ -16,7 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy
 
+from kincompile.calculus.expressions import Expression, Rotated, dot
+from kincompile.calculus.space import EulerRotation
 from kincompile.compare.agreement import ON_MANIFOLD
+from kincompile.compare.formula_faults import everywhere
 from kincompile.compare.reference import QUANTITIES, ConstraintBlock, Reference, Subject
 from kincompile.compare.states import Array, States
 from kincompile.compare.vectors import joint_values, with_roles_exchanged
@@ -40,6 +43,7 @@ INDEPENDENT = 1e-6
 
 ROLES = "roles of i and j"
 EQUIVALENT = "equivalent form"
+EXTENSION = "another rotation matrix off p^T p = 1"
 LENGTH = "the length instead of its square"
 ANGLE = "an angle instead of its sine"
 OTHER = "another equation that holds where the generated one holds"
@@ -96,6 +100,15 @@ def _exchanged(block: ConstraintBlock, subject: Subject) -> Form | None:
     other = with_roles_exchanged(joint) if isinstance(joint, Joint) else None
     if other is None:
         return None
+    text = "the roles of bodies i and j are exchanged"
+    form = _of_joint(ROLES, text, other, block, reference)
+    return form if _is_equivalent(form, subject) else None
+
+
+def _of_joint(
+    kind: str, text: str, other: Joint, block: ConstraintBlock, reference: Reference
+) -> Form:
+    """Return the form of another joint that stands in the place of a constraint."""
     kept = [k for k, name in enumerate(other.columns) if name is not None]
     columns = [reference.columns[name] for name in other.columns if name is not None]
 
@@ -107,9 +120,7 @@ def _exchanged(block: ConstraintBlock, subject: Subject) -> Form | None:
         Phi_q[:, :, columns] = values["Phi_q"][:, :, kept]
         return {**values, "Phi_q": Phi_q}
 
-    text = "the roles of bodies i and j are exchanged"
-    form = Form(ROLES, text, block.rows, evaluate, joint=other)
-    return form if _is_equivalent(form, subject) else None
+    return Form(kind, text, block.rows, evaluate, joint=other)
 
 
 def own_form(
@@ -247,12 +258,51 @@ def known_forms(block: ConstraintBlock, subject: Subject) -> Iterator[Form]:
 
 
 def _known_forms(block: ConstraintBlock, subject: Subject) -> Iterator[Form]:
+    yield from _other_extensions(block, subject)
     if _is_distance(block):
         assert isinstance(block.constraint, Joint)
         length = sympy.sympify(block.constraint.scalars["C"])
         Phi = subject.reference.expression("Phi", block.rows[0], 0)
         if form := _derived(subject.reference, block.rows, [sympy.sqrt(Phi + length**2) - length]):
             yield replace(form, text=LENGTH)
+
+
+def _other_extensions(block: ConstraintBlock, subject: Subject) -> Iterator[Form]:
+    """Yield a constraint in space with other rotation matrices, equal where p^T p = 1.
+
+    They have other derivatives by p than the homogeneous A = E G^T.
+    """
+    joint = block.constraint
+    if not isinstance(joint, Joint) or joint.template.dimension == 2:
+        return
+    for text, change in EXTENSIONS.items():
+        Phi = tuple(everywhere(item, change) for item in joint.template.Phi)
+        other = replace(joint, template=replace(joint.template, Phi=Phi))
+        if Phi != joint.template.Phi:
+            yield _of_joint(EXTENSION, text, other, block, subject.reference)
+
+
+def _with_norm(node: Expression) -> Expression | None:
+    """Return A v + (p^T p - 1) v for A v."""
+    match node:
+        case Rotated(EulerRotation(p), vector, ()):
+            return node + (dot(p, p) - 1) * vector
+    return None
+
+
+def _normalised(node: Expression) -> Expression | None:
+    """Return A v/(p^T p) for A v."""
+    match node:
+        case Rotated(EulerRotation(p), _, ()):
+            return dot(p, p) ** -1 * node
+    return None
+
+
+EXTENSIONS: Mapping[str, Callable[[Expression], Expression | None]] = {
+    "A = (2 e0^2 - 1) I + 2 (e e^T + e0 e~) instead of E G^T": _with_norm,
+    "A = E G^T/(p^T p) instead of E G^T": _normalised,
+}
+"""What is written, and what stands for a turned vector."""
 
 
 def _is_distance(block: ConstraintBlock) -> bool:

@@ -23,6 +23,8 @@ from kincompile.calculus.expressions import (
     Product,
     ProfileFunction,
     Rotated,
+    RotationSlope,
+    RowOfSlope,
     Scalar,
     Scaled,
     Sum,
@@ -31,8 +33,11 @@ from kincompile.calculus.expressions import (
     Vector,
     VectorSum,
     VectorSymbol,
+    scaled,
+    split_factor,
 )
 from kincompile.calculus.rotations import PlaneRotation
+from kincompile.calculus.space import EulerRotation
 from kincompile.compare.fault import (
     A_FOR_B,
     DRIVER_RATE,
@@ -133,7 +138,7 @@ def _here(node: Expression, symbols: Symbols) -> Iterator[Fault[Expression]]:
             yield from _wrong_orders(node)
         case ProfileFunction():
             yield from _wrong_orders(node)
-        case Rotated() | VectorSymbol():
+        case Rotated() | VectorSymbol() | RotationSlope():
             yield from swaps(node, symbols)
 
 
@@ -183,15 +188,18 @@ def _dropped(factor: Scalar, rest: Expression) -> Iterator[Fault[Expression]]:
 
 def swaps(node: Expression, symbols: Symbols) -> Iterator[Fault[Expression]]:
     """Yield the mistakes for a rotation or a body-fixed vector; each result stands in its place."""
+    if isinstance(node, RotationSlope):
+        yield from _wrong_slopes(node)
     if isinstance(node, Rotated):
         yield from _wrong_rotations(node, symbols)
     if isinstance(node, VectorSymbol) and node.name in symbols.vectors:
         swapped = Exchanged(node.name, node.size)
-        yield Fault(XI_ETA, f"xi and eta of {node.name} are swapped", swapped)
+        if node.size == 2:
+            yield Fault(XI_ETA, f"xi and eta of {node.name} are swapped", swapped)
         partner = symbols.partners.get(node.name)
         if partner is not None:
             text = f"{partner} stands where {node.name} belongs"
-            yield Fault(MIXED_POINTS, text, VectorSymbol(partner))
+            yield Fault(MIXED_POINTS, text, VectorSymbol(partner, node.size))
     if (other := rate_or_position(node)) is not None:
         yield Fault(
             MIXED_RATES, f"{described(other)} stands where {described(node)} belongs", other
@@ -203,10 +211,12 @@ def rate_or_position(node: Expression) -> VectorSymbol | None:
     if not isinstance(node, VectorSymbol) or not node.name.startswith("r_"):
         return None
     position = node.name.removesuffix(rate(""))
-    return VectorSymbol(rate(position) if node.name == position else position)
+    return VectorSymbol(rate(position) if node.name == position else position, node.size)
 
 
 def _wrong_rotations(node: Rotated, symbols: Symbols) -> Iterator[Fault[Expression]]:
+    if isinstance(node.rotation, EulerRotation):
+        yield from _wrong_slopes(node)
     if not isinstance(node.rotation, PlaneRotation):
         return
     angle, vector, along = node.rotation.angle, node.vector, node.along
@@ -228,6 +238,18 @@ def _wrong_rotations(node: Rotated, symbols: Symbols) -> Iterator[Fault[Expressi
     if mixed is not None:
         text = f"{mixed} stands where phi_{index} belongs, in {name}"
         yield Fault(MIXED_ANGLES, text, Rotated(PlaneRotation(Symbol(mixed)), vector, along))
+
+
+def _wrong_slopes(node: Rotated | RotationSlope) -> Iterator[Fault[Expression]]:
+    """Yield the mistakes for A s and B(p, s) of Euler parameters."""
+    assert isinstance(node.rotation, EulerRotation)
+    is_slope = isinstance(node, RotationSlope) or bool(node.along)
+    name = f"{'B' if is_slope else 'A'}_{node.rotation.p.name.removeprefix('p_')}"
+    back = replace(node, rotation=replace(node.rotation, is_back=True))
+    text = f"the signs of e~ are wrong in {name}" if is_slope else f"{name} is transposed"
+    yield Fault(TRANSPOSED, text, back)
+    if is_slope:
+        yield Fault(FACTOR, f"the 2 of {name} is missing", times(Fraction(1, 2), node))
 
 
 def everywhere(
@@ -267,6 +289,18 @@ def _children(node: Expression) -> Iterator[tuple[Any, Callable[[Any], Expressio
             yield vector, lambda new: Rotated(rotation, new, along)
         case Perpendicular(vector):
             yield vector, Perpendicular
+        case RotationSlope(rotation, vector):
+            yield vector, lambda new: RotationSlope(rotation, new)
+        case RowOfSlope(left, slope):
+            yield left, lambda new: RowOfSlope(new, slope)
+            yield slope, lambda new: _row_of(left, new)
+
+
+def _row_of(left: Vector, slope: Vector) -> Expression:
+    """Return left^T slope, a number of the slope in front."""
+    factor, inner = split_factor(slope)
+    assert isinstance(inner, RotationSlope)
+    return scaled(factor, RowOfSlope(left, inner))
 
 
 def _sequence(

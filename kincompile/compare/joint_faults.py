@@ -38,6 +38,7 @@ from kincompile.calculus.expressions import (
     split_coefficient,
 )
 from kincompile.calculus.rotations import PlaneRotation
+from kincompile.calculus.space import EulerRotation
 from kincompile.calculus.symbols import PlaneFrame
 from kincompile.compare.agreement import agrees
 from kincompile.compare.collected import (
@@ -52,6 +53,7 @@ from kincompile.compare.fault import (
     COUPLING,
     CROSS_TERM,
     DRIVER_DEGREES,
+    E0_LAST,
     FACTOR,
     MISSING_SQUARE,
     MIXED_ANGLES,
@@ -112,6 +114,17 @@ NumericFault = Fault[Mapping[Index, "Array"]]
 """A fault with the numbers that stand in the entries where it shows, shape (N,) each."""
 
 
+_ORDERS = {
+    2: [(X_AND_Y, "x and y are swapped in the columns", [1, 0])],
+    3: [
+        (X_AND_Y, f"{'xyz'[a]} and {'xyz'[b]} are swapped in the columns", order)
+        for a, b, order in ((0, 1, [1, 0, 2]), (0, 2, [2, 1, 0]), (1, 2, [0, 2, 1]))
+    ],
+    4: [(E0_LAST, "e0 stands last in the columns", [1, 2, 3, 0])],
+}
+"""Wrong orders of the columns of a vector coordinate, by the number of its components."""
+
+
 class JointFaults:
     """The faults of one quantity of a joint, on the level of vectors.
 
@@ -159,6 +172,7 @@ class JointFaults:
         entries: dict[Index, Array] = {}
         for place, item in values.items():
             right = self._right[place]
+            item = np.broadcast_to(item, right.shape)
             same = agrees(item, np.abs(item) + np.abs(right), right).all(axis=0)
             row, column = self._corner(place)
             for a, b in np.argwhere(~same):
@@ -186,7 +200,8 @@ class JointFaults:
     def _corner(self, place: Index) -> Index:
         """Return row and column of the first entry of a part."""
         b, k = place
-        rows = sum(2 if isinstance(block.Phi, Vector) else 1 for block in self._blocks[:b])
+        size = self._joint.template.dimension
+        rows = sum(size if isinstance(block.Phi, Vector) else 1 for block in self._blocks[:b])
         coordinates = self._joint.template.coordinates[:k] if self._quantity == "Phi_q" else ()
         return rows, sum(item.size for item in coordinates)
 
@@ -260,12 +275,14 @@ class JointFaults:
     def _exchanged_columns(self) -> Iterator[NumericFault]:
         """Yield the Jacobians with the columns of x and y in each other's place."""
         for k, coordinate in enumerate(self._joint.template.coordinates):
-            if isinstance(coordinate, VectorSymbol):
-                text = f"the columns of x and y of {described(coordinate)} are swapped"
-                places = [(b, k) for b in range(len(self._blocks))]
+            if not isinstance(coordinate, VectorSymbol):
+                continue
+            places = [(b, k) for b in range(len(self._blocks))]
+            for kind, text, order in _ORDERS[coordinate.size]:
+                text = f"{text} of {described(coordinate)}"
                 for chosen in (*([place] for place in places), places):
-                    swapped = {place: self._right[place][..., ::-1] for place in chosen}
-                    yield from self._if_different(X_AND_Y, text, swapped)
+                    swapped = {place: self._right[place][..., order] for place in chosen}
+                    yield from self._if_different(kind, text, swapped)
 
 
 def _faults_everywhere(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
@@ -277,6 +294,8 @@ def _faults_everywhere(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]
             case VectorSymbol():
                 leaves[node] = None
             case Rotated(PlaneRotation(Symbol())):
+                leaves[replace(node, vector=_ANY)] = None
+            case Rotated(EulerRotation(), _, ()):
                 leaves[replace(node, vector=_ANY)] = None
 
     _changed(parts, collect)
@@ -370,7 +389,7 @@ def _exchanged_names(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
 
     def points(node: Expression) -> Expression | None:
         if isinstance(node, VectorSymbol) and (partner := symbols.partners.get(node.name)):
-            return VectorSymbol(partner)
+            return VectorSymbol(partner, node.size)
         return None
 
     if symbols.angles == {"phi_i", "phi_j"}:

@@ -128,13 +128,15 @@ def _arrangements(
     """Yield the ways to write the coordinates of bodies in a given order, each with its name."""
     words = [MOVED] if is_moved else []
     yield words, [column for triple in order for column in triple]
-    angle_first = [column for x, y, phi in order for column in (phi, x, y)]
-    yield [*words, "each body has its angle first"], angle_first
+    place = {3: 2, 7: 3}.get(len(order[0]), len(order[0])) if order else 0
+    turn, turns = ("angle", "angles") if place == 2 else ("Euler parameters",) * 2
+    turned_first = [column for own in order for column in (*own[place:], *own[:place])]
+    yield [*words, f"each body has its {turn} first"], turned_first
     by_kind = [column for kind in zip(*order, strict=True) for column in kind]
-    yield [*words, "all x come first, then all y, then all angles"], by_kind
-    positions = [column for triple in order for column in triple[:2]]
-    angles = [triple[2] for triple in order]
-    yield [*words, "the positions come first, then the angles"], [*positions, *angles]
+    yield [*words, f"all x come first, then all y, then all {turns}"], by_kind
+    positions = [column for own in order for column in own[:place]]
+    rest = [column for own in order for column in own[place:]]
+    yield [*words, f"the positions come first, then the {turns}"], [*positions, *rest]
 
 
 def _with_ground(columns: Columns, ground: Columns) -> Iterator[Columns]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.calculus.expressions import (
+    Angle,
     Basis,
+    Circular,
     Dot,
     Expression,
     Norm,
@@ -16,6 +18,8 @@ from kincompile.calculus.expressions import (
     Product,
     ProfileFunction,
     Rotated,
+    RotationSlope,
+    RowOfSlope,
     Scalar,
     Scaled,
     Sum,
@@ -27,6 +31,7 @@ from kincompile.calculus.expressions import (
     split_coefficient,
 )
 from kincompile.calculus.rotations import PlaneRotation
+from kincompile.calculus.space import EulerRotation
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -57,6 +62,10 @@ def _scalar(expression: Scalar) -> str:
             return f"{_bracketed(_scalar(base))}^{exponent}"
         case Norm(vector):
             return f"|{_vector(vector)}|"
+        case Circular(name, argument):
+            return f"{name}({_scalar(argument)})"
+        case Angle(sine, cosine):
+            return f"atan2({_scalar(sine)}, {_scalar(cosine)})"
         case Dot(left, right):
             return f"({_vector(left)})^T {_bracketed(_vector(right))}"
     raise TypeError(f"not a scalar expression: {expression!r}")
@@ -66,8 +75,17 @@ def _vector(expression: Vector) -> str:
     match expression:
         case VectorSymbol(name):
             return name
-        case Basis():
-            return "e_x"
+        case Basis(axis, size):
+            return f"e_{'xyz'[axis]}" if size < 4 else f"e_{axis}"
+        case Rotated(EulerRotation(p), vector, along):
+            if not along:
+                return f"A_{p.name.removeprefix('p_')} {_bracketed(_vector(vector))}"
+            first, last = (p, *along)[-2:]
+            return f"B({described(first)}, {_vector(vector)}) {_bracketed(described(last))}"
+        case RotationSlope(EulerRotation(p), vector):
+            return f"B({p.name}, {_vector(vector)})"
+        case RowOfSlope(left, slope):
+            return f"({_vector(left)})^T {_vector(slope)}"
         case Rotated(PlaneRotation(angle) as rotation, vector):
             letter = rotation.letters[expression.order]
             of_body = isinstance(angle, Symbol) and angle.name.startswith("phi_")

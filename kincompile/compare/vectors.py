@@ -13,6 +13,8 @@ import numpy as np
 
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import (
+    Angle,
+    Circular,
     Dot,
     Norm,
     Perpendicular,
@@ -50,7 +52,19 @@ if TYPE_CHECKING:
     from kincompile.compare.states import Array, States
     from kincompile.model.resolve import Joint
 
-_COMPOUND = (Dot, Norm, Perpendicular, Power, Product, Rotated, Scaled, Sum, VectorSum)
+_COMPOUND = (
+    Angle,
+    Circular,
+    Dot,
+    Norm,
+    Perpendicular,
+    Power,
+    Product,
+    Rotated,
+    Scaled,
+    Sum,
+    VectorSum,
+)
 
 
 class Exchanged(VectorSymbol):
@@ -101,9 +115,9 @@ class NumericEnvironment:
         """Return the numbers of a rotation that all vectors share."""
         return expand.entries(rotation)
 
-    def call(self, function: str, value: Value) -> Value:
+    def call(self, function: str, *values: Value) -> Value:
         """Return an elementary function."""
-        return getattr(np, function)(value)
+        return getattr(np, {"atan2": "arctan2"}.get(function, function))(*values)
 
 
 class NumericExpansion(Expansion):
@@ -114,7 +128,7 @@ class NumericExpansion(Expansion):
     """
 
     def __init__(self, joint: Joint, reference: Reference, states: States) -> None:
-        super().__init__(NumericEnvironment(joint, reference, states))
+        super().__init__(NumericEnvironment(joint, reference, states), joint.template.dimension)
         self._known: dict[int, tuple[Expression, Any]] = {}
 
     def scalar(self, expression: Scalar) -> Value:
@@ -137,7 +151,7 @@ class NumericExpansion(Expansion):
 
 
 def component_values(expression: Expression, expansion: Expansion) -> Array:
-    """Return the values of an expression, shape (N, 1) or (N, 2)."""
+    """Return the values of an expression, shape (N, components)."""
     return np.stack(expansion.components(expression), axis=-1)
 
 

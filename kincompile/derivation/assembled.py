@@ -76,6 +76,18 @@ def assembled_section(evaluation: Evaluation) -> Chapter:
     return Chapter("assembled", ("The assembled system",), (), parts)
 
 
+EULER_PARAMETERS: Runs = (
+    "A body has the Euler parameters p = (e0, e), of length one. Its rotation matrix is ",
+    Verbatim("A = E G^T = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~"),
+    ", where e~ is the skew matrix of e, E = [-e, e~ + e0 I] and G = [-e, -e~ + e0 I]. "
+    "The derivative of A s by p is the matrix ",
+    Verbatim("B(p, s) = 2 [(e0 I + e~) s, e s^T - (e0 I + e~) s~]"),
+    ", linear in p and in s. The angular velocity is 2 E p_dot in the global frame, 2 G p_dot in "
+    "that of the body.",
+)
+"""What the letters of a derivation in space mean (Haug, chapter 9)."""
+
+
 def unknowns_section(figures: Figures) -> Chapter:
     """Return the mechanism drawn, its coordinates and parameters, with the chosen state."""
     evaluation = figures.evaluation
@@ -88,6 +100,8 @@ def unknowns_section(figures: Figures) -> Chapter:
     if (shown := figures.mechanism()) is not None:
         blocks.append(Figure(shown))
     blocks.append(table(("column", "coordinate", "unit", "guess", "chosen state"), rows))
+    if len(evaluation.system.ground.kind.axes) > 2:
+        blocks.append(text(*EULER_PARAMETERS))
     if evaluation.system.parameters:
         known: Rows = [
             (Verbatim(item.name), item.unit, _math(values[item.name]))

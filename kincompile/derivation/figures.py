@@ -64,16 +64,22 @@ class Figures:
 
     def mechanism(self) -> Picture | None:
         """Return the whole mechanism with the axes of its bodies; None without bodies."""
-        drawn = self._drawn
-        if not drawn.bodies:
+        if self._is_spatial or not self.evaluation.system.bodies:
             return None
+        drawn = self._drawn
         named = zip(drawn.frames, drawn.bodies, strict=True)
         arrows = [arrow for frame, name in named for arrow in self._axes(frame, name)]
         title = f"{drawn.name} at {self.evaluation.origin}"
         return picture(drawn, self.evaluation.q, title, [*self._axes(GROUND_FRAME, ""), *arrows])
 
-    def joint(self, joint: Joint) -> Picture:
-        """Return a joint with the vectors and axes that occur in its equation."""
+    @property
+    def _is_spatial(self) -> bool:
+        return len(self.evaluation.system.ground.kind.axes) > 2
+
+    def joint(self, joint: Joint) -> Picture | None:
+        """Return a joint with the vectors and axes that occur in its equation; none in space."""
+        if self._is_spatial:
+            return None
         arrows = [*self.vectors(joint)]
         indices = dict(zip(self._frames(joint), "ij", strict=False))
         for frame, index in indices.items():

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
+    from kincompile.view.picture import Picture
 
 
 def joint_section(figures: Figures, joint: Joint, rows: Rows) -> Chapter:
@@ -68,7 +69,7 @@ def joint_section(figures: Figures, joint: Joint, rows: Rows) -> Chapter:
     return steps.section(
         joint.template.type_name,
         joint.is_driver,
-        steps.attributes(Figure(figures.joint(joint))),
+        steps.attributes(figures.joint(joint)),
         steps.constraint(),
         steps.rules(),
         steps.jacobian(),
@@ -99,7 +100,7 @@ class _JointSteps(Steps[RowBlock]):
         ]
         return all(step.rule is Rule.SUM for step in telling(steps))
 
-    def attributes(self, figure: Figure) -> Chapter:
+    def attributes(self, picture: Picture | None) -> Chapter:
         written = type(self.joint.written)
         meaning = (written.__doc__ or "").strip().splitlines()[0]
         rows: list[tuple[Run | Runs, ...]] = []
@@ -114,7 +115,8 @@ class _JointSteps(Steps[RowBlock]):
         source = text(f"{meaning} Source: {self.joint.source}.")
         header = ("attribute", "symbol", "as written", "number")
         attributes = table(header, rows)
-        return self.step(1, "The joint and its attributes", source, figure, attributes, level="")
+        figure = [] if picture is None else [Figure(picture)]
+        return self.step(1, "The joint and its attributes", source, *figure, attributes, level="")
 
     def _number(self, symbol: str) -> Run:
         """Return an attribute in numbers; a profile has none."""
@@ -202,15 +204,29 @@ class _JointSteps(Steps[RowBlock]):
         return [text("Here ", value, " is constant: ", rate, " = ", second, " = 0.")]
 
     def matrices(self) -> Iterator[Block]:
-        for frame, body in zip(self.joint.template.frames, self.joint.bodies, strict=True):
+        template = self.joint.template
+        if template.dimension == 3:
+            yield from self._rotations()
+            return
+        for frame, body in zip(template.frames, self.joint.bodies, strict=True):
             angle = evaluate(body.phi, self.evaluation.values) or 0.0
             c, s = np.cos(angle), np.sin(angle)
             for letter, matrix in (("A", [[c, -s], [s, c]]), ("B", [[-s, -c], [c, -s]])):
                 yield Display(Equated((Glyph(letter, frame.index), decimals(np.array(matrix)))))
 
+    def _rotations(self) -> Iterator[Block]:
+        """Yield the rotation matrices of bodies in space."""
+        expansion = Expansion(SymbolicEnvironment(self.joint), 3)
+        for frame in self.joint.template.frames:
+            entries = [
+                _decimal(x, self.evaluation.values) for x in expansion.entries(frame.rotation)
+            ]
+            rows = tuple(tuple(entries[k : k + 3]) for k in range(0, 9, 3))
+            yield Display(Equated((Glyph("A", frame.index), Matrix(rows))))
+
     def vectors(self) -> Iterator[Block]:
         template, values = self.joint.template, self.evaluation.values
-        expansion = Expansion(SymbolicEnvironment(self.joint))
+        expansion = Expansion(SymbolicEnvironment(self.joint), template.dimension)
         named: list[tuple[Formula, Vector]] = [(item, item) for item in known_vectors(template)]
         for item, glyph in abbreviations(template).items():
             if isinstance(item, Vector):

@@ -9,7 +9,9 @@ from kincompile.calculus.expressions import (
     ONE,
     ZERO,
     ZERO_VECTOR,
+    Angle,
     Basis,
+    Circular,
     Dot,
     Expression,
     Number,
@@ -25,6 +27,7 @@ from kincompile.calculus.expressions import (
     VectorSymbol,
 )
 from kincompile.calculus.rotations import PlaneRotation
+from kincompile.calculus.space import EulerRotation
 from kincompile.derivation.document import Math
 from kincompile.derivation.formulas import (
     IDENTITY,
@@ -55,6 +58,9 @@ RULES: Mapping[Rule, Runs] = {
     Rule.CHAIN: ("chain rule",),
     Rule.A_TO_B: (Math(Equated((DerivativeSymbol(_A, _PHI, "d"), _B))),),
     Rule.B_TO_A: (Math(Equated((DerivativeSymbol(_B, _PHI, "d"), Joined(("-", _A))))),),
+    Rule.A_TO_SLOPE: ("d(A s) = B(p, s) dp",),
+    Rule.SLOPE: ("d(B(p, s) w) = B(w, s) dp",),
+    Rule.ANGLE: ("d atan2(s, c) = (c ds - s dc)/(s² + c²)",),
     Rule.DRIVER: ("driver, a function of ", Math(Symbol("t"))),
     Rule.PROFILE: ("profile, chain rule",),
 }
@@ -67,9 +73,9 @@ def parts(expression: Any) -> Iterator[Expression]:
     match expression:
         case Sum(items) | VectorSum(items) | Product(items):
             inner: tuple[Expression, ...] = items
-        case Dot(left, right) | Scaled(left, right):
+        case Dot(left, right) | Scaled(left, right) | Angle(left, right):
             inner = (left, right)
-        case Power(base, _):
+        case Power(base, _) | Circular(_, base):
             inner = (base,)
         case Rotated(rotation, vector):
             inner = (*rotation.coordinates, vector)
@@ -123,8 +129,7 @@ def block_entry(entry: Expression, coordinate: Expression, Phi: Expression) -> F
     if isinstance(coordinate, Symbol):
         return entry
     if isinstance(Phi, Vector):
-        assert isinstance(entry, Scalar)
-        return _times_identity(entry)
+        return _times_identity(entry) if isinstance(entry, Scalar) else entry
     assert isinstance(entry, Vector)
     return Transposed(entry)
 
@@ -177,5 +182,7 @@ def known_vectors(template: Template) -> list[Vector]:
             for item in parts(expression):
                 match item:
                     case Rotated(PlaneRotation(Symbol()), VectorSymbol()):
+                        found[item] = None
+                    case Rotated(EulerRotation(), VectorSymbol(), ()):
                         found[item] = None
     return [*sorted(found, key=lambda item: item.order)]

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.calculus.expressions import (
     ONE,
+    Angle,
     Basis,
+    Circular,
     Dot,
     Norm,
     Number,
@@ -22,6 +24,8 @@ from kincompile.calculus.expressions import (
     Product,
     ProfileFunction,
     Rotated,
+    RotationSlope,
+    RowOfSlope,
     Scaled,
     Sum,
     Symbol,
@@ -29,6 +33,7 @@ from kincompile.calculus.expressions import (
     VectorSum,
     VectorSymbol,
 )
+from kincompile.calculus.space import EulerRotation
 from kincompile.derivation.formulas import (
     Call,
     Choice,
@@ -173,8 +178,14 @@ class Notation:
         return self._letter("pi")
 
     def _print_Basis(self, expr: Basis) -> Printed:
-        del expr
-        return self._unit("x")
+        return self._unit("xyz"[expr.axis] if expr.size < 4 else str(expr.axis))
+
+    def _print_Circular(self, expr: Circular) -> Printed:
+        return self._row([self._function(expr.name), self._fenced(self._short(expr.argument))])
+
+    def _print_Angle(self, expr: Angle) -> Printed:
+        parts = [self._short(expr.sine), self._operator(","), self._short(expr.cosine)]
+        return self._row([self._function("atan2"), self._fenced(self._row(parts))])
 
     def _unit(self, axis: str) -> Printed:
         return self._scripts(self._letter("e", bold=True), self._index_text(axis), None)
@@ -185,13 +196,28 @@ class Notation:
         turn = self._letter("R", bold=True)
         return self._row([turn, self._factor(expr.vector)])
 
+    def _print_RotationSlope(self, expr: RotationSlope) -> Printed:
+        (p,) = expr.rotation.coordinates
+        return self._slope(p, expr.vector)
+
+    def _print_RowOfSlope(self, expr: RowOfSlope) -> Printed:
+        return self._row([self._transposed(expr.left), self._short(expr.slope)])
+
+    def _slope(self, p: Any, vector: Any) -> Printed:
+        """Return B(p, v), linear in both."""
+        arguments = [self._short(p), self._operator(","), self._short(vector)]
+        return self._row([self._letter("B", bold=True), self._fenced(self._row(arguments))])
+
     def _print_Rotated(self, expr: Rotated) -> Printed:
         (angle,) = expr.rotation.coordinates
+        if isinstance(expr.rotation, EulerRotation) and expr.along:
+            first, *others = (angle, *expr.along)[-2:]
+            return self._row([self._slope(first, expr.vector), self._factor(others[0])])
         if isinstance(expr.vector, Basis):
             unit = self._row([self._letter("u", bold=True), self._fenced(self._short(angle))])
             turn = [self._letter("R", bold=True)] if expr.along else []
             return self._row([*turn, unit])
-        index = split_name(angle.name)[1] if isinstance(angle, Symbol) else ""
+        index = split_name(angle.name)[1] if isinstance(angle, Symbol | VectorSymbol) else ""
         base = self._letter(expr.rotation.letters[expr.order], bold=True)
         matrix = self._scripts(base, self._index_text(index), None)
         return self._row([matrix, self._factor(expr.vector)])
@@ -203,11 +229,27 @@ class Notation:
         return self._row([self._transposed(expr.left), self._factor(expr.right)])
 
     def _print_Transposed(self, expr: Transposed) -> Printed:
+        if isinstance(expr.vector, VectorSum) and any(map(_is_slope, expr.vector.terms)):
+            return self._row_of(expr.vector.terms)
+        if _is_slope(expr.vector):
+            return self._print(expr.vector)
         is_negative, magnitude = _signed(expr.vector)
         minus = [self._operator("-")] if is_negative else []
         return self._row([*minus, self._transposed(magnitude)])
 
+    def _row_of(self, terms: Sequence[Any]) -> Printed:
+        """Return a sum of rows: vectors transposed, and rows of slopes."""
+        parts: list[Printed] = []
+        for term in terms:
+            is_negative, magnitude = _signed(term)
+            if is_negative or parts:
+                parts.append(self._operator("-" if is_negative else "+"))
+            parts.append(self._print(Transposed(magnitude)))
+        return self._row(parts)
+
     def _transposed(self, vector: Any) -> Printed:
+        if isinstance(vector, RowOfSlope):
+            return self._short(vector)
         return self._raised(vector, self._letter("T"))
 
     def _raised(self, base: Any, exponent: Printed) -> Printed:
@@ -426,6 +468,11 @@ class Notation:
 
     def _print_Matrix(self, expr: Matrix) -> Printed:
         return self._array([[self._short(cell) for cell in row] for row in expr.rows])
+
+
+def _is_slope(term: Any) -> bool:
+    """Return whether a term is a row of the derivative of a rotation."""
+    return isinstance(term.vector if isinstance(term, Scaled) else term, RowOfSlope)
 
 
 def _signed(term: Any) -> tuple[bool, Any]:

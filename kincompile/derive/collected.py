@@ -397,8 +397,8 @@ class _AtRandom:
     def entries(self, rotation: Rotation, expand: Expansion) -> Any:
         return expand.entries(rotation)
 
-    def call(self, function: str, value: Any) -> Any:
-        return getattr(math, function)(value)
+    def call(self, function: str, *values: Any) -> Any:
+        return getattr(math, function)(*values)
 
 
 def _require_equal(first: Expression, second: Expression) -> None:

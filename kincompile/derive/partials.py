@@ -1,7 +1,8 @@
 """Phi_q as the book prints it, read off the directional derivative.
 
 By a position r the derivative along a change of r is linear in that change: ``k r_dot`` of a vector
-constraint, whose block is k I, and ``u^T r_dot`` of a scalar one, whose row is u^T.
+constraint, whose block is k I, and ``u^T r_dot`` of a scalar one, whose row is u^T. By Euler
+parameters p it is ``B(p, s) p_dot``, whose block is the matrix B(p, s), and ``u^T B(p, s) p_dot``.
 """
 
 from __future__ import annotations
@@ -17,12 +18,18 @@ from kincompile.calculus.expressions import (
     Dot,
     Expression,
     Product,
+    Rotated,
+    RotationSlope,
+    RowOfSlope,
     Scalar,
+    Scaled,
     Sum,
     Vector,
+    VectorSum,
     VectorSymbol,
     dot,
     product_of,
+    rotated,
     scaled,
     split_factor,
     vector_sum,
@@ -46,7 +53,8 @@ class PartialDerivative:
         A coordinate of the template.
     entry
         By a vector r: k of the block k I where Phi is a vector, u of the row u^T where Phi is a
-        scalar. By a scalar: a vector or a scalar, as Phi is.
+        scalar. By Euler parameters: the matrix, or the row, of slopes. By a scalar: a vector or a
+        scalar, as Phi is.
     steps
         The rules that fired, innermost first, with what they give in the same form.
     """
@@ -86,16 +94,52 @@ def _applied(entry: Expression, change: Expression) -> Expression:
     """Return what an entry gives for a change of its coordinate."""
     if isinstance(change, Scalar):
         return change * entry
-    return scaled(entry, change) if isinstance(entry, Scalar) else dot(entry, change)
+    if isinstance(entry, Scalar):
+        return scaled(entry, change)
+    match entry:
+        case VectorSum(terms) if _has_slopes(entry):
+            parts = [_applied(term, change) for term in terms]
+            return sum(parts[1:], start=parts[0])
+        case Scaled(factor, vector) if _has_slopes(vector):
+            return factor * _applied(vector, change)
+        case RotationSlope(rotation, vector):
+            return rotated(rotation, vector, (change,))
+        case RowOfSlope(left, RotationSlope(rotation, vector)):
+            return dot(left, rotated(rotation, vector, (change,)))
+    return dot(entry, change)
+
+
+def _has_slopes(vector: Vector) -> bool:
+    """Return whether there is a slope, or a row of one, in a vector."""
+    match vector:
+        case VectorSum(terms):
+            return any(map(_has_slopes, terms))
+        case Scaled(_, inner):
+            return _has_slopes(inner)
+    return isinstance(vector, RotationSlope | RowOfSlope)
+
+
+def _slope(vector: Vector, rate: VectorSymbol) -> Vector | None:
+    """Return B(p, v) of B(p, v) p_dot; None for anything else."""
+    match vector:
+        case Rotated(rotation, inner, (along_rate,)) if along_rate == rate:
+            return RotationSlope(rotation, inner)
+    return None
 
 
 def coefficient(expression: Expression, rate: VectorSymbol) -> Expression:
-    """Return k of a vector k r_dot, u of a scalar u^T r_dot."""
+    """Return k of a vector k r_dot, u of a scalar u^T r_dot; of p_dot the slopes."""
     if isinstance(expression, Scalar):
         return _row(expression, rate)
     if expression == ZERO_VECTOR:
         return ZERO
+    if isinstance(expression, VectorSum):
+        terms = [coefficient(term, rate) for term in expression.terms]
+        return vector_sum(tuple(term for term in terms if isinstance(term, Vector)))
     factor, vector = split_factor(expression)
+    slope = _slope(vector, rate)
+    if slope is not None:
+        return scaled(factor, slope)
     if vector != rate:
         raise InternalError(f"{expression} is no multiple of {rate}")
     return factor
@@ -113,6 +157,11 @@ def _row(expression: Scalar, rate: VectorSymbol) -> Vector:
             return vector_sum(tuple(rows))
         case Dot(left, right) if rate in (left, right):
             return right if left == rate else left
+        case Dot(left, right):
+            for one, other in ((left, right), (right, left)):
+                slope = _slope(one, rate)
+                if isinstance(slope, RotationSlope):
+                    return RowOfSlope(other, slope)
     if along(expression, {rate: rate}) != ZERO:
         raise InternalError(f"{expression} is not a multiple of {rate}")
     return ZERO_VECTOR

@@ -16,6 +16,7 @@ from kincompile.calculus.expressions import (
     ZERO,
     ZERO_VECTOR,
     Angle,
+    Circular,
     Dot,
     Expression,
     Norm,
@@ -58,6 +59,8 @@ class Rule(Enum):
     CHAIN = "chain rule"
     A_TO_B = "dA/dphi = B"
     B_TO_A = "dB/dphi = -A"
+    A_TO_SLOPE = "d(A s) = B(p, s) dp"
+    SLOPE = "d(B(p, s) w) = B(w, s) dp"
     ANGLE = "d atan2(s, c) = (c ds - s dc)/(s^2 + c^2)"
     CONSTANT = "constant"
     COORDINATE = "coordinate"
@@ -123,6 +126,10 @@ def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[R
         case Root(square):
             half = Number(Fraction(1, 2))
             return Rule.CHAIN, half * along(square, direction, record) * expression**-1
+        case Circular(name, argument):
+            sign, other = (-1, "sin") if name == "cos" else (1, "cos")
+            inner = along(argument, direction, record)
+            return Rule.CHAIN, sign * Circular(other, argument) * inner
         case Angle(sine, cosine):
             by_sine, by_cosine = (along(item, direction, record) for item in (sine, cosine))
             turn = cosine * by_sine - sine * by_cosine
@@ -153,7 +160,7 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
         case Rotated(rotation, vector, directions):
             changes = [along(item, direction, record) for item in rotation.coordinates]
             moved = along(vector, direction, record)
-            return _ROTATION[len(directions)], vector_sum(
+            return _ROTATION[rotation.letters][len(directions)], vector_sum(
                 (
                     *(rotated(rotation, vector, (*directions, change)) for change in changes),
                     rotated(rotation, moved, directions),
@@ -168,5 +175,8 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
     return Rule.COORDINATE, change
 
 
-_ROTATION = (Rule.A_TO_B, Rule.B_TO_A)
-"""What the derivative of A is called, and that of B."""
+_ROTATION = {
+    "AB": (Rule.A_TO_B, Rule.B_TO_A),
+    "ABB": (Rule.A_TO_SLOPE, Rule.SLOPE),
+}
+"""What the derivative of A is called, and that of it, by the letters of these."""

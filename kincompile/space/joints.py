@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING
 
 from kincompile.calculus.expressions import (
     Angle,
-    Basis,
+    Circular,
     Expression,
-    Perpendicular,
     Pi,
     Scalar,
     Symbol,
     dot,
 )
-from kincompile.calculus.rotations import turned
 from kincompile.calculus.symbols import C
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
@@ -50,7 +48,7 @@ def angle_from(reference: Scalar) -> Scalar:
     So the number of turns is that of the reference, and no other root has the residual zero.
     """
     cosine, sine = dot(i.A(f_i), j.A(f_j)), dot(i.A(g_i), j.A(f_j))
-    c, s = (dot(axis, turned(reference, Basis())) for axis in (Basis(), Perpendicular(Basis())))
+    c, s = Circular("cos", reference), Circular("sin", reference)
     return Angle(sine * c - cosine * s, cosine * c + sine * s)
 
 
