@@ -42,7 +42,7 @@ class Numbers:
         return math.pi
 
     def time_function(self, function: Any) -> float:
-        return 0.3 + function.order
+        return 0.3 + float(function.order)
 
     def entries(self, rotation: Any, expand: Expansion) -> Any:
         return expand.entries(rotation)
