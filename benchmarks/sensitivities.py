@@ -1,10 +1,10 @@
 """What exact sensitivities cost and what they are worth, beside the same by other means.
 
 ``python -m benchmarks.sensitivities`` differentiates the motion of a four-bar, 10,000 points,
-q, q_dot and q_ddot by its five parameters: kincompile in NumPy and in C, central differences of the same solvers, JAX's jacfwd
-and CasADi's jacobian, both of a Newton step and the rates, at positions that are given. Errors are
-against complex steps. The limits are 2 times the kinematics of the same target, a tenth of the time
-of differences and a 10,000th of their error.
+q, q_dot and q_ddot by its five parameters: kincompile in NumPy and in C, central differences of the
+same solvers, JAX's jacfwd and CasADi's jacobian, both of a Newton step and the rates, at positions
+that are given. Errors are against complex steps. The limits are 2 times the kinematics of the same
+target, a tenth of the time of differences and a 10,000th of their error.
 """
 
 from __future__ import annotations
