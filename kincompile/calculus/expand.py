@@ -12,6 +12,7 @@ from operator import add, mul
 from typing import TYPE_CHECKING, Protocol
 
 from kincompile.calculus.expressions import (
+    Angle,
     Basis,
     Dot,
     Expression,
@@ -22,6 +23,7 @@ from kincompile.calculus.expressions import (
     Power,
     Product,
     ProfileFunction,
+    Root,
     Rotated,
     Scalar,
     Scaled,
@@ -63,8 +65,8 @@ class Environment(Protocol):
     def entries(self, rotation: Rotation, expand: Expansion) -> Components:
         """Return the numbers that all vectors share that a rotation turns."""
 
-    def call(self, function: str, value: Value) -> Value:
-        """Return cosine (``"cos"``), sine or square root (``"sqrt"``)."""
+    def call(self, function: str, *values: Value) -> Value:
+        """Return cosine (``"cos"``), sine, square root (``"sqrt"``) or ``"atan2"`` of y and x."""
 
 
 class Expansion:
@@ -76,7 +78,7 @@ class Expansion:
     def __init__(self, environment: Environment, size: int = 2) -> None:
         self.environment = environment
         self._size = size
-        self._scalars: dict[Scalar, Value] = {}
+        self.scalars: dict[Scalar, Value] = {}
         self.vectors: dict[Vector, Components] = {}
 
     def components(self, expression: Expression) -> Components:
@@ -87,9 +89,9 @@ class Expansion:
 
     def scalar(self, expression: Scalar) -> Value:
         """Return the value of a scalar expression."""
-        if expression not in self._scalars:
-            self._scalars[expression] = self._scalar(expression)
-        return self._scalars[expression]
+        if expression not in self.scalars:
+            self.scalars[expression] = self._scalar(expression)
+        return self.scalars[expression]
 
     def vector(self, expression: Vector) -> Components:
         """Return the components of a vector expression."""
@@ -124,6 +126,10 @@ class Expansion:
             case Norm(vector):
                 squares = [item**2 for item in self.vector(vector)]
                 return environment.call("sqrt", reduce(add, squares))
+            case Root(square):
+                return environment.call("sqrt", self.scalar(square))
+            case Angle(sine, cosine):
+                return environment.call("atan2", self.scalar(sine), self.scalar(cosine))
             case Dot(left, right):
                 return reduce(add, map(mul, self.vector(left), self.vector(right)))
         raise TypeError(f"not a scalar expression: {expression!r}")
@@ -149,6 +155,7 @@ class Expansion:
                     environment.entries(rotation, self),
                     self.vector(vector),
                     tuple(self.components(item) for item in along),
+                    self.components,
                 )
             case Perpendicular(vector):
                 x, y = self.vector(vector)

@@ -142,9 +142,24 @@ class Power(Scalar):
 
 @dataclass(frozen=True, slots=True)
 class Norm(Scalar):
-    """The length of a constant vector."""
+    """The length of a vector."""
 
     vector: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Root(Scalar):
+    """The square root of a scalar."""
+
+    square: Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Angle(Scalar):
+    """The angle of the point (cosine, sine) of the plane, in (-pi, pi]."""
+
+    sine: Scalar
+    cosine: Scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,9 +223,16 @@ class Rotation(Protocol):
         """
 
     def components(
-        self, entries: Components, vector: Components, along: tuple[Components, ...]
+        self,
+        entries: Components,
+        vector: Components,
+        along: tuple[Components, ...],
+        expand: Callable[[Expression], Components],
     ) -> Components:
-        """Return the components of a turned vector, all of them given as components."""
+        """Return the components of a turned vector, all of them given as components.
+
+        `expand` gives those of a coordinate, where the entries are not enough.
+        """
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,16 +28,17 @@ FLOORS = {
     "calculus": 1,
     "derive": 2,
     "model": 3,
-    "files": 4,
-    "structure": 4,
-    "ir": 5,
-    "targets": 6,
+    "space": 4,
+    "files": 5,
+    "structure": 5,
+    "ir": 6,
+    "targets": 7,
 }
 GROUND = {name for name, floor in FLOORS.items() if floor == 0}
 # Beyond the wall: it stands on the ground floor alone, and no floor stands on it.
 RUNTIME = "runtime"
 BOTH_SIDES = {
-    *("__init__", "__main__", "compiler", "cli"),
+    *("__init__", "__main__", "compiler", "cli", "spatial"),
     *("compare", "derivation", "exercises", "verify", "view"),
 }
 
@@ -45,12 +46,16 @@ BOTH_SIDES = {
 # package promises: `import kincompile` loads nothing, a name loads its module. The table of targets
 # loads the modules of the one that is emitted, the command line the command that is called, and the
 # compiler the stages that a model needs. The options of a motion are formulas: to read them takes
-# SymPy, and to print a help does not.
+# SymPy, and to print a help does not. Masses and forces are loaded where a mechanism has any.
 DEFERRED = {
     PACKAGE,
     "kincompile.cli",
     "kincompile.cli.motion",
     "kincompile.compiler",
+    "kincompile.files.file_format",
+    "kincompile.files.model_file",
+    "kincompile.ir.lower",
+    "kincompile.model.system",
     "kincompile.targets.registry",
 }
 

@@ -129,9 +129,10 @@ def test_that_a_page_does_what_it_says(page, least, tmp_path):
         pytest.fail("\n\n".join(failures), pytrace=False)
 
 
-def test_that_the_page_of_the_checker_does_what_it_says(tmp_path):
+@pytest.mark.parametrize("name", ["checker.md", "forces.md"])
+def test_that_a_page_of_a_feature_does_what_it_says(name, tmp_path):
     reader = Reader(tmp_path)
-    page = (ROOT / "docs" / "checker.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     failures = [found for block in BLOCK.finditer(page) if (found := failure_of(reader, block))]
     assert failures == []
 
@@ -157,7 +158,8 @@ def test_that_links_lead_somewhere():
 
 
 def test_that_every_public_name_is_mentioned():
-    mentioned = set(re.findall(r"`(?:kc\.)?(\w+)", README))
+    forces = (ROOT / "docs" / "forces.md").read_text(encoding="utf-8")
+    mentioned = set(re.findall(r"`(?:kc\.)?(\w+)", README + forces))
     warnings = {name for name in kc.__all__ if name.endswith("Warning")}
     assert set(kc.__all__) - warnings - mentioned == set()
 
