@@ -70,8 +70,8 @@ def observing_sensitivities(
     -------
     Program or None
         Its outputs are determinants or pivots of the blocks of Phi_q, then by parameter the
-        derivatives of the columns; their rates are the derivatives of the rates. None where Phi_q
-        is not solved by elimination: of redundant equations.
+        derivatives of the columns; their rates are the derivatives of the rates. None where the
+        equations are structurally singular.
     """
     check_names(code.program, names)
     plan = plan_solve(code, is_straight=True)
@@ -97,6 +97,8 @@ def observing_sensitivities(
         program,
         equations=(),
         instances=(),
+        loads=(),
+        redundant=(),
         values=tuple(graph.nodes),
         fingerprint=hashlib.sha256(content.encode()).hexdigest()[:32],
         unsolvable="it has no equations",

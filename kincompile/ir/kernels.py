@@ -371,10 +371,9 @@ class _OutputConverter(Converter):
 
     def _ordered(self, value: sympy.Add | sympy.Mul) -> list[sympy.Expr]:
         """Return terms in SymPy's own order, which costs nothing, a positive one first."""
-        items = cast("tuple[sympy.Expr, ...]", value.args)
         if value.is_Mul:
-            return list(items)
-        return sorted(items, key=lambda item: bool(item.could_extract_minus_sign()))
+            return list(value.args)
+        return sorted(value.args, key=lambda item: bool(item.could_extract_minus_sign()))
 
     def _function(self, value: sympy.Basic) -> int:
         if isinstance(value, PointCoordinate):

@@ -2,8 +2,8 @@ r"""Exact derivatives of a motion by parameters: position, velocity, acceleratio
 
 The matrix is the mechanism's own Phi_q for all of them. Straight-line code with the planned
 elimination in it (`ir/implicit.py`) gives them, compiled on request for these parameters. Where
-that may not be trusted, and of redundant equations, the right sides come from the mechanism with
-its sensitivities (`ir/sensitive.py`),
+that may not be trusted, the right sides come from the mechanism with its sensitivities
+(`ir/sensitive.py`),
 
 .. math:: \Phi_q q_a = -\Phi_a, \qquad \Phi_q \dot q_a = \nu_a - C \dot q, \qquad
           \Phi_q \ddot q_a = \gamma_a - C \ddot q, \qquad C = (\Phi_q q_a + \Phi_a)_q.
