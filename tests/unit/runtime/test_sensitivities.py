@@ -255,6 +255,8 @@ def test_that_points_which_are_not_trusted_are_solved_by_matrices(name, example_
     )  # every determinant is smaller than twice the largest
     assert_complex_steps(solution, kc.sensitivities(solution, names))
     matrices = kc.sensitivities(solution, names, of=column)
+    second = kc.sensitivities(solution, names, of=column, second=True)
+    assert np.isnan(second.second).all()
     for part in ("q_p", "q_dot_p", "q_ddot_p", "y_p", "y_dot_p", "y_ddot_p"):
         np.testing.assert_allclose(getattr(few, part), getattr(matrices, part), atol=1e-9)
     np.testing.assert_allclose(few.q_ddot_p[..., 0, :], usual.q_ddot_p[..., -1, :], atol=1e-9)
