@@ -275,13 +275,13 @@ def _sensitive_module(program: Program, names: tuple[str, ...]) -> ModuleType:
 
 
 def _observing_module(
-    code: InlineProgram, target: str, names: tuple[str, ...], of: tuple[str, ...]
+    code: InlineProgram, target: str, names: tuple[str, ...], of: tuple[str, ...], second: bool
 ) -> ModuleType | None:
     """Return the module whose outputs are derivatives of columns, for `kc.sensitivities`."""
     from kincompile.ir.implicit import observing_sensitivities
     from kincompile.runtime.load import from_source
 
-    program = observing_sensitivities(code, names, of)
+    program = observing_sensitivities(code, names, of, second=second)
     if program is None:
         return None
     written = inline(program)

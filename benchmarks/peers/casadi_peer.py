@@ -21,6 +21,8 @@ from benchmarks.peers.common import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from benchmarks.linkages import Linkage
 
 casadi = optional("casadi")
@@ -79,13 +81,46 @@ def _external(function: Any) -> Any:
         return casadi.external(function.name(), str(Path(folder) / "march.so"))
 
 
-def _step(linkage: Linkage) -> Any:
-    """Return the function (q before, t, p) -> (q, q_dot, q_ddot) of a linkage."""
+def sensitivities(linkage: Linkage, *, is_compiled: bool) -> Callable[[Vector, Vector], Vector]:
+    """Return a function of times and positions that gives q_p, q_dot_p and q_ddot_p.
+
+    A step of Newton's method from a position has the derivative of the position.
+    """
+    four = all_four(*_equations(linkage))
+    symbols = four.sx_in()
+    position = casadi.Function("position", [symbols[0], *symbols[2:]], four(*symbols)[:2])
+    before, time = casadi.MX.sym("before", symbols[0].numel()), casadi.MX.sym("time")
+    values = casadi.MX.sym("values", symbols[3].numel())
+    residual, matrix = position(before, time, values)
+    q = before - casadi.solve(matrix, residual)
+    state = casadi.vertcat(q, *_rates(four, q, time, values))
+    slopes = casadi.densify(casadi.jacobian(state, values))
+    function = casadi.Function("slopes", [before, time, values], [slopes])
+    built: dict[int, Any] = {}
+
+    def differentiate(times: Vector, q: Vector) -> Vector:
+        if times.size not in built:
+            mapped = function.map(times.size)
+            built[times.size] = _external(mapped) if is_compiled else mapped
+        p = np.repeat(linkage.values[:, np.newaxis], times.size, axis=1)
+        found = built[times.size](q.T, times[np.newaxis], p).full()
+        return np.moveaxis(found.reshape(3, q.shape[1], times.size, -1), 1, 2)
+
+    return differentiate
+
+
+def _equations(linkage: Linkage) -> tuple[Any, Any, Any, Any]:
+    """Return Phi, q, t and p of a linkage in SX."""
     require(casadi, "casadi")
     q, t = casadi.SX.sym("q", len(linkage.guess)), casadi.SX.sym("t")
     p = casadi.SX.sym("p", len(linkage.parameters))
     rows = linkage.residual(casadi, casadi.vertsplit(q), t, casadi.vertsplit(p))
-    return step_function(casadi.vertcat(*rows), q, t, p)
+    return casadi.vertcat(*rows), q, t, p
+
+
+def _step(linkage: Linkage) -> Any:
+    """Return the function (q before, t, p) -> (q, q_dot, q_ddot) of a linkage."""
+    return step_function(*_equations(linkage))
 
 
 def all_four(Phi: Any, q: Any, t: Any, p: Any) -> Any:

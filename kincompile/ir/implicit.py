@@ -23,7 +23,8 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from itertools import combinations_with_replacement
+from typing import TYPE_CHECKING, TypeVar
 
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve
@@ -48,12 +49,14 @@ if TYPE_CHECKING:
     Columns = Sequence[Sequence["_Slopes | None"]]
     """Slopes of columns and of their rates; None of what is not a number."""
 
+_T = TypeVar("_T")
+
 DETERMINANT = "determinant_of_block_{}"
 """Names of the first outputs, which say where the elimination may be trusted."""
 
 
 def observing_sensitivities(
-    code: InlineProgram, names: Sequence[str], of: Sequence[str]
+    code: InlineProgram, names: Sequence[str], of: Sequence[str], *, second: bool = False
 ) -> Program | None:
     """Return a program without equations whose outputs are derivatives of a motion.
 
@@ -65,13 +68,15 @@ def observing_sensitivities(
         Its parameters by which columns are differentiated.
     of
         Those columns: names of coordinates and outputs.
+    second
+        Whether second derivatives are wanted too, by each pair of parameters.
 
     Returns
     -------
     Program or None
-        Its outputs are determinants or pivots of the blocks of Phi_q, then by parameter the
-        derivatives of the columns; their rates are the derivatives of the rates. None where Phi_q
-        is not solved by elimination: of redundant equations.
+        Its outputs are determinants or pivots of the blocks of Phi_q, then by parameter,
+        and by pair of parameters, the derivatives of the columns; their rates are the derivatives
+        of the rates. None where the equations are structurally singular.
     """
     check_names(code.program, names)
     plan = plan_solve(code, is_straight=True)
@@ -80,8 +85,10 @@ def observing_sensitivities(
     program, system = code.program, _Linearized(code, plan, names)
     columns = system.columns(of)
     # A column needs at most four transposed solves, a parameter three solves.
-    is_transposed = 4 * len(columns) < 3 * len(names)
+    is_transposed = 4 * len(columns) < 3 * len(names) and not second
     found = system.backward(columns) if is_transposed else system.forward(columns)
+    if second:
+        found += system.second(found)
     nan = system.graph.nan()
     rows = [(node, nan, nan) for node in system.determinants] + found
     outputs = {
@@ -89,14 +96,17 @@ def observing_sensitivities(
         for order, quantity in enumerate(TOGETHER["observe"])
     }
     kernel = pruned_kernel("Sensitivities", system.graph, outputs)
-    about = OutputDerivatives("sensitivities", (), _titles(program, plan, names, of))
+    by: list[str | tuple[str, str]] = [*names, *(pairs_of(names) if second else ())]
+    about = OutputDerivatives("sensitivities", (), _titles(program, len(plan.determinants), by, of))
     graph = Graph(program.values)
     bindings = tuple(graph.input(name) for name in kernel.inputs)
-    content = repr((program.fingerprint, "observed", tuple(names), tuple(of)))
+    content = repr((program.fingerprint, "observed", by, tuple(of)))
     return replace(
         program,
         equations=(),
         instances=(),
+        loads=(),
+        redundant=(),
         values=tuple(graph.nodes),
         fingerprint=hashlib.sha256(content.encode()).hexdigest()[:32],
         unsolvable="it has no equations",
@@ -104,22 +114,26 @@ def observing_sensitivities(
     )
 
 
+def pairs_of(names: Sequence[_T]) -> tuple[tuple[_T, _T], ...]:
+    """Return the pairs by which there are second derivatives, in order."""
+    return tuple(combinations_with_replacement(names, 2))
+
+
 def _titles(
-    program: Program, plan: SolvePlan, names: Sequence[str], of: Sequence[str]
+    program: Program, blocks: int, by: Iterable[str | tuple[str, str]], of: Sequence[str]
 ) -> tuple[OutputColumn, ...]:
     """Return names and units of the outputs."""
     units = {item.name: item.unit for item in program.coordinates}
     units |= {item.name: item.unit for item in program.outputs}
     per = {item.name: item.unit for item in program.parameters}
-    first = [OutputColumn(DETERMINANT.format(k), "") for k in range(len(plan.determinants))]
-    return (
-        *first,
-        *(
-            OutputColumn(sensitivity(name, by), quotient_unit(units[name], per[by]))
-            for by in names
-            for name in of
-        ),
-    )
+    found = [OutputColumn(DETERMINANT.format(k), "") for k in range(blocks)]
+    for parameters in by:
+        for name in of:
+            title, unit = name, units[name]
+            for parameter in (parameters,) if isinstance(parameters, str) else parameters:
+                title, unit = sensitivity(title, parameter), quotient_unit(unit, per[parameter])
+            found.append(OutputColumn(title, unit))
+    return tuple(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,6 +172,7 @@ class _Linearized:
         self._given = {f"Phi_q[{x.row}, {x.column}]": x.node for x in code.entries("Phi_q")}
         self._solved = self._planned([graph.input(("b", row)) for row in range(len(plan.right))])
         self._moving = depending_on(plan.nodes, plan.right)
+        self._directions: list[dict[int, int]] = []
         self.determinants = [self._solved[node] for node in plan.determinants]
 
     def _planned(self, right: Sequence[int]) -> list[int]:
@@ -205,8 +220,8 @@ class _Linearized:
             item.name: ([state[k] for state in self._q], [k])
             for k, item in enumerate(program.coordinates)
         }
-        outputs = program.names_of("outputs")
-        for section in self._code.sections[len(program.instances) :]:
+        outputs, first = program.names_of("outputs"), len(program.instances)
+        for section in self._code.sections[first : first + len(program.observers)]:
             columns = [column for column in section.instance.columns if column is not None]
             for own in zip(*(section.entries[name] for name in TOGETHER["observe"]), strict=True):
                 known[outputs[own[0].row]] = [entry.node for entry in own], columns
@@ -226,14 +241,32 @@ class _Linearized:
     def forward(self, columns: Columns) -> list[list[int]]:
         """Return the derivatives of columns and their rates by each parameter: a solve for each."""
         found = []
-        for k in range(len(self._parameters)):
+        for k, parameter in enumerate(self._parameters):
             motion: list[list[int]] = []
             for order in range(3):
                 right = [self.graph.neg(self._along(motion, k, row[order])) for row in self._rows]
                 new = self._planned(right)
                 motion.append([new[node] for node in self._plan.solution])
             found += self._each(columns, partial(self._along, motion, k))
+            self._directions.append({parameter: self.graph.const(1)})
+            for state, rates in zip(self._q, motion, strict=True):
+                self._directions[k] |= zip(state, rates, strict=True)
         return found
+
+    def second(self, found: Sequence[Sequence[int]]) -> list[list[int]]:
+        """Return the derivatives of first derivatives, by each pair of parameters.
+
+        A first derivative is code in q, its rates and p: its total derivative is that along the
+        motion of another parameter.
+        """
+        nan, slopes = self.graph.nan(), []
+        size = len(found) // len(self._parameters)
+        for first, direction in pairs_of(range(len(self._parameters))):
+            for nodes in found[size * first : size * (first + 1)]:
+                own = tangents(self.graph, nodes, self._directions[direction])
+                pairs = zip(nodes, own, strict=True)
+                slopes.append([nan if node == nan else slope for node, slope in pairs])
+        return slopes
 
     def _along(self, motion: Sequence[Sequence[int]], parameter: int, slopes: _Slopes) -> int:
         """Return a total derivative by a parameter; what is not yet in the motion is held."""

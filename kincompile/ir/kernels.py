@@ -319,6 +319,17 @@ def point_kernel() -> Kernel:
     return kernel_of(POINT, environment, expansion, outputs)
 
 
+@cache
+def _point_row(row: int) -> Kernel:
+    """Return the part of a point's kernel that gives one of its coordinates."""
+    kernel, graph = point_kernel(), Graph(point_kernel().nodes)
+    outputs = {
+        name: [(0, column, node) for own, column, node in found if own == row]
+        for name, found in kernel.outputs.items()
+    }
+    return pruned_kernel("Point", graph, outputs)
+
+
 class _OutputConverter(Converter):
     """Writes an output into a graph: points by their kernel, rates by differentiation.
 
@@ -358,6 +369,12 @@ class _OutputConverter(Converter):
             self.given[item] = value
         return self._graph.input(self._inputs[value])
 
+    def _ordered(self, value: sympy.Add | sympy.Mul) -> list[sympy.Expr]:
+        """Return terms in SymPy's own order, which costs nothing, a positive one first."""
+        if value.is_Mul:
+            return list(value.args)
+        return sorted(value.args, key=lambda item: bool(item.could_extract_minus_sign()))
+
     def _function(self, value: sympy.Basic) -> int:
         if isinstance(value, PointCoordinate):
             return self._point(value)
@@ -367,7 +384,7 @@ class _OutputConverter(Converter):
 
     def _point(self, value: PointCoordinate) -> int:
         """Return the node of a point's coordinate; its derivatives are those of the kernel."""
-        graph, kernel, row = self._graph, point_kernel(), value.row
+        graph, kernel, row = self._graph, _point_row(value.row), value.row
         origin, angle = (str(item) for item in value.args[:2])
         if origin not in self.by_column or angle not in self.by_column:
             return self.convert(value.written_out())
@@ -383,11 +400,10 @@ class _OutputConverter(Converter):
                 case Attribute(_, place):
                     inputs[item] = self._named(cast("sympy.Expr", value.args[2 + place]))
         new = graph.instantiate(kernel.nodes, inputs)
-        orders = [new[kernel.outputs[name][row][2]] for name in TOGETHER["observe"]]
+        orders = [new[kernel.outputs[name][0][2]] for name in TOGETHER["observe"]]
         self.motion |= dict(pairwise(orders))
-        for entry, column, node in kernel.outputs["outputs_q"]:
-            if entry == row:
-                self.by_column[names[column]][orders[0]] = new[node]
+        for _, column, node in kernel.outputs["outputs_q"]:
+            self.by_column[names[column]][orders[0]] = new[node]
         return orders[0]
 
 

@@ -60,7 +60,9 @@ class Listing:
 def varying(inline: InlineProgram, section: ConstraintRows, quantity: str) -> tuple[Entry, ...]:
     """Return the entries a function computes: of a matrix those that are not plain numbers."""
     entries = section.entries[quantity]
-    if all(item.name != quantity or not item.is_matrix for item in quantities.QUANTITIES):
+    if not entries or all(
+        item.name != quantity or not item.is_matrix for item in quantities.QUANTITIES
+    ):
         return entries
     return tuple(entry for entry in entries if inline.number(entry.node) is None)
 

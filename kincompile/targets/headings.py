@@ -8,7 +8,7 @@ from kincompile.quantities import FORMAT, quantity_named
 from kincompile.targets.lines import indented, labelled, quoted, table, wrapped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
     from kincompile.ir.program import Instance
@@ -89,13 +89,13 @@ def title(section: ConstraintRows, first: int = 0) -> str:
     return f"{short_title(section, first)}: {section.instance.constraint.text}"
 
 
-def entry_title(quantity: str, entry: Entry, code: InlineProgram) -> str:
-    """Return which entry of a matrix a line is; nothing for rows of equations, which are titled."""
+def entry_titles(quantity: str, code: InlineProgram) -> Callable[[Entry], str]:
+    """Return what says which entry a line is; nothing for rows of equations, which are titled."""
     found = quantity_named(quantity)
-    row = code.program.names_of(found.rows)[entry.row]
+    rows, columns = (code.program.names_of(kind) for kind in (found.rows, found.columns))
     if found.is_matrix:
-        return f"{row} by {code.program.names_of(found.columns)[entry.column]}"
-    return "" if found.rows == "equations" else row
+        return lambda entry: f"{rows[entry.row]} by {columns[entry.column]}"
+    return lambda entry: "" if found.rows == "equations" else rows[entry.row]
 
 
 def _unit(unit: str) -> str:

@@ -114,8 +114,9 @@ class Scheduler:
 
 def count_uses(nodes: Sequence[Node], outputs: Iterable[int]) -> Counter[int]:
     """Count how often each value is used, outputs too; a changed sign is no value of its own."""
-    uses = [0] * len(nodes)
-    for node in outputs:
+    starts = list(outputs)
+    uses = [0] * (max(starts, default=-1) + 1)
+    for node in starts:
         uses[node] += 1
     for node in range(len(uses) - 1, -1, -1):
         if uses[node]:

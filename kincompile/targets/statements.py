@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.quantities import quantity_named
 from kincompile.targets.evaluators import inputs_read
-from kincompile.targets.headings import entry_title, header, title
+from kincompile.targets.headings import entry_titles, header, title
 from kincompile.targets.lines import broken, pieces
 
 if TYPE_CHECKING:
@@ -107,18 +107,18 @@ class Statements:
         lines = []
         for quantity, rows in listing.results:
             places = {place: k for k, place in enumerate(code.pattern(quantity))}
-            is_matrix = quantity_named(quantity).is_matrix
+            is_matrix, about = quantity_named(quantity).is_matrix, entry_titles(quantity, code)
             for section, entries in rows:
                 lines += [f"{self.comment} {title(section, self.first)}"] if entries else []
                 for item in entries:
                     index = places[item.row, item.column] if is_matrix else item.row
                     left, text = self.element.format(quantity, index), printer.text(item.node)
-                    lines += self.assigned(left, text, entry_title(quantity, item, code))
+                    lines += self.assigned(left, text, about(item))
         return lines
 
     def results(self, quantity: str, code: InlineProgram, printer: Printer) -> list[str]:
         """Return the statements that put a quantity's entries into an array of zeros."""
-        lines = []
+        lines, about = [], entry_titles(quantity, code)
         for section in code.sections:
             entries = [item for item in section.entries[quantity] if code.number(item.node) != 0]
             lines += [f"{self.comment} {title(section, self.first)}"] if entries else []
@@ -126,7 +126,5 @@ class Statements:
                 row, column = item.row + self.first, item.column + self.first
                 form = self.entry if quantity_named(quantity).is_matrix else self.element
                 left = form.format(quantity, row, column)
-                lines += self.assigned(
-                    left, printer.text(item.node), entry_title(quantity, item, code)
-                )
+                lines += self.assigned(left, printer.text(item.node), about(item))
         return lines

@@ -129,7 +129,7 @@ def test_that_a_page_does_what_it_says(page, least, tmp_path):
         pytest.fail("\n\n".join(failures), pytrace=False)
 
 
-@pytest.mark.parametrize("name", ["checker.md", "forces.md"])
+@pytest.mark.parametrize("name", ["checker.md", "forces.md", "sensitivities.md"])
 def test_that_a_page_of_a_feature_does_what_it_says(name, tmp_path):
     reader = Reader(tmp_path)
     page = (ROOT / "docs" / name).read_text(encoding="utf-8")

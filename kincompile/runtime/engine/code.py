@@ -61,14 +61,15 @@ class SensitiveModules:
     Attributes
     ----------
     observing
-        Takes names of parameters and of columns to a module without equations whose outputs are
-        the determinants of the blocks of Phi_q, then by parameter the derivatives of the columns;
-        None where there is no planned elimination.
+        Takes names of parameters and of columns, and whether second derivatives are wanted, to a
+        module without equations whose outputs are the determinants of the blocks of Phi_q, then by
+        parameter, and by pair of them, the derivatives of the columns; None where there is no
+        planned elimination.
     larger
         Takes names of parameters to the module of the mechanism with its sensitivities.
     """
 
-    observing: Callable[[tuple[str, ...], tuple[str, ...]], ModuleType | None]
+    observing: Callable[[tuple[str, ...], tuple[str, ...], bool], ModuleType | None]
     larger: Callable[[tuple[str, ...]], ModuleType]
 
 

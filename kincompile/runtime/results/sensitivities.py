@@ -2,8 +2,8 @@ r"""Exact derivatives of a motion by parameters: position, velocity, acceleratio
 
 The matrix is the mechanism's own Phi_q for all of them. Straight-line code with the planned
 elimination in it (`ir/implicit.py`) gives them, compiled on request for these parameters. Where
-that may not be trusted, and of redundant equations, the right sides come from the mechanism with
-its sensitivities (`ir/sensitive.py`),
+that may not be trusted, the right sides come from the mechanism with its sensitivities
+(`ir/sensitive.py`),
 
 .. math:: \Phi_q q_a = -\Phi_a, \qquad \Phi_q \dot q_a = \nu_a - C \dot q, \qquad
           \Phi_q \ddot q_a = \gamma_a - C \ddot q, \qquad C = (\Phi_q q_a + \Phi_a)_q.
@@ -12,8 +12,8 @@ its sensitivities (`ir/sensitive.py`),
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -54,7 +54,8 @@ BLOCK = 500
 class Sensitivities(Shown):
     """Derivatives of a motion by k parameters, over N points of n coordinates and r outputs.
 
-    ``found["phi_rod", "a"]``, ``found["rod.phi_dot", "a"]`` and the like give them by name. All are
+    ``found["phi_rod", "a"]``, ``found["rod.phi_dot", "a"]`` and the like give them by name, and
+    ``found["phi_rod", "a", "b"]`` second derivatives where they were asked for. All are
     NaN where the motion was not found, or has no velocity. Of B parameter sets, all arrays have a
     leading axis of length B.
 
@@ -72,6 +73,9 @@ class Sensitivities(Shown):
         What the axes belong to.
     units : dict
         Unit of each coordinate, output and parameter.
+    second : ndarray, shape (3, N, n + r, k, k), or None
+        Second derivatives of coordinates and outputs, of their rates and second rates; NaN also
+        where Phi_q is nearly singular.
     """
 
     t: Array
@@ -86,29 +90,47 @@ class Sensitivities(Shown):
     outputs: tuple[str, ...]
     parameters: tuple[str, ...]
     units: dict[str, str]
+    second: Array | None = None
 
-    def __getitem__(self, names: tuple[str, str]) -> Array:
-        """Return the derivative of a column by a parameter, shape (N,).
+    def __getitem__(self, names: tuple[str, str] | tuple[str, str, str]) -> Array:
+        """Return the derivative of a column by a parameter, or by two, shape (N,).
 
         Raises
         ------
         InputError
             When there is no such column, or no such parameter among those asked for.
         """
-        column, parameter = _pair(names, self.name)
-        k = self._place(parameter)
+        column, *parameters = _names(names, self.name)
+        k, *others = map(self._place, parameters)
         name, order = self._found(column)
+        if others:
+            return self._second(order)[
+                ..., (*self.coordinates, *self.outputs).index(name), k, others[0]
+            ]
         if name in self.coordinates:
             values = (self.q_p, self.q_dot_p, self.q_ddot_p)[order]
             return values[..., self.coordinates.index(name), k]
         values = (self.y_p, self.y_dot_p, self.y_ddot_p)[order]
         return values[..., self.outputs.index(name), k]
 
-    def unit(self, column: str, parameter: str) -> str:
-        """Return the unit of the derivative of a column by a parameter: that of their quotient."""
-        self._place(parameter)
+    def _second(self, order: int) -> Array:
+        """Return the second derivatives of columns, or of their rates."""
+        if self.second is None:
+            raise InputError(
+                f"second derivatives of {self.name} were not asked for: give second=True to "
+                "kc.sensitivities."
+            )
+        found: Array = self.second[order]
+        return found
+
+    def unit(self, column: str, *parameters: str) -> str:
+        """Return the unit of the derivative of a column by parameters: that of their quotient."""
         name, order = self._found(column)
-        return quotient_unit(rate_unit(self.units[name], order), self.units[parameter])
+        unit = rate_unit(self.units[name], order)
+        for parameter in parameters:
+            self._place(parameter)
+            unit = quotient_unit(unit, self.units[parameter])
+        return unit
 
     def _place(self, name: str) -> int:
         """Return the number of a parameter."""
@@ -153,11 +175,11 @@ def _largest(values: Array) -> float:
     return float(found.max()) if found.size else np.nan
 
 
-def _pair(names: object, mechanism: str) -> tuple[str, str]:
-    """Return a column and a parameter, checked."""
+def _names(names: object, mechanism: str) -> tuple[str, ...]:
+    """Return a column and one or two parameters, checked."""
     match names:
-        case (str(column), str(parameter)):
-            return column, parameter
+        case (str(), str()) | (str(), str(), str()):
+            return cast("tuple[str, ...]", names)
     raise InputError(
         f"sensitivities of {mechanism} are asked for by a column and a parameter, as in "
         f'found["rod.phi", "a"], not by {names!r}.'
@@ -165,7 +187,11 @@ def _pair(names: object, mechanism: str) -> tuple[str, str]:
 
 
 def sensitivities(
-    solution: Solution, parameters: str | Sequence[str], of: str | Sequence[str] | None = None
+    solution: Solution,
+    parameters: str | Sequence[str],
+    of: str | Sequence[str] | None = None,
+    *,
+    second: bool = False,
 ) -> Sensitivities:
     r"""Differentiate a motion by parameters, exactly.
 
@@ -182,6 +208,9 @@ def sensitivities(
         Coordinates and outputs that are wanted, ``["foot.x", "rod.phi"]``; all where it is not
         given. Of a few columns many parameters cost hardly more than one: they are differentiated
         by solves with the transposed matrix.
+    second
+        Whether second derivatives are wanted too: the code grows with the square of the number of
+        parameters.
 
     Returns
     -------
@@ -205,7 +234,8 @@ def sensitivities(
     columns = (*code.coordinates, *outputs)
     if of is not None:
         columns = _columns((of,) if isinstance(of, str) else of, columns, solution.name)
-    found = _over_motion(solution, code, names, columns)
+    found = _over_motion(solution, code, names, columns, second)
+    found, pairs = found[:, : len(names)], found[:, len(names) :]
     size = len(set(columns) & set(code.coordinates))
     parts = found[:, :, :size], found[:, :, size:]
     q_p, y_p = (np.moveaxis(part, (1, 2), (-1, -2)) for part in parts)
@@ -218,7 +248,17 @@ def sensitivities(
         columns[size:],
         names,
         dict(code.units),
+        _symmetric(pairs, len(names)) if second else None,
     )
+
+
+def _symmetric(pairs: Array, count: int) -> Array:
+    """Return derivatives by pairs (3, pairs, columns, ..., N) as (3, ..., N, columns, k, k)."""
+    places = np.empty((count, count), dtype=np.intp)
+    first, other = np.triu_indices(count)
+    places[first, other] = places[other, first] = np.arange(first.size)
+    found: Array = np.moveaxis(pairs[:, places], (1, 2, 3), (-2, -1, -3))
+    return found
 
 
 def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[str, ...]:
@@ -251,22 +291,31 @@ def _modules(module: ModuleType) -> SensitiveModules:
 
 
 def _over_motion(
-    solution: Solution, code: Code, names: tuple[str, ...], columns: tuple[str, ...]
+    solution: Solution,
+    code: Code,
+    names: tuple[str, ...],
+    columns: tuple[str, ...],
+    second: bool,
 ) -> Array:
-    """Return derivatives of columns and their rates, shape (3, parameters, columns, ..., N)."""
+    """Return derivatives of columns and their rates, shape (3, k, columns, ..., N).
+
+    Those by pairs of parameters come after those by one.
+    """
     shape, n = solution.q.shape[:-1], len(code.coordinates)
     motion = [part.reshape(-1, n).T for part in (solution.q, solution.q_dot, solution.q_ddot)]
     times = np.broadcast_to(solution.t, shape).ravel()
     p = np.array(list(solution.parameters.values()), dtype=np.float64)
     sets = p if p.ndim == 1 else np.repeat(p, shape[-1], axis=1)
-    points = _Points(code, _modules(code.module), names, columns, sets, times, *motion)
+    modules = _modules(code.module)
+    points = _Points(code, modules, names, columns, second, sets, times, *motion)
     finite = np.isfinite(motion[1].sum(axis=0))
     with np.errstate(all="ignore"):
         found, trusted = points.by_plan()
         left = np.flatnonzero(finite & ~trusted)
         for start in range(0, left.size, BLOCK):
             some = left[start : start + BLOCK]
-            found[..., some] = points.at(some).by_matrices()
+            found[:, : len(names), :, some] = points.at(some).by_matrices()
+            found[:, len(names) :, :, some] = np.nan
     if not finite.all():
         found[..., ~finite] = np.nan
     if not (accelerated := np.isfinite(motion[2].sum(axis=0))).all():  # a corner of a driver
@@ -283,6 +332,7 @@ class _Points:
     modules: SensitiveModules
     names: tuple[str, ...]
     columns: tuple[str, ...]
+    second: bool
     p: Array
     t: Array
     q: Array
@@ -292,15 +342,14 @@ class _Points:
     def at(self, some: NDArray[np.intp]) -> _Points:
         """Return some of the points."""
         p = self.p if self.p.ndim == 1 else self.p[:, some]
-        states = (state[:, some] for state in (self.q, self.q_dot, self.q_ddot))
-        return _Points(
-            self.code, self.modules, self.names, self.columns, p, self.t[some], *states
-        )  # fmt: skip
+        states = {name: getattr(self, name)[:, some] for name in ("q", "q_dot", "q_ddot")}
+        return replace(self, p=p, t=self.t[some], **states)
 
     def by_plan(self) -> tuple[Array, NDArray[np.bool_]]:
         """Return the derivatives by the planned elimination, and where that can be trusted."""
-        module = self.modules.observing(self.names, self.columns)
-        size = len(self.names), len(self.columns)
+        module = self.modules.observing(self.names, self.columns, self.second)
+        k = len(self.names)
+        size = k + self.second * k * (k + 1) // 2, len(self.columns)
         if module is None:
             return np.empty((3, *size, self.t.size)), np.zeros(self.t.size, dtype=bool)
         code = code_of(module)

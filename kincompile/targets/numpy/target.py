@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from kincompile.ir.elimination import plan_solve
 from kincompile.quantities import FORMAT, kernels, quantity_named, states_of
 from kincompile.targets.evaluators import varying, vectors
-from kincompile.targets.headings import entry_title, header, short_title, title
+from kincompile.targets.headings import entry_titles, header, short_title, title
 from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
 from kincompile.targets.numpy.dialect import NUMPY
@@ -18,7 +18,7 @@ from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
     from kincompile.ir.program import Program
@@ -77,11 +77,12 @@ def files(
         solving = schedule_solve(code, plan, NameTable(RESERVED_IN_SOLVE))
         lines += ["", "", *solve_functions(code, solving)]
         keys += ["factor", "solve"]
+    text = "\n".join(lines)
     data = {
         **_constants(code),
-        "kernels": "\n".join(lines),
-        "has_pi": _has("pi", lines),
-        "has_nan": _has("nan", lines),
+        "kernels": text,
+        "has_pi": _has("pi", text),
+        "has_nan": _has("nan", text),
         "functions": "\n".join(_functions(code)),
         "results": "\n".join(_results(code.program)),
         "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
@@ -94,9 +95,9 @@ def files(
     return {f"{code.program.name}.py": fill("numpy/module.py.jinja", data)}
 
 
-def _has(name: str, lines: Iterable[str]) -> bool:
-    """Return whether a constant is used."""
-    return re.search(rf"\b{name}\b", "\n".join(lines)) is not None
+def _has(name: str, text: str) -> bool:
+    """Return whether a constant is used; a search for whole words alone takes a millisecond."""
+    return name in text and re.search(rf"\b{name}\b", text) is not None
 
 
 def _constants(code: InlineProgram) -> dict[str, Any]:
@@ -283,8 +284,9 @@ def function_body(
         if style == "packed":
             body += packed([printer.text(entry.node) for _, own in rows for entry in own])
             continue
+        about = entry_titles(name, code) if style == "titled" else None
         for section, entries in rows:
-            body += _section(name, section, entries, code, printer, style)
+            body += _section(name, section, entries, about, printer)
     body.append(")")
     if body[-2] == "return (":
         body[-2:] = ["return ()"]
@@ -295,16 +297,17 @@ def _section(
     name: str,
     section: ConstraintRows,
     entries: Sequence[Entry],
-    code: InlineProgram,
+    about: Callable[[Entry], str] | None,
     printer: Printer,
-    style: Style,
 ) -> list[str]:
-    """Return the entries of a constraint, right sides on one line where they fit."""
-    texts, quantity = [printer.text(entry.node) for entry in entries], None
-    if style == "titled" and entries:
-        quantity = quantity_named(name)
-    if quantity is None:
+    """Return the entries of a constraint, right sides on one line where they fit.
+
+    `about` says what an entry is, of titled code.
+    """
+    texts = [printer.text(entry.node) for entry in entries]
+    if about is None or not entries:
         return [line for text in texts for line in element(text, "")]
+    quantity = quantity_named(name)
     is_own = quantity.rows == "equations" and not quantity.is_matrix
     lines: list[str] = []
     if is_own:
@@ -317,7 +320,7 @@ def _section(
             return [line]
         lines = [f"    {line}" for line in commented(whole)]
     for entry, text in zip(entries, texts, strict=True):
-        lines += element(text, entry_title(name, entry, code))
+        lines += element(text, about(entry))
     return lines
 
 

@@ -35,7 +35,7 @@ def slider_crank(scale=1.0):
 
 
 def closed_form(name, t, order, by):
-    """Return a derivative of x or beta, of some order by t and the first by a parameter."""
+    """Return a derivative of x or beta, of some order by t and by one parameter or several."""
 
     def beta(time, r, length, e, w):
         return mpmath.asin((e - r * mpmath.sin(w * time + 0.3)) / length)
@@ -46,7 +46,7 @@ def closed_form(name, t, order, by):
 
     with mpmath.workdps(40):
         where = (mpmath.mpf(t), *map(mpmath.mpf, VALUES.values()))
-        orders = (order, *(int(name == by) for name in VALUES))
+        orders = (order, *(by.count(name) for name in VALUES))
         return float(mpmath.diff({"x": x, "beta": beta}[name], where, orders))
 
 
@@ -62,13 +62,56 @@ def test_that_a_slider_crank_has_the_derivatives_of_its_closed_form(target, requ
     for name, column in {"x": "slider.x", "beta": "rod.phi"}.items():
         for order, ending in enumerate(("", "_dot", "_ddot")):
             for by in VALUES:
-                known = [closed_form(name, t, order, by) for t in TIMES.tolist()]
+                known = [closed_form(name, t, order, [by]) for t in TIMES.tolist()]
                 np.testing.assert_allclose(
                     found[column + ending, by], known, rtol=1e-10, atol=1e-12
                 )
                 if name == "x":
                     y = found["stroke" + ending, by]
                     np.testing.assert_allclose(y, known, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_that_second_derivatives_are_those_of_the_closed_form(target, request):
+    if target == "c":
+        request.getfixturevalue("quick_compiler")
+    solution = kc.solve(kc.compile(slider_crank(), target), TIMES)
+    found = kc.sensitivities(solution, ["L", "r", "w"], of=["rod.phi", "stroke"], second=True)
+    for name, column in {"x": "stroke", "beta": "rod.phi"}.items():
+        for order, ending in enumerate(("", "_dot", "_ddot")):
+            for pair in (("L", "L"), ("L", "r"), ("w", "L"), ("w", "w")):
+                known = [closed_form(name, t, order, pair) for t in TIMES.tolist()]
+                own = found[column + ending, *pair]
+                np.testing.assert_allclose(own, known, rtol=1e-9, atol=1e-9)
+    assert found.second.shape == (3, 3, 2, 3, 3)
+    assert found.unit("stroke_dot", "L", "w") == "m/s/m/(rad/s)"
+
+
+@pytest.mark.parametrize("name", ["four_bar", "cam_flat_follower", "shaper"])
+def test_that_second_derivatives_are_differences_of_the_first(name, example_named):
+    example = example_named(name)
+    t = np.linspace(0.05, 0.4, 4) * example.model.end
+    names = example.module.PARAMETERS[:3]
+    solution = kc.solve(example.module, t)
+    found = kc.sensitivities(solution, names, second=True)
+    for k, by in enumerate(names):
+        h = 1e-5 * solution.parameters[by]
+        ends = [
+            kc.sensitivities(kc.solve(example.module, t, p={by: x}), names)
+            for x in (solution.parameters[by] + h, solution.parameters[by] - h)
+        ]
+        for order, part in enumerate(("q_p", "q_dot_p", "q_ddot_p")):
+            slopes = (getattr(ends[0], part) - getattr(ends[1], part)) / (2 * h)
+            own = found.second[order][:, : len(solution.coordinates), :, k]
+            assert np.abs(own - slopes).max() <= 1e-7 * max(1, np.abs(slopes).max())
+
+
+def test_that_second_derivatives_are_asked_for():
+    found = kc.sensitivities(kc.solve(kc.compile(slider_crank()), TIMES), ["r", "L"])
+    with pytest.raises(InputError, match="give second=True to kc"):
+        found["rod.phi", "r", "L"]
+    with pytest.raises(InputError, match="by a column and a parameter"):
+        found["rod.phi", "r", "L", "r"]
 
 
 def test_that_the_table_of_the_reference_is_met():
@@ -212,6 +255,8 @@ def test_that_points_which_are_not_trusted_are_solved_by_matrices(name, example_
     )  # every determinant is smaller than twice the largest
     assert_complex_steps(solution, kc.sensitivities(solution, names))
     matrices = kc.sensitivities(solution, names, of=column)
+    second = kc.sensitivities(solution, names, of=column, second=True)
+    assert np.isnan(second.second).all()
     for part in ("q_p", "q_dot_p", "q_ddot_p", "y_p", "y_dot_p", "y_ddot_p"):
         np.testing.assert_allclose(getattr(few, part), getattr(matrices, part), atol=1e-9)
     np.testing.assert_allclose(few.q_ddot_p[..., 0, :], usual.q_ddot_p[..., -1, :], atol=1e-9)
@@ -228,7 +273,8 @@ def test_that_few_columns_of_many_parameters_are_those_of_all(
         request.getfixturevalue("quick_compiler")
     model = example_named(name).model
     solution = kc.solve(kc.compile(model, target), np.linspace(0, 1, 5))
-    every = kc.sensitivities(solution, tuple(solution.parameters))
+    in_numpy = kc.solve(kc.compile(model), solution.t)
+    every = kc.sensitivities(in_numpy, tuple(solution.parameters))
     few = kc.sensitivities(solution, tuple(solution.parameters), of=columns)
     assert len(few.coordinates) == 1
     for column in (*few.coordinates, *few.outputs):
@@ -314,7 +360,7 @@ def test_that_parameter_sets_are_differentiated_each_for_itself():
             np.testing.assert_allclose(several, alone, rtol=1e-9, atol=1e-11)
 
 
-def test_that_redundant_equations_are_solved_by_least_squares():
+def test_that_redundant_equations_change_nothing():
     m = slider_crank()
     slider = m.bodies[2]
     m.add(kc.AbsoluteY("second_guide", slider, (0.01, 0), sympy.Symbol("e")))
@@ -336,6 +382,18 @@ def test_that_there_are_none_where_there_is_no_motion():
     assert 0 < np.count_nonzero(lost) < 40
     assert np.isnan(found.q_p[lost]).all()
     assert np.isfinite(found.q_ddot_p[solution.good]).all()
+
+
+def test_that_masses_and_loads_change_nothing():
+    m = kc.Mechanism("arm")
+    r = m.parameter("r", 0.5, "m")
+    arm = m.body("arm", guess=(-0.5, 0, 0), mass=2.0, inertia=0.3)
+    m.add(kc.Revolute("pin", arm, (r, 0), m.ground, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", arm, kc.t))
+    found = kc.sensitivities(kc.solve(kc.compile(m), TIMES), "r")
+    close(found["arm.x", "r"], -np.cos(TIMES))
+    close(found["arm.y_dot", "r"], -np.cos(TIMES))
+    assert "x_arm_by_r" in kc.emit(m, sensitivities=["r"]).source
 
 
 def test_that_units_are_quotients():

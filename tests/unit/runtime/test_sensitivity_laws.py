@@ -43,3 +43,22 @@ def test_that_the_speed_of_a_driver_moves_along_the_motion(name, example_named):
         (found.q_dot_p, q_dot / w + t * q_ddot / w),
     ):
         assert np.abs(part[..., 0] - known).max() <= 1e-11 * np.abs(known).max()
+
+
+def test_that_a_corner_has_no_derivative_of_the_acceleration():
+    m = kc.Mechanism("arm")
+    r, late = m.parameter("r", 0.5, "m"), m.parameter("late", 0.5, "s")
+    arm = m.body("arm", guess=(-0.5, 0, 0))
+    m.add(kc.Revolute("pin", arm, (r, 0), m.ground, (0, 0)))
+    law = kc.motion.sequence([(0, 0), (late, 0), (1, 1)], law="linear")
+    m.add(kc.AbsoluteAngle("motor", arm, law, corners=True))
+    t = np.array([0.25, 0.5, 0.75])
+    with pytest.warns(kc.CornerWarning):
+        solution = kc.solve(kc.compile(m), t)
+    found = kc.sensitivities(solution, ["r", "late"])
+    assert np.isnan(solution.q_ddot[1]).all()
+    assert np.isnan(found.q_ddot_p[1]).all()
+    assert np.isfinite(found.q_ddot_p[::2]).all()
+    # phi = (t - late) / (1 - late) after the corner.
+    np.testing.assert_allclose(found["arm.phi", "late"], [0, -2, (0.75 - 1) / 0.25], atol=1e-12)
+    np.testing.assert_allclose(found["arm.x", "r"], -np.cos(solution["arm.phi"]), atol=1e-12)
