@@ -119,6 +119,8 @@ class Constraint(Element):
     """Names of the equations where there is more than one."""
     simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
     """Pairs: where this one of two equations depends on others, the type that keeps the other."""
+    is_own: ClassVar[bool] = False
+    """Whether it is an equation of a body itself, which no joint makes superfluous."""
     replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"
     """The advice to take the simpler type, in words."""
 
@@ -157,6 +159,11 @@ class Constraint(Element):
     def template(cls) -> Template:
         """Return the template of this type, made once."""
         return Template(cls.__name__, cls.frames(), cls.contacts, cls.Phi())
+
+    @classmethod
+    def keeping_others(cls, lost: Sequence[str]) -> type[Constraint] | None:
+        """Return the type that keeps its equations but those rows, where there is one."""
+        return next((other for row, other in cls.simpler if [row] == list(lost)), None)
 
     @classmethod
     def equations_of(cls, name: str) -> tuple[str, ...]:
