@@ -97,6 +97,8 @@ def observing_sensitivities(
         program,
         equations=(),
         instances=(),
+        loads=(),
+        redundant=(),
         values=tuple(graph.nodes),
         fingerprint=hashlib.sha256(content.encode()).hexdigest()[:32],
         unsolvable="it has no equations",
