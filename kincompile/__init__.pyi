@@ -50,6 +50,8 @@ from kincompile.model.sketch import Sketch as Sketch
 from kincompile.model.system import ConstraintSystem as ConstraintSystem
 from kincompile.runtime.load import load as load
 from kincompile.runtime.newton import newton as newton
+from kincompile.runtime.results.forces import Forces as Forces
+from kincompile.runtime.results.forces import forces as forces
 from kincompile.runtime.results.sensitivities import Sensitivities as Sensitivities
 from kincompile.runtime.results.sensitivities import sensitivities as sensitivities
 from kincompile.runtime.results.solution import Solution as Solution

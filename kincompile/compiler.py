@@ -213,8 +213,10 @@ def compile(  # noqa: A001 - the public name kc.compile
     """
     from kincompile.runtime.engine.code import (
         DRIVERS,
+        FORCES,
         JOINT_POINTS,
         SENSITIVITIES,
+        ForceModules,
         SensitiveModules,
     )
     from kincompile.runtime.load import from_source
@@ -244,6 +246,13 @@ def compile(  # noqa: A001 - the public name kc.compile
             cache(partial(_observing_module, code, target)),
             cache(partial(_sensitive_module, code.program)),
         )
+        if system.loads:
+            joints = {
+                item.name: tuple(body.name for body in item.bodies) for item in system.constraints
+            }
+            vars(module)[FORCES] = ForceModules(
+                cache(partial(_forces_module, code, target)), joints
+            )
     return remember_model(module, system)
 
 
@@ -279,11 +288,23 @@ def _observing_module(
 ) -> ModuleType | None:
     """Return the module whose outputs are derivatives of columns, for `kc.sensitivities`."""
     from kincompile.ir.implicit import observing_sensitivities
-    from kincompile.runtime.load import from_source
 
     program = observing_sensitivities(code, names, of, second=second)
-    if program is None:
-        return None
+    return None if program is None else _observing(program, target)
+
+
+def _forces_module(code: InlineProgram, target: str, is_planned: bool) -> ModuleType | None:
+    """Return the module whose outputs are forces, for `kc.forces`."""
+    from kincompile.ir.forces import observing_forces
+
+    program = observing_forces(code, is_planned=is_planned)
+    return None if program is None else _observing(program, target)
+
+
+def _observing(program: Program, target: str) -> ModuleType:
+    """Return the module of a program without equations."""
+    from kincompile.runtime.load import from_source
+
     written = inline(program)
     module = from_source(emit_program("numpy", written).source, program.name)
     return _native(module, written) if target == "c" else module

@@ -162,3 +162,17 @@ def parameters_problem(names: Sequence[str], known: Sequence[str], mechanism: st
         f"sensitivities of {mechanism} are asked for by {listed(names)}: name each parameter once; "
         f"there are {listed(known)}."
     )
+
+
+def multiplier(equation: str) -> str:
+    """Return the name of the multiplier of an equation: ``lambda_A_x`` of ``A.x``."""
+    return f"lambda_{equation.replace('.', '_')}"
+
+
+def force_units(length: str) -> tuple[str, str, str]:
+    """Return the units of forces, torques and power where lengths have a unit, and masses kg."""
+    if length == "m":
+        return "N", "N*m", "W"
+    if not length:
+        return "", "", ""
+    return f"kg*{length}/s^2", f"kg*{length}^2/s^2", f"kg*{length}^2/s^3"

@@ -66,6 +66,7 @@ def _sweeps(
 @click.option(
     "--deg", "angle_unit", flag_value="deg", default="rad", help="Show and write angles in degrees."
 )
+@click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
 @output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context
 def command(
@@ -82,14 +83,15 @@ def command(
     product: bool,
     analysis: str | None,
     angle_unit: str,
+    has_forces: bool,
     output: str | None,
 ) -> None:
     """Solve the motion of MODEL over time and summarise it.
 
     Position, velocity and acceleration are solved at equally spaced times, from start to end. The
     summary goes to stdout, or to stderr where a file is written. With --sweep it has a part for
-    each parameter set, and a file their values. Where the motion does not converge, what was found
-    is written nevertheless, and the exit code is 3.
+    each parameter set, and a file their values; with --forces both have forces too. Where the
+    motion does not converge, what was found is written nevertheless, and the exit code is 3.
     """
     if output is not None:
         require_known_suffix(output)
@@ -107,11 +109,16 @@ def command(
     with progress_bar() as progress:
         options: dict[str, Any] = {"through": through, "assembly": assembly, "product": product}
         solution = kc.solve(module, times, numbers | sweeps, progress=progress, **options)
+    text = summary(solution, angle_unit)
+    written = solution
+    if has_forces:
+        found = kc.forces(solution)
+        text, written = f"{text}\n\n{found.summary()}", found.motion
     if output is None:
-        print_data(summary(solution, angle_unit) + "\n")
+        print_data(text + "\n")
     else:
-        kc.write(solution, output, angle_unit=angle_unit)
-        click.echo(f"{summary(solution, angle_unit)}\nWrote {output}", err=True)
+        kc.write(written, output, angle_unit=angle_unit)
+        click.echo(f"{text}\nWrote {output}", err=True)
     if not solution.success:
         click.echo(f"Error: {solution.message}", err=True)
         context.exit(NOT_CONVERGED)

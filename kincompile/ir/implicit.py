@@ -28,19 +28,19 @@ from typing import TYPE_CHECKING, TypeVar
 
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve
-from kincompile.ir.graph import Graph, depending_on
+from kincompile.ir.graph import Graph
 from kincompile.ir.kernels import pruned_kernel
 from kincompile.ir.program import Instance, OutputDerivatives
 from kincompile.ir.sensitive import check_names
+from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
 from kincompile.names import quotient_unit, rate, sensitivity
 from kincompile.quantities import TOGETHER
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from kincompile.ir.elimination import SolvePlan
-    from kincompile.ir.graph import Node
     from kincompile.ir.inline import ConstraintRows, InlineProgram
     from kincompile.ir.program import Program
 
@@ -164,21 +164,14 @@ class _Linearized:
     """
 
     def __init__(self, code: InlineProgram, plan: SolvePlan, names: Sequence[str]) -> None:
-        self._code, self._plan, self.graph = code, plan, Graph(code.nodes)
+        self._code, self.graph = code, Graph(code.nodes)
         graph, coordinates = self.graph, code.program.coordinates
         self._q = [[graph.input(rate(x.name, order)) for x in coordinates] for order in range(3)]
         self._parameters = [graph.input(name) for name in names]
         self._rows = [row for section in code.constraints for row in self._residuals(section)]
-        self._given = {f"Phi_q[{x.row}, {x.column}]": x.node for x in code.entries("Phi_q")}
-        self._solved = self._planned([graph.input(("b", row)) for row in range(len(plan.right))])
-        self._moving = depending_on(plan.nodes, plan.right)
+        self._solve = StraightSolve(graph, code, plan)
+        self.determinants = self._solve.determinants
         self._directions: list[dict[int, int]] = []
-        self.determinants = [self._solved[node] for node in plan.determinants]
-
-    def _planned(self, right: Sequence[int]) -> list[int]:
-        """Return the nodes of the planned elimination for a right side."""
-        given = self._given | {f"b[{row}]": node for row, node in enumerate(right)}
-        return self.graph.instantiate(self._plan.nodes, given)
 
     def _residuals(self, section: ConstraintRows) -> list[list[_Slopes]]:
         """Return the slopes of Phi, Phi_q q_dot - nu and Phi_q q_ddot - gamma, row by row."""
@@ -245,8 +238,7 @@ class _Linearized:
             motion: list[list[int]] = []
             for order in range(3):
                 right = [self.graph.neg(self._along(motion, k, row[order])) for row in self._rows]
-                new = self._planned(right)
-                motion.append([new[node] for node in self._plan.solution])
+                motion.append(self._solve.solve(right))
             found += self._each(columns, partial(self._along, motion, k))
             self._directions.append({parameter: self.graph.const(1)})
             for state, rates in zip(self._q, motion, strict=True):
@@ -294,7 +286,7 @@ class _Linearized:
                 for row, weight in zip(self._rows, found[higher], strict=True):
                     for column, slope in row[higher].by[order].items():
                         sides[column] = graph.sub(sides[column], graph.mul(slope, weight))
-            found[order] = self._transposed(sides)
+            found[order] = self._solve.transposed(sides)
         return found
 
     def _weighted(
@@ -307,34 +299,3 @@ class _Linearized:
                 term = graph.mul(row[order].by_parameter[parameter], weight)
                 total = graph.sub(total, term)
         return total
-
-    def _transposed(self, sides: Sequence[int]) -> list[int]:
-        """Return x of Phi_q^T x = b: the plan, linear in its right side, from its end to its start.
-
-        Every number of the plan hands on to its operands what the solution owes to it.
-        """
-        graph, plan, zero = self.graph, self._plan, self.graph.const(0)
-        owed = dict.fromkeys(self._moving, zero)
-        for node, side in zip(plan.solution, sides, strict=True):
-            owed[node] = graph.add(owed[node], side)
-        for node in sorted(self._moving, reverse=True):
-            for operand, share in self._shares(plan.nodes[node], owed[node]):
-                owed[operand] = graph.add(owed[operand], share)
-        return [owed[node] for node in plan.right]
-
-    def _shares(self, content: Node, amount: int) -> Iterator[tuple[int, int]]:
-        """Yield the operands of a step that depend on the right side, and what each is owed."""
-        graph, new = self.graph, self._solved
-        shares: tuple[tuple[int, int], ...] = ()
-        match content:
-            case "add", a, b:
-                shares = ((a, amount), (b, amount))
-            case "sub", a, b:
-                shares = ((a, amount), (b, graph.neg(amount)))
-            case "neg", a:
-                shares = ((a, graph.neg(amount)),)
-            case "mul", a, b:
-                shares = ((a, graph.mul(amount, new[b])), (b, graph.mul(new[a], amount)))
-            case "div", a, b:
-                shares = ((a, graph.div(amount, new[b])),)
-        yield from ((node, share) for node, share in shares if node in self._moving)

@@ -66,7 +66,7 @@ class Mechanism(MatrixViews, TextViews):
         self.constraints: list[Constraint | Equation] = []
         self.outputs: list[BodyPoint | Output] = []
         self.loads: list[Element] = []
-        self.gravity: Scalars = (0, 0)
+        self.gravity: Scalars = (0,) * len(self.fixed.kind.axes)
 
     @property
     def end(self) -> float:

@@ -29,6 +29,9 @@ WRITTEN = "_written_position"
 SENSITIVITIES = "_sensitivities"
 """Where a module keeps its `SensitiveModules`."""
 
+FORCES = "_forces"
+"""Where a module of a mechanism with loads keeps what compiles its forces, on request."""
+
 DRIVERS = "_drivers"
 """Where a module keeps the function that describes its drivers at a time and parameters."""
 
@@ -71,6 +74,25 @@ class SensitiveModules:
 
     observing: Callable[[tuple[str, ...], tuple[str, ...], bool], ModuleType | None]
     larger: Callable[[tuple[str, ...]], ModuleType]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceModules:
+    """What compiles the forces of a mechanism on request, and keeps them.
+
+    Attributes
+    ----------
+    compiled
+        Takes whether multipliers are to be solved for to a module without equations whose outputs
+        are the determinants of the blocks of Phi_q and the multipliers, then the forces, without
+        rates; None where there is no planned elimination. Else it gives the forces alone, and
+        multipliers are its last parameters.
+    joints
+        The bodies of each constraint, by name; none of a free equation.
+    """
+
+    compiled: Callable[[bool], ModuleType | None]
+    joints: Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.criteria import SMALLEST_DETERMINANT
 from kincompile.runtime.engine.engine import Point, Rates
 
 if TYPE_CHECKING:
@@ -100,3 +101,11 @@ def stacked(lanes: Lanes, points: int) -> Array:
     for row, lane in zip(result, lanes, strict=True):
         row[:] = lane
     return result
+
+
+def trusted(determinants: Array) -> NDArray[np.bool_]:
+    """Return at which of N points elimination can be trusted, by determinants (blocks, N)."""
+    sizes = np.abs(determinants)
+    smallest = SMALLEST_DETERMINANT * np.max(sizes, axis=1, initial=0.0, where=sizes < np.inf)
+    found: NDArray[np.bool_] = np.all(sizes > smallest[:, np.newaxis], axis=0)
+    return found

@@ -267,13 +267,13 @@ class _Functions:
         def observe_into(
             states: Sequence[Array], t: Array, p: Array, found: Sequence[Array]
         ) -> None:
-            """Put outputs and their rates at states (n, N) into an array (3, r, N)."""
+            """Put outputs, and their rates, at states (n, N) into arrays (3, r, N) or (1, r, N)."""
             batch = self._batch_type(
                 count=states[0].shape[1], t=numbers_of_times(t), p=numbers_of_batch(p)
             )
             for name, state in zip(STATES, states, strict=True):
                 setattr(batch, name, numbers_of_batch(state))
-            for name, part in zip(quantities.TOGETHER["observe"], found, strict=True):
+            for name, part in zip(quantities.TOGETHER["observe"], found, strict=False):
                 setattr(batch, name, numbers_of_batch(part))
             self._run(byref(batch))
 

@@ -103,6 +103,8 @@ class Observed:
     y, y_dot, y_ddot : ndarray, shape (N, k)
         Values and time derivatives; NaN where the motion was not found, or where a derivative would
         need the third one of q. Of B variants they have a leading axis of length B.
+    without_rates
+        Names of those of which no rate is shown, as of forces.
     """
 
     names: tuple[str, ...]
@@ -110,6 +112,20 @@ class Observed:
     y: NDArray[np.float64]
     y_dot: NDArray[np.float64]
     y_ddot: NDArray[np.float64]
+    without_rates: frozenset[str] = frozenset()
+
+    def joined(
+        self, names: tuple[str, ...], units: dict[str, str], values: NDArray[np.float64]
+    ) -> Observed:
+        """Return these outputs and further ones, (..., N, k), which have no rates."""
+        nothing = np.broadcast_to(np.nan, values.shape)
+        y, y_dot, y_ddot = values, nothing, nothing
+        if self.names:
+            y = np.concatenate((self.y, values), axis=-1)
+            y_dot = np.concatenate((self.y_dot, nothing), axis=-1)
+            y_ddot = np.concatenate((self.y_ddot, nothing), axis=-1)
+        known, still = {**self.units, **units}, self.without_rates | frozenset(names)
+        return Observed((*self.names, *names), known, y, y_dot, y_ddot, still)
 
     def column(self, name: str, order: int) -> Column:
         """Return an output, its rate or its second rate."""
@@ -186,8 +202,11 @@ class MotionTable:
 
     def columns(self) -> list[Column]:
         """Return the coordinates and outputs, then their rates, then their second rates."""
-        names = self.names
-        return [self._column(name, order) for order in range(3) for name in names]
+        names, still = self.names, self.observed.without_rates
+        moving = [name for name in names if name not in still]
+        return [
+            self._column(name, order) for order in range(3) for name in (moving if order else names)
+        ]
 
     def _column(self, name: str, order: int) -> Column:
         if name not in self.coordinates:

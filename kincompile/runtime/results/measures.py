@@ -163,7 +163,7 @@ def measures(solution: MotionTable, module: ModuleType, p: Array) -> Measures:
     if not np.isfinite(solution.q_dot).any():
         raise InputError(f"{solution.name} has no motion to measure. {solution.message}")
     found: tuple[OutputMeasures, ...] = ()
-    if solution.observed.names:
+    if any(name not in solution.observed.without_rates for name in solution.observed.names):
         motion = _ObservedMotion(solution, module, p)
         found = tuple(_measured(motion, k) for k in range(len(motion.names)))
     return Measures(solution.name, found, driver_ranges(solution, module, p))
@@ -177,8 +177,10 @@ class _ObservedMotion:
         good = np.flatnonzero(np.isfinite(solution.q_dot).all(axis=1))
         self.t, order = np.unique(solution.t[good], return_index=True)
         self.rows = good[order]
-        self.names, self.units = own.names, own.units
-        y, y_dot, y_ddot = (part[self.rows] for part in (own.y, own.y_dot, own.y_ddot))
+        # Forces are not followed between the times; they come after all that is.
+        self.names = tuple(name for name in own.names if name not in own.without_rates)
+        self.units, count = own.units, len(self.names)
+        y, y_dot, y_ddot = (part[self.rows, :count] for part in (own.y, own.y_dot, own.y_ddot))
         self.emitted: NDArray[np.bool_] = np.any(np.isfinite(y_dot), axis=0)
         self.y, self.y_dot, self.y_ddot = y, y_dot, y_ddot
         for k in np.flatnonzero(~self.emitted).tolist():

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from kincompile.criteria import SMALLEST_DETERMINANT
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.html import Shown
 from kincompile.names import (
@@ -29,6 +28,7 @@ from kincompile.names import (
     suggestion,
 )
 from kincompile.runtime.engine.code import SENSITIVITIES, code_of
+from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import rate_unit
 from kincompile.runtime.results.observed import observed
@@ -310,8 +310,8 @@ def _over_motion(
     points = _Points(code, modules, names, columns, second, sets, times, *motion)
     finite = np.isfinite(motion[1].sum(axis=0))
     with np.errstate(all="ignore"):
-        found, trusted = points.by_plan()
-        left = np.flatnonzero(finite & ~trusted)
+        found, is_trusted = points.by_plan()
+        left = np.flatnonzero(finite & ~is_trusted)
         for start in range(0, left.size, BLOCK):
             some = left[start : start + BLOCK]
             found[:, : len(names), :, some] = points.at(some).by_matrices()
@@ -357,11 +357,8 @@ class _Points:
         assert code.observe_into is not None
         code.observe_into((self.q, self.q_dot, self.q_ddot), self.t, self.p, seen)
         blocks = len(module.OUTPUTS) - math.prod(size)
-        sizes = np.abs(seen[0, :blocks])
-        smallest = SMALLEST_DETERMINANT * np.max(sizes, axis=1, initial=0.0, where=sizes < np.inf)
-        trusted = np.all(sizes > smallest[:, np.newaxis], axis=0)
         found: Array = seen[:, blocks:].reshape(3, *size, -1)
-        return found, trusted
+        return found, trusted(seen[0, :blocks])
 
     def by_matrices(self) -> Array:
         """Return the derivatives by singular values; of redundant equations by least squares."""

@@ -106,6 +106,11 @@ class Solution(MotionTable):
             p = np.zeros((len(self.q), 0))
         return observed(module, (self.q, self.q_dot, self.q_ddot), self.t, p)
 
+    def observing(self, outputs: Observed) -> Solution:
+        """Return the same motion with other outputs."""
+        units = {**self.units, **outputs.units}
+        return replace(self, units=units, _observed={**self._observed, "outputs": outputs})
+
     def require_module(self, wanted: str) -> ModuleType:
         """Return the emitted module; raise an error that names what needs it if it is not here."""
         if self.module is None:

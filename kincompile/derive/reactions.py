@@ -1,0 +1,146 @@
+r"""What a constraint does to its bodies and its driver, derived from the work of its multipliers.
+
+The constraint forces do the virtual work :math:`-\lambda^T \delta\Phi`. Moved along an axis, a body
+shows the force on it; turned about a point of its own, the moment about that point. A driver
+C(t) does the work :math:`\lambda^T \Phi_C \delta C`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+from kincompile.calculus.expressions import (
+    ONE,
+    ZERO,
+    Basis,
+    Norm,
+    Scalar,
+    Symbol,
+    Vector,
+    VectorSymbol,
+    dot,
+    perpendicular,
+    sum_of,
+)
+from kincompile.calculus.symbols import C
+from kincompile.derive.derivation import units
+from kincompile.derive.rules import along
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from kincompile.calculus.symbols import Frame
+    from kincompile.calculus.template import Template
+    from kincompile.derive.rules import Direction
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """What a constraint does to one of its bodies.
+
+    Attributes
+    ----------
+    force
+        Components along the fixed axes.
+    moment
+        About the joint's point of this body, or its origin where it has none.
+    """
+
+    force: tuple[Scalar, ...]
+    moment: tuple[Scalar, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Reactions:
+    """Reactions of a constraint type, in its multipliers and its own symbols.
+
+    Attributes
+    ----------
+    bodies
+        Of each of its bodies.
+    drive
+        What the driver does, along its value C: a force or a torque; zero where there is no C.
+    along_axis
+        The force on the last body along the joint's axis and across it; none without an axis.
+    """
+
+    bodies: tuple[Reaction, ...]
+    drive: Scalar
+    along_axis: tuple[Scalar, ...]
+
+
+def multipliers(template: Template, size: int) -> tuple[Symbol | VectorSymbol, ...]:
+    """Return the multipliers of the row blocks of a type whose vectors have so many components."""
+    return tuple(
+        VectorSymbol(f"lambda_{k}", size) if isinstance(Phi, Vector) else Symbol(f"lambda_{k}")
+        for k, Phi in enumerate(template.Phi)
+    )
+
+
+@cache
+def derive_reactions(
+    template: Template, points: tuple[str | None, ...], axis: tuple[str, str] | None
+) -> Reactions:
+    """Derive the reactions of a constraint type.
+
+    Parameters
+    ----------
+    template
+        Its Phi.
+    points
+        The symbol of the joint's point on each of its bodies.
+    axis
+        The symbol of the joint's axis, and the index of the body that it is fixed in.
+    """
+    bodies = tuple(
+        _reaction(template, frame, point)
+        for frame, point in zip(template.frames, points, strict=True)
+    )
+    return Reactions(bodies, -_work(template, {C: ONE}), _along_axis(template, axis))
+
+
+def _along_axis(template: Template, axis: tuple[str, str] | None) -> tuple[Scalar, ...]:
+    """Return the work for displacements of the last body along the axis, and across it."""
+    if axis is None:
+        return ()
+    symbol, index = axis
+    (frame,) = (item for item in template.frames if item.index == index)
+    v, last = VectorSymbol(symbol, frame.size), template.frames[-1]
+    unit = Norm(v) ** -1 * frame.A(v)
+    return tuple(_work(template, {last.r: way}) for way in (unit, perpendicular(unit)))
+
+
+def _reaction(template: Template, frame: Frame, point: str | None) -> Reaction:
+    force = (_work(template, {frame.r: Basis(k, frame.size)}) for k in range(frame.size))
+    moment = []
+    for turn in _turns(frame):
+        direction = dict(turn)
+        if point is not None:
+            direction[frame.r] = -along(frame.A(VectorSymbol(point, frame.size)), turn)
+        moment.append(_work(template, direction))
+    return Reaction(tuple(force), tuple(moment))
+
+
+def _turns(frame: Frame) -> Iterator[Direction]:
+    """Yield the directions in which a body turns in the plane, at unit rates."""
+    for coordinate in frame.coordinates:
+        if coordinate != frame.r:
+            for unit in units(coordinate):
+                yield {coordinate: unit}
+
+
+def _work(template: Template, direction: Direction) -> Scalar:
+    """Return the work of the constraint forces for a displacement."""
+    size = template.frames[0].size
+    terms: list[Scalar] = [ZERO]
+    for Phi, factor in zip(template.Phi, multipliers(template, size), strict=True):
+        change = along(Phi, direction)
+        if isinstance(change, Vector):
+            assert isinstance(factor, Vector)
+            terms.append(-dot(factor, change))
+        else:
+            assert isinstance(factor, Scalar)
+            terms.append(-(factor * change))
+    return sum_of(tuple(terms))

@@ -1,0 +1,81 @@
+"""The planned elimination written out in a graph: solves with Phi_q and with its transpose."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.ir.graph import depending_on
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from kincompile.ir.elimination import SolvePlan
+    from kincompile.ir.graph import Graph, Node
+    from kincompile.ir.inline import InlineProgram
+
+
+class StraightSolve:
+    """Code that solves linear systems whose matrix is Phi_q.
+
+    Parameters
+    ----------
+    graph
+        The mechanism's code, to which that of the solves is added.
+    code
+        The mechanism.
+    plan
+        Its planned solve, without calls of LAPACK.
+
+    Attributes
+    ----------
+    determinants
+        Nodes of the determinants of the blocks.
+    """
+
+    def __init__(self, graph: Graph, code: InlineProgram, plan: SolvePlan) -> None:
+        self._graph, self._plan = graph, plan
+        self._given = {f"Phi_q[{x.row}, {x.column}]": x.node for x in code.entries("Phi_q")}
+        self._solved = self._planned([graph.input(("b", row)) for row in range(len(plan.right))])
+        self._moving = depending_on(plan.nodes, plan.right)
+        self.determinants = [self._solved[node] for node in plan.determinants]
+
+    def _planned(self, right: Sequence[int]) -> list[int]:
+        """Return the nodes of the planned elimination for a right side."""
+        given = self._given | {f"b[{row}]": node for row, node in enumerate(right)}
+        return self._graph.instantiate(self._plan.nodes, given)
+
+    def solve(self, right: Sequence[int]) -> list[int]:
+        """Return x of Phi_q x = b."""
+        new = self._planned(right)
+        return [new[node] for node in self._plan.solution]
+
+    def transposed(self, sides: Sequence[int]) -> list[int]:
+        """Return x of Phi_q^T x = b: the plan, linear in its right side, from its end to its start.
+
+        Every number of the plan hands on to its operands what the solution owes to it.
+        """
+        graph, plan, zero = self._graph, self._plan, self._graph.const(0)
+        owed = dict.fromkeys(self._moving, zero)
+        for node, side in zip(plan.solution, sides, strict=True):
+            owed[node] = graph.add(owed[node], side)
+        for node in sorted(self._moving, reverse=True):
+            for operand, share in self._shares(plan.nodes[node], owed[node]):
+                owed[operand] = graph.add(owed[operand], share)
+        return [owed[node] for node in plan.right]
+
+    def _shares(self, content: Node, amount: int) -> Iterator[tuple[int, int]]:
+        """Yield the operands of a step that depend on the right side, and what each is owed."""
+        graph, new = self._graph, self._solved
+        shares: tuple[tuple[int, int], ...] = ()
+        match content:
+            case "add", a, b:
+                shares = ((a, amount), (b, amount))
+            case "sub", a, b:
+                shares = ((a, amount), (b, graph.neg(amount)))
+            case "neg", a:
+                shares = ((a, graph.neg(amount)),)
+            case "mul", a, b:
+                shares = ((a, graph.mul(amount, new[b])), (b, graph.mul(new[a], amount)))
+            case "div", a, b:
+                shares = ((a, graph.div(amount, new[b])),)
+        yield from ((node, share) for node, share in shares if node in self._moving)

@@ -1,0 +1,405 @@
+r"""Forces along a motion: reactions of joints, torques of drivers, what shakes the ground.
+
+They follow from :math:`\Phi_q^T \lambda = Q - M \ddot q`, by code that is derived and compiled on
+request. Where redundant joints share a load, or a position is singular, the system is solved by
+singular values: what changes with multipliers that change nothing else is not determined, and NaN.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.criteria import probe_of
+from kincompile.errors import InputError, UnsupportedError
+from kincompile.html import Shown
+from kincompile.names import listed, multiplier
+from kincompile.runtime.engine.code import FORCES, code_of
+from kincompile.runtime.engine.planned import trusted
+from kincompile.runtime.memory import empty
+from kincompile.runtime.results.force_measures import ForceMeasures, force_measures
+from kincompile.runtime.results.solution import Solution, require_solution
+from kincompile.tables import indented, table
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.engine.code import Array, Code, ForceModules
+
+RANK = 1e-9
+"""Singular value of Phi_q, relative to the largest, that is zero."""
+
+BALANCED = 1e-7
+"""Part of the largest force up to which the equations may be out of balance."""
+
+MOVED = 1e-8
+"""Change of a force, relative to that of the multipliers, that shows that it is not determined."""
+
+BLOCK = 2000
+"""Points at a time where singular values are taken."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reaction:
+    """What a joint does to its bodies, over N points; of variants with a leading axis.
+
+    Attributes
+    ----------
+    force : ndarray, shape (N, 2)
+        On body j, or the one body, along the fixed axes. On body i it is the opposite.
+    moment : ndarray, shape (N,)
+        On body j, about the joint's point of it.
+    moment_on_i : ndarray, shape (N,)
+        On body i, about the joint's point of that.
+    along_axis : ndarray, shape (N, 2)
+        The force on body j along the joint's axis and across it; NaN where it has no axis.
+    """
+
+    force: Array
+    moment: Array
+    moment_on_i: Array
+    along_axis: Array
+
+    @property
+    def size(self) -> Array:
+        """The magnitude of the force, shape (N,)."""
+        return np.asarray(np.linalg.norm(self.force, axis=-1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """What a driver does: force or torque along its value, and power [force length/s], (N,)."""
+
+    value: Array
+    power: Array
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Forces(Shown):
+    """Forces over a motion of N points.
+
+    ``found["A.F_x"]``, ``found["motor.drive"]`` and the like give columns by name, and so do those
+    of the motion. All are NaN where the motion was not found, or has no acceleration.
+
+    Attributes
+    ----------
+    motion : Solution
+        The motion with the forces as columns: it can be written, plotted and shown.
+    names : tuple of str
+        Names of the columns of forces.
+    multipliers : ndarray, shape (N, m)
+        lambda, one for each equation.
+    undetermined : tuple of str
+        Names of multipliers and forces that no rigid model can know, because redundant joints
+        share a load; they are NaN.
+    """
+
+    motion: Solution
+    names: tuple[str, ...]
+    multipliers: Array
+    undetermined: tuple[str, ...]
+    _joints: dict[str, tuple[str, ...]]
+
+    @property
+    def name(self) -> str:
+        """Name of the mechanism."""
+        return self.motion.name
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the values of a column, shape (N,).
+
+        Raises
+        ------
+        InputError
+            When there is no such column.
+        """
+        return self.motion[name]
+
+    def _column(self, name: str) -> Array:
+        """Return a force, zeros where it is not a column since it vanishes."""
+        if name in self.names:
+            return self.motion.observed.column(name, 0).values
+        return np.where(np.isnan(self.multipliers[..., 0]), np.nan, 0.0)
+
+    @property
+    def reactions(self) -> dict[str, Reaction]:
+        """The reactions by the name of the joint."""
+        return {name: self._reaction(name, bodies) for name, bodies in self._joints.items()}
+
+    def _reaction(self, name: str, bodies: tuple[str, ...]) -> Reaction:
+        drive = f"drive_{name}"
+        force = np.stack([self._column(f"F_{axis}_{name}") for axis in "xy"], axis=-1)
+        moment = self._column(f"T_{name}")
+        has_forces = any(f"F_{axis}_{name}" in self.names for axis in "xy")
+        if drive in self.names and f"T_{name}" not in self.names and not has_forces:
+            moment = self._column(drive)
+        on_i = self._column(f"T_i_{name}") if len(bodies) > 1 else np.full_like(moment, np.nan)
+        axes = [f"F_along_{name}", f"F_across_{name}"]
+        by_axis = np.full_like(force, np.nan)
+        if any(axis in self.names for axis in axes):
+            by_axis = np.stack([self._column(axis) for axis in axes], axis=-1)
+        return Reaction(force, moment, on_i, by_axis)
+
+    @property
+    def drivers(self) -> dict[str, Drive]:
+        """What the drivers do, by name."""
+        units = self.motion.observed.units
+        found = {}
+        for column in self.names:
+            name = column.removeprefix("drive_")
+            if name != column and name in self._joints:
+                value, power = self._column(column), self._column(f"P_{name}")
+                found[name] = Drive(value, power, units[column])
+        return found
+
+    @property
+    def ground(self) -> Reaction:
+        """What shakes the ground: force and moment about the origin."""
+        force = np.stack([self._column(f"F_{axis}_ground") for axis in "xy"], axis=-1)
+        nothing = np.full(force.shape[:-1], np.nan)
+        return Reaction(force, self._column("T_ground"), nothing, np.full_like(force, np.nan))
+
+    def in_axes_of(self, body: str, force: Array) -> Array:
+        """Return forces (N, 2) in the axes of a body, which turn with it."""
+        angle = self.motion[f"{body}.phi"]
+        x, y = force[..., 0], force[..., 1]
+        c, s = np.cos(angle), np.sin(angle)
+        return np.stack((c * x + s * y, c * y - s * x), axis=-1)
+
+    def measures(self) -> ForceMeasures:
+        """Measure what drivers and joints bear: peak, root mean square and mean.
+
+        Raises
+        ------
+        InputError
+            If the solution is one of variants, or holds no point that was found.
+        """
+        self.motion.require_one_motion("measures are those of", "take a variant: .variant(0)")
+        return force_measures(self.name, self.motion.t, self.columns())
+
+    def columns(self) -> dict[str, tuple[Array, str]]:
+        """Return values and unit of what is measured: drives, powers, loads, sizes of reactions."""
+        units = self.motion.observed.units
+        kinds = ("drive_", "P_", "load_", "T_")
+        found = {
+            name: (self._column(name), units[name]) for name in self.names if name.startswith(kinds)
+        }
+        for name, reaction in (*self.reactions.items(), ("ground", self.ground)):
+            unit = units.get(f"F_x_{name}", units.get(f"F_y_{name}"))
+            if unit is not None:
+                found[f"F_{name}"] = reaction.size, unit
+        return found
+
+    def plot(self, *names: str, **options: Any) -> Axes:
+        """Draw columns over time or over another column, as `Solution.plot`; drives without names.
+
+        Raises
+        ------
+        InputError
+            When no column has such a name.
+        UnsupportedError
+            When matplotlib is not installed.
+        """
+        chosen = names or tuple(name for name in self.names if name.startswith("drive_"))
+        return self.motion.plot(*(chosen or self.names), **options)
+
+    def summary(self) -> str:
+        """Return the table of measures, of variants that of the largest magnitudes."""
+        if self.motion.q.ndim > 2 or not np.isfinite(self.multipliers).any():
+            return self.to_text()
+        return "\n".join([str(self.measures()), *self._remarks()])
+
+    def to_text(self) -> str:
+        """Return a table: of each drive, load and reaction the largest magnitude."""
+        rows = [
+            (name, f"{_largest(values):.6g}", unit)
+            for name, (values, unit) in self.columns().items()
+        ]
+        lines = [
+            self.headline(),
+            *indented(table(("force", "largest", "unit"), rows, ("largest",))),
+        ]
+        return "\n".join([*lines, *self._remarks()])
+
+    def _remarks(self) -> list[str]:
+        """Return a line on what is not determined, if anything is."""
+        shared = [name for name in self.undetermined if not name.startswith("lambda_")]
+        return (
+            [f"not determined, since redundant joints share it: {listed(shared)}"] if shared else []
+        )
+
+    def headline(self) -> str:
+        """Return the name and the number of times."""
+        return f"{self.name}: forces at {self.motion.t.size} times"
+
+
+def _largest(values: Array) -> float:
+    found = np.abs(values[np.isfinite(values)])
+    return float(found.max()) if found.size else np.nan
+
+
+def forces(solution: Solution) -> Forces:
+    r"""Return the forces along a motion: inverse dynamics.
+
+    Parameters
+    ----------
+    solution
+        A motion, or one for each of several parameter sets, of a mechanism with masses or forces.
+
+    Returns
+    -------
+    Forces
+        ``found.reactions["A"].force``, ``found.drivers["motor"].value``, ``found["A.F_x"]``.
+
+    Raises
+    ------
+    InputError
+        If this is no Solution, or one that was pickled or solved with a module from a file, or the
+        mechanism has no loads.
+    UnsupportedError
+        If the mechanism is so large that its module is in grouped form.
+    """
+    require_solution(solution)
+    module = solution.require_module("its forces")
+    modules = _modules(module)
+    points = _Points.of(solution, code_of(module), modules)
+    names, units, found, shared = points.forces()
+    values = np.moveaxis(found.reshape(len(names), *solution.q.shape[:-1]), 0, -1)
+    m = len(solution.equations)
+    added = names[m:]
+    merged = solution.observed.joined(added, {name: units[name] for name in added}, values[..., m:])
+    motion = solution.observing(merged)
+    return Forces(motion, added, values[..., :m], shared, dict(modules.joints))
+
+
+def _modules(module: ModuleType) -> ForceModules:
+    """Return what compiles the forces of a mechanism."""
+    found: ForceModules | None = vars(module).get(FORCES)
+    if found is not None:
+        return found
+    if not hasattr(module, "LOADS"):
+        raise InputError(
+            f"{module.NAME} has no masses and no forces, so that nothing bears a load: give its "
+            "bodies masses, m.body(..., mass=..., inertia=...), or add forces such as kc.Force."
+        )
+    if code_of(module).evaluate is not None:
+        raise UnsupportedError(
+            f"{module.NAME} is in grouped form, as large mechanisms are, whose forces are not "
+            "compiled: use form='inline'."
+        )
+    raise InputError(
+        f"the module of {module.NAME} was loaded from a file, which knows no more than its own "
+        "functions: compile the model, solve with that, then ask for forces."
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Points:
+    """A batch of L points of a motion."""
+
+    code: Code
+    modules: ForceModules
+    p: Array
+    t: Array
+    q: Array
+    q_dot: Array
+    q_ddot: Array
+
+    @classmethod
+    def of(cls, solution: Solution, code: Code, modules: ForceModules) -> _Points:
+        """Return the points of a motion, of all variants one after the other."""
+        shape, n = solution.q.shape[:-1], len(code.coordinates)
+        p = np.array(list(solution.parameters.values()), dtype=np.float64).T
+        if len(shape) > 1:
+            p = np.repeat(p.reshape(shape[0], len(solution.parameters)), shape[-1], axis=0)
+        states = (part.reshape(-1, n) for part in (solution.q, solution.q_dot, solution.q_ddot))
+        return cls(code, modules, p, np.broadcast_to(solution.t, shape).ravel(), *states)
+
+    def at(self, some: NDArray[Any]) -> _Points:
+        """Return some of the points."""
+        p = self.p if self.p.ndim == 1 else self.p[some]
+        states = (state[some] for state in (self.q, self.q_dot, self.q_ddot))
+        return _Points(self.code, self.modules, p, self.t[some], *states)
+
+    def forces(self) -> tuple[tuple[str, ...], dict[str, str], Array, tuple[str, ...]]:
+        """Return names, units, values (K, L) of multipliers and forces, and what is shared."""
+        names, units = self._names()
+        finite = np.isfinite(self.q_ddot.sum(axis=-1))
+        left = finite
+        if (module := self.modules.compiled(True)) is not None:
+            values = self.outputs_of(module, self.p)
+            blocks = len(values) - len(names)
+            found, left = values[blocks:], finite & ~trusted(values[:blocks])
+        else:
+            found = np.empty((len(names), self.t.size))
+        if not finite.all():
+            found[:, ~finite] = np.nan
+        shared = np.zeros(len(names), dtype=bool)
+        numbers = np.flatnonzero(left)
+        for start in range(0, numbers.size, BLOCK):
+            own = numbers[start : start + BLOCK]
+            part, loose = self.at(own).by_matrices()
+            found[:, own] = part.T
+            shared |= loose
+        return names, units, found, tuple(np.array(names)[shared].tolist())
+
+    def outputs_of(self, module: ModuleType, p: Array) -> Array:
+        """Return the outputs of a module at the points, shape (K, L)."""
+        found = empty((1, len(module.OUTPUTS), self.t.size))
+        observe = code_of(module).observe_into
+        assert observe is not None
+        with np.errstate(all="ignore"):
+            observe((self.q.T, self.q_dot.T, self.q_ddot.T), self.t, p.T, found)
+        return np.asarray(found[0])
+
+    def _names(self) -> tuple[tuple[str, ...], dict[str, str]]:
+        """Return names and units of the multipliers and forces."""
+        own = tuple(multiplier(name) for name in self.code.equations)
+        module = self.modules.compiled(True)
+        if module is not None:
+            names = module.OUTPUTS[module.OUTPUTS.index(own[0]) :]
+            return names, {name: module.UNITS[name] for name in names}
+        module = self.modules.compiled(False)
+        assert module is not None
+        names = (*own, *module.OUTPUTS)
+        return names, dict.fromkeys(own, "") | {name: module.UNITS[name] for name in module.OUTPUTS}
+
+    def by_matrices(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Return values by singular values, and which of them redundant joints share."""
+        module = self.modules.compiled(False)
+        assert module is not None
+        states = self.q, self.q_dot, self.q_ddot
+        own = self.code.module
+        matrix = self.code.Phi_q(self.q, self.t, self.p)
+        inertia = np.einsum("lij,lj->li", own.M(self.q, self.t, self.p), self.q_ddot)
+        sides = own.Q(*states[:2], self.t, self.p) - inertia
+        left, values, right = np.linalg.svd(matrix, full_matrices=True)
+        zero = values <= RANK * values[:, :1]
+        inverse = np.where(zero, 0.0, 1 / np.where(zero, 1.0, values))
+        size = values.shape[1]
+        parts = inverse * np.einsum("lij,lj->li", right[:, :size], sides)
+        factors = np.einsum("lij,lj->li", left[:, :, :size], parts)
+        # Multipliers that do no work, mixed so that each shows wherever one of them does.
+        idle = np.concatenate((zero, np.ones((len(zero), len(left[0]) - size), dtype=bool)), axis=1)
+        mixed = np.where(idle, probe_of(idle.shape[1]), 0.0)
+        loose = np.einsum("lij,lj->li", left, mixed)
+        moved = np.abs(self._given(module, loose) - self._given(module, 0 * loose))
+        found = self._given(module, factors)
+        is_shared = moved > MOVED * np.abs(loose).max(axis=-1, keepdims=True)
+        rest = np.abs(np.einsum("lij,li->lj", matrix, factors) - sides).max(axis=-1)
+        off = rest > BALANCED * np.abs(sides).max(axis=-1, initial=1e-300)
+        found[is_shared] = np.nan
+        found[off] = np.nan
+        return found, np.asarray(is_shared[~off].any(axis=0))
+
+    def _given(self, module: ModuleType, factors: Array) -> Array:
+        """Return multipliers and the forces that they give, shape (L, m + K)."""
+        p = np.broadcast_to(self.p, (self.t.size, self.p.shape[-1]))
+        both = np.concatenate((p, factors), axis=-1)
+        return np.concatenate((factors, self.outputs_of(module, both).T), axis=-1)
