@@ -93,6 +93,16 @@ class Body(Shown):
         return sympy.S.Zero if self.is_ground else sympy.Symbol(rate(self.coordinates[index]))
 
     @property
+    def symbols(self) -> tuple[sympy.Expr, ...]:
+        """Symbols of the coordinates, in order; of the ground their values."""
+        return tuple(map(self._coordinate, range(len(self.kind.letters))))
+
+    @property
+    def on_request(self) -> tuple[tuple[str, sympy.Expr, str], ...]:
+        """Name, expression and unit of what a solution has beside coordinates: here nothing."""
+        return ()
+
+    @property
     def x(self) -> sympy.Expr:
         """Symbol of the x coordinate of the body's origin."""
         return self._coordinate(0)

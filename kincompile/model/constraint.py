@@ -50,6 +50,8 @@ class Constraint(Shown):
     """The kind of bodies that it connects."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
     """Contact parameters: coordinates that belong to the constraint."""
+    contact_letter: ClassVar[str] = "alpha"
+    """Letter of their names."""
     simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
     """Pairs: where this one of two equations depends on others, the type that keeps the other."""
     replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"
@@ -144,8 +146,8 @@ class Constraint(Shown):
     def contacts_of(cls, name: str) -> tuple[str, ...]:
         """Return the names of contact parameters: ``alpha_<name>``; of two ``alpha_i_<name>``."""
         if len(cls.contacts) == 1:
-            return (f"alpha_{name}",)
-        return tuple(f"alpha_{contact.index}_{name}" for contact in cls.contacts)
+            return (f"{cls.contact_letter}_{name}",)
+        return tuple(f"{cls.contact_letter}_{contact.index}_{name}" for contact in cls.contacts)
 
     @property
     def equation_names(self) -> tuple[str, ...]:
@@ -202,7 +204,8 @@ def _documentation(cls: type[Constraint]) -> str:
         place = _place(cls.bodies, item.on, on)
         entries[name] = item.text.format(on=on, ground=ground, place=place)
     if cls.contacts:
-        contacts = _listed("contact parameter", cls.contacts_of("name"))
+        what = "contact parameter" if cls.contact_letter == "alpha" else "coordinate"
+        contacts = _listed(what, cls.contacts_of("name"))
         entries["guess"] = f"Where Newton's method begins [rad], 0 if not given; the {contacts}."
     entries["corners"] = "Of a driver, whether its velocity may jump; see docs/motion_laws.md."
     lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]

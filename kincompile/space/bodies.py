@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.calculus.space import SpatialFrame
 from kincompile.model.bodies import Body, BodyKind
+from kincompile.space.points import SpatialPoint
 
 if TYPE_CHECKING:
     import sympy
@@ -38,7 +39,49 @@ class SpatialBody(Body):
     @property
     def p(self) -> tuple[sympy.Expr, ...]:
         """Symbols of the Euler parameters."""
-        return tuple(self._coordinate(k) for k in range(3, 7))
+        return self.symbols[3:]
+
+    @property
+    def p_dot(self) -> tuple[sympy.Expr, ...]:
+        """Symbols of the rates of the Euler parameters."""
+        return tuple(map(self._rate, range(3, 7)))
+
+    @property
+    def z_dot(self) -> sympy.Expr:
+        """Symbol of the rate of z."""
+        return self._rate(2)
+
+    def direction(self, local: Scalars) -> tuple[sympy.Expr, ...]:
+        """Return the global components A v of a vector v that is fixed in the body."""
+        origin = SpatialPoint(self.name, self, (0, 0, 0))
+        ends = zip(
+            SpatialPoint(self.name, self, local).coordinates, origin.coordinates, strict=True
+        )
+        return tuple((end - start).doit().expand() for end, start in ends)
+
+    @property
+    def omega(self) -> tuple[sympy.Expr, ...]:
+        """The angular velocity in global components, 2 E p_dot (Haug 9.3)."""
+        return self._spin(1)
+
+    @property
+    def omega_fixed(self) -> tuple[sympy.Expr, ...]:
+        """The angular velocity in body-fixed components, 2 G p_dot (Haug 9.3)."""
+        return self._spin(-1)
+
+    def _spin(self, sign: int) -> tuple[sympy.Expr, ...]:
+        """Return twice -e p0_dot + (e0 I + e~) p_dot, with -e~ for the sign -1."""
+        (e0, *e), (e0_dot, *e_dot) = self.p, self.p_dot
+        turned = (e[k - 2] * e_dot[k - 1] - e[k - 1] * e_dot[k - 2] for k in range(3))
+        rows = zip(e, e_dot, turned, strict=True)
+        return tuple(2 * (e0 * b - e0_dot * a + sign * c) for a, b, c in rows)
+
+    @property
+    def on_request(self) -> tuple[tuple[str, sympy.Expr, str], ...]:
+        """Name, expression and unit of the components of its angular velocity."""
+        axes = ("x", "y", "z", "xi", "eta", "zeta")
+        spins = zip(axes, (*self.omega, *self.omega_fixed), strict=True)
+        return tuple((f"omega_{axis}_{self.name}", spin, "rad/s") for axis, spin in spins)
 
 
 GROUND = SpatialBody("ground", is_ground=True)

@@ -6,6 +6,8 @@ Rows are "j minus i".
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from kincompile.calculus.expressions import (
     Angle,
     Basis,
@@ -17,12 +19,15 @@ from kincompile.calculus.expressions import (
     dot,
 )
 from kincompile.calculus.rotations import turned
-from kincompile.calculus.symbols import C
+from kincompile.calculus.symbols import C, contact_i
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
-from kincompile.model.constraint import constraint_type
+from kincompile.model.constraint import CamConstraint, constraint_type
 from kincompile.space.constraint import SpatialConstraint, SpatialPoints
 from kincompile.space.symbols import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
+
+if TYPE_CHECKING:
+    import sympy
 
 XYZ = ("x", "y", "z")
 
@@ -307,19 +312,48 @@ class Screw(Triads):
 
 
 @constraint_type
-class RelativeRotation(SpatialConstraint):
-    """The angle of the cross of body j from that of body i, about the axis of body i, is C."""
+class Turning(SpatialConstraint):
+    """A constraint of the angle of a cross from another; the types are its subclasses."""
 
-    source = "Haug 9.4"
     i: BodyLike = argument.body("i")
     axis_i: PointLike = argument.axis("h_i", on="i")
     cross_i: PointLike = argument.cross("f_i", on="i")
     j: BodyLike = argument.body("j")
     axis_j: PointLike = argument.axis("h_j", on="j")
     cross_j: PointLike = argument.cross("f_j", on="j")
+
+
+@constraint_type
+class RelativeRotation(Turning):
+    """The angle of the cross of body j from that of body i, about the axis of body i, is C."""
+
+    source = "Haug 9.4"
     angle: ValueLike = argument.value("rad")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return theta - C with theta = atan2(g_i^T f_j, f_i^T f_j), the one nearest to C."""
         return (angle_from(C),)
+
+
+@constraint_type
+class JointAngle(Turning, CamConstraint):
+    """A coordinate ``theta_<name>``, the angle of a hinge over any number of turns.
+
+    It counts from the cross of body i to that of body j, about the axis of body i. `theta` is its
+    symbol, for free equations and outputs.
+    """
+
+    source = "own"
+    contacts = (contact_i,)
+    contact_letter = "theta"
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return theta - alpha: of all angles theta the one nearest to the coordinate alpha."""
+        return (angle_from(contact_i.alpha),)
+
+    @property
+    def theta(self) -> sympy.Symbol:
+        """Symbol of the angle."""
+        return self.alpha

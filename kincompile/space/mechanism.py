@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.model.mechanism import Mechanism as PlanarMechanism
 from kincompile.space.bodies import GROUND, SpatialBody, euler_parameters
+from kincompile.space.points import SpatialPoint
 from kincompile.space.primitives import Normalization
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ class Mechanism(PlanarMechanism):
     """
 
     fixed = GROUND
+    point_type = SpatialPoint
+    bodies: list[SpatialBody]  # type: ignore[assignment]
 
     def body(
         self, name: str, position: Scalars = (0, 0, 0), orientation: Any = (1, 0, 0, 0)
