@@ -74,6 +74,8 @@ class Body(Shown):
     outline: Sequence[Scalars] = ()
     is_ground: bool = field(default=False, kw_only=True)
     kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
+    # What is wrong with its guess, as it was given.
+    problem: str = field(default="", kw_only=True, repr=False)
 
     def to_text(self) -> str:
         """Return its name, coordinates and guess."""

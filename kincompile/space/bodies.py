@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from kincompile.calculus.space import SpatialFrame
 from kincompile.model.bodies import Body, BodyKind
@@ -85,24 +85,3 @@ class SpatialBody(Body):
 
 
 GROUND = SpatialBody("ground", is_ground=True)
-
-
-def euler_parameters(orientation: Any) -> tuple[float, ...]:
-    """Return Euler parameters (e0, e1, e2, e3) of an orientation, of length one.
-
-    Parameters
-    ----------
-    orientation
-        Four Euler parameters of any length but zero, a rotation matrix, shape (3, 3), or a
-        `scipy.spatial.transform.Rotation`.
-    """
-    import numpy as np
-    from scipy.spatial.transform import Rotation
-
-    if not isinstance(orientation, Rotation):
-        given = np.asarray(orientation, dtype=float)
-        if given.shape == (4,):
-            return tuple((given / np.linalg.norm(given)).tolist())
-        orientation = Rotation.from_matrix(given)
-    x, y, z, w = orientation.as_quat()
-    return float(w), float(x), float(y), float(z)
