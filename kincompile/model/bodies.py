@@ -15,7 +15,7 @@ from kincompile.model.expressions import NotAnExpressionError, as_expression, nu
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from kincompile.model.expressions import Scalars
 
@@ -32,11 +32,14 @@ class BodyKind:
         Unit of each coordinate, None for that of lengths.
     drivers
         Name of the constraint type that drives each.
+    elsewhere
+        What to take in place of constraint types of the other kinds of bodies, by their names.
     """
 
     frame: type[Frame]
     units: tuple[str | None, ...]
     drivers: tuple[str, ...]
+    elsewhere: Mapping[str, str]
 
     @property
     def ground(self) -> tuple[int, ...]:
@@ -58,6 +61,13 @@ PLANAR = BodyKind(
     frame=PlaneFrame,
     units=(None, None, "rad"),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteAngle"),
+    elsewhere={
+        "Spherical": "Revolute",
+        "Cylindrical": "Translational, or RevoluteTranslational",
+        "RelativeRotation": "RelativeAngle",
+        "RelativeTranslation": "TranslationalDistance",
+        "PointOnLine": "RevoluteTranslational",
+    },
 )
 
 

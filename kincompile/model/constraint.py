@@ -15,7 +15,7 @@ from kincompile.calculus.template import Template
 from kincompile.html import Shown
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
-from kincompile.model.bodies import GROUND, PLANAR, BodyKind
+from kincompile.model.bodies import GROUND, PLANAR, Body, BodyKind
 from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
@@ -77,6 +77,17 @@ class Constraint(Shown):
     def problem(numbers: Numbers) -> str | None:
         """Return what is wrong with several arguments together; each alone is good."""
         del numbers
+        return None
+
+    @classmethod
+    def misplaced(
+        cls,
+        bodies: Sequence[Body],
+        points: Mapping[str, tuple[Scalar, ...]],
+        defaults: Mapping[str, float],
+    ) -> str | None:
+        """Return why it cannot hold its bodies as their guesses have them."""
+        del bodies, points, defaults
         return None
 
     @staticmethod

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import sympy
 
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import Body
+from kincompile.model.bodies import Body, BodyKind
 from kincompile.model.expressions import (
     Scalar,
     alpha,
@@ -165,7 +165,7 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     profiles: dict[str, sympy.Expr] = {}
     title = _title(constraint)
     if constraint.bodies is not scope.ground.kind:
-        scope.problems.append(f"{title}: {_KIND_PROBLEM[len(scope.ground.kind.axes)]}")
+        scope.problems.append(f"{title}: {_of_other_bodies(constraint, scope.ground.kind)}")
         return None
     corners = _corners(constraint.corners, title, scope)
     for name, item in constraint.arguments().items():
@@ -190,6 +190,9 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     _check_whole(constraint, scalars, points, scope)
     if len(scope.problems) > before:
         return None
+    if problem := constraint.misplaced([body for body in bodies if body], points, scope.defaults):
+        scope.problems.append(f"{title}: {problem}")
+        return None
     return Joint(
         constraint,
         constraint.template(),
@@ -201,10 +204,18 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     )
 
 
-_KIND_PROBLEM = {
-    2: "it is a constraint of bodies in space; take the one of kincompile for bodies in the plane",
-    3: "it is a constraint of bodies in the plane; take the one of kincompile.spatial",
-}
+_WHERE = {2: "in the plane", 3: "in space"}
+
+
+def _of_other_bodies(constraint: Constraint, kind: BodyKind) -> str:
+    """Say that a constraint is for bodies of another kind, and what to take."""
+    name = type(constraint).__name__
+    given, own = _WHERE[len(constraint.bodies.axes)], _WHERE[len(kind.axes)]
+    found = kind.elsewhere.get(name)
+    if found is None and len(kind.axes) == 2 and name in constraint.bodies.elsewhere:
+        found = f"kincompile.{name}"
+    remedy = f"take {found}" if found else "it has none like it there"
+    return f"it is a constraint of bodies {given}, and those of this mechanism are {own}; {remedy}"
 
 
 def _title(constraint: Constraint) -> str:
@@ -240,6 +251,8 @@ def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bo
             scope.problems.append(
                 f"{where}: the radius is zero; give the pitch radius "
                 "(negative for an internal gear)"
+                if item.symbol.startswith("R")
+                else f"{where}: it is zero; give a length, negative for the other hand"
             )
         return value
     declared = scope.declared
@@ -326,7 +339,7 @@ def _text(constraint: Constraint) -> str:
             body = given.name if isinstance(given, Body) else given
             parts.append(f"- {body}" if parts else body)
         elif item.kind in (Kind.POINT, Kind.AXIS):
-            text = "({}, {})".format(*given)
+            text = f"({', '.join(map(str, given))})"
             parts.append(text if item.kind is Kind.POINT else f"axis {text}")
         elif item.kind is Kind.PROFILE:
             parts.append("profile table" if isinstance(given, tuple | list) else "profile")

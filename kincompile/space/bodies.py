@@ -18,6 +18,27 @@ SPATIAL = BodyKind(
     frame=SpatialFrame,
     units=(None, None, None, "", "", "", ""),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteZ", *("AbsoluteOrientation",) * 4),
+    elsewhere={
+        **{
+            name: f"spatial.{name}"
+            for name in (
+                "AbsoluteX",
+                "AbsoluteY",
+                "AbsoluteDistance",
+                "RelativeX",
+                "RelativeY",
+                "Distance",
+                "Revolute",
+                "Translational",
+            )
+        },
+        "AbsoluteAngle": "spatial.RelativeRotation from the ground",
+        "RelativeAngle": "spatial.RelativeRotation",
+        "RevoluteTranslational": "spatial.PointOnLine",
+        "TranslationalDistance": "spatial.RelativeTranslation",
+        "Gear": "an Equation between two spatial.JointAngle",
+        "RackAndPinion": "an Equation between a spatial.JointAngle and a way",
+    },
 )
 
 

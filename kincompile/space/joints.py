@@ -217,6 +217,7 @@ class Universal(PointsAndAxes):
     """Two axes at a right angle meet in a cross: Hooke's joint."""
 
     source = "Haug 9.4"
+    right_angle = ("h_i", "h_j")
     row_names = (*XYZ, "cross")
 
     @staticmethod
@@ -230,6 +231,7 @@ class RevoluteCylindrical(PointsAndAxes):
     """A hinge about the axis of body i meets at a right angle a slide along that of body j."""
 
     source = "Haug 9.4"
+    right_angle = ("h_i", "h_j")
     row_names = ("cross", "line_f", "line_g")
 
     @staticmethod
@@ -258,6 +260,7 @@ class Translational(Triads):
     """Body j slides along an axis of body i without turning; its cross is at a right angle."""
 
     source = "Haug 9.4"
+    right_angle = ("f_i", "f_j")
     row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "cross")
 
     @staticmethod
