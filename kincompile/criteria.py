@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -215,6 +215,30 @@ LATE = 1e-6
 
 IN_RANGE = 1e-6
 """Part of nu that the equations cannot give, below which a singular point is no lock-up."""
+
+
+SPATIAL_COORDINATES = 7
+"""Coordinates of a body in space: three of its place, then its Euler parameters."""
+
+
+def turning(units: Iterable[str], bodies: Iterable[Sequence[int] | range]) -> list[bool]:
+    """Return which coordinates have the scale of angles, whatever the unit of lengths.
+
+    They are the angles, and the Euler parameters, which are cosines and sines of half angles.
+
+    Parameters
+    ----------
+    units
+        The unit of each coordinate.
+    bodies
+        The columns of the coordinates of each body.
+    """
+    found = [unit == "rad" for unit in units]
+    for columns in bodies:
+        if len(columns) == SPATIAL_COORDINATES:
+            for column in columns[3:]:
+                found[column] = True
+    return found
 
 
 def size_of(

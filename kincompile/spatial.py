@@ -9,5 +9,7 @@
 Everything that is not a body or a joint is called as in the plane.
 """
 
+from kincompile.runtime.results.orientation import orientation as orientation
+from kincompile.space import outputs as outputs
 from kincompile.space.catalogue import *  # noqa: F403
 from kincompile.space.mechanism import Mechanism as Mechanism

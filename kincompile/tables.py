@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -48,3 +49,15 @@ def indented(lines: Sequence[str]) -> list[str]:
 def counted(number: int, what: str) -> str:
     """Return a number with its noun, in the plural where there is not exactly one."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+def pose(q: Sequence[float]) -> str:
+    """Return where a body is: x, y and its angle; in space x, y, z, an angle and its axis."""
+    if len(q) == 3:
+        x, y, phi = q
+        return f"at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+    x, y, z, e0, *e = q
+    size = math.hypot(*e)
+    angle = 2 * math.atan2(size, e0)
+    about = ", ".join(f"{item / (size or 1.0):.4g}" for item in e)
+    return f"at ({x:.4g}, {y:.4g}, {z:.4g}), angle {angle:.4g} about ({about})"

@@ -163,6 +163,11 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
             return _ROTATION[rotation.letters][len(directions)], vector_sum(
                 (
                     *(rotated(rotation, vector, (*directions, change)) for change in changes),
+                    *(
+                        rotated(rotation, vector, (*directions[:k], change, *directions[k + 1 :]))
+                        for k, item in enumerate(directions)
+                        if (change := direction.get(item)) is not None
+                    ),
                     rotated(rotation, moved, directions),
                 )
             )

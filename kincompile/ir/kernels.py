@@ -18,7 +18,6 @@ from kincompile.calculus.expressions import (
     VectorSum,
     VectorSymbol,
 )
-from kincompile.calculus.symbols import Frame, s_i, s_j, v_i, v_j
 from kincompile.calculus.template import Template
 from kincompile.derive.derivation import derive, units
 from kincompile.derive.rules import along
@@ -35,7 +34,7 @@ from kincompile.ir.program import (
     Kernel,
     StateEntry,
 )
-from kincompile.model.points import POINT, PointCoordinate
+from kincompile.model.points import PointCoordinate, point_template
 from kincompile.model.points import rate as rate_of
 from kincompile.names import rate
 from kincompile.quantities import TOGETHER
@@ -54,9 +53,8 @@ if TYPE_CHECKING:
         TimeFunction,
         Value,
     )
-    from kincompile.calculus.symbols import CoordinateSymbol
+    from kincompile.calculus.symbols import CoordinateSymbol, Frame
     from kincompile.ir.graph import Node
-    from kincompile.model.bodies import BodyKind
     from kincompile.model.expressions import Scalar
     from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.resolve import FreeEquation
@@ -177,9 +175,8 @@ def _motion(template: Template) -> dict[CoordinateSymbol, tuple[StateEntry, ...]
 
 
 @cache
-def frame_kernel(kind: BodyKind) -> FrameKernel:
-    """Return the kernel of the frame of a kind of body."""
-    own = kind.frame("i")
+def frame_kernel(own: Frame) -> FrameKernel:
+    """Return the kernel of the frame of a body i."""
     environment = KernelEnvironment(Template("Frame", (own,), (), ()))
     found = Expansion(environment).entries(own.rotation)
     graph = Graph()
@@ -190,7 +187,7 @@ def frame_kernel(kind: BodyKind) -> FrameKernel:
     }
     new = graph.instantiate(environment.graph.nodes, numbers)
     entries = tuple(new[item.node] for item in found)
-    return FrameKernel(tuple(graph.nodes), entries, tuple(kind.letters), own.rotation.symbols)
+    return FrameKernel(tuple(graph.nodes), entries, own.letters, own.rotation.symbols)
 
 
 @cache
@@ -257,9 +254,7 @@ def _hints(template: Template, expansion: Expansion) -> tuple[Hint, ...]:
     return tuple(found)
 
 
-STEMS = {
-    s_i: "{}", s_j: "{}", v_i: "axis_{}", v_j: "axis_{}", VectorSymbol("s_C"): "C"
-}  # fmt: skip
+STEMS = {"s_i": "{}", "s_j": "{}", "v_i": "axis_{}", "v_j": "axis_{}", "s_C": "C"}
 """Names of turned points and directions, with that of the body; others have their symbol."""
 
 
@@ -267,8 +262,8 @@ def _spoken(template: Template, vector: Vector) -> tuple[int | None, str, str] |
     """Return the body in the name of a vector, its name, and that in the type's own symbols."""
     rotations = [item.rotation for item in template.owners]
     match vector:
-        case Rotated(rotation, VectorSymbol(name) as symbol, ()) if rotation in rotations:
-            return rotations.index(rotation), STEMS.get(symbol, name), name
+        case Rotated(rotation, VectorSymbol(name), ()) if rotation in rotations:
+            return rotations.index(rotation), STEMS.get(name, name), name
         case Scaled(Power(Symbol(), 2), Rotated() as inner):
             found = _spoken(template, inner)
             return found and (found[0], f"{found[1]}_w2", f"{found[2]}_w2")
@@ -297,32 +292,33 @@ def equation_kernel(equation: FreeEquation) -> Kernel:
 
 
 @cache
-def point_kernel() -> Kernel:
+def point_kernel(frame: Frame) -> Kernel:
     r"""Return the kernel of a point: r + A s, its derivatives along the motion, and by q.
 
-    They are :math:`\dot r + B s \dot\phi` and
+    In the plane they are :math:`\dot r + B s \dot\phi` and
     :math:`\ddot r + B s \ddot\phi - A s \dot\phi^2`.
     """
-    environment = KernelEnvironment(POINT)
-    expansion = Expansion(environment)
-    (frame,), (found,) = POINT.frames, POINT.Phi
-    outputs = {}
+    template = point_template(frame)
+    environment = KernelEnvironment(template)
+    expansion = Expansion(environment, template.dimension)
+    (found,) = template.Phi
     motion: dict[Expression, Expression] = dict(zip(frame.coordinates, frame.rates, strict=True))
     motion |= zip(frame.rates, frame.second_rates, strict=True)
+    found_dot = along(found, motion)
+    orders = found, found_dot, along(found_dot, motion)
     by_column = [along(found, {item: x}) for item in frame.coordinates for x in units(item)]
-    for name in TOGETHER["observe"]:
-        outputs[name] = [
-            (row, 0, item.node) for row, item in enumerate(expansion.components(found))
-        ]
-        found = along(found, motion)
+    outputs = {
+        name: [(row, 0, item.node) for row, item in enumerate(expansion.components(order))]
+        for name, order in zip(TOGETHER["observe"], orders, strict=True)
+    }
     outputs["outputs_q"] = _nonzeros(expansion, by_column)
-    return kernel_of(POINT, environment, expansion, outputs)
+    return kernel_of(template, environment, expansion, outputs)
 
 
 @cache
-def _point_row(row: int) -> Kernel:
+def _point_row(frame: Frame, row: int) -> Kernel:
     """Return the part of a point's kernel that gives one of its coordinates."""
-    kernel, graph = point_kernel(), Graph(point_kernel().nodes)
+    kernel, graph = point_kernel(frame), Graph(point_kernel(frame).nodes)
     outputs = {
         name: [(0, column, node) for own, column, node in found if own == row]
         for name, found in kernel.outputs.items()
@@ -384,27 +380,35 @@ class _OutputConverter(Converter):
 
     def _point(self, value: PointCoordinate) -> int:
         """Return the node of a point's coordinate; its derivatives are those of the kernel."""
-        graph, kernel, row = self._graph, _point_row(value.row), value.row
-        origin, angle = (str(item) for item in value.args[:2])
-        if origin not in self.by_column or angle not in self.by_column:
+        graph, kernel = self._graph, _point_row(value.frame, value.row)
+        names = {column: str(item) for column, item in value.moving.items()}
+        if not self.by_column.keys() >= set(names.values()):
             return self.convert(value.written_out())
-        names = {row: origin, 2: angle}
         inputs: dict[Input | str, int] = {}
+        entries = self._frame(value.frame, names)
         for item in kernel.inputs:
             match item:
                 case StateEntry(_, component, order):
                     own = names.get(component)
                     inputs[item] = self._named(rate(own, order)) if own else graph.const(0)
                 case FrameEntry(_, entry):
-                    inputs[item] = graph.call(("cos", "sin")[entry], self._named(angle))
+                    inputs[item] = entries[entry]
                 case Attribute(_, place):
-                    inputs[item] = self._named(cast("sympy.Expr", value.args[2 + place]))
+                    inputs[item] = self._named(cast("sympy.Expr", value.local[place]))
         new = graph.instantiate(kernel.nodes, inputs)
         orders = [new[kernel.outputs[name][0][2]] for name in TOGETHER["observe"]]
         self.motion |= dict(pairwise(orders))
         for _, column, node in kernel.outputs["outputs_q"]:
             self.by_column[names[column]][orders[0]] = new[node]
         return orders[0]
+
+    def _frame(self, frame: Frame, names: Mapping[int, str]) -> list[int]:
+        """Return the entries of a body's frame."""
+        kernel = frame_kernel(frame)
+        used = {item[1] for item in kernel.nodes if item[0] == "input"}
+        inputs = {column: self._named(name) for column, name in names.items() if column in used}
+        new = self._graph.instantiate(kernel.nodes, inputs)
+        return [new[node] for node in kernel.entries]
 
 
 def output_kernel(output: ResolvedOutput) -> tuple[Kernel, Mapping[Input | str, Scalar | str]]:

@@ -188,7 +188,7 @@ class _Binder:
         if isinstance(item, ResolvedOutput):
             kernel, given = output_kernel(item)
             return kernel, tuple(self._named(given[entry]) for entry in kernel.inputs)
-        kernel, template, (body,) = point_kernel(), item.template, item.bodies
+        kernel, template, (body,) = point_kernel(item.frame), item.template, item.bodies
         first: list[Input] = [*motion_of(template, 0, 0), *motion_of(template, 0, 1)]
         first += frame_entries(template, template.frames[0])
         known: dict[Input | str, int] = dict(zip(first, self._body(body), strict=True))
@@ -311,7 +311,7 @@ class _Binder:
                 names = body.coordinates
                 nodes = [graph.input(name) for name in names]
                 rates = [graph.input(rate(name)) for name in names]
-            frame = frame_kernel(kind)
+            frame = frame_kernel(kind.frame("i"))
             new = graph.instantiate(frame.nodes, dict(enumerate(nodes)))
             self._bodies[body.name] = *nodes, *rates, *(new[node] for node in frame.entries)
         return self._bodies[body.name]
@@ -319,4 +319,4 @@ class _Binder:
     def frame_of(self, body: Body, columns: range) -> BodyFrame:
         """Return a body with the nodes that its frame gives."""
         entries = self._body(body)[2 * len(columns) :]
-        return BodyFrame(body.name, frame_kernel(body.kind), columns, entries)
+        return BodyFrame(body.name, frame_kernel(body.kind.frame("i")), columns, entries)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import turning
 from kincompile.ir.interpret import interpret
 from kincompile.model.resolve import Joint
 from kincompile.names import listed
@@ -42,7 +43,7 @@ def rank_report(
     return generic_rank(
         evaluate,
         np.array([item.guess for item in system.coordinates]) if guess is None else guess,
-        np.array([item.unit == "rad" for item in system.coordinates]),
+        np.array(turning((item.unit for item in system.coordinates), system.body_columns)),
         driver_rows(system),
         _rows(system, lambda item: isinstance(item, Joint) and item.written.is_own),
         float(system.end),

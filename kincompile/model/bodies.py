@@ -15,7 +15,7 @@ from kincompile.model.expressions import NotAnExpressionError, as_expression, nu
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from kincompile.model.expressions import Scalar, Scalars
 
@@ -32,11 +32,14 @@ class BodyKind:
         Unit of each coordinate, None for that of lengths.
     drivers
         Name of the constraint type that drives each.
+    elsewhere
+        What to take in place of constraint types of the other kinds of bodies, by their names.
     """
 
     frame: type[Frame]
     units: tuple[str | None, ...]
     drivers: tuple[str, ...]
+    elsewhere: Mapping[str, str]
 
     @property
     def ground(self) -> tuple[int, ...]:
@@ -58,6 +61,13 @@ PLANAR = BodyKind(
     frame=PlaneFrame,
     units=(None, None, "rad"),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteAngle"),
+    elsewhere={
+        "Spherical": "Revolute",
+        "Cylindrical": "Translational, or RevoluteTranslational",
+        "RelativeRotation": "RelativeAngle",
+        "RelativeTranslation": "TranslationalDistance",
+        "PointOnLine": "RevoluteTranslational",
+    },
 )
 
 
@@ -79,6 +89,8 @@ class Body(Shown):
     centre: Scalars = field(default=(0, 0), kw_only=True)
     density: Scalar | None = field(default=None, kw_only=True)
     thickness: Scalar | None = field(default=None, kw_only=True)
+    # What is wrong with its guess, as it was given.
+    problem: str = field(default="", kw_only=True, repr=False)
 
     def to_text(self) -> str:
         """Return its name, coordinates and guess."""
@@ -102,6 +114,16 @@ class Body(Shown):
 
     def _rate(self, index: int) -> sympy.Expr:
         return sympy.S.Zero if self.is_ground else sympy.Symbol(rate(self.coordinates[index]))
+
+    @property
+    def symbols(self) -> tuple[sympy.Expr, ...]:
+        """Symbols of the coordinates, in order; of the ground their values."""
+        return tuple(map(self._coordinate, range(len(self.kind.letters))))
+
+    @property
+    def on_request(self) -> tuple[tuple[str, sympy.Expr, str], ...]:
+        """Name, expression and unit of what a solution has beside coordinates: here nothing."""
+        return ()
 
     @property
     def x(self) -> sympy.Expr:

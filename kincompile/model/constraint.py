@@ -15,7 +15,7 @@ from kincompile.calculus.template import Template
 from kincompile.html import Shown
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import Argument, Kind, ValueLike
-from kincompile.model.bodies import GROUND, PLANAR, BodyKind
+from kincompile.model.bodies import GROUND, PLANAR, Body, BodyKind
 from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ class Element(Shown):
     """The kind of bodies that it connects."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
     """Contact parameters: coordinates that belong to the element."""
+    contact_letter: ClassVar[str] = "alpha"
+    """Letter of their names."""
     is_load: ClassVar[bool] = False
     """Whether it is a mass or a force, which adds no equation."""
 
@@ -64,6 +66,17 @@ class Element(Shown):
     def problem(numbers: Numbers) -> str | None:
         """Return what is wrong with several arguments together; each alone is good."""
         del numbers
+        return None
+
+    @classmethod
+    def misplaced(
+        cls,
+        bodies: Sequence[Body],
+        points: Mapping[str, tuple[Scalar, ...]],
+        defaults: Mapping[str, float],
+    ) -> str | None:
+        """Return why it cannot hold its bodies as their guesses have them."""
+        del bodies, points, defaults
         return None
 
     @staticmethod
@@ -174,8 +187,8 @@ class Constraint(Element):
     def contacts_of(cls, name: str) -> tuple[str, ...]:
         """Return the names of contact parameters: ``alpha_<name>``; of two ``alpha_i_<name>``."""
         if len(cls.contacts) == 1:
-            return (f"alpha_{name}",)
-        return tuple(f"alpha_{contact.index}_{name}" for contact in cls.contacts)
+            return (f"{cls.contact_letter}_{name}",)
+        return tuple(f"{cls.contact_letter}_{contact.index}_{name}" for contact in cls.contacts)
 
     @property
     def equation_names(self) -> tuple[str, ...]:
@@ -193,7 +206,8 @@ class Constraint(Element):
         equations = _listed("equation", cls.equations_of("name"))
         entries = {"name": f"Name of the constraint; its {equations}."}
         if cls.contacts:
-            contacts = _listed("contact parameter", cls.contacts_of("name"))
+            what = "contact parameter" if cls.contact_letter == "alpha" else "coordinate"
+            contacts = _listed(what, cls.contacts_of("name"))
             start = "Where Newton's method begins [rad], 0 if not given"
             entries["guess"] = f"{start}; the {contacts}."
         corners = "Of a driver, whether its velocity may jump; see docs/motion_laws.md."

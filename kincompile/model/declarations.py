@@ -141,6 +141,7 @@ def body_coordinates(
     """Return the coordinates of the bodies, with their guesses as numbers."""
     found = []
     for body in bodies:
+        problems += filter(None, [body.problem])
         try:
             guess = tuple(body.guess)
         except TypeError:

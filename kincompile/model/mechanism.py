@@ -52,6 +52,7 @@ class Mechanism(MatrixViews, TextViews):
     """
 
     fixed: ClassVar[Body] = GROUND
+    point_type: ClassVar[type[BodyPoint]] = BodyPoint
 
     def __init__(
         self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
@@ -167,8 +168,8 @@ class Mechanism(MatrixViews, TextViews):
             stand where a joint wants a body and a point.
         """
         known = {item.name: item for item in (self.ground, *self.bodies)}
-        named = body if isinstance(body, Body) else known.get(body, Body(body))
-        point = BodyPoint(name, named, local)
+        named = body if isinstance(body, Body) else known.get(body, type(self.fixed)(body))
+        point = self.point_type(name, named, local)
         self.outputs.append(point)
         return point
 

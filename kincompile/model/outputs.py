@@ -29,7 +29,7 @@ from kincompile.names import rate as rate_name
 from kincompile.names import unit_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
@@ -96,8 +96,8 @@ class ResolvedOutput(Observed):
         return (OutputColumn(self.name, self.unit),)
 
 
-AnyPoint: TypeAlias = BodyPoint | tuple["Scalar", "Scalar"]
-"""A point of a body, or a fixed one (x, y)."""
+AnyPoint: TypeAlias = BodyPoint | tuple["Scalar", ...]
+"""A point of a body, or a fixed one (x, y), in space (x, y, z)."""
 
 
 def angle(i: Body | tuple[AnyPoint, AnyPoint], j: Body | tuple[AnyPoint, AnyPoint]) -> sympy.Expr:
@@ -113,18 +113,17 @@ def angle(i: Body | tuple[AnyPoint, AnyPoint], j: Body | tuple[AnyPoint, AnyPoin
 
 def distance(point: AnyPoint, other: AnyPoint) -> sympy.Expr:
     """Return the distance of two points [length]."""
-    a, b = _direction((point, other))
-    return _expression(sympy.sqrt(a**2 + b**2))
+    return length(_direction((point, other)))
 
 
 def speed(point: BodyPoint) -> sympy.Expr:
     """Return the magnitude of a point's velocity."""
-    return _expression(sympy.sqrt(rate(point.x) ** 2 + rate(point.y) ** 2))
+    return length(tuple(map(rate, point.coordinates)))
 
 
 def acceleration(point: BodyPoint) -> sympy.Expr:
     """Return the magnitude of a point's acceleration; it has no rates of its own."""
-    return _expression(sympy.sqrt(rate(rate(point.x)) ** 2 + rate(rate(point.y)) ** 2))
+    return length(tuple(rate(rate(item)) for item in point.coordinates))
 
 
 def transmission_angle(before: AnyPoint, joint: AnyPoint, after: AnyPoint) -> sympy.Expr:
@@ -132,9 +131,7 @@ def transmission_angle(before: AnyPoint, joint: AnyPoint, after: AnyPoint) -> sy
 
     `joint` is that of coupler and follower, `before` and `after` are their other joints.
     """
-    (a, b), (c, d) = _direction((joint, before)), _direction((joint, after))
-    cosine = (a * c + b * d) / sympy.sqrt((a**2 + b**2) * (c**2 + d**2))
-    return _expression(sympy.acos(cosine))
+    return between(_direction((joint, before)), _direction((joint, after)))
 
 
 def velocity_ratio(output: Scalar, by: Scalar) -> sympy.Expr:
@@ -150,19 +147,35 @@ def _expression(found: object) -> sympy.Expr:
     return cast("sympy.Expr", found)
 
 
-def _direction(given: Body | tuple[AnyPoint, AnyPoint]) -> tuple[sympy.Expr, sympy.Expr]:
+def scalar_product(u: Sequence[sympy.Expr], v: Sequence[sympy.Expr]) -> sympy.Expr:
+    """Return u^T v."""
+    return _expression(sympy.Add(*(a * b for a, b in zip(u, v, strict=True))))
+
+
+def length(u: Sequence[sympy.Expr]) -> sympy.Expr:
+    """Return the length of a vector."""
+    return _expression(sympy.sqrt(scalar_product(u, u)))
+
+
+def between(u: Sequence[sympy.Expr], v: Sequence[sympy.Expr]) -> sympy.Expr:
+    """Return the angle between two vectors, 0 to pi."""
+    sizes = sympy.sqrt(scalar_product(u, u) * scalar_product(v, v))
+    return _expression(sympy.acos(scalar_product(u, v) / sizes))
+
+
+def _direction(given: Body | tuple[AnyPoint, AnyPoint]) -> tuple[sympy.Expr, ...]:
     """Return the components of a body's xi axis, or of the way from a point to another."""
     if isinstance(given, Body):
         return _expression(sympy.cos(given.phi)), _expression(sympy.sin(given.phi))
-    (a, b), (c, d) = (_coordinates(place) for place in given)
-    return c - a, d - b
+    start, end = (coordinates(place) for place in given)
+    return tuple(b - a for a, b in zip(start, end, strict=True))
 
 
-def _coordinates(place: AnyPoint) -> tuple[sympy.Expr, sympy.Expr]:
+def coordinates(place: AnyPoint) -> tuple[sympy.Expr, ...]:
+    """Return the global coordinates of a point."""
     if isinstance(place, BodyPoint):
-        return place.x, place.y
-    x, y = place
-    return as_sympy(x), as_sympy(y)
+        return place.coordinates
+    return tuple(map(as_sympy, place))
 
 
 def point_of(joint: Joint) -> BodyPoint | None:
@@ -194,7 +207,8 @@ def resolved_point(point: BodyPoint, scope: Scope, length_unit: str) -> PlacedPo
     if body is None or len(scope.problems) > before:
         return None
     rows = tuple(OutputColumn(name, length_unit) for name in point.output_names)
-    return PlacedPoint(point.name, scope.columns[body.name], local, (body,), rows)
+    columns = scope.columns[body.name]
+    return PlacedPoint(point.name, columns, local, (body,), rows, body.kind.frame("i"))
 
 
 def _resolved(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput | None:

@@ -10,7 +10,8 @@ import sympy
 from sympy.printing.precedence import PRECEDENCE
 
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.symbols import i, s_i
+from kincompile.calculus.expressions import VectorSymbol
+from kincompile.calculus.symbols import i
 from kincompile.calculus.template import Template
 from kincompile.model.expressions import as_sympy
 from kincompile.model.symbolic import SymbolicEnvironment
@@ -18,11 +19,15 @@ from kincompile.model.symbolic import SymbolicEnvironment
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from kincompile.calculus.symbols import Frame
     from kincompile.model.bodies import Body
     from kincompile.model.expressions import Scalar, Scalars
 
-POINT = Template("Point", (i,), (), (i.point(s_i),))
-"""The global coordinates of a point of a body, r + A s."""
+
+@cache
+def point_template(frame: Frame) -> Template:
+    """Return the global coordinates of a point of body i with such a frame, r + A s."""
+    return Template("Point", (frame,), (), (frame.point(VectorSymbol("s_i", frame.size)),))
 
 
 class rate(sympy.Function):  # noqa: N801 - a function for those who write expressions
@@ -39,22 +44,36 @@ class PointCoordinate(sympy.Function):
     """A global coordinate of a point, as a function of the body's, of its angle and of xi, eta.
 
     The compiler has its derivatives from the vectors, and so need not expand it; everybody else
-    sees cosine and sine. It is one of `point_x` and `point_y`.
+    sees cosine and sine. It is one of `point_x` and `point_y`. In space there are the Euler
+    parameters in place of the angle, and zeta.
     """
 
     nargs = 4
+    frame: ClassVar[Frame] = i
     row: ClassVar[int]
     precedence: ClassVar[int] = PRECEDENCE["Atom"]
 
     @classmethod
     def eval(cls, *args: sympy.Expr) -> sympy.Expr | None:
         """Write out what is at no coordinates."""
-        is_free = isinstance(args[0], sympy.Symbol) and isinstance(args[1], sympy.Symbol)
-        return None if is_free else _entry(cls.row, args)
+        moving = args[: len(args) - cls.frame.size]
+        is_free = all(isinstance(item, sympy.Symbol) for item in moving)
+        return None if is_free else _entry(cls.frame, cls.row, args)
+
+    @property
+    def moving(self) -> dict[int, sympy.Basic]:
+        """What moves in it, by the number of the coordinate of its body."""
+        size = self.frame.size
+        return dict(zip((self.row, *range(size, len(self.frame.letters))), self.args, strict=False))
+
+    @property
+    def local(self) -> tuple[sympy.Basic, ...]:
+        """Its place in the frame of its body."""
+        return self.args[len(self.args) - self.frame.size :]
 
     def written_out(self) -> sympy.Expr:
         """Return it in cosine and sine."""
-        return _entry(self.row, self.args)
+        return _entry(self.frame, self.row, self.args)
 
     def _eval_derivative(self, symbol: sympy.Symbol) -> sympy.Expr:
         return cast("sympy.Expr", self.written_out().diff(symbol))
@@ -88,17 +107,21 @@ class point_y(PointCoordinate):  # noqa: N801
     row = 1
 
 
-def _entry(row: int, args: tuple[sympy.Basic, ...]) -> sympy.Expr:
+LOCAL = ("xi", "eta", "zeta")
+
+
+def _entry(frame: Frame, row: int, args: tuple[sympy.Basic, ...]) -> sympy.Expr:
     """Return an entry of r + A s, written out."""
-    origin, *others = sympy.symbols(("xy"[row], "phi", "xi", "eta"))
-    given = dict(zip((origin, *others), args, strict=True))
-    return cast("sympy.Expr", _written(row).xreplace(given))
+    names = frame.letters[row], *frame.letters[frame.size :], *LOCAL[: frame.size]
+    given = dict(zip(sympy.symbols(names), args, strict=True))
+    return cast("sympy.Expr", _written(frame, row).xreplace(given))
 
 
 @cache
-def _written(row: int) -> sympy.Expr:
-    """Return an entry of r + A s in symbols x, y, phi, xi, eta."""
-    return PlacedPoint("", ("x", "y", "phi"), sympy.symbols("xi eta")).expressions[row]
+def _written(frame: Frame, row: int) -> sympy.Expr:
+    """Return an entry of r + A s in symbols of the coordinates and of xi, eta, zeta."""
+    local = sympy.symbols(LOCAL[: frame.size])
+    return PlacedPoint("", frame.letters, local, frame=frame).expressions[row]
 
 
 def written_out(value: sympy.Expr) -> sympy.Expr:
@@ -142,6 +165,8 @@ class PlacedPoint(Observed):
         The body.
     rows
         The outputs that its coordinates are.
+    frame
+        The frame of body i in the calculus.
     """
 
     name: str
@@ -149,20 +174,26 @@ class PlacedPoint(Observed):
     local: tuple[Scalar, ...]
     bodies: tuple[Body, ...] = ()
     rows: tuple[OutputColumn, ...] = ()
+    frame: Frame = i
 
-    template: ClassVar[Template] = POINT
     scalars: ClassVar[Mapping[str, Scalar]] = {}
     profiles: ClassVar[Mapping[str, sympy.Expr]] = {}
 
     @property
+    def template(self) -> Template:
+        """The vectors."""
+        return point_template(self.frame)
+
+    @property
     def points(self) -> Mapping[str, tuple[Scalar, ...]]:
         """Its place by the symbol in the template."""
-        return {s_i.name: self.local}
+        return {"s_i": self.local}
 
     @property
     def expressions(self) -> tuple[sympy.Expr, ...]:
         """Its coordinates, written out."""
-        return Expansion(SymbolicEnvironment(self)).components(POINT.Phi[0])
+        expansion = Expansion(SymbolicEnvironment(self), self.frame.size)
+        return expansion.components(self.template.Phi[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,28 +209,36 @@ class BodyPoint:
     body: Body
     local: Scalars
 
-    @property
-    def output_names(self) -> tuple[str, str]:
-        """Names of its columns."""
-        return f"x_{self.name}", f"y_{self.name}"
+    functions: ClassVar[tuple[type[PointCoordinate], ...]] = (point_x, point_y)
 
-    def _coordinate(self, kind: type[PointCoordinate], origin: sympy.Expr) -> sympy.Expr:
-        """Return an entry of r + A s."""
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of its columns."""
+        return tuple(f"{axis}_{self.name}" for axis in "xyz"[: len(self.body.kind.axes)])
+
+    @property
+    def coordinates(self) -> tuple[sympy.Expr, ...]:
+        """Its global coordinates as expressions."""
+        symbols, size = self.body.symbols, len(self.functions)
         try:
-            xi, eta = (as_sympy(value) for value in self.local)
+            local = [as_sympy(value) for value in self.local]
+            found = tuple(
+                kind(origin, *symbols[size:], *local)
+                for kind, origin in zip(self.functions, symbols[:size], strict=True)
+            )
         except (TypeError, ValueError, sympy.SympifyError):
-            return sympy.S.Zero  # the check of the mechanism says what is wrong with it
-        return cast("sympy.Expr", kind(origin, self.body.phi, xi, eta))
+            return (sympy.S.Zero,) * size  # the check of the mechanism says what is wrong with it
+        return found
 
     @property
     def x(self) -> sympy.Expr:
         """Its global x coordinate as an expression."""
-        return self._coordinate(point_x, self.body.x)
+        return self.coordinates[0]
 
     @property
     def y(self) -> sympy.Expr:
         """Its global y coordinate as an expression."""
-        return self._coordinate(point_y, self.body.y)
+        return self.coordinates[1]
 
     @property
     def x_dot(self) -> sympy.Expr:

@@ -190,6 +190,9 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     check_whole(constraint, scalars, points, scope)
     if len(scope.problems) > before:
         return None
+    if problem := constraint.misplaced([body for body in bodies if body], points, scope.defaults):
+        scope.problems.append(f"{title}: {problem}")
+        return None
     return Joint(
         constraint,
         constraint.template(),
@@ -201,18 +204,21 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     )
 
 
-_KIND_PROBLEM = {
-    2: "it is a {} of bodies in space; take the one of kincompile for bodies in the plane",
-    3: "it is a {} of bodies in the plane; take the one of kincompile.spatial",
-}
+_WHERE = {2: "in the plane", 3: "in space"}
 
 
 def kind_problem(constraint: Element, scope: Scope) -> str | None:
     """Return a message about a constraint or a load of another kind of bodies, or None."""
-    if constraint.bodies is scope.ground.kind:
+    kind = scope.ground.kind
+    if constraint.bodies is kind:
         return None
-    what = "load" if constraint.is_load else "constraint"
-    return _KIND_PROBLEM[len(scope.ground.kind.axes)].format(what)
+    name, what = type(constraint).__name__, "load" if constraint.is_load else "constraint"
+    given, own = _WHERE[len(constraint.bodies.axes)], _WHERE[len(kind.axes)]
+    found = kind.elsewhere.get(name)
+    if found is None and len(kind.axes) == 2 and name in constraint.bodies.elsewhere:
+        found = f"kincompile.{name}"
+    remedy = f"take {found}" if found else "it has none like it there"
+    return f"it is a {what} of bodies {given}, and those of this mechanism are {own}; {remedy}"
 
 
 def title_of(constraint: Element) -> str:
@@ -248,6 +254,8 @@ def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bo
             scope.problems.append(
                 f"{where}: the radius is zero; give the pitch radius "
                 "(negative for an internal gear)"
+                if item.symbol.startswith("R")
+                else f"{where}: it is zero; give a length, negative for the other hand"
             )
         return value
     declared = scope.declared
@@ -334,7 +342,7 @@ def text_of(constraint: Element) -> str:
             body = given.name if isinstance(given, Body) else given
             parts.append(f"- {body}" if parts else body)
         elif item.kind in (Kind.POINT, Kind.AXIS):
-            text = "({}, {})".format(*given)
+            text = f"({', '.join(map(str, given))})"
             parts.append(text if item.kind is Kind.POINT else f"axis {text}")
         elif item.kind is Kind.PROFILE:
             parts.append("profile table" if isinstance(given, tuple | list) else "profile")

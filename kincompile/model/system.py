@@ -184,9 +184,10 @@ class ConstraintSystem(MatrixViews, TextViews):
         return self
 
     def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
-        """Return the same system with these points as its outputs, no others, and no loads."""
+        """Return the system with these points, and what bodies have, as outputs, and no loads."""
         scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
-        observers = resolved_observers(points, (), scope, self.length_unit)
+        spins = [Output(*given) for body in self.bodies for given in body.on_request]
+        observers = resolved_observers(points, spins, scope, self.length_unit)
         values = {key: getattr(self, key) for key in self.__slots__}
         other = ConstraintSystem.__new__(ConstraintSystem)
         _fill(other, {**values, "body_points": tuple(points), "observers": observers, "loads": ()})

@@ -318,6 +318,23 @@ def unwound(equations: Problem, t: float, point: Point, guess: Vector, tolerance
             is_same = turned.status is Status.CONVERGED
             if is_same and distance(turned.last.q, q, equations.reference) <= SAME_POSITION:
                 point = turned.last
+    return _covered(equations, t, point, guess, tolerance)
+
+
+def _covered(equations: Problem, t: float, point: Point, guess: Vector, tolerance: float) -> Point:
+    """Give Euler parameters the signs of a guess's, as far as the equations allow it.
+
+    Where they are as far from it either way, the largest one becomes positive.
+    """
+    for cover in equations.code.covers():
+        p = point.q[cover]
+        along = p @ guess[cover]
+        if (along if abs(along) > SAME_POSITION else p[np.argmax(np.abs(p))]) < 0:
+            q = point.q.copy()
+            q[cover] = -q[cover]
+            other = equations.at(q, t)
+            if other is not None and equations.holds(other, RESIDUAL_FACTOR * tolerance):
+                point = other
     return point
 
 

@@ -17,6 +17,7 @@ from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.assemblies import unchosen
 from kincompile.runtime.singular.reach import impossible, missed
 from kincompile.runtime.status import Status
+from kincompile.tables import pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -226,10 +227,9 @@ def _unmet(inputs: Inputs, point: Point) -> str:
 def _places(code: Code, q: Array) -> Iterator[str]:
     """Yield where each body is, and the values of coordinates that belong to none."""
     values = dict(zip(code.coordinates, q.tolist(), strict=True))
-    firsts = {body: first for body, first, _ in code.bodies}
+    places = {body: slice(first, first + count) for body, first, count in code.bodies}
     for owner in dict.fromkeys(code.owners().values()):
-        if owner in firsts:
-            x, y, phi = q[firsts[owner] : firsts[owner] + 3]
-            yield f"{owner} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+        if owner in places:
+            yield f"{owner} {pose(q[places[owner]].tolist())}"
         else:
             yield f"{owner} = {values[owner]:.4g}"

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from kincompile.calculus.space import SpatialFrame
 from kincompile.model.bodies import Body, BodyKind
+from kincompile.space.points import SpatialPoint
 
 if TYPE_CHECKING:
     import sympy
@@ -17,6 +18,27 @@ SPATIAL = BodyKind(
     frame=SpatialFrame,
     units=(None, None, None, "", "", "", ""),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteZ", *("AbsoluteOrientation",) * 4),
+    elsewhere={
+        **{
+            name: f"spatial.{name}"
+            for name in (
+                "AbsoluteX",
+                "AbsoluteY",
+                "AbsoluteDistance",
+                "RelativeX",
+                "RelativeY",
+                "Distance",
+                "Revolute",
+                "Translational",
+            )
+        },
+        "AbsoluteAngle": "spatial.RelativeRotation from the ground",
+        "RelativeAngle": "spatial.RelativeRotation",
+        "RevoluteTranslational": "spatial.PointOnLine",
+        "TranslationalDistance": "spatial.RelativeTranslation",
+        "Gear": "an Equation between two spatial.JointAngle",
+        "RackAndPinion": "an Equation between a spatial.JointAngle and a way",
+    },
 )
 
 
@@ -38,28 +60,49 @@ class SpatialBody(Body):
     @property
     def p(self) -> tuple[sympy.Expr, ...]:
         """Symbols of the Euler parameters."""
-        return tuple(self._coordinate(k) for k in range(3, 7))
+        return self.symbols[3:]
+
+    @property
+    def p_dot(self) -> tuple[sympy.Expr, ...]:
+        """Symbols of the rates of the Euler parameters."""
+        return tuple(map(self._rate, range(3, 7)))
+
+    @property
+    def z_dot(self) -> sympy.Expr:
+        """Symbol of the rate of z."""
+        return self._rate(2)
+
+    def direction(self, local: Scalars) -> tuple[sympy.Expr, ...]:
+        """Return the global components A v of a vector v that is fixed in the body."""
+        origin = SpatialPoint(self.name, self, (0, 0, 0))
+        ends = zip(
+            SpatialPoint(self.name, self, local).coordinates, origin.coordinates, strict=True
+        )
+        return tuple((end - start).doit().expand() for end, start in ends)
+
+    @property
+    def omega(self) -> tuple[sympy.Expr, ...]:
+        """The angular velocity in global components, 2 E p_dot (Haug 9.3)."""
+        return self._spin(1)
+
+    @property
+    def omega_fixed(self) -> tuple[sympy.Expr, ...]:
+        """The angular velocity in body-fixed components, 2 G p_dot (Haug 9.3)."""
+        return self._spin(-1)
+
+    def _spin(self, sign: int) -> tuple[sympy.Expr, ...]:
+        """Return twice -e p0_dot + (e0 I + e~) p_dot, with -e~ for the sign -1."""
+        (e0, *e), (e0_dot, *e_dot) = self.p, self.p_dot
+        turned = (e[k - 2] * e_dot[k - 1] - e[k - 1] * e_dot[k - 2] for k in range(3))
+        rows = zip(e, e_dot, turned, strict=True)
+        return tuple(2 * (e0 * b - e0_dot * a + sign * c) for a, b, c in rows)
+
+    @property
+    def on_request(self) -> tuple[tuple[str, sympy.Expr, str], ...]:
+        """Name, expression and unit of the components of its angular velocity."""
+        axes = ("x", "y", "z", "xi", "eta", "zeta")
+        spins = zip(axes, (*self.omega, *self.omega_fixed), strict=True)
+        return tuple((f"omega_{axis}_{self.name}", spin, "rad/s") for axis, spin in spins)
 
 
 GROUND = SpatialBody("ground", is_ground=True)
-
-
-def euler_parameters(orientation: Any) -> tuple[float, ...]:
-    """Return Euler parameters (e0, e1, e2, e3) of an orientation, of length one.
-
-    Parameters
-    ----------
-    orientation
-        Four Euler parameters of any length but zero, a rotation matrix, shape (3, 3), or a
-        `scipy.spatial.transform.Rotation`.
-    """
-    import numpy as np
-    from scipy.spatial.transform import Rotation
-
-    if not isinstance(orientation, Rotation):
-        given = np.asarray(orientation, dtype=float)
-        if given.shape == (4,):
-            return tuple((given / np.linalg.norm(given)).tolist())
-        orientation = Rotation.from_matrix(given)
-    x, y, z, w = orientation.as_quat()
-    return float(w), float(x), float(y), float(z)

@@ -9,6 +9,7 @@ from kincompile.space.joints import (
     Cylindrical,
     Fixed,
     InPlane,
+    JointAngle,
     Parallel,
     Planar,
     PointOnLine,
@@ -47,7 +48,7 @@ __all__ = (  # noqa: RUF022 - in the order of the tables, simple ones first
     "AbsoluteOrientation", "RelativeX", "RelativeY", "RelativeZ", "Distance", "Parallel",
     "PointOnLine", "InPlane", "Planar", "Spherical", "Revolute", "Cylindrical", "Translational",
     "Universal", "ConstantVelocity", "Screw", "Fixed", "RevoluteCylindrical", "RevoluteSpherical",
-    "RelativeTranslation", "RelativeRotation",
+    "RelativeTranslation", "RelativeRotation", "JointAngle",
 )  # fmt: skip
 
 CONSTRAINTS: Mapping[str, type[Constraint]] = {name: globals()[name] for name in __all__}

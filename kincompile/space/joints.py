@@ -17,15 +17,17 @@ from kincompile.calculus.expressions import (
     Symbol,
     dot,
 )
-from kincompile.calculus.symbols import C
+from kincompile.calculus.symbols import C, contact_i
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
-from kincompile.model.constraint import constraint_type
+from kincompile.model.constraint import CamConstraint, constraint_type
 from kincompile.space.constraint import SpatialConstraint, SpatialPoints
 from kincompile.space.symbols import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import sympy
 
     from kincompile.model.constraint import Constraint
 
@@ -226,6 +228,7 @@ class Universal(PointsAndAxes):
     """Two axes at a right angle meet in a cross: Hooke's joint."""
 
     source = "Haug 9.4"
+    right_angle = ("h_i", "h_j")
     row_names = (*XYZ, "cross")
 
     @staticmethod
@@ -239,6 +242,7 @@ class RevoluteCylindrical(PointsAndAxes):
     """A hinge about the axis of body i meets at a right angle a slide along that of body j."""
 
     source = "Haug 9.4"
+    right_angle = ("h_i", "h_j")
     row_names = ("cross", "line_f", "line_g")
 
     @staticmethod
@@ -267,6 +271,7 @@ class Translational(Triads):
     """Body j slides along an axis of body i without turning; its cross is at a right angle."""
 
     source = "Haug 9.4"
+    right_angle = ("f_i", "f_j")
     row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "cross")
 
     @staticmethod
@@ -321,19 +326,48 @@ class Screw(Triads):
 
 
 @constraint_type
-class RelativeRotation(SpatialConstraint):
-    """The angle of the cross of body j from that of body i, about the axis of body i, is C."""
+class Turning(SpatialConstraint):
+    """A constraint of the angle of a cross from another; the types are its subclasses."""
 
-    source = "Haug 9.4"
     i: BodyLike = argument.body("i")
     axis_i: PointLike = argument.axis("h_i", on="i")
     cross_i: PointLike = argument.cross("f_i", on="i")
     j: BodyLike = argument.body("j")
     axis_j: PointLike = argument.axis("h_j", on="j")
     cross_j: PointLike = argument.cross("f_j", on="j")
+
+
+@constraint_type
+class RelativeRotation(Turning):
+    """The angle of the cross of body j from that of body i, about the axis of body i, is C."""
+
+    source = "Haug 9.4"
     angle: ValueLike = argument.value("rad")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return theta - C with theta = atan2(g_i^T f_j, f_i^T f_j), the one nearest to C."""
         return (angle_from(C),)
+
+
+@constraint_type
+class JointAngle(Turning, CamConstraint):
+    """A coordinate ``theta_<name>``, the angle of a hinge over any number of turns.
+
+    It counts from the cross of body i to that of body j, about the axis of body i. `theta` is its
+    symbol, for free equations and outputs.
+    """
+
+    source = "own"
+    contacts = (contact_i,)
+    contact_letter = "theta"
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return theta - alpha: of all angles theta the one nearest to the coordinate alpha."""
+        return (angle_from(contact_i.alpha),)
+
+    @property
+    def theta(self) -> sympy.Symbol:
+        """Symbol of the angle."""
+        return self.alpha

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
+from kincompile.errors import KincompileWarning
 from kincompile.model.mechanism import Mechanism as PlanarMechanism
-from kincompile.space.bodies import GROUND, SpatialBody, euler_parameters
+from kincompile.space.bodies import GROUND, SpatialBody
+from kincompile.space.guesses import IDENTITY, OrientationError, euler_parameters
+from kincompile.space.points import SpatialPoint
 from kincompile.space.primitives import Normalization
 
 if TYPE_CHECKING:
+    from kincompile.model.arguments import PointLike
     from kincompile.model.constraint import Constraint
     from kincompile.model.equation import Equation
-    from kincompile.model.expressions import Scalars
+    from kincompile.model.expressions import Scalar, Scalars
 
 
 class Mechanism(PlanarMechanism):
@@ -22,11 +27,25 @@ class Mechanism(PlanarMechanism):
     """
 
     fixed = GROUND
+    point_type = SpatialPoint
+    bodies: list[SpatialBody]  # type: ignore[assignment]
 
     def body(  # type: ignore[override]  # a place and an orientation; it has no mass yet
-        self, name: str, position: Scalars = (0, 0, 0), orientation: Any = (1, 0, 0, 0)
+        self,
+        name: str,
+        position: Scalars = (0, 0, 0),
+        orientation: Any = None,
+        *,
+        axis: PointLike | None = None,
+        angle: Scalar | None = None,
+        x: PointLike | None = None,
+        y: PointLike | None = None,
+        z: PointLike | None = None,
     ) -> SpatialBody:
         """Add a body and return it.
+
+        Its orientation, a guess like its position, is given in one way: as `orientation`, by `axis`
+        and `angle`, or by two of its axes; without, its axes are the ground's.
 
         Parameters
         ----------
@@ -35,10 +54,33 @@ class Mechanism(PlanarMechanism):
         position
             Guess of x, y, z [length] for Newton's method.
         orientation
-            Guess of its orientation: Euler parameters, a rotation matrix, or a
+            Euler parameters (e0, e1, e2, e3), a rotation matrix, or a
             `scipy.spatial.transform.Rotation`.
+        axis, angle
+            The direction about which it is turned, and the angle [rad], a number or an expression
+            of parameters.
+        x, y, z
+            Directions of its axes in the ground's frame. Of two that are not at a right angle the
+            first is kept.
+
+        Warns
+        -----
+        KincompileWarning
+            If the Euler parameters have another length than one: they are divided by it.
         """
-        body = SpatialBody(name, (*position, *euler_parameters(orientation)))
+        given = {"x": x, "y": y, "z": z}
+        axes = {key: item for key, item in given.items() if item is not None}
+        p: Scalars = IDENTITY
+        problem = ""
+        try:
+            p, remark = euler_parameters(orientation, axis, angle, axes)
+        except OrientationError as error:
+            problem = f"body {name!r}: {error}"
+        else:
+            if remark:
+                warnings.warn(f"body {name!r}: {remark}", KincompileWarning, stacklevel=2)
+        start = (*_flat(position), *p)
+        body = SpatialBody(name, start, problem=problem)
         self.bodies.append(body)
         return body
 
@@ -46,3 +88,11 @@ class Mechanism(PlanarMechanism):
         """Return the constraints, then the normalization of each body."""
         own = [Normalization(f"norm_{body.name}", body) for body in self.bodies]
         return [*self.constraints, *own]
+
+
+def _flat(position: Any) -> tuple[Scalar, ...]:
+    """Return the components of a position; what is none keeps its place, and is refused later."""
+    try:
+        return tuple(position)
+    except TypeError:
+        return (position,)

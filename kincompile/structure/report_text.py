@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from kincompile.names import listed
-from kincompile.tables import counted, indented, table
+from kincompile.tables import counted, indented, pose, table
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -124,7 +124,8 @@ def _meaning(undriven: int) -> str:
 
 
 def _origin(count: Mobility) -> str:
-    bodies = f"3 for each of {count.bodies} bodies" if count.bodies else ""
+    each = (count.coordinates - count.others) // (count.bodies or 1)
+    bodies = f"{each} for each of {count.bodies} bodies" if count.bodies else ""
     others = f"{count.others} that belong to no body" if count.others else ""
     return ", ".join(part for part in (bodies, others) if part)
 
@@ -229,9 +230,8 @@ def _coordinates_of(found: Findings, equations: Collection[str]) -> list[str]:
 def _places(found: Findings, owners: Collection[str]) -> Iterator[str]:
     """Yield where some bodies are at the nearest position, and other coordinates' values."""
     for body, columns in zip(found.bodies, found.body_columns, strict=True):
-        x, y, phi = (found.nearest[k] for k in columns)
         if body.name in owners:
-            yield f"{body.name} at ({x:.4g}, {y:.4g}), angle {phi:.4g}"
+            yield f"{body.name} {pose([found.nearest[k] for k in columns])}"
     for item, value in zip(found.coordinates, found.nearest, strict=True):
         if item.name in owners:
             yield f"{item.name} = {value:.4g}"

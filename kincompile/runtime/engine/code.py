@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.criteria import SPATIAL_COORDINATES, turning
 from kincompile.errors import StructuralError
 from kincompile.names import listed
 
@@ -112,7 +113,7 @@ class Code:
     bodies
         Of each body its name, the number of its first coordinate, and how many it has.
     angular : ndarray of bool, shape (n,)
-        Which coordinates are angles.
+        Which coordinates have the scale of angles: these, and Euler parameters.
     may_turn : ndarray of bool, shape (n,)
         Which are angles, or may be: a free coordinate has no unit that says so.
     position, nu, gamma, Phi_q, nonzeros
@@ -167,6 +168,11 @@ class Code:
     march_variants: Callable[..., int] | None
     observe_into: Callable[..., None] | None
 
+    def covers(self) -> list[slice]:
+        """Return the places of the Euler parameters of each body in space: p and -p are one."""
+        spatial = SPATIAL_COORDINATES
+        return [slice(k + 3, k + count) for _, k, count in self.bodies if count == spatial]
+
     def without_guess(self) -> tuple[str, ...]:
         """Return the bodies whose guess is zero throughout, as it is where none is given."""
         given = np.concatenate(((0,), np.cumsum(self.guess != 0))).tolist()
@@ -192,7 +198,9 @@ def attach(module: ModuleType) -> Code:
     names = vars(module)
     lanes = names.get("LANES", {})
     coordinates = names["COORDINATES"]
-    angular = np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool)
+    places = [range(first, first + count) for _, first, count in names.get("BODIES", ())]
+    is_angle = np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool)
+    angular = np.array(turning((names["UNITS"][name] for name in coordinates), places), dtype=bool)
     code = Code(
         module=module,
         name=names["NAME"],
@@ -204,7 +212,7 @@ def attach(module: ModuleType) -> Code:
         pattern=names["PATTERN"],
         bodies=names.get("BODIES", ()),
         angular=angular,
-        may_turn=angular | _without_body(names, coordinates),
+        may_turn=is_angle | _without_body(names, coordinates),
         position=names["position"],
         nu=names["nu"],
         gamma=names["gamma"],

@@ -92,7 +92,10 @@ class Solution(MotionTable):
 
     @property
     def joints(self) -> Observed:
-        """The points of the joints, as outputs ``x_<joint>`` and ``y_<joint>``, on request."""
+        """What nobody asked for, on request: the points of the joints, ``x_<joint>`` and so on.
+
+        In space the angular velocities of bodies too, ``omega_x_<body>`` to ``omega_zeta_<body>``.
+        """
         if JOINT_POINTS not in self._observed:
             module = self.require_module("its joints")
             compiled = vars(module).get(JOINT_POINTS)

@@ -63,7 +63,8 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
     -------
     ndarray, shape (k, n)
         The positions, nearest to the module's GUESS first, the same on every run. Angles that the
-        equations leave free by whole turns are those nearest to the guess. Shape (0, n) where the
+        equations leave free by whole turns are those nearest to the guess, and of Euler parameters
+        p and -p, which are one orientation, the nearer. Shape (0, n) where the
         mechanism cannot be assembled. Any row serves as `guess` of `solve`.
 
     Raises
@@ -244,6 +245,9 @@ def distance_modulo_turns(equations: Problem, q: Vector, other: Vector) -> float
 
 def _difference(equations: Problem, q: Vector, other: Vector) -> Vector:
     away = (q - other) / equations.reference
+    for cover in equations.code.covers():  # p and -p are one orientation
+        if q[cover] @ other[cover] < 0:
+            away[cover] = q[cover] + other[cover]
     return np.where(equations.angular, np.remainder(away + math.pi, math.tau) - math.pi, away)
 
 

@@ -270,7 +270,9 @@ def _splines(program: Program) -> Iterable[str]:
 
 def _scales(program: Program) -> dict[str, str]:
     """Return what tells large from small in a march: kinds of coordinates, and the criteria."""
-    angular = [str(int(item.unit == "rad")) for item in program.coordinates]
+    units = (item.unit for item in program.coordinates)
+    columns = (body.columns for body in program.bodies)
+    angular = [str(int(turns)) for turns in criteria.turning(units, columns)]
     probe = [repr(value) for value in criteria.probe_of(len(angular)).tolist()]
     numbers = {name: repr(getattr(criteria, name)) for name in CRITERIA}
     return {"angular": _array_lines(angular), "probe": _array_lines(probe), **numbers}

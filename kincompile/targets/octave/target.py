@@ -220,7 +220,9 @@ def _script(code: InlineProgram) -> str:
 def _assembly(code: InlineProgram) -> str:
     """Return the function that finds the position at the first time."""
     program = code.program
-    angles = [k for k, item in enumerate(program.coordinates) if item.unit == "rad"]
+    units = (item.unit for item in program.coordinates)
+    columns = (body.columns for body in program.bodies)
+    angles = [k for k, turns in enumerate(criteria.turning(units, columns)) if turns]
     data = {
         "name": program.name,
         "fingerprint": program.fingerprint,

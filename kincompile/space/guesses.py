@@ -1,0 +1,172 @@
+"""Guesses of orientations: Euler parameters from what a person knows, with what is wrong."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+from kincompile.model.expressions import as_sympy
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from kincompile.model.expressions import Scalars
+
+IDENTITY = (1, 0, 0, 0)
+
+ROUNDED = 1e-3
+"""Up to which a length of p differs from one, or a matrix from a rotation, by rounded decimals."""
+
+
+class OrientationError(ValueError):
+    """What was given is no orientation."""
+
+
+def euler_parameters(
+    given: Any, axis: Any, angle: Any, axes: Mapping[str, Any]
+) -> tuple[Scalars, str]:
+    """Return Euler parameters of length one, and a remark where what was given is not exactly one.
+
+    Parameters
+    ----------
+    given
+        Four Euler parameters, a rotation matrix (3, 3), a `scipy.spatial.transform.Rotation`, or
+        None.
+    axis, angle
+        A direction, and the angle about it, which may be an expression of parameters; or None.
+    axes
+        Directions of two of the body's axes, by ``"x"``, ``"y"`` and ``"z"``.
+
+    Raises
+    ------
+    OrientationError
+        If that is no orientation, or more than one.
+    """
+    forms = (given is not None, axis is not None or angle is not None, bool(axes))
+    if sum(forms) > 1:
+        raise OrientationError(
+            "it is given twice; give orientation, or axis and angle, or two of x, y and z"
+        )
+    if axes:
+        return _of_matrix(_from_axes(axes))
+    if forms[1]:
+        return _about(axis, angle), ""
+    return _given(given) if forms[0] else (IDENTITY, "")
+
+
+def _given(given: Any) -> tuple[Scalars, str]:
+    """Return the parameters of what was given alone."""
+    if hasattr(given, "as_matrix"):  # of SciPy, which need not be loaded
+        given = given.as_matrix()
+    elif np.shape(given) == (4,) and any(isinstance(item, sympy.Expr) for item in given):
+        return tuple(given), ""
+    numbers = _numbers(given, "orientation")
+    if numbers.shape == (4,):
+        return _normalised(numbers)
+    if numbers.shape == (3, 3):
+        return _of_matrix(numbers)
+    raise OrientationError(
+        f"orientation has the shape {numbers.shape}; give four Euler parameters (e0, e1, e2, e3), "
+        "a rotation matrix of three rows, or a scipy Rotation"
+    )
+
+
+def _normalised(p: NDArray[np.float64]) -> tuple[Scalars, str]:
+    """Return p of length one."""
+    length = float(np.linalg.norm(p))
+    if length == 0:
+        raise OrientationError(
+            "the Euler parameters have length zero, which is no orientation; (1, 0, 0, 0) is that "
+            "of the ground"
+        )
+    remark = f"the Euler parameters have length {length:.6g}, and were divided by it"
+    return tuple((p / length).tolist()), remark if abs(length - 1) > ROUNDED else ""
+
+
+def _about(axis: Any, angle: Any) -> Scalars:
+    """Return cos(angle/2) and sin(angle/2) times the unit axis."""
+    if axis is None or angle is None:
+        raise OrientationError("give both axis and angle, as axis=(0, 0, 1), angle=0.5")
+    u = _direction(axis, "axis")
+    try:
+        half = as_sympy(angle) / 2
+    except (TypeError, ValueError, sympy.SympifyError):
+        raise OrientationError(f"the angle {angle!r} is not a number") from None
+    if half.is_number:
+        c, s = math.cos(_finite(half)), math.sin(_finite(half))
+        return c, *(s * item for item in u.tolist())
+    return sympy.cos(half), *(sympy.sin(half) * item for item in u.tolist())
+
+
+def _from_axes(given: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Return the matrix of two axes: the first is taken as it is, the second beside it."""
+    if len(given) != 2:
+        raise OrientationError(
+            f"{len(given)} of the body's axes {'is' if len(given) == 1 else 'are'} given; give two "
+            "of x, y and z, the third follows"
+        )
+    (first, second), known = given, {key: _direction(item, key) for key, item in given.items()}
+    u = known[first]
+    beside = known[second] - (known[second] @ u) * u
+    size = float(np.linalg.norm(beside))
+    if size < ROUNDED:
+        raise OrientationError(f"its axes {first} and {second} are parallel; give two that cross")
+    columns = {first: u, second: beside / size}
+    order = "xyz"
+    third = next(key for key in order if key not in columns)
+    before, after = (order[(order.index(third) + k) % 3] for k in (1, 2))
+    columns[third] = np.cross(columns[before], columns[after])
+    return np.column_stack([columns[key] for key in order])
+
+
+def _of_matrix(matrix: NDArray[np.float64]) -> tuple[Scalars, str]:
+    """Return the parameters of a rotation matrix."""
+    off = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
+    if off > ROUNDED:
+        raise OrientationError(
+            f"the matrix is no rotation: its columns miss lengths of one and right angles by "
+            f"{off:.3g}; the columns are the body's unit axes in the ground's frame"
+        )
+    determinant = float(np.linalg.det(matrix))
+    if determinant < 0:
+        raise OrientationError(
+            f"the matrix is left-handed, its determinant is {determinant:.3g}; turn one axis "
+            "round, so that z = x cross y"
+        )
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(matrix).as_quat()
+    sign = -1.0 if w < 0 else 1.0
+    return tuple(float(sign * item) for item in (w, x, y, z)), ""
+
+
+def _finite(half: sympy.Expr) -> float:
+    """Return a half angle as a number."""
+    if not (half.is_real and half.is_finite):
+        raise OrientationError(f"the angle {2 * half} is not a finite number")
+    return float(half)
+
+
+def _direction(given: Any, what: str) -> NDArray[np.float64]:
+    """Return a unit vector."""
+    numbers = _numbers(given, what)
+    size = float(np.linalg.norm(numbers))
+    if numbers.shape != (3,) or size == 0:
+        raise OrientationError(f"{what} is {given!r}; give three numbers, not all zero")
+    return numbers / size
+
+
+def _numbers(given: Any, what: str) -> NDArray[np.float64]:
+    """Return finite numbers as an array."""
+    try:
+        numbers = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.array(np.nan)
+    if not np.isfinite(numbers).all():
+        raise OrientationError(f"{what} is {given!r}, which is not made of finite numbers")
+    return numbers
