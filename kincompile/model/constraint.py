@@ -43,6 +43,12 @@ class Constraint(Shown):
 
     source: ClassVar[str] = ""
     """Where the textbook has it."""
+    known_as: ClassVar[str] = ""
+    """What engineers call it, and search for, separated by commas."""
+    positive: ClassVar[str] = ""
+    """Which way its value counts, or what the guess decides."""
+    use: ClassVar[tuple[str, str]] = ("", "")
+    """How it is written, in two lines for a mechanism `m`: its bodies, and the constraint."""
     row_names: ClassVar[tuple[str, ...]] = ()
     """Names of the equations where there is more than one."""
     bodies: ClassVar[BodyKind] = PLANAR
