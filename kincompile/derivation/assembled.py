@@ -138,7 +138,7 @@ def _offsets(evaluation: Evaluation) -> Chapter:
 def _pattern(evaluation: Evaluation) -> Chapter:
     entries = {
         (entry.row, entry.column): anchor("Phi_q", entry)
-        for section in evaluation.code.sections
+        for section in evaluation.code.constraints
         for entry in section.entries["Phi_q"]
     }
     counts = (len(item.equation_names) for item in evaluation.system.constraints)
@@ -172,7 +172,7 @@ def _mobility(evaluation: Evaluation) -> Chapter:
 
 def _vectors(evaluation: Evaluation) -> Chapter:
     rows: Rows = []
-    for section in evaluation.code.sections:
+    for section in evaluation.code.constraints:
         quantities = (section.entries[name] for name in ("Phi", "nu", "gamma"))
         for Phi, nu, gamma in zip(*quantities, strict=True):
             row: list[Run | Runs] = [str(Phi.row), Verbatim(evaluation.system.equations[Phi.row])]
@@ -194,7 +194,7 @@ def _vectors(evaluation: Evaluation) -> Chapter:
 def _jacobian(evaluation: Evaluation) -> Chapter:
     found = {
         (entry.row, entry.column): entry
-        for section in evaluation.code.sections
+        for section in evaluation.code.constraints
         for entry in section.entries["Phi_q"]
     }
     is_wide = len(evaluation.coordinates) > WIDEST_TABLE

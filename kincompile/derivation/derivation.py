@@ -184,7 +184,7 @@ def constraint_chapters(
         joint_section(figures, item, rows)
         if isinstance(item, Joint)
         else equation_section(chosen, item, rows)
-        for item, rows in zip(constraints, chosen.code.sections, strict=True)
+        for item, rows in zip(constraints, chosen.code.constraints, strict=True)
         if constraint in (None, item.name)
     )
     names: dict[Expression, Glyph] = {}
