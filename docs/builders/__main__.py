@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 from docs.builders import course, joints, notebooks, pictures
 from docs.builders.places import DOCS, write
 
 WRITERS = {
-    "pictures": lambda: write(DOCS / "images", {**joints.pictures(), **pictures.drawn()}),
+    "pictures": lambda: write(
+        DOCS / "images", {**joints.pictures(), **course.sketches(), **pictures.drawn()}
+    ),
     "joints": lambda: write(DOCS, {"joints.md": joints.page()}),
     "notebooks": lambda: write(notebooks.FOLDER, notebooks.notebooks()),
-    "course": lambda: course.make(Path(sys.argv[2])),
+    "course": lambda: course.make(sys.argv[2:]),
 }
 
 if __name__ == "__main__":

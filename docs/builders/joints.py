@@ -33,7 +33,9 @@ def catalogue_text() -> str:
         arguments = ", ".join(kind.arguments())
         rows = max(len(kind.row_names), 1)
         table.append(f"| [`{name}`](#{name.lower()}) | {kind.known_as} | {arguments} | {rows} |")
-    table.append("| `Equation` | free equation | one or more SymPy expressions, each = 0 | one each |")
+    table.append(
+        "| `Equation` | free equation | one or more SymPy expressions, each = 0 | one each |"
+    )
     sections = "\n".join(line for kind in CONSTRAINTS.values() for line in _section(kind))
     return "\n".join(table) + f"\n\n{sections}"
 

@@ -13,7 +13,7 @@ from posixpath import normpath
 from typing import TYPE_CHECKING
 
 import kincompile as kc
-from docs.builders import benchmark_plots, pictures
+from docs.builders import benchmark_plots, course, pictures
 from docs.builders.places import DOCS, EXAMPLES, ROOT, write
 from kincompile.model.catalogue import CONSTRAINTS
 
@@ -94,6 +94,8 @@ def _read(app: Sphinx, name: str, source: list[str]) -> None:
     if not name.startswith("generated/"):
         folder = PurePosixPath("docs", name).parent
         source[0] = in_the_site(source[0], str(folder))
+    if name.startswith("course/"):
+        source[0] = course.LIVE.sub(_live(f"lesson_{PurePosixPath(name).name}"), source[0])
     if name == "names":
         source[0] = _with_links(source[0]) + _toctree("generated/api/*")
     if name == "guides":
@@ -153,12 +155,8 @@ def _example_page(name: str) -> str:
     first, *rest = inspect.cleandoc(source.split('"""')[1]).split("\n\n")
     return "\n".join([
         f"# {title(name)}", "", first, "", *rest, "",
-        "```{raw} html",
-        f'<iframe class="live" src="../../live/{name}.html" title="{title(name)}, live" '
-        'loading="lazy"></iframe>',
-        f'<p><a href="../../live/{name}.html">The page alone</a>, as '
-        f"<code>kincompile view examples/{name}.toml -o {name}.html</code> writes it.</p>",
-        "```", "",
+        _live(name, "../.."), "",
+        f"`kincompile view examples/{name}.toml -o {name}.html` writes this page.", "",
         "::::{tab-set}",
         ":::{tab-item} Python", f"```{{literalinclude}} ../../../examples/{name}.py", "```", ":::",
         ":::{tab-item} TOML", f"```{{literalinclude}} ../../../examples/{name}.toml",
@@ -167,18 +165,29 @@ def _example_page(name: str) -> str:
     ])  # fmt: skip
 
 
+def _live(name: str, top: str = "..") -> str:
+    """Return a live page inside another."""
+    return (
+        f'```{{raw}} html\n<iframe class="live" src="{top}/live/{name}.html" title="{name}, live" '
+        f'loading="lazy"></iframe>\n<p><a href="{top}/live/{name}.html">The page alone</a></p>\n```'
+    )
+
+
 def _write_motions() -> None:
     """Write the pictures and the live pages that are older than what they are made from."""
     sources = [*(ROOT / "kincompile").rglob("*.py"), *(ROOT / "templates").rglob("*.*")]
     newest = max(path.stat().st_mtime for path in sources)
-    (GENERATED / "extra" / "live").mkdir(parents=True, exist_ok=True)
+    live_folder = GENERATED / "extra" / "live"
+    live_folder.mkdir(parents=True, exist_ok=True)
     for name in _examples():
         model = EXAMPLES / f"{name}.toml"
-        live = GENERATED / "extra" / "live" / f"{name}.html"
+        live = live_folder / f"{name}.html"
         if live.exists() and live.stat().st_mtime > max(newest, model.stat().st_mtime):
             continue
         write(GENERATED / "motions", {f"{name}.svg": pictures.moving(name)})
         kc.page(kc.read_model(model)).write(live)
+    for lesson in course.LESSONS:
+        kc.page(course.model_of(lesson)).write(live_folder / f"lesson_{lesson}.html")
 
 
 # ---- public names --------------------------------------------------------------------------------

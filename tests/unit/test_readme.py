@@ -29,14 +29,9 @@ ROOT = Path(__file__).resolve().parents[2]
 RUN = {
     "README.md": 9, "docs/modelling.md": 7, "docs/emitted_modules.md": 9, "docs/errors.md": 3,
     "docs/command_line.md": 4, "docs/motion_laws.md": 8, "docs/checker.md": 7,
+    "docs/explanation/newton.md": 4, "docs/explanation/signs.md": 4,
 }  # fmt: skip
 """Pages that are run, and how many blocks each has at least."""
-
-RUN_SLOWLY = {
-    f"docs/{page}.md": 4
-    for page in ("tutorials/jacobian", "tutorials/linkage", "tutorials/teaching",
-                 "explanation/newton", "explanation/signs")
-}  # fmt: skip
 
 README, COMMANDS, NAMES, JOINTS = (
     (ROOT / page).read_text(encoding="utf-8")
@@ -134,13 +129,7 @@ def failure_of(reader: Reader, block: re.Match[str]) -> str:
     return ""
 
 
-@pytest.mark.parametrize(
-    ("page", "least"),
-    [
-        *RUN.items(),
-        *(pytest.param(*item, marks=pytest.mark.slow) for item in RUN_SLOWLY.items()),
-    ],
-)
+@pytest.mark.parametrize(("page", "least"), RUN.items())
 def test_that_a_page_does_what_it_says(page, least, tmp_path):
     reader = Reader(tmp_path)
     blocks = list(BLOCK.finditer((ROOT / page).read_text(encoding="utf-8")))
@@ -170,7 +159,9 @@ def test_that_the_make_targets_exist():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_that_links_lead_somewhere(page):
-    text = re.sub(r"^ *```.*?^ *```$|`[^`\n]+`", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    text = re.sub(
+        r"^ *```.*?^ *```$|`[^`\n]+`", "", page.read_text(encoding="utf-8"), flags=re.M | re.S
+    )
     links = re.findall(r"\]\(([^)]+)\)|src=\"([^\"]+)\"", text)
     assert [link for pair in links for link in pair if link and not leads(page, link)] == []
 
