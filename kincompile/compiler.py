@@ -211,7 +211,12 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    from kincompile.runtime.engine.code import DRIVERS, JOINT_POINTS, SENSITIVITIES
+    from kincompile.runtime.engine.code import (
+        DRIVERS,
+        JOINT_POINTS,
+        SENSITIVITIES,
+        SensitiveModules,
+    )
     from kincompile.runtime.load import from_source
 
     loadable = [name for name, item in TARGETS.items() if item.is_loadable]
@@ -235,7 +240,10 @@ def compile(  # noqa: A001 - the public name kc.compile
     vars(module)[JOINT_POINTS] = partial(_joint_points, system)
     vars(module)[DRIVERS] = system.drivers_at
     if isinstance(code, InlineProgram):  # the program of a large mechanism is not worth its memory
-        vars(module)[SENSITIVITIES] = cache(partial(_sensitive_module, code.program))
+        vars(module)[SENSITIVITIES] = SensitiveModules(
+            cache(partial(_observing_module, code, target)),
+            cache(partial(_sensitive_module, code.program)),
+        )
     return remember_model(module, system)
 
 
@@ -264,6 +272,21 @@ def _sensitive_module(program: Program, names: tuple[str, ...]) -> ModuleType:
     from kincompile.runtime.load import from_source
 
     return from_source(emit_program("numpy", _sensitive(program, names)).source, program.name)
+
+
+def _observing_module(
+    code: InlineProgram, target: str, names: tuple[str, ...], of: tuple[str, ...]
+) -> ModuleType | None:
+    """Return the module whose outputs are derivatives of columns, for `kc.sensitivities`."""
+    from kincompile.ir.implicit import observing_sensitivities
+    from kincompile.runtime.load import from_source
+
+    program = observing_sensitivities(code, names, of)
+    if program is None:
+        return None
+    written = inline(program)
+    module = from_source(emit_program("numpy", written).source, program.name)
+    return _native(module, written) if target == "c" else module
 
 
 def _native(module: ModuleType, code: InlineProgram) -> ModuleType:

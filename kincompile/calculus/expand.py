@@ -12,6 +12,7 @@ from operator import add, mul
 from typing import TYPE_CHECKING, Protocol
 
 from kincompile.calculus.expressions import (
+    Angle,
     Basis,
     Dot,
     Expression,
@@ -63,8 +64,8 @@ class Environment(Protocol):
     def entries(self, rotation: Rotation, expand: Expansion) -> Components:
         """Return the numbers that all vectors share that a rotation turns."""
 
-    def call(self, function: str, value: Value) -> Value:
-        """Return cosine (``"cos"``), sine or square root (``"sqrt"``)."""
+    def call(self, function: str, *values: Value) -> Value:
+        """Return cosine (``"cos"``), sine, square root (``"sqrt"``) or ``"atan2"`` of y and x."""
 
 
 class Expansion:
@@ -124,6 +125,8 @@ class Expansion:
             case Norm(vector):
                 squares = [item**2 for item in self.vector(vector)]
                 return environment.call("sqrt", reduce(add, squares))
+            case Angle(sine, cosine):
+                return environment.call("atan2", self.scalar(sine), self.scalar(cosine))
             case Dot(left, right):
                 return reduce(add, map(mul, self.vector(left), self.vector(right)))
         raise TypeError(f"not a scalar expression: {expression!r}")
@@ -149,6 +152,7 @@ class Expansion:
                     environment.entries(rotation, self),
                     self.vector(vector),
                     tuple(self.components(item) for item in along),
+                    self.components,
                 )
             case Perpendicular(vector):
                 x, y = self.vector(vector)

@@ -148,6 +148,14 @@ class Norm(Scalar):
 
 
 @dataclass(frozen=True, slots=True)
+class Angle(Scalar):
+    """The angle of the point (cosine, sine) of the plane, in (-pi, pi]."""
+
+    sine: Scalar
+    cosine: Scalar
+
+
+@dataclass(frozen=True, slots=True)
 class Dot(Scalar):
     """The scalar product u^T v."""
 
@@ -208,9 +216,16 @@ class Rotation(Protocol):
         """
 
     def components(
-        self, entries: Components, vector: Components, along: tuple[Components, ...]
+        self,
+        entries: Components,
+        vector: Components,
+        along: tuple[Components, ...],
+        expand: Callable[[Expression], Components],
     ) -> Components:
-        """Return the components of a turned vector, all of them given as components."""
+        """Return the components of a turned vector, all of them given as components.
+
+        `expand` gives those of a coordinate, where the entries are not enough.
+        """
 
 
 @dataclass(frozen=True, slots=True)

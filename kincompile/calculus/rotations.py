@@ -58,9 +58,14 @@ class PlaneRotation:
         return call("cos", angle), call("sin", angle)
 
     def components(
-        self, entries: Components, vector: Components, along: tuple[Components, ...]
+        self,
+        entries: Components,
+        vector: Components,
+        along: tuple[Components, ...],
+        expand: Callable[[Expression], Components],
     ) -> Components:
         """Return A v, or B v where `along` has its one."""
+        del expand
         cosine, sine = entries
         x, y = vector
         x, y = x * cosine - y * sine, x * sine + y * cosine

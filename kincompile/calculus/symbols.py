@@ -16,6 +16,7 @@ from kincompile.calculus.expressions import (
     rotated,
 )
 from kincompile.calculus.rotations import PlaneRotation, turned
+from kincompile.names import rate
 
 if TYPE_CHECKING:
     from kincompile.calculus.expressions import Rotation
@@ -25,41 +26,44 @@ CoordinateSymbol = VectorSymbol | Symbol
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """The frame of a body in the plane: position r, angle phi, and its rotation."""
+    """The frame of a body: its position r, its orientation, and the rotation that belongs to it."""
 
     index: str
-    letters: ClassVar[tuple[str, ...]] = ("x", "y", "phi")
+    letters: ClassVar[tuple[str, ...]]
     """Letters of the coordinates, one a component."""
+    ground: ClassVar[tuple[int, ...]]
+    """Values of the ground's."""
+    size: ClassVar[int]
+    """Number of components of a position."""
 
     @property
     def r(self) -> VectorSymbol:
         """The position of the body's origin."""
-        return VectorSymbol(f"r_{self.index}")
-
-    @property
-    def phi(self) -> Symbol:
-        """The angle of the body."""
-        return Symbol(f"phi_{self.index}")
+        return VectorSymbol(f"r_{self.index}", self.size)
 
     @property
     def coordinates(self) -> tuple[CoordinateSymbol, ...]:
         """Its generalised coordinates, in order."""
-        return self.r, self.phi
+        return self.motion(0)
 
     @property
     def rates(self) -> tuple[CoordinateSymbol, ...]:
         """Their rates, in the same order."""
-        return VectorSymbol(f"r_{self.index}_dot"), Symbol(f"phi_{self.index}_dot")
+        return self.motion(1)
 
     @property
     def second_rates(self) -> tuple[CoordinateSymbol, ...]:
         """Their second rates, in the same order."""
-        return VectorSymbol(f"r_{self.index}_ddot"), Symbol(f"phi_{self.index}_ddot")
+        return self.motion(2)
+
+    def motion(self, order: int) -> tuple[CoordinateSymbol, ...]:
+        """Return the coordinates, or their time derivatives of the given order."""
+        raise NotImplementedError
 
     @property
     def rotation(self) -> Rotation:
         """The rotation matrix A as a function of the coordinates."""
-        return PlaneRotation(self.phi)
+        raise NotImplementedError
 
     def A(self, vector: Vector) -> Vector:  # noqa: N802 - the rotation matrix of the textbook
         """Turn a body-fixed vector into the global frame."""
@@ -71,11 +75,36 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
+class PlaneFrame(Frame):
+    """The frame of a body in the plane: position r, angle phi, and its rotation."""
+
+    letters: ClassVar[tuple[str, ...]] = ("x", "y", "phi")
+    ground: ClassVar[tuple[int, ...]] = (0, 0, 0)
+    size: ClassVar[int] = 2
+
+    @property
+    def phi(self) -> Symbol:
+        """The angle of the body."""
+        return Symbol(f"phi_{self.index}")
+
+    def motion(self, order: int) -> tuple[CoordinateSymbol, ...]:
+        """Return r and phi, or their time derivatives of the given order."""
+        r, phi = (rate(f"{letter}_{self.index}", order) for letter in ("r", "phi"))
+        return VectorSymbol(r, self.size), Symbol(phi)
+
+    @property
+    def rotation(self) -> Rotation:
+        """The rotation by phi."""
+        return PlaneRotation(self.phi)
+
+
+@dataclass(frozen=True, slots=True)
 class Contact:
     """The contact parameter of a cam profile in polar form, a(alpha) = rho(alpha) u(alpha)."""
 
     index: str
     letters: ClassVar[tuple[str, ...]] = ("alpha",)
+    ground: ClassVar[tuple[int, ...]] = (0,)
 
     @property
     def alpha(self) -> Symbol:
@@ -117,7 +146,7 @@ def unit(angle: Scalar) -> Vector:
     return turned(angle, Basis())
 
 
-i, j = Frame("i"), Frame("j")
+i, j = PlaneFrame("i"), PlaneFrame("j")
 contact_i, contact_j = Contact("i"), Contact("j")
 s_i, s_j, v_i, v_j = (VectorSymbol(name) for name in ("s_i", "s_j", "v_i", "v_j"))
 s_P, s_Q, c = (VectorSymbol(name) for name in ("s_P", "s_Q", "c"))

@@ -41,6 +41,11 @@ class Template:
         return *self.frames, *self.contacts
 
     @property
+    def dimension(self) -> int:
+        """Number of components of a vector: 2 in the plane, 3 in space."""
+        return self.frames[0].size if self.frames else 2
+
+    @property
     def coordinates(self) -> tuple[CoordinateSymbol, ...]:
         """The generalised coordinates: r and phi of each body, then the contact parameters."""
         return tuple(item for owner in self.owners for item in owner.coordinates)

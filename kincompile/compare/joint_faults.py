@@ -38,6 +38,7 @@ from kincompile.calculus.expressions import (
     split_coefficient,
 )
 from kincompile.calculus.rotations import PlaneRotation
+from kincompile.calculus.symbols import PlaneFrame
 from kincompile.compare.agreement import agrees
 from kincompile.compare.collected import (
     CollectedTerm,
@@ -132,7 +133,9 @@ class JointFaults:
         self._blocks = derive(joint.template)
         self._partials = partials(joint.template)
         self._expansion = NumericExpansion(joint, reference, states)
-        angles = frozenset(frame.phi.name for frame in joint.template.frames)
+        angles = frozenset(
+            frame.phi.name for frame in joint.template.frames if isinstance(frame, PlaneFrame)
+        )
         partners = joint.written.partners()
         self._symbols = Symbols(angles, frozenset(joint.points), partners)
         self._parts = self._right_formulas()

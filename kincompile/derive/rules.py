@@ -14,6 +14,7 @@ from typing import overload
 from kincompile.calculus.expressions import (
     ZERO,
     ZERO_VECTOR,
+    Angle,
     Dot,
     Expression,
     Perpendicular,
@@ -53,6 +54,7 @@ class Rule(Enum):
     CHAIN = "chain rule"
     A_TO_B = "dA/dphi = B"
     B_TO_A = "dB/dphi = -A"
+    ANGLE = "d atan2(s, c) = (c ds - s dc)/(s^2 + c^2)"
     CONSTANT = "constant"
     COORDINATE = "coordinate"
     DRIVER = "driver: C(t) to its time derivative"
@@ -112,6 +114,10 @@ def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[R
             return Rule.PRODUCT, dot(along(left, direction, record), right) + dot(
                 left, along(right, direction, record)
             )
+        case Angle(sine, cosine):
+            by_sine, by_cosine = (along(item, direction, record) for item in (sine, cosine))
+            turn = cosine * by_sine - sine * by_cosine
+            return Rule.ANGLE, turn / (sine**2 + cosine**2)
         case ProfileFunction(name, argument, order):
             inner = along(argument, direction, record)
             return Rule.PROFILE, ProfileFunction(name, argument, order + 1) * inner

@@ -16,7 +16,7 @@ from kincompile.ir.graph import Constant, Graph, Node
 from kincompile.structure.blocks import Block, block_triangular
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
+    from collections.abc import Collection, Iterable, Sequence
 
     from kincompile.ir.inline import InlineProgram
 
@@ -68,10 +68,14 @@ class SolvePlan:
         return any(len(block.rows) > LARGEST_CLOSED_FORM for block in self.blocks)
 
 
-def plan_solve(code: InlineProgram) -> SolvePlan | None:
-    """Plan the solve of a square system; None where it is structurally singular."""
+def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan | None:
+    """Plan the solve of a square system; None where it is structurally singular.
+
+    `is_straight` is for code that may not call LAPACK: larger blocks are eliminated too, with
+    pivots that vary. The determinants are then these pivots.
+    """
     size = len(code.program.equations), len(code.program.coordinates)
-    return plan_entries(*size, jacobian_entries(code))
+    return plan_entries(*size, jacobian_entries(code), is_straight=is_straight)
 
 
 def jacobian_entries(code: InlineProgram) -> list[tuple[int, int, Constant | None]]:
@@ -80,7 +84,11 @@ def jacobian_entries(code: InlineProgram) -> list[tuple[int, int, Constant | Non
 
 
 def plan_entries(
-    row_count: int, column_count: int, entries: Iterable[tuple[int, int, Constant | None]]
+    row_count: int,
+    column_count: int,
+    entries: Iterable[tuple[int, int, Constant | None]],
+    *,
+    is_straight: bool = False,
 ) -> SolvePlan | None:
     """Plan the solve of a matrix given by its entries, each a number or, where it varies, None."""
     graph = Graph()
@@ -104,11 +112,14 @@ def plan_entries(
     if blocks is None:
         return None
     solution: dict[int, int] = {}
-    determinants = [_solve_block(graph, block, matrix, right, solution) for block in blocks]
-    for pivot in reversed(pivots):
-        terms = eliminated[pivot.row]
-        rest = _remainder(graph, terms, {pivot.column}, right[pivot.row], solution)
-        solution[pivot.column] = graph.div(rest, terms[pivot.column])
+    determinants: list[int] = []
+    for block in blocks:
+        is_small = len(block.rows) <= LARGEST_CLOSED_FORM
+        solve = _eliminate_block if is_straight and not is_small else _solve_block
+        determinants += solve(graph, block, matrix, right, solution)
+    _substitute(graph, pivots, eliminated, right, solution)
+    if len(solution) < column_count:
+        return None
     return SolvePlan(
         tuple(graph.nodes),
         tuple(varying),
@@ -133,14 +144,30 @@ def _remainder(
     return right
 
 
-def _eliminate(graph: Graph, matrix: Matrix, right: dict[int, int]) -> tuple[list[Pivot], Matrix]:
-    """Eliminate with plain numbers as long as there are any.
+def _substitute(
+    graph: Graph,
+    pivots: Sequence[Pivot],
+    eliminated: Matrix,
+    right: dict[int, int],
+    solution: dict[int, int],
+) -> None:
+    """Add the coordinates that were eliminated to the solution, the last one first."""
+    for pivot in reversed(pivots):
+        terms = eliminated[pivot.row]
+        rest = _remainder(graph, terms, {pivot.column}, right[pivot.row], solution)
+        solution[pivot.column] = graph.div(rest, terms[pivot.column])
+
+
+def _eliminate(
+    graph: Graph, matrix: Matrix, right: dict[int, int], *, any_pivot: bool = False
+) -> tuple[list[Pivot], Matrix]:
+    """Eliminate with plain numbers, or any pivot, as long as there are such.
 
     Return the pivots and their rows, which are taken out of the matrix.
     """
     pivots: list[Pivot] = []
     eliminated: Matrix = {}
-    while (pivot := _cheapest(graph, matrix)) is not None:
+    while (pivot := _cheapest(graph, matrix, any_pivot)) is not None:
         row = matrix.pop(pivot.row)
         for other, entries in matrix.items():
             if pivot.column not in entries:
@@ -162,8 +189,8 @@ def _eliminate(graph: Graph, matrix: Matrix, right: dict[int, int]) -> tuple[lis
     return pivots, eliminated
 
 
-def _cheapest(graph: Graph, matrix: Matrix) -> Pivot | None:
-    """Return the constant entry with the least fill (Markowitz), the first of equals."""
+def _cheapest(graph: Graph, matrix: Matrix, any_pivot: bool) -> Pivot | None:
+    """Return the constant entry, or any, with the least fill (Markowitz), the first of equals."""
     in_column: dict[int, int] = {}
     for entries in matrix.values():
         for column in entries:
@@ -171,7 +198,7 @@ def _cheapest(graph: Graph, matrix: Matrix) -> Pivot | None:
     best: tuple[int, int, int] | None = None
     for row, entries in matrix.items():
         for column, node in entries.items():
-            if graph.value_of(node) is None:
+            if not any_pivot and graph.value_of(node) is None:
                 continue
             rank = ((len(entries) - 1) * (in_column[column] - 1), row, column)
             if best is None or rank < best:
@@ -181,7 +208,7 @@ def _cheapest(graph: Graph, matrix: Matrix) -> Pivot | None:
 
 def _solve_block(
     graph: Graph, block: Block, matrix: Matrix, right: dict[int, int], solution: dict[int, int]
-) -> int:
+) -> list[int]:
     """Add the solution of a block to what is known; return the node of its determinant."""
     zero = graph.const(0)
     size = len(block.rows)
@@ -191,7 +218,7 @@ def _solve_block(
         entries = [node for row in a for node in row]
         for k, column in enumerate(block.columns):
             solution[column] = graph.linear("solve", size, k, (*entries, *b))
-        return graph.linear("determinant", size, 0, entries)
+        return [graph.linear("determinant", size, 0, entries)]
     adjugate, determinant = _adjugate(graph, a)
     inverse = graph.div(graph.const(1), determinant)
     for column, cofactors in zip(block.columns, adjugate, strict=True):
@@ -199,7 +226,20 @@ def _solve_block(
         for cofactor, value in zip(cofactors[1:], b[1:], strict=True):
             total = graph.add(total, graph.mul(cofactor, value))
         solution[column] = graph.mul(total, inverse)
-    return determinant
+    return [determinant]
+
+
+def _eliminate_block(
+    graph: Graph, block: Block, matrix: Matrix, right: dict[int, int], solution: dict[int, int]
+) -> list[int]:
+    """Add the solution of a block to what is known; return its pivots, whatever varies in them."""
+    own = set(block.columns)
+    part = {row: {k: x for k, x in matrix[row].items() if k in own} for row in block.rows}
+    sides = {row: _remainder(graph, matrix[row], own, right[row], solution) for row in block.rows}
+    pivots, eliminated = _eliminate(graph, part, sides, any_pivot=True)
+    if not part:
+        _substitute(graph, pivots, eliminated, sides, solution)
+    return [eliminated[pivot.row][pivot.column] for pivot in pivots]
 
 
 LARGEST_CLOSED_FORM = 3

@@ -331,6 +331,15 @@ def reachable(nodes: Sequence[Node], outputs: Iterable[int]) -> list[int]:
     return sorted(found)
 
 
+def depending_on(nodes: Sequence[Node], inputs: Iterable[int]) -> set[int]:
+    """Return the nodes that depend on any of the inputs."""
+    found = set(inputs)
+    for node, content in enumerate(nodes):
+        if not found.isdisjoint(operands_of(content)):
+            found.add(node)
+    return found
+
+
 def pruned(nodes: Sequence[Node], outputs: Iterable[int]) -> tuple[list[Node], dict[int, int]]:
     """Return the code that some outputs need, and the new number of each node that is left."""
     kept = reachable(nodes, outputs)

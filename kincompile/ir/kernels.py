@@ -135,9 +135,9 @@ class KernelEnvironment:
             return expand.entries(rotation)
         return tuple(map(self._input, frame_entries(self._template, frame)))
 
-    def call(self, function: str, value: Value) -> Value:
+    def call(self, function: str, *values: Value) -> Value:
         """Return an elementary function."""
-        return Operand(self.graph, self.graph.call(function, value.node))
+        return Operand(self.graph, self.graph.call(function, *(value.node for value in values)))
 
 
 AXES = "xyz"
@@ -168,7 +168,7 @@ def _motion(template: Template) -> dict[CoordinateSymbol, tuple[StateEntry, ...]
     """Return the inputs of each coordinate and rate of a template."""
     found = {}
     for owner, item in enumerate(template.owners):
-        second_rates = item.second_rates if isinstance(item, Frame) else ()
+        second_rates = item.second_rates if item in template.frames else ()
         for order, symbols in enumerate((item.coordinates, item.rates, second_rates)):
             own = iter(motion_of(template, owner, order))
             for symbol in symbols:
@@ -197,7 +197,7 @@ def frame_kernel(kind: BodyKind) -> FrameKernel:
 def constraint_kernel(template: Template) -> Kernel:
     """Return the kernel of a constraint type."""
     environment = KernelEnvironment(template)
-    expansion = Expansion(environment)
+    expansion = Expansion(environment, template.dimension)
     outputs: dict[str, list[tuple[int, int, int]]] = {}
     first = 0
     for block in derive(template):

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.calculus.symbols import Frame
 from kincompile.errors import ModelError
 from kincompile.ir.differentiate import derivative_code
 from kincompile.ir.equation_shapes import EquationShapes
@@ -249,7 +248,7 @@ class _Binder:
             known: list[Input] = []
             for owner, item in enumerate(template.owners):
                 known += motion_of(template, owner, 0) + motion_of(template, owner, 1)
-                known += frame_entries(template, item) if isinstance(item, Frame) else ()
+                known += frame_entries(template, item) if item in template.frames else ()
             known += [Attribute(symbol, 0, symbol) for symbol in joint.scalars if symbol != "C"]
             for symbol, point in joint.points.items():
                 known += attributes(symbol, len(point))

@@ -67,7 +67,7 @@ def with_sensitivities(program: Program, names: Sequence[str]) -> Program:
         then those of each parameter in turn.
     """
     given = {item.name: item for item in program.parameters}
-    _check_names(program, names)
+    check_names(program, names)
     graph = Graph(program.values)
     larger = program
     for number, name in enumerate(names, start=1):
@@ -92,7 +92,7 @@ NAMED: tuple[Rows | Columns, ...] = ("coordinates", "parameters", "outputs")
 """What shares its names with the derivatives."""
 
 
-def _check_names(program: Program, names: Sequence[str]) -> None:
+def check_names(program: Program, names: Sequence[str]) -> None:
     """Refuse what is no parameter, and a mechanism that has the name of a derivative already."""
     known = [item.name for item in program.parameters]
     if problem := parameters_problem(names, known, program.name):

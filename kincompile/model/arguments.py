@@ -17,7 +17,7 @@ import numpy as np
 import sympy
 from numpy.typing import NDArray
 
-from kincompile.model.bodies import GROUND, Body
+from kincompile.model.bodies import Body
 from kincompile.model.expressions import Scalar, Scalars
 
 BodyLike: TypeAlias = Body | str
@@ -62,7 +62,7 @@ class Argument:
         Its symbol in the textbook's formula.
     text
         What it means, for the docstring; ``{on}`` stands for the argument that names its body,
-        ``{ground}`` for a remark on the ground.
+        ``{place}`` for its coordinates, ``{ground}`` for a remark on the ground.
     on
         The symbol of the body whose frame a point or a direction is given in, ``"ground"`` for the
         fixed frame; "" for what belongs to no frame.
@@ -92,13 +92,23 @@ def body(symbol: str) -> Any:
 
 def point(symbol: str, on: str, what: str = "Point") -> Any:
     """Declare a point in the frame of a body, or of the ground."""
-    where = "(x, y) of the ground" if on == GROUND.name else "(xi, eta) in the frame of {on}"
-    return _declared(Kind.POINT, symbol, f"{what} {where} [length].", on)
+    return _declared(Kind.POINT, symbol, f"{what} {{place}} [length].", on)
 
 
 def axis(symbol: str, on: str) -> Any:
     """Declare a direction in the frame of a body."""
-    text = "Direction (xi, eta) in the frame of {on}, of any length but zero."
+    text = "Direction {place}, of any length but zero."
+    return _declared(Kind.AXIS, symbol, text, on, unit="")
+
+
+def vector(symbol: str, on: str) -> Any:
+    """Declare a vector in the frame of a body, whose length counts."""
+    return _declared(Kind.AXIS, symbol, "Vector {place}, not zero.", on, unit="")
+
+
+def cross(symbol: str, on: str) -> Any:
+    """Declare the direction at a right angle to an axis from which a joint counts angles."""
+    text = "Direction {place} at a right angle to the axis; what is along the axis is left out."
     return _declared(Kind.AXIS, symbol, text, on, unit="")
 
 

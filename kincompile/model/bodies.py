@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.calculus.symbols import Frame
+from kincompile.calculus.symbols import Frame, PlaneFrame
 from kincompile.html import Shown
 from kincompile.model.expressions import NotAnExpressionError, as_expression, number_in
 from kincompile.names import rate
@@ -30,16 +30,23 @@ class BodyKind:
         The frame of a body i or j in the calculus, by its index.
     units
         Unit of each coordinate, None for that of lengths.
-    ground
-        Values of the ground's.
     drivers
         Name of the constraint type that drives each.
     """
 
     frame: type[Frame]
     units: tuple[str | None, ...]
-    ground: tuple[int, ...]
     drivers: tuple[str, ...]
+
+    @property
+    def ground(self) -> tuple[int, ...]:
+        """Values of the ground's coordinates."""
+        return self.frame.ground
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the coordinates of a point in the body's frame."""
+        return ("xi", "eta", "zeta")[: self.frame.size]
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -48,9 +55,8 @@ class BodyKind:
 
 
 PLANAR = BodyKind(
-    frame=Frame,
+    frame=PlaneFrame,
     units=(None, None, "rad"),
-    ground=(0, 0, 0),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteAngle"),
 )
 

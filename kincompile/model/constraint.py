@@ -19,9 +19,10 @@ from kincompile.model.bodies import GROUND, PLANAR, BodyKind
 from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
+    from kincompile.model.expressions import Scalar
 
     Numbers = Callable[[str], tuple[float | None, ...]]
     """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
@@ -81,6 +82,14 @@ class Constraint(Shown):
         """Return what is wrong with several arguments together; each alone is good."""
         del numbers
         return None
+
+    @staticmethod
+    def completed(
+        points: Mapping[str, tuple[Scalar, ...]], defaults: Mapping[str, float]
+    ) -> Mapping[str, tuple[Scalar, ...]]:
+        """Return points and directions as the template has them, from those that were given."""
+        del defaults
+        return points
 
     @classmethod
     @cache
@@ -158,8 +167,8 @@ class Constraint(Shown):
 @dataclass_transform(
     frozen_default=True,
     field_specifiers=(
-        argument.angle, argument.axis, argument.body, argument.distance, argument.point,
-        argument.profile, argument.radius, argument.value, field,
+        argument.angle, argument.axis, argument.body, argument.cross, argument.distance,
+        argument.point, argument.profile, argument.radius, argument.value, argument.vector, field,
     ),
 )  # fmt: skip
 def constraint_type(cls: type[Type]) -> type[Type]:
@@ -195,7 +204,9 @@ def _documentation(cls: type[Constraint]) -> str:
     equations = _listed("equation", cls.equations_of("name"))
     entries = {"name": f"Name of the constraint; its {equations}."}
     for name, item in given.items():
-        entries[name] = item.text.format(on=bodies.get(item.on, ""), ground=ground)
+        on = bodies.get(item.on, "")
+        place = _place(cls.bodies, item.on, on)
+        entries[name] = item.text.format(on=on, ground=ground, place=place)
     if cls.contacts:
         contacts = _listed("contact parameter", cls.contacts_of("name"))
         entries["guess"] = f"Where Newton's method begins [rad], 0 if not given; the {contacts}."
@@ -204,6 +215,13 @@ def _documentation(cls: type[Constraint]) -> str:
     for name, text in entries.items():
         lines += [name, textwrap.fill(text, 92, initial_indent="    ", subsequent_indent="    ")]
     return "\n".join(lines)
+
+
+def _place(kind: BodyKind, on: str, body: str) -> str:
+    """Return the coordinates of a point or a direction, and whose they are, in words."""
+    if on == GROUND.name:
+        return f"({', '.join('xyz'[: len(kind.axes)])}) of the ground"
+    return f"({', '.join(kind.axes)}) in the frame of {body}"
 
 
 def _listed(what: str, names: Sequence[str]) -> str:

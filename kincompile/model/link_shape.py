@@ -20,7 +20,7 @@ from kincompile.names import listed
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from kincompile.model.resolve import Point
+    from kincompile.model.scope import Point
 
     Pair = frozenset[str]
 

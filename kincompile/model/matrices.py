@@ -132,7 +132,7 @@ def _free_rows(equation: FreeEquation) -> list[EquationRow]:
 
 
 def _joint_rows(joint: Joint) -> list[EquationRow]:
-    expansion = Expansion(SymbolicEnvironment(joint))
+    expansion = Expansion(SymbolicEnvironment(joint), joint.template.dimension)
     rows = []
     for block in derive(joint.template):
         columns = [expansion.components(column) for column in block.Phi_q]

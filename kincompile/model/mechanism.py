@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, ClassVar, TypeVar, cast
 
 import sympy
 
@@ -49,6 +49,8 @@ class Mechanism(MatrixViews, TextViews):
         The fixed frame.
     """
 
+    fixed: ClassVar[Body] = GROUND
+
     def __init__(
         self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
     ) -> None:
@@ -56,7 +58,7 @@ class Mechanism(MatrixViews, TextViews):
         self.length_unit = length_unit
         self.end_given = end
         self.points = points
-        self.ground = GROUND
+        self.ground = self.fixed
         self.bodies: list[Body] = []
         self.parameters: list[Parameter] = []
         self.constraints: list[Constraint | Equation] = []
@@ -139,7 +141,7 @@ class Mechanism(MatrixViews, TextViews):
             Its coordinates ``.x`` and ``.y`` are expressions for equations and outputs, and it may
             stand where a joint wants a body and a point.
         """
-        known = {item.name: item for item in (GROUND, *self.bodies)}
+        known = {item.name: item for item in (self.ground, *self.bodies)}
         named = body if isinstance(body, Body) else known.get(body, Body(body))
         point = BodyPoint(name, named, local)
         self.outputs.append(point)
@@ -171,6 +173,10 @@ class Mechanism(MatrixViews, TextViews):
         self.constraints.append(constraint)
         return constraint
 
+    def written(self) -> list[Constraint | Equation]:
+        """Return the constraints in the order of their rows."""
+        return self.constraints
+
     def system(self) -> ConstraintSystem:
         """Check the mechanism and return it as a frozen `ConstraintSystem`.
 
@@ -181,10 +187,11 @@ class Mechanism(MatrixViews, TextViews):
         """
         return ConstraintSystem(
             self.name,
-            equations=self.constraints,
+            equations=self.written(),
             parameters=self.parameters,
             bodies=self.bodies,
             outputs=self.outputs,
+            ground=self.ground,
             length_unit=self.length_unit,
             end=self.end_given,
             points=self.points,

@@ -24,7 +24,7 @@ from kincompile.model.points import (
     rate,
     written_out,
 )
-from kincompile.model.resolve import body_named, checked_expression, checked_point, named_tables
+from kincompile.model.scope import body_named, checked_expression, checked_point, named_tables
 from kincompile.names import rate as rate_name
 from kincompile.names import unit_problem
 
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from kincompile.model.expressions import Scalar
-    from kincompile.model.resolve import Joint, Scope
+    from kincompile.model.resolve import Joint
+    from kincompile.model.scope import Scope
 
 
 @dataclass(frozen=True, slots=True)

@@ -146,7 +146,7 @@ class PlacedPoint(Observed):
 
     name: str
     columns: tuple[str | None, ...]
-    local: tuple[Scalar, Scalar]
+    local: tuple[Scalar, ...]
     bodies: tuple[Body, ...] = ()
     rows: tuple[OutputColumn, ...] = ()
 
@@ -155,7 +155,7 @@ class PlacedPoint(Observed):
     profiles: ClassVar[Mapping[str, sympy.Expr]] = {}
 
     @property
-    def points(self) -> Mapping[str, tuple[Scalar, Scalar]]:
+    def points(self) -> Mapping[str, tuple[Scalar, ...]]:
         """Its place by the symbol in the template."""
         return {s_i.name: self.local}
 

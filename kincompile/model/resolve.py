@@ -5,48 +5,41 @@ Every problem is collected, none is raised.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set, Sized
-from dataclasses import dataclass, field
-from functools import cached_property
-from math import isfinite
+from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, Any, cast
 
 import sympy
 
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import GROUND, Body, Parameter
+from kincompile.model.bodies import Body
 from kincompile.model.expressions import (
-    Degree,
-    NotAnExpressionError,
     Scalar,
     alpha,
-    as_expression,
     as_sympy,
-    degrees_problem,
     depends_on,
     evaluate,
-    in_radians,
-    smoothness_problem,
     symbol_names,
-    t,
-    unknown_problem,
 )
-from kincompile.model.laws import MotionLaw, TableLaw
-from kincompile.model.points import PointCoordinate, written_out
-from kincompile.model.points import rate as rate_of
+from kincompile.model.scope import (
+    Point,
+    Scope,
+    body_named,
+    checked_attribute,
+    checked_expression,
+    checked_point,
+    named_tables,
+)
 from kincompile.model.spline import PeriodicSpline, fit
-from kincompile.names import listed, rate, suggestion
+from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Mapping
 
     from kincompile.calculus.template import Template
     from kincompile.model.arguments import Argument
     from kincompile.model.constraint import Constraint
     from kincompile.model.equation import Equation
-
-Point = tuple[Scalar, Scalar]
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,51 +127,6 @@ class FreeEquation:
         return any(depends_on(expression, ("t",)) for expression in self.expressions)
 
 
-@dataclass
-class Scope:
-    """The names that may be used, and the problems found so far."""
-
-    bodies: Mapping[str, Body]
-    coordinates: Sequence[str]
-    parameters: Mapping[str, Parameter]
-    problems: list[str] = field(default_factory=list)
-
-    @cached_property
-    def declared(self) -> frozenset[str]:
-        """Every name that may occur in an expression."""
-        return frozenset((*self.coordinates, *self.parameters, "t"))
-
-    @cached_property
-    def places(self) -> dict[str, int]:
-        """The number of each coordinate."""
-        return {name: place for place, name in enumerate(self.coordinates)}
-
-    @cached_property
-    def motion(self) -> dict[str, tuple[str, int]]:
-        """The coordinate, and the order of the derivative, by names of coordinates and rates."""
-        orders = range(3)
-        return {rate(name, k): (name, k) for name in self.coordinates for k in orders}
-
-    @cached_property
-    def columns(self) -> dict[str, tuple[str | None, ...]]:
-        """The names of the columns of each body, by its name; the ground has none."""
-        found: dict[str, tuple[str | None, ...]] = {
-            name: body.coordinates for name, body in self.bodies.items()
-        }
-        return found | {GROUND.name: (None,) * len(GROUND.coordinates)}
-
-    @cached_property
-    def coordinate_names(self) -> frozenset[str]:
-        """The coordinates, for membership."""
-        return frozenset(self.coordinates)
-
-    @cached_property
-    def defaults(self) -> dict[str, float]:
-        """Parameters with a default."""
-        values = self.parameters.values()
-        return {item.name: item.default for item in values if item.default is not None}
-
-
 def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:
     """Check a free equation against the names that exist."""
     before = len(scope.problems)
@@ -216,6 +164,9 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
     title = _title(constraint)
+    if constraint.bodies is not scope.ground.kind:
+        scope.problems.append(f"{title}: {_KIND_PROBLEM[len(scope.ground.kind.axes)]}")
+        return None
     corners = _corners(constraint.corners, title, scope)
     for name, item in constraint.arguments().items():
         given, where = getattr(constraint, name), f"{title}, {name}"
@@ -244,10 +195,16 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
         constraint.template(),
         tuple(known),
         scalars,
-        points,
+        constraint.completed(points, scope.defaults),
         profiles,
         (*(name for body in known for name in scope.columns[body.name]), *constraint.contact_names),
     )
+
+
+_KIND_PROBLEM = {
+    2: "it is a constraint of bodies in space; take the one of kincompile for bodies in the plane",
+    3: "it is a constraint of bodies in the plane; take the one of kincompile.spatial",
+}
 
 
 def _title(constraint: Constraint) -> str:
@@ -259,21 +216,6 @@ def _corners(given: Any, title: str, scope: Scope) -> bool:
     if not isinstance(given, bool):
         scope.problems.append(f"{title}, corners: {given!r} is neither True nor False")
     return given is True
-
-
-def body_named(given: Any, where: str, scope: Scope) -> Body | None:
-    """Return the body with the given name, None where there is none."""
-    name = given.name if isinstance(given, Body) else given
-    if isinstance(name, str) and name == GROUND.name:
-        return GROUND
-    if not isinstance(name, str) or name not in scope.bodies:
-        hint = suggestion(name, scope.bodies) if isinstance(name, str) else ""
-        scope.problems.append(
-            f"{where}: there is no body {name!r} in this mechanism{hint}; bodies are: ground, "
-            f"{listed(scope.bodies)}"
-        )
-        return None
-    return scope.bodies[name]
 
 
 def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> None:
@@ -290,97 +232,10 @@ def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> N
         )
 
 
-def checked_expression(
-    given: Any,
-    where: str,
-    declared: Collection[str],
-    scope: Scope,
-    *,
-    unit: str = "",
-    corners: bool = False,
-    is_output: bool = False,
-) -> Scalar | None:
-    """Return a checked expression, with radians for degrees; None where a problem was noted.
-
-    In an output there may be rates, and points stay what they are; elsewhere points are written
-    out.
-    """
-    try:
-        value = as_expression(given)
-    except NotAnExpressionError as error:
-        scope.problems.append(f"{where}: {error}; give a finite number or a SymPy expression")
-        return None
-    if not isinstance(value, sympy.Expr):
-        return value
-    known = (PointCoordinate, rate_of) if is_output else ()
-    value = value if is_output else written_out(value)
-    problem = smoothness_problem(value, corners=corners, known=known)
-    # Rare, so that large mechanisms pay for one look alone.
-    if problem is None and (laws := value.atoms(Degree, MotionLaw)):
-        problem = degrees_problem(value, unit) or _falling_problem(laws, scope)
-        value = in_radians(value)
-    if problem is not None:
-        scope.problems.append(f"{where}: {problem}")
-        return None
-    problem = unknown_problem(value, declared, where)
-    if problem is not None:
-        scope.problems.append(problem)
-        return None
-    return value
-
-
-def _falling_problem(laws: Set[sympy.Basic], scope: Scope) -> str | None:
-    """Return a message about a motion law whose argument falls with time, or None."""
-    for law in sorted((item for item in laws if isinstance(item, MotionLaw)), key=str):
-        argument = cast("sympy.Expr", law.args[0])
-        slope = evaluate(argument.diff(t), scope.defaults)
-        if slope is not None and slope <= 0 and argument.has(t):
-            return (
-                f"the times of {law} must rise, but at the default parameters its argument changes "
-                f"by {slope:g} per unit of time"
-            )
-    return None
-
-
-def named_tables(value: Any, name: str) -> Any:
-    """Return an expression whose tables over time are called after a constraint."""
-    if not isinstance(value, sympy.Expr) or not value.has(TableLaw):
-        return value
-    tables = sorted(value.atoms(TableLaw), key=lambda item: item.given)
-    numbers = {given: k for k, given in enumerate(dict.fromkeys(item.given for item in tables))}
-    stem = f"C_{name}".replace(".", "_")
-    named = {
-        item: item.called(f"{stem}_{numbers[item.given]}" if numbers[item.given] else stem)(
-            *item.args
-        )
-        for item in tables
-    }
-    return value.xreplace(named)
-
-
-def _attribute(given: Any, where: str, scope: Scope, unit: str) -> Scalar:
-    """Return an attribute: a number or an expression of parameters."""
-    if type(given) is float and isfinite(given):
-        return given  # of a large mechanism nearly all
-    value = checked_expression(given, where, scope.declared, scope, unit=unit)
-    if value is None:
-        return 1
-    if not isinstance(value, sympy.Expr):
-        return value
-    varying = sorted(symbol_names(value) - set(scope.parameters))
-    if varying:
-        scope.problems.append(
-            f"{where}: {value} depends on {listed(varying)}; an attribute is fixed in its body, so "
-            "only parameters may occur in it"
-        )
-        return 1
-    return value
-
-
 def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bool) -> Scalar:
     kind, unit = item.kind, item.unit
     if kind in (Kind.SCALAR, Kind.RADIUS):
-        value = _attribute(given, where, scope, unit)
+        value = checked_attribute(given, where, scope, unit)
         if kind is Kind.RADIUS and evaluate(value, scope.defaults) == 0:
             scope.problems.append(
                 f"{where}: the radius is zero; give the pitch radius "
@@ -407,27 +262,6 @@ def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bo
             "(or AbsoluteX and AbsoluteY)"
         )
     return value_or_none
-
-
-def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
-    """Return a pair (xi, eta) of numbers or expressions of parameters."""
-    # A generator would be used up here, a set has no order.
-    is_list = type(given) is tuple or (
-        isinstance(given, Sized) and not isinstance(given, str | Set | Mapping)
-    )
-    try:
-        xi, eta = tuple(given) if is_list else ()
-    except (TypeError, ValueError):
-        scope.problems.append(
-            f"{where}: {given!r} is not a pair (xi, eta) of coordinates in the body's frame; "
-            "give two numbers, or expressions of parameters"
-        )
-        return 1, 1
-    unit = "" if kind is Kind.AXIS else "length"
-    point = _attribute(xi, where, scope, unit), _attribute(eta, where, scope, unit)
-    if kind is Kind.AXIS and [evaluate(value, scope.defaults) for value in point] == [0, 0]:
-        scope.problems.append(f"{where}: the axis has length zero; give a direction such as (1, 0)")
-    return point
 
 
 def _profile(given: Any, table_name: str, where: str, scope: Scope) -> sympy.Expr:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.arguments import BodyLike, PointLike, ValueLike
     from kincompile.model.expressions import Scalar, Scalars
-    from kincompile.model.resolve import Point
+    from kincompile.model.scope import Point
 
 Item = TypeVar("Item", bound=Constraint | Equation)
 

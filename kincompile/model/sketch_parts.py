@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.arguments import BodyLike, PointLike
     from kincompile.model.mechanism import Mechanism
-    from kincompile.model.resolve import Point
+    from kincompile.model.scope import Point
 
 ALONG = "two joints of one link, along='C D', or a direction, along=(1, 0)"
 

@@ -43,7 +43,7 @@ class Bound(Protocol):
         """Scalar attributes by symbol."""
 
     @property
-    def points(self) -> Mapping[str, tuple[Scalar, Scalar]]:
+    def points(self) -> Mapping[str, tuple[Scalar, ...]]:
         """Points and directions by symbol."""
 
     @property
@@ -58,10 +58,11 @@ class SymbolicEnvironment:
         self._bound = bound
         self._motion: dict[CoordinateSymbol, tuple[sympy.Expr, ...]] = {}
         names = iter(bound.columns)
+        values = iter([value for item in bound.template.owners for value in item.ground])
         for item, item_rate in zip(bound.template.coordinates, bound.template.rates, strict=True):
-            own = [next(names) for _ in range(item.size)]
-            self._motion[item] = tuple(_symbol(name) for name in own)
-            self._motion[item_rate] = tuple(_symbol(name and rate(name)) for name in own)
+            own = [(next(names), next(values)) for _ in range(item.size)]
+            self._motion[item] = tuple(_symbol(name, value) for name, value in own)
+            self._motion[item_rate] = tuple(_symbol(name and rate(name)) for name, _ in own)
 
     def number(self, value: Fraction) -> Value:
         """Return an exact number."""
@@ -96,10 +97,10 @@ class SymbolicEnvironment:
         """Return the numbers that all vectors share that a rotation turns."""
         return expand.entries(rotation)
 
-    def call(self, function: str, value: Value) -> Value:
+    def call(self, function: str, *values: Value) -> Value:
         """Return an elementary function."""
-        return getattr(sympy, function)(value)
+        return getattr(sympy, function)(*values)
 
 
-def _symbol(name: str | None) -> sympy.Expr:
-    return sympy.S.Zero if name is None else sympy.Symbol(name)
+def _symbol(name: str | None, ground: int = 0) -> sympy.Expr:
+    return sympy.Integer(ground) if name is None else sympy.Symbol(name)

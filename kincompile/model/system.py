@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy
 
 from kincompile.errors import ModelError
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, Body, Coordinate, Parameter, body_columns
-from kincompile.model.constraint import CamConstraint, Constraint
+from kincompile.model.declarations import (
+    body_coordinates,
+    check_names,
+    check_outlines,
+    checked_bodies,
+    checked_number,
+    checked_parameters,
+    contact_coordinates,
+    free_coordinates,
+    members,
+    written_constraints,
+)
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import (
-    NotAnExpressionError,
     Scalar,
-    as_expression,
-    degrees_problem,
     evaluate,
-    number_in,
 )
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.outputs import (
@@ -31,9 +35,14 @@ from kincompile.model.outputs import (
     resolved_observers,
 )
 from kincompile.model.points import BodyPoint, PlacedPoint
-from kincompile.model.resolve import FreeEquation, Joint, Scope, resolve_equation, resolve_joint
+from kincompile.model.resolve import FreeEquation, Joint, resolve_equation, resolve_joint
+from kincompile.model.scope import Scope
 from kincompile.model.text_views import TextViews
-from kincompile.names import listed, name_problem, rate, unit_problem
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from kincompile.model.constraint import Constraint
 
 
 class ConstraintSystem(MatrixViews, TextViews):
@@ -56,6 +65,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         Bodies, whose coordinates come first.
     outputs
         `Output` and `BodyPoint`, as `Mechanism.output` and `Mechanism.point` make them.
+    ground
+        The fixed frame of the bodies.
     length_unit, end, points
         As for `Mechanism`.
 
@@ -85,7 +96,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
-        "length_unit", "name", "observers", "parameters", "points",
+        "ground", "length_unit", "name", "observers", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -94,6 +105,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     parameters: tuple[Parameter, ...]
     constraints: tuple[Joint | FreeEquation, ...]
     equations: tuple[str, ...]
+    ground: Body
     body_points: tuple[BodyPoint, ...]
     observers: tuple[PlacedPoint | ResolvedOutput, ...]
     length_unit: str
@@ -111,28 +123,31 @@ class ConstraintSystem(MatrixViews, TextViews):
         guess: Sequence[float] | Mapping[Any, float] | None = None,
         bodies: Iterable[Body] = (),
         outputs: Iterable[BodyPoint | Output] = (),
+        ground: Body = GROUND,
         length_unit: str = "m",
         end: Scalar = 1.0,
         points: int = 101,
     ) -> None:
         problems: list[str] = []
-        bodies = _bodies(bodies, problems)
-        written = _written(equations, problems)
-        declared = _parameters(parameters, problems)
+        bodies = checked_bodies(bodies, problems)
+        written = written_constraints(equations, problems)
+        declared = checked_parameters(parameters, problems)
         defaults = {item.name: item.default for item in declared if item.default is not None}
         found = [
-            *_body_coordinates(bodies, length_unit, defaults, problems),
-            *_free_coordinates(coordinates, guess, defaults, problems),
-            *_contact_coordinates(written, defaults, problems),
+            *body_coordinates(bodies, length_unit, defaults, problems),
+            *free_coordinates(coordinates, guess, defaults, problems),
+            *contact_coordinates(written, defaults, problems),
         ]
-        _check_outlines(bodies, defaults, problems)
-        last: Any = _number(end, "end", defaults, problems) if isinstance(end, sympy.Expr) else end
-        wanted = _items(outputs, "outputs", problems)
+        check_outlines(bodies, defaults, problems)
+        last: Any = (
+            checked_number(end, "end", defaults, problems) if isinstance(end, sympy.Expr) else end
+        )
+        wanted = members(outputs, "outputs", problems)
         body_points = tuple(item for item in wanted if isinstance(item, BodyPoint))
         asked = [item for item in wanted if isinstance(item, Output)]
         named = [*chain(*(item.output_names for item in body_points)), *(x.name for x in asked)]
-        _check_names(name, bodies, found, declared, written, named, problems)
-        scope = _scope(bodies, found, declared, problems)
+        check_names(name, bodies, found, declared, written, named, problems)
+        scope = _scope(bodies, found, declared, problems, ground)
         constraints = _resolved(written, scope)
         observers = resolved_observers(body_points, asked, scope, length_unit)
         if not written:
@@ -145,8 +160,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
-            "observers": observers, "length_unit": length_unit, "end": last, "end_given": end,
-            "points": points,
+            "observers": observers, "ground": ground, "length_unit": length_unit, "end": last,
+            "end_given": end, "points": points,
         }  # fmt: skip
         _fill(self, values)
 
@@ -159,7 +174,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
         """Return the same system with these points as its outputs, and no others."""
-        scope = _scope(self.bodies, self.coordinates, self.parameters, [])
+        scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
         observers = resolved_observers(points, (), scope, self.length_unit)
         values = {key: getattr(self, key) for key in self.__slots__}
         other = ConstraintSystem.__new__(ConstraintSystem)
@@ -232,6 +247,7 @@ def _scope(
     coordinates: Iterable[Coordinate],
     parameters: Iterable[Parameter],
     problems: list[str],
+    ground: Body,
 ) -> Scope:
     """Return the names that may be used in a system."""
     return Scope(
@@ -239,6 +255,7 @@ def _scope(
         [item.name for item in coordinates],
         {item.name: item for item in parameters},
         problems,
+        ground,
     )
 
 
@@ -251,261 +268,3 @@ def _resolved(
         for item in written
     )
     return tuple(item for item in found if item is not None)
-
-
-def _written(equations: Iterable[Any], problems: list[str]) -> list[Constraint | Equation]:
-    """Return the constraints as written; an expression is named by its place."""
-    return [
-        item if isinstance(item, Constraint | Equation) else Equation(f"equation_{k}", item)
-        for k, item in enumerate(_items(equations, "equations", problems), 1)
-    ]
-
-
-def _bodies(given: Iterable[Any], problems: list[str]) -> tuple[Body, ...]:
-    """Return the valid bodies; report everything else as a problem."""
-    found = _items(given, "bodies", problems)
-    problems += [
-        f"{item!r} is not a body; make one with Mechanism.body"
-        for item in found
-        if not isinstance(item, Body)
-    ]
-    return tuple(item for item in found if isinstance(item, Body))
-
-
-def _items(given: Iterable[Any], what: str, problems: list[str]) -> list[Any]:
-    """Return the members of a list, none where it is not one."""
-    if not isinstance(given, str):
-        with suppress(TypeError):
-            return list(given)
-    problems.append(f"the {what} {given!r} are not a list; write {what}=[...]")
-    return []
-
-
-def _name_of(item: Any) -> str:
-    """Return the name of a symbol, of a function of time, or of itself."""
-    if isinstance(item, sympy.Symbol):
-        return str(item.name)
-    return str(item.func.__name__) if isinstance(item, sympy.Function) else str(item)
-
-
-def _number(
-    given: Any, where: str, values: dict[str, float], problems: list[str], unit: str = ""
-) -> float:
-    """Return a finite number, angles in radians, from a number or an expression of parameters."""
-    try:
-        number = number_in(as_expression(given), unit, values)
-    except NotAnExpressionError as error:
-        problems.append(f"{where}: {error}; give a finite number")
-        return 0.0
-    problem = degrees_problem(given, unit)
-    if problem:
-        problems.append(f"{where}: {problem}")
-    if number is None:
-        problems.append(
-            f"{where}: {given} is not a number at the default parameters; give a finite number"
-        )
-        return 0.0
-    return number
-
-
-def _parameters(
-    given: Mapping[Any, float] | Iterable[Parameter], problems: list[str]
-) -> tuple[Parameter, ...]:
-    if isinstance(given, Mapping):
-        given = [Parameter(_name_of(key), value) for key, value in given.items()]
-    checked = []
-    for item in _items(given, "parameters", problems):
-        if not isinstance(item, Parameter):
-            problems.append(
-                f"{item!r} is not a parameter; give values by name: parameters={{'a': 1.0}}"
-            )
-            continue
-        if not isinstance(item.name, str):
-            problems.append(f"{name_problem(item.name, 'a parameter')}")
-            continue
-        default = item.default
-        if default is None:
-            problems.append(
-                f"parameter {item.name!r} has no value; give a default: "
-                f"parameter({item.name!r}, 1.0)"
-            )
-        else:
-            unit = str(item.unit)
-            default = _number(default, f"parameter {item.name!r}", {}, problems, unit)
-        limits = _range(item, default, problems)
-        checked.append(Parameter(item.name, default, item.unit, limits))
-    return tuple(checked)
-
-
-def _range(
-    item: Parameter, default: float | None, problems: list[str]
-) -> tuple[float, float] | None:
-    """Return the least and the greatest value of a parameter as numbers, if it has them."""
-    given, where = item.range, f"parameter {item.name!r}"
-    if given is None or default is None:
-        return None
-    try:
-        low, high = given
-    except (TypeError, ValueError):
-        problems.append(f"{where}: its range is {given!r}; give (least, greatest) value")
-        return None
-    low, high = (
-        _number(end, f"{where}, range", {}, problems, str(item.unit)) for end in (low, high)
-    )
-    if not low < high:
-        problems.append(
-            f"{where}: its range goes from {low:g} to {high:g}; give the least value first"
-        )
-    elif not low <= default <= high:
-        problems.append(
-            f"{where}: its default {default:g} is outside its range from {low:g} to {high:g}"
-        )
-    return low, high
-
-
-def _body_coordinates(
-    bodies: tuple[Body, ...], unit: str, values: dict[str, float], problems: list[str]
-) -> list[Coordinate]:
-    found = []
-    for body in bodies:
-        try:
-            guess = tuple(body.guess)
-        except TypeError:
-            guess = ()
-        kind = body.kind
-        if len(guess) != len(kind.letters):
-            expected = ", ".join(kind.letters)
-            problems.append(f"body {body.name!r}: the guess {body.guess!r} is not ({expected})")
-            guess = kind.ground
-        for name, value, own in zip(body.coordinates, guess, kind.units, strict=True):
-            where, own_unit = f"guess of {name}", unit if own is None else own
-            found.append(
-                Coordinate(name, _number(value, where, values, problems, own_unit), own_unit)
-            )
-    return found
-
-
-def _check_outlines(
-    bodies: tuple[Body, ...], values: dict[str, float], problems: list[str]
-) -> None:
-    """Check that every outline is a list of corners, or none."""
-    for body in bodies:
-        where = f"outline of {body.name}"
-        try:
-            corners = [tuple(corner) for corner in body.outline]
-        except TypeError:
-            problems.append(f"{where}: {body.outline!r} is not a list of corners (xi, eta)")
-            continue
-        if len(corners) in (1, 2):
-            problems.append(f"{where}: it has {len(corners)} corners; a polygon has 3 or more")
-        for k, corner in enumerate(corners, 1):
-            if len(corner) != 2:
-                problems.append(
-                    f"{where}: corner {k}, {corner!r}, is not a pair (xi, eta); give two numbers"
-                )
-            for number in corner:
-                _number(number, f"{where}, corner {k}", values, problems)
-
-
-def _free_coordinates(
-    given: str | Iterable[Any],
-    guess: Sequence[float] | Mapping[Any, float] | None,
-    values: dict[str, float],
-    problems: list[str],
-) -> list[Coordinate]:
-    if isinstance(given, str):
-        given = given.replace(",", " ").split()
-    names = [_name_of(item) for item in _items(given, "coordinates", problems)]
-    if guess is None:
-        guess = [0.0] * len(names)
-    if isinstance(guess, Mapping):
-        by_name = {_name_of(key): value for key, value in guess.items()}
-        unknown = sorted(set(by_name) - set(names))
-        if unknown:
-            problems.append(f"the guess names {listed(unknown)}; coordinates are: {listed(names)}")
-        guess = [by_name.get(name, 0.0) for name in names]
-    try:
-        guess = list(guess)
-    except TypeError:
-        problems.append(f"the guess {guess!r} is not a list; give a value for each coordinate")
-        guess = [0.0] * len(names)
-    if len(guess) != len(names):
-        problems.append(
-            f"the guess has {len(guess)} values for {len(names)} coordinates ({listed(names)}); "
-            "give one for each"
-        )
-        guess = [0.0] * len(names)
-    return [
-        Coordinate(name, _number(value, f"guess of {name}", values, problems))
-        for name, value in zip(names, guess, strict=True)
-    ]
-
-
-def _contact_coordinates(
-    constraints: list[Constraint | Equation], values: dict[str, float], problems: list[str]
-) -> list[Coordinate]:
-    found = []
-    for item in constraints:
-        if not isinstance(item, CamConstraint):
-            continue
-        names = item.contact_names
-        guess: Sequence[Any] = (0.0,) * len(names)
-        if item.guess is not None:
-            guess = item.guess if isinstance(item.guess, tuple | list) else (item.guess,)
-        if len(guess) != len(names):
-            problems.append(
-                f"{type(item).__name__} {item.name!r}: the guess has {len(guess)} values; give one "
-                f"for each of {listed(names)}"
-            )
-            guess = (0.0,) * len(names)
-        for name, value in zip(names, guess, strict=True):
-            found.append(
-                Coordinate(name, _number(value, f"guess of {name}", values, problems), "rad")
-            )
-    return found
-
-
-def _check_names(
-    name: str,
-    bodies: tuple[Body, ...],
-    coordinates: list[Coordinate],
-    parameters: tuple[Parameter, ...],
-    constraints: list[Constraint | Equation],
-    outputs: Sequence[str],
-    problems: list[str],
-) -> None:
-    """Check that names and units are well formed, and that each name means one thing."""
-    named = [("the system", name)]
-    named += [("a body", body.name) for body in bodies]
-    named += [("a parameter", item.name) for item in parameters]
-    named += [("a coordinate", item.name) for item in coordinates]
-    named += [("a constraint", item.name) for item in constraints]
-    named += [("an output", name) for name in outputs]
-    problems += [problem for what, text in named if (problem := name_problem(text, what))]
-    if not all(isinstance(text, str) for _, text in named):
-        raise ModelError(problems)  # further checks need names
-    problems += [
-        f"body {body.name!r}: this is the name of the fixed frame; use m.ground, or another name"
-        for body in bodies
-        if body.name == GROUND.name
-    ]
-    units = [(f"parameter {item.name!r}", item.unit) for item in parameters]
-    units += [("lengths", item.unit) for item in coordinates]
-    problems += [problem for what, unit in units if (problem := unit_problem(unit, what))]
-    _check_unique("bodies", [body.name for body in bodies], problems)
-    _check_unique("constraints", [item.name for item in constraints], problems)
-    symbols = [item.name for item in parameters]
-    if len({body.name for body in bodies}) == len(bodies):
-        symbols += [item.name for item in coordinates]
-        known = dict.fromkeys(item.name for item in coordinates)
-        known |= dict.fromkeys(outputs)
-        symbols += [rate(name, order) for name in known for order in (1, 2)]
-    symbols += outputs
-    kinds = "coordinates, outputs, rates" if outputs else "coordinates, rates"
-    _check_unique(f"{kinds} and parameters", symbols, problems)
-
-
-def _check_unique(what: str, names: list[Any], problems: list[str]) -> None:
-    for name, count in Counter(names).items():
-        if count > 1:
-            problems.append(f"{count} {what} are named {name!r}; give each a name of its own")

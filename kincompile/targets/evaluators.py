@@ -141,9 +141,12 @@ def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[UsedFrame, ...
     """Return the frames of which something is used, and name that."""
     found = []
     for entries in inline.frames:
-        values = tuple(scheduler.name(node) for node in entries if node in scheduler.uses)
+        used = [node for node in entries if node in scheduler.uses]
+        parts = [node for node in scheduler.operands_first(used) if node not in used]
+        shared = scheduler.assign("frame", parts)
+        values = tuple(scheduler.name(node) for node in used)
         if values:
-            found.append(UsedFrame(_angle(inline, values), values))
+            found.append(UsedFrame(_angle(inline, values), (*shared, *values)))
     return tuple(found)
 
 

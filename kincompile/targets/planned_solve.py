@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kincompile.ir.graph import number_of, operands_of
+from kincompile.ir.graph import depending_on, number_of, operands_of
 from kincompile.targets.lines import wrapped
 from kincompile.targets.schedule import Assignment, Scheduler, count_uses
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping
 
     from kincompile.ir.elimination import SolvePlan
-    from kincompile.ir.graph import Node
     from kincompile.ir.inline import InlineProgram
     from kincompile.targets.naming import NameTable
 
@@ -73,7 +72,7 @@ def schedule_solve(code: InlineProgram, plan: SolvePlan, table: NameTable) -> So
     names |= {node: table.take(equations[row]) for row, node in enumerate(plan.right)}
     labels = dict.fromkeys(plan.determinants, "determinant")
     labels |= zip(plan.solution, coordinates, strict=True)
-    variable = _depending_on(plan.nodes, plan.right)
+    variable = depending_on(plan.nodes, plan.right)
     factors = _factors(plan, variable)
     blocks = {node for node, content in enumerate(plan.nodes) if content[0] == "linear"}
     scheduler = Scheduler(plan.nodes, labels, names, table, labels, {*labels, *factors, *blocks})
@@ -103,15 +102,6 @@ def _calls(
         names_of_call = tuple(names[k] for k in called)
         found.setdefault(key, BlockCall(names_of_call, size, tuple(matrix), tuple(right)))
     return tuple(found.values())
-
-
-def _depending_on(nodes: Sequence[Node], inputs: Iterable[int]) -> set[int]:
-    """Return the nodes that depend on any of the inputs."""
-    found = set(inputs)
-    for node, content in enumerate(nodes):
-        if not found.isdisjoint(operands_of(content)):
-            found.add(node)
-    return found
 
 
 def _factors(plan: SolvePlan, variable: Collection[int]) -> tuple[int, ...]:

@@ -33,6 +33,8 @@ ROWS = (
         ("test_two_thousand_bad_starts",)),
     Row("the same bad starts in JavaScript, against the runtime's",
         ("test_two_thousand_starts_in_javascript",)),
+    Row("the same bad starts in Octave, against the runtime's",
+        ("test_two_thousand_starts_in_octave",)),
     Row("bad starts, the iterates of the page's JavaScript against NumPy's",
         ("test_two_hundred_bad_starts_on_the_page",)),
     Row("words of Python, C, JavaScript and Octave as names, in NumPy", ("test_all_names[numpy]",)),

@@ -1,4 +1,4 @@
-"""Bad starts: what NumPy, C and JavaScript make of the same one, and who gets home.
+"""Bad starts: what NumPy, C, JavaScript and Octave make of the same one, and who gets home.
 
 Every found position is compared with the closed form of the chain, which knows all assemblies.
 """
@@ -26,6 +26,7 @@ from tests.adversary.chains import (
     reach,
 )
 from tests.adversary.test_chains import Case, chain_of, start_of
+from tests.targets.conftest import OCTAVE, run_octave
 
 STRUCTURES = (("RRR",), ("RRP", "slot"), ("RRR", "gear", "RRR"), ("slot", "RRR", "RRP"))
 AT_START = np.zeros(1)
@@ -139,6 +140,41 @@ def compare_in_javascript(count, folder, record):
     return other
 
 
+def in_octave(folder, model, guesses):
+    """Yield whether Octave's start finds a position from each guess, and the position."""
+    kc.emit(model, "octave").write(folder)
+    columns = "; ".join(" ".join(map(repr, row)) for row in guesses.T.tolist())
+    defaults = kc.compile(model).DEFAULTS.tolist()
+    lines = [
+        "warning('off', 'all');", f"guesses = [{columns}];", f"p = {defaults}';",
+        "for k = 1:size(guesses, 2)",
+        f"[q, is_found] = {model.name}_assemble(guesses(:, k), 0, p);",
+        "show('start', [is_found; q]);",
+        "end",
+    ]  # fmt: skip
+    for is_found, *q in run_octave(folder, lines)["start"]:
+        yield bool(is_found), np.array(q)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not installed (Debian: octave)")
+def test_two_thousand_starts_in_octave(tmp_path, record):
+    """All is as in the runtime, but what is thrown so far that roundings decide where it ends."""
+    tried = other = 0
+    for number, (case, random) in enumerate(cases()):
+        module, guesses = kc.compile(case.model), bad_starts(case, random, 500)
+        (folder := tmp_path / str(number)).mkdir()
+        results = in_octave(folder, case.model, guesses)
+        for guess, (is_found, q) in zip(guesses, results, strict=True):
+            status, known, _ = solved(module, guess)
+            is_same = is_found == (status == kc.Status.CONVERGED)
+            is_same &= not is_found or np.allclose(q, known, 1e-9, 1e-9)
+            assert is_same or is_thrown(module, guess)
+            tried, other = tried + 1, other + (not is_same)
+    record(tried=tried, wrong=0, gave_up=other)
+    assert other <= 10
+
+
 needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
 
 
@@ -229,6 +265,13 @@ def linkages():
             yield Case(chain, at, AT_START, exact), random
 
 
+def near_start(case, random):
+    """Return a start near the assembly of a linkage."""
+    away = random.uniform(-1, 1, case.guess.size) * NEAR[0]
+    away.reshape(-1, 3)[:, :2] *= case.at.scale * NEAR[1] / NEAR[0]
+    return case.guess + away
+
+
 def come_home(count, record):
     """Start near an assembly of random linkages; return the share that reaches it.
 
@@ -236,9 +279,7 @@ def come_home(count, record):
     """
     reached = other = 0
     for case, random in itertools.islice(linkages(), count):
-        away = random.uniform(-1, 1, case.guess.size) * NEAR[0]
-        away.reshape(-1, 3)[:, :2] *= case.at.scale * NEAR[1] / NEAR[0]
-        status, q, said = solved(kc.compile(case.model), case.guess + away)
+        status, q, said = solved(kc.compile(case.model), near_start(case, random))
         is_home = reach(q[np.newaxis], case.guess[np.newaxis], case.at.scale)[0] < 1e-6
         reached += is_home
         is_told = status != kc.Status.CONVERGED or "is as near to the guess" in said

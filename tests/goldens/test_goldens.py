@@ -32,7 +32,7 @@ PINNED = re.search(
 SUFFIXES = {
     "numpy": (".py",),
     "c": (".c", ".h"),
-    "octave": (".m", "_Phi.m", "_Phi_q.m", "_gamma.m", "_nu.m"),
+    "octave": (".m", "_assemble.m", "_Phi.m", "_Phi_q.m", "_gamma.m", "_nu.m"),
     "javascript": (".js",),
 }
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")

@@ -60,6 +60,7 @@ def test_that_functions_that_octaves_files_call_are_reserved(model):
         words = set(WORD.findall(text))
         given = set(re.findall(r"(?m)(?:^|[ ;])(\w+)(?:\([^=\n]*\))? = ", text))
         given |= set(re.findall(r"\w+", " ".join(re.findall(r"function [^\n]*", text))))
+        given |= set(re.findall(r"\w+", " ".join(re.findall(r"\[([\w, ~]*)\] = ", text))))
         own = {word for word in words if word.startswith(f"{emitted.name}_")}
         known = {*octave.CALLED, *octave.KEYWORDS}
         assert words - given - own <= known, name

@@ -28,16 +28,17 @@ FLOORS = {
     "calculus": 1,
     "derive": 2,
     "model": 3,
-    "files": 4,
-    "structure": 4,
-    "ir": 5,
-    "targets": 6,
+    "space": 4,
+    "files": 5,
+    "structure": 5,
+    "ir": 6,
+    "targets": 7,
 }
 GROUND = {name for name, floor in FLOORS.items() if floor == 0}
 # Beyond the wall: it stands on the ground floor alone, and no floor stands on it.
 RUNTIME = "runtime"
 BOTH_SIDES = {
-    *("__init__", "__main__", "compiler", "cli"),
+    *("__init__", "__main__", "compiler", "cli", "spatial"),
     *("compare", "derivation", "exercises", "verify", "view"),
 }
 

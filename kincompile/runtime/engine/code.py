@@ -27,7 +27,7 @@ WRITTEN = "_written_position"
 """Where a compiled module keeps the `position` that was emitted in Python."""
 
 SENSITIVITIES = "_sensitivities"
-"""Where a module keeps the function that compiles it with its sensitivities, on request."""
+"""Where a module keeps its `SensitiveModules`."""
 
 DRIVERS = "_drivers"
 """Where a module keeps the function that describes its drivers at a time and parameters."""
@@ -52,6 +52,24 @@ class LaneFunctions:
     solve: Callable[..., Sequence[Any]]
     floats: Any
     arrays: Any
+
+
+@dataclass(frozen=True, slots=True)
+class SensitiveModules:
+    """What compiles a mechanism's sensitivities to parameters on request, and keeps them.
+
+    Attributes
+    ----------
+    observing
+        Takes names of parameters and of columns to a module without equations whose outputs are
+        the determinants of the blocks of Phi_q, then by parameter the derivatives of the columns;
+        None where there is no planned elimination.
+    larger
+        Takes names of parameters to the module of the mechanism with its sensitivities.
+    """
+
+    observing: Callable[[tuple[str, ...], tuple[str, ...]], ModuleType | None]
+    larger: Callable[[tuple[str, ...]], ModuleType]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +112,8 @@ class Code:
         Elementary functions of arrays, for the code of stages.
     march, march_variants : callable or None
         Of a compiled module: its own march over times, and of many parameter sets.
+    observe_into : callable or None
+        Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
     """
 
     module: ModuleType
@@ -122,6 +142,7 @@ class Code:
     arrays: Any
     march: Callable[..., int] | None
     march_variants: Callable[..., int] | None
+    observe_into: Callable[..., None] | None
 
     def without_guess(self) -> tuple[str, ...]:
         """Return the bodies whose guess is zero throughout, as it is where none is given."""
@@ -186,9 +207,35 @@ def attach(module: ModuleType) -> Code:
         arrays=names.get("ARRAYS"),
         march=names.get("march"),
         march_variants=names.get("march_variants"),
+        observe_into=_observing(names, lanes),
     )
     names[PLACE] = code
     return code
+
+
+STRIP = 2000
+"""Points at a time, so that intermediate arrays stay in the cache."""
+
+
+def _observing(
+    names: Mapping[str, Any], lanes: Mapping[str, Callable[..., Sequence[Any]]]
+) -> Callable[..., None] | None:
+    """Return what puts outputs into an array: compiled, or the code of the module in strips."""
+    if "observe" not in lanes:
+        return None
+
+    def observe_into(states: Sequence[Array], t: Array, p: Array, found: Array) -> None:
+        places = found.reshape(-1, t.size)
+        for start in range(0, t.size, STRIP):
+            own = slice(start, start + STRIP)
+            parts = (state[:, own] for state in states)
+            sets = p[:, own] if p.ndim > 1 else p
+            values = lanes["observe"](names["ARRAYS"], *parts, t[own], sets)
+            for place, value in zip(places[:, own], values, strict=True):
+                place[:] = value
+
+    found: Callable[..., None] = names.get("observe_into", observe_into)
+    return found
 
 
 def _without_body(names: Mapping[str, Any], coordinates: Sequence[str]) -> NDArray[np.bool_]:

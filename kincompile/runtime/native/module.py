@@ -86,6 +86,8 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
         compiled["solve"] = functions.solve()
         compiled["march"] = functions.march()
         compiled["march_variants"] = functions.march_variants()
+    if "observe" in names:
+        compiled["observe_into"] = functions.observe_into()
     for name, function in compiled.items():
         function.__name__, function.__module__ = name, module.__name__
         function.__doc__ = function.__doc__ or names[name].__doc__
@@ -258,6 +260,24 @@ class _Functions:
             return x
 
         return solve
+
+    def observe_into(self) -> Function:
+        """Return what puts outputs of a batch into an array."""
+
+        def observe_into(
+            states: Sequence[Array], t: Array, p: Array, found: Sequence[Array]
+        ) -> None:
+            """Put outputs and their rates at states (n, N) into an array (3, r, N)."""
+            batch = self._batch_type(
+                count=states[0].shape[1], t=numbers_of_times(t), p=numbers_of_batch(p)
+            )
+            for name, state in zip(STATES, states, strict=True):
+                setattr(batch, name, numbers_of_batch(state))
+            for name, part in zip(quantities.TOGETHER["observe"], found, strict=True):
+                setattr(batch, name, numbers_of_batch(part))
+            self._run(byref(batch))
+
+        return observe_into
 
     def march(self) -> Function:
         """Return the march over a time grid."""

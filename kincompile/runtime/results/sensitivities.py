@@ -1,19 +1,19 @@
 r"""Exact derivatives of a motion by parameters: position, velocity, acceleration and outputs.
 
-The right sides come from the mechanism with its sensitivities (`ir/sensitive.py`), compiled on
-request; the matrix is the mechanism's own Phi_q for all of them,
+The matrix is the mechanism's own Phi_q for all of them. Straight-line code with the planned
+elimination in it (`ir/implicit.py`) gives them, compiled on request for these parameters. Where
+that may not be trusted, and of redundant equations, the right sides come from the mechanism with
+its sensitivities (`ir/sensitive.py`),
 
 .. math:: \Phi_q q_a = -\Phi_a, \qquad \Phi_q \dot q_a = \nu_a - C \dot q, \qquad
-          \Phi_q \ddot q_a = \gamma_a - C \ddot q, \qquad C = (\Phi_q q_a + \Phi_a)_q,
-
-so that it is factored once a point, whatever the number of parameters.
+          \Phi_q \ddot q_a = \gamma_a - C \ddot q, \qquad C = (\Phi_q q_a + \Phi_a)_q.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from kincompile.names import (
     suggestion,
 )
 from kincompile.runtime.engine.code import SENSITIVITIES, code_of
-from kincompile.runtime.engine.planned import Planned, stacked
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import rate_unit
 from kincompile.runtime.results.observed import observed
@@ -37,20 +36,18 @@ from kincompile.runtime.results.solution import require_solution
 from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.code import Array, Code, SensitiveModules
     from kincompile.runtime.results.solution import Solution
 
-    Lanes = Sequence[Any]
-    Solver = Callable[[Lanes], Lanes]
-    Coupling = Sequence[tuple[int, int, Any]]
+    Coupling = Sequence[tuple[int, int, Array]]
 
-BLOCK = 2000
-"""Points at a time, so that intermediate arrays stay in the cache."""
+BLOCK = 500
+"""Points whose matrices are taken at a time, so that they fit into memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -167,11 +164,13 @@ def _pair(names: object, mechanism: str) -> tuple[str, str]:
     )
 
 
-def sensitivities(solution: Solution, parameters: str | Sequence[str]) -> Sensitivities:
+def sensitivities(
+    solution: Solution, parameters: str | Sequence[str], of: str | Sequence[str] | None = None
+) -> Sensitivities:
     r"""Differentiate a motion by parameters, exactly.
 
     With :math:`\Phi(q, t, p) = 0` all derivatives of q, its rates and the outputs are solutions of
-    linear systems whose matrix is Phi_q. Their right sides are derived and compiled on request.
+    linear systems whose matrix is Phi_q. Their code is derived and compiled on request, and kept.
 
     Parameters
     ----------
@@ -179,6 +178,10 @@ def sensitivities(solution: Solution, parameters: str | Sequence[str]) -> Sensit
         A motion, or one for each of several parameter sets.
     parameters
         Names of parameters.
+    of
+        Coordinates and outputs that are wanted, ``["foot.x", "rod.phi"]``; all where it is not
+        given. Of a few columns many parameters cost hardly more than one: they are differentiated
+        by solves with the transposed matrix.
 
     Returns
     -------
@@ -189,7 +192,7 @@ def sensitivities(solution: Solution, parameters: str | Sequence[str]) -> Sensit
     ------
     InputError
         If this is no Solution, or one that was pickled or solved with a module from a file, or a
-        name is none of a parameter, or is there twice.
+        name is none of a parameter or column, or is there twice.
     UnsupportedError
         If the mechanism is so large that its module is in grouped form.
     """
@@ -197,204 +200,163 @@ def sensitivities(solution: Solution, parameters: str | Sequence[str]) -> Sensit
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if problem := parameters_problem(names, tuple(solution.parameters), solution.name):
         raise InputError(problem)
-    module = solution.require_module("its sensitivities")
-    larger = _compiled(module, names)
-    p = np.array(list(solution.parameters.values()), dtype=np.float64)
-    found = _over_motion(solution, code_of(module), code_of(larger), p, len(names))
-    q_p, q_dot_p, q_ddot_p = (np.moveaxis(part, (0, 1), (-1, -2)) for part in found)
-    y_p, y_dot_p, y_ddot_p = _of_outputs(solution, larger, found, p)
-    outputs = solution.observed
+    code = code_of(solution.require_module("its sensitivities"))
+    outputs = getattr(code.module, "OUTPUTS", ())
+    columns = (*code.coordinates, *outputs)
+    if of is not None:
+        columns = _columns((of,) if isinstance(of, str) else of, columns, solution.name)
+    found = _over_motion(solution, code, names, columns)
+    size = len(set(columns) & set(code.coordinates))
+    parts = found[:, :, :size], found[:, :, size:]
+    q_p, y_p = (np.moveaxis(part, (1, 2), (-1, -2)) for part in parts)
     return Sensitivities(
         solution.t,
-        *(q_p, q_dot_p, q_ddot_p),
-        *(y_p, y_dot_p, y_ddot_p),
+        *(q_p[0], q_p[1], q_p[2]),
+        *(y_p[0], y_p[1], y_p[2]),
         solution.name,
-        solution.coordinates,
-        outputs.names,
+        columns[:size],
+        columns[size:],
         names,
-        {**solution.units, **outputs.units},
+        dict(code.units),
     )
 
 
-def _of_outputs(
-    solution: Solution, larger: ModuleType, found: Array, p: Array
-) -> tuple[Array, ...]:
-    """Return the derivatives of outputs and their rates, (..., N, r, k) each."""
-    shape, k, r = solution.q.shape[:-1], found.shape[1], len(solution.observed.names)
-    if not r:
-        return (np.empty((*shape, 0, k)),) * 3
-    motion = []
-    for own, part in zip((solution.q, solution.q_dot, solution.q_ddot), found, strict=True):
-        derivatives = np.moveaxis(part, (0, 1), (-2, -1)).reshape(*shape, -1)
-        motion.append(np.concatenate((own, derivatives), axis=-1))
-    seen = observed(larger, (motion[0], motion[1], motion[2]), solution.t, p.T)
-    return tuple(
-        np.swapaxes(part[..., r:].reshape(*shape, k, r), -1, -2)
-        for part in (seen.y, seen.y_dot, seen.y_ddot)
-    )
+def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[str, ...]:
+    """Return the names of columns, the coordinates first."""
+    wanted = [column_name(name) for name in of]
+    for given, name in zip(of, wanted, strict=True):
+        if name not in known:
+            near = suggestion(name, known) or "."
+            raise InputError(
+                f"{mechanism} has no coordinate or output {given!r}{near} There are "
+                f"{listed(known)}; derivatives of rates come with them."
+            )
+    return tuple(name for name in known if name in wanted)
 
 
-def _compiled(module: ModuleType, names: tuple[str, ...]) -> ModuleType:
-    """Return the module of a mechanism with its sensitivities."""
-    compiled = vars(module).get(SENSITIVITIES)
-    if compiled is None and code_of(module).evaluate is not None:
+def _modules(module: ModuleType) -> SensitiveModules:
+    """Return what compiles a mechanism's sensitivities."""
+    found: SensitiveModules | None = vars(module).get(SENSITIVITIES)
+    if found is None and code_of(module).evaluate is not None:
         raise UnsupportedError(
             f"{module.NAME} is in grouped form, as large mechanisms are, and that has no "
             "sensitivities: differentiate a part of it, or use form='inline'."
         )
-    if compiled is None:
+    if found is None:
         raise InputError(
             f"the module of {module.NAME} was loaded from a file, which knows no more than its "
             "own functions: compile the model, solve with that, then ask for sensitivities."
         )
-    larger: ModuleType = compiled(names)
-    return larger
+    return found
 
 
-def _over_motion(solution: Solution, code: Code, larger: Code, p: Array, k: int) -> Array:
-    """Return the derivatives of q, q_dot and q_ddot, shape (3, k, n, ..., N)."""
+def _over_motion(
+    solution: Solution, code: Code, names: tuple[str, ...], columns: tuple[str, ...]
+) -> Array:
+    """Return derivatives of columns and their rates, shape (3, parameters, columns, ..., N)."""
     shape, n = solution.q.shape[:-1], len(code.coordinates)
     motion = [part.reshape(-1, n).T for part in (solution.q, solution.q_dot, solution.q_ddot)]
     times = np.broadcast_to(solution.t, shape).ravel()
+    p = np.array(list(solution.parameters.values()), dtype=np.float64)
     sets = p if p.ndim == 1 else np.repeat(p, shape[-1], axis=1)
-    found = empty((3, k, n, times.size))
+    points = _Points(code, _modules(code.module), names, columns, sets, times, *motion)
     finite = np.isfinite(motion[1].sum(axis=0))
     with np.errstate(all="ignore"):
-        for start in range(0, times.size, BLOCK):
-            own = slice(start, start + BLOCK)
-            parameters = p if p.ndim == 1 else sets[:, own]
-            states = [state[:, own] for state in motion]
-            _fill(code, _Points(larger, parameters, times[own], *states), found[..., own])
+        found, trusted = points.by_plan()
+        left = np.flatnonzero(finite & ~trusted)
+        for start in range(0, left.size, BLOCK):
+            some = left[start : start + BLOCK]
+            found[..., some] = points.at(some).by_matrices()
     if not finite.all():
         found[..., ~finite] = np.nan
-    return found.reshape(3, k, n, *shape)
-
-
-def _fill(code: Code, points: _Points, found: Array) -> None:
-    """Fill in the derivatives at a batch of points, shape (3, k, n, N)."""
-    left = np.isfinite(points.q_dot.sum(axis=0))
-    if code.lanes is not None:
-        solve, trusted = _planned(code, points)
-        points.fill(found, solve, len(code.equations))
-        left &= ~trusted
-    if left.any():
-        p = points.p[:, left] if points.p.ndim > 1 else points.p
-        states = [state[:, left] for state in (points.q, points.q_dot, points.q_ddot)]
-        some = _Points(points.larger, p, points.t[left], *states)
-        part = np.empty((*found.shape[:-1], np.count_nonzero(left)))
-        some.fill(part, _dense(code, some), len(code.equations))
-        found[..., left] = part
-
-
-class _Zero:
-    """A lane that is zero at all points: what is multiplied by it costs nothing.
-
-    Most parameters move few coordinates, and which ones is found while the lanes are computed.
-    """
-
-    __array_ufunc__ = None  # so that arrays leave the operation to it
-
-    def __float__(self) -> float:
-        """Return zero, where it is put into an array."""
-        return 0.0
-
-    def _itself(self, _: object = None) -> _Zero:
-        return self
-
-    def _other(self, other: Any) -> Any:
-        return other
-
-    def __rsub__(self, other: Any) -> Any:
-        """Return the other."""
-        return other
-
-    def __sub__(self, other: Any) -> Any:
-        """Return the other with its sign changed."""
-        return -other
-
-    __mul__ = __rmul__ = __truediv__ = __neg__ = _itself
-    __add__ = __radd__ = _other
-
-
-ZERO = _Zero()
-
-
-def _is_zero(lane: Any) -> bool:
-    """Return whether a lane is the plain number zero."""
-    return not isinstance(lane, np.ndarray | _Zero) and lane == 0
+    if not (accelerated := np.isfinite(motion[2].sum(axis=0))).all():  # a corner of a driver
+        own = sum(name in code.coordinates for name in columns)
+        found[2, :, :own, ~accelerated] = np.nan
+    return found.reshape(*found.shape[:3], *shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Points:
-    """A batch of points, a lane each coordinate, and the larger mechanism there."""
+    """A batch of points, and what is asked there: columns by parameters."""
 
-    larger: Code
+    code: Code
+    modules: SensitiveModules
+    names: tuple[str, ...]
+    columns: tuple[str, ...]
     p: Array
     t: Array
     q: Array
     q_dot: Array
     q_ddot: Array
 
-    def fill(self, found: Array, solve: Solver, m: int) -> None:
-        """Fill in the derivatives, shape (3, k, n, N), by a solve with Phi_q of m equations."""
-        lanes, k = self.larger.module.LANES, found.shape[1]
-        f, n = self.larger.arrays, len(self.q)
-        Phi_a = lanes["position"](f, [*self.q, *([ZERO] * (k * n))], self.t, self.p)
-        sides = [-x for x in Phi_a[: m * (k + 1)]]
-        q = [*self.q, *_solved(found[0], solve, sides)]
-        coupling = self._coupling(q, m, n)
-        nu = _reduced(lanes["nu"](f, q, self.t, self.p), coupling, self.q_dot)
-        q_dot = [*self.q_dot, *_solved(found[1], solve, nu)]
-        gamma = lanes["gamma"](f, q, q_dot, self.t, self.p)
-        _solved(found[2], solve, _reduced(gamma, coupling, self.q_ddot))
+    def at(self, some: NDArray[np.intp]) -> _Points:
+        """Return some of the points."""
+        p = self.p if self.p.ndim == 1 else self.p[:, some]
+        states = (state[:, some] for state in (self.q, self.q_dot, self.q_ddot))
+        return _Points(
+            self.code, self.modules, self.names, self.columns, p, self.t[some], *states
+        )  # fmt: skip
 
-    def _coupling(self, q: Lanes, m: int, n: int) -> list[tuple[int, int, Any]]:
-        """Return row, column and value of the entries left of the diagonal blocks."""
-        module, code = self.larger.module, self.larger
-        values = module.LANES["position"](code.arrays, q, self.t, self.p)
-        constants = vars(module)["_CONSTANTS"]
-        varying = iter(values[len(code.equations) :])
-        entries = []
-        for number, (row, column) in enumerate(code.pattern.tolist()):
-            constant = constants.get(number)
-            value = next(varying) if constant is None else constant
-            if row >= m and column < n:
-                entries.append((row, column, value))
-        return entries
+    def by_plan(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the derivatives by the planned elimination, and where that can be trusted."""
+        module = self.modules.observing(self.names, self.columns)
+        size = len(self.names), len(self.columns)
+        if module is None:
+            return np.empty((3, *size, self.t.size)), np.zeros(self.t.size, dtype=bool)
+        code = code_of(module)
+        seen = empty((3, len(module.OUTPUTS), self.t.size))
+        assert code.observe_into is not None
+        code.observe_into((self.q, self.q_dot, self.q_ddot), self.t, self.p, seen)
+        blocks = len(module.OUTPUTS) - math.prod(size)
+        sizes = np.abs(seen[0, :blocks])
+        smallest = SMALLEST_DETERMINANT * np.max(sizes, axis=1, initial=0.0, where=sizes < np.inf)
+        trusted = np.all(sizes > smallest[:, np.newaxis], axis=0)
+        found: Array = seen[:, blocks:].reshape(3, *size, -1)
+        return found, trusted
+
+    def by_matrices(self) -> Array:
+        """Return the derivatives by singular values; of redundant equations by least squares."""
+        larger = self.modules.larger(self.names)
+        m, n, k = len(self.code.equations), len(self.code.coordinates), len(self.names)
+        q, q_dot, q_ddot, t, p = self.q.T, self.q_dot.T, self.q_ddot.T, self.t, self.p.T
+        inverses = np.linalg.pinv(self.code.Phi_q(q, t, p))
+
+        def solved(sides: Array) -> Array:
+            """Return derivatives, (L, k n), for right sides below the mechanism's own."""
+            own = sides[:, m:].reshape(-1, k, m)
+            found: Array = np.einsum("lij,lkj->lki", inverses, own).reshape(-1, k * n)
+            return found
+
+        held = np.concatenate((q, np.zeros((len(q), k * n))), axis=1)
+        every_q = np.concatenate((q, solved(-larger.Phi(held, t, p))), axis=1)
+        coupling = _coupling(larger, every_q, t, p, m, n)
+        nu = _reduced(larger.nu(every_q, t, p), coupling, q_dot)
+        every_q_dot = np.concatenate((q_dot, solved(nu)), axis=1)
+        gamma = _reduced(larger.gamma(every_q, every_q_dot, t, p), coupling, q_ddot)
+        every = every_q, every_q_dot, np.concatenate((q_ddot, solved(gamma)), axis=1)
+        found = np.array(every)[..., n:].reshape(3, -1, k, n)
+        if outputs := getattr(self.code.module, "OUTPUTS", ()):
+            seen = observed(larger, every, t, p)
+            y = np.array((seen.y, seen.y_dot, seen.y_ddot))[..., len(outputs) :]
+            found = np.concatenate((found, y.reshape(3, -1, k, len(outputs))), axis=-1)
+        known = (*self.code.coordinates, *outputs)
+        places = [known.index(name) for name in self.columns]
+        by_point: Array = np.moveaxis(found[..., places], 1, -1)
+        return by_point
 
 
-def _reduced(sides: Lanes, coupling: Coupling, rates: Array) -> Lanes:
+def _coupling(larger: ModuleType, q: Array, t: Array, p: Array, m: int, n: int) -> Coupling:
+    """Return row, column and values of the entries left of the diagonal blocks."""
+    entries = larger.Phi_q_nonzeros(q, t, p)
+    return [
+        (row, column, entries[:, number])
+        for number, (row, column) in enumerate(larger.PATTERN.tolist())
+        if row >= m and column < n
+    ]
+
+
+def _reduced(sides: Array, coupling: Coupling, rates: Array) -> Array:
     """Return right sides without the part of the rates that are known."""
-    sides = list(sides)
-    for row, column, value in coupling:
-        sides[row] = sides[row] - value * rates[column]
+    for row, column, values in coupling:
+        sides[:, row] -= values * rates[:, column]
     return sides
-
-
-def _solved(found: Array, solve: Solver, sides: Lanes) -> Lanes:
-    """Fill in derivatives, shape (k, n, N), and return their lanes; `sides` has q's own first."""
-    lanes: list[Any] = []
-    m = len(sides) // (len(found) + 1)
-    for part, place in enumerate(found, start=1):
-        own = [ZERO if _is_zero(x) else x for x in sides[m * part : m * (part + 1)]]
-        solution = solve(own)
-        for row, lane in zip(place, solution, strict=True):
-            row[:] = lane
-        lanes.extend(solution)
-    return lanes
-
-
-def _planned(code: Code, points: _Points) -> tuple[Solver, NDArray[np.bool_]]:
-    """Return the planned solve, and where it can be trusted."""
-    engine = Planned(code, points.p)
-    point = engine.evaluate(points.q, points.t)
-    sizes = np.abs(engine.determinants(point))
-    smallest = SMALLEST_DETERMINANT * np.max(sizes, axis=1, initial=0.0, where=sizes < np.inf)
-    return partial(engine.solve, point), np.all(sizes > smallest[:, np.newaxis], axis=0)
-
-
-def _dense(code: Code, points: _Points) -> Solver:
-    """Return the solve by singular values; of redundant equations by least squares."""
-    found = code.Phi_q(points.q.T.copy(), points.t, points.p.T)
-    inverses = np.linalg.pinv(found)
-    return lambda b: np.einsum("lij,jl->il", inverses, stacked(b, points.t.size))

@@ -1,4 +1,4 @@
-"""The Octave target, which is MATLAB too: a function each for Phi, Phi_q, nu, gamma, and a script.
+"""The Octave target, which is MATLAB too: functions of Phi, Phi_q, nu, gamma, and a script.
 
 This is the shape in which courses write them: column vectors, rows that count from 1, and a script
 that solves position, velocity and acceleration over time with Newton's method. No toolbox.
@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from kincompile import quantities
+from kincompile import criteria, quantities
 from kincompile.errors import InputError, UnsupportedError
+from kincompile.ir.elimination import jacobian_entries
+from kincompile.structure.blocks import parts_of
 from kincompile.targets.lines import indented, pieces
 from kincompile.targets.naming import NameTable
 from kincompile.targets.octave.dialect import NAMES, OCTAVE
@@ -34,6 +36,14 @@ WRITE = Statements("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, 
 LONGEST_NAME = 63
 """Longest name; MATLAB truncates longer ones."""
 
+CRITERIA = (
+    "ASTRAY", "AS_NEAR", "BEND", "CONSTANT", "FAR", "FOLDED", "LARGEST_ANGLE", "MAX_CORRECTIONS",
+    "MAX_ITERATIONS", "MIRRORED", "MIRROR_STEP", "MOST_MIRRORED", "MOST_TURNED", "NEAR_ANGLE",
+    "NEAR_PART", "NUDGE", "RESIDUAL_FACTOR", "RESTARTS", "ROUNDING", "SAME_POSITION", "SETTLED",
+    "SHORTEST_STEP", "SMALL_PART", "STEEP", "SUFFICIENT", "TOLERANCE", "WILD",
+)  # fmt: skip
+"""The numbers of `criteria` that a start is judged by."""
+
 KEYWORDS = (
     "break", "case", "catch", "classdef", "continue", "do", "else", "elseif", "end", "endif",
     "endfor", "endfunction", "endwhile", "endswitch", "for", "function", "global", "if",
@@ -43,9 +53,11 @@ KEYWORDS = (
 """Words of MATLAB and of Octave."""
 
 CALLED = (
-    *NAMES.values(), "abs", "all", "either", "error", "false", "find", "in_reals", "Inf",
-    "isempty", "isreal", "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell",
-    "numel", "pi", "polyval", "round", "size", "sum", "true", "zeros",
+    *NAMES.values(), "abs", "all", "any", "circshift", "deal", "det", "diag", "double", "either",
+    "eps", "error", "eye", "false", "find", "in_reals", "Inf", "isempty", "isfinite", "isnan",
+    "isreal", "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell", "numel", "pi",
+    "polyval", "rcond", "round", "sign", "single", "size", "sortrows", "sqrt", "sum", "svd",
+    "true", "zeros",
 )  # fmt: skip
 """Functions that the files call; a script of such a name would be called in their place."""
 
@@ -92,6 +104,8 @@ def files(
     """
     program = code.program
     found = {NameTable((*KEYWORDS, *CALLED)).take(program.name): _script(code)}
+    if not program.unsolvable:
+        found[f"{program.name}_assemble"] = _assembly(code)
     for name, lines in functions.items():
         found[f"{program.name}_{name}"] = _function_file(name, code, "\n".join(lines))
     for name, spline in program.tables.items():
@@ -153,14 +167,29 @@ def _literal(text: str) -> str:
     return "'" + text.replace("'", "''") + "' ..."
 
 
-def _angles(program: Program) -> str:
-    """Return the numbers of the coordinates that may turn, as a column."""
+def _numbers(places: Iterable[int]) -> str:
+    """Return numbers of rows or columns, which count from 1."""
+    return f"[{', '.join(str(k + 1) for k in places)}]"
+
+
+def _turning(program: Program) -> list[int]:
+    """Return the coordinates that may turn: angles, and free ones whose unit is not known."""
     owned = {column for body in program.bodies for column in body.columns}
     units = [item.unit for item in program.coordinates]
-    turning = [
-        str(k + 1) for k, unit in enumerate(units) if unit == "rad" or not (unit or k in owned)
+    return [k for k, unit in enumerate(units) if unit == "rad" or not (unit or k in owned)]
+
+
+def _blocks(code: InlineProgram) -> list[str]:
+    """Return rows and columns of the blocks whose determinant may change its sign."""
+    entries = jacobian_entries(code)
+    constant = {(row, column) for row, column, number in entries if number is not None}
+    size = len(code.program.equations), len(code.program.coordinates)
+    blocks = parts_of([entry[:2] for entry in entries], size).blocks
+    return [
+        f"{_numbers(block.rows)}, {_numbers(block.columns)};"
+        for block in blocks
+        if (block.rows[0], block.columns[0]) not in constant or len(block.rows) > 1
     ]
-    return f"[{'; '.join(turning)}]" if turning else "zeros(0, 1)"
 
 
 def _script(code: InlineProgram) -> str:
@@ -184,6 +213,21 @@ def _script(code: InlineProgram) -> str:
         "points": points,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 1),
         "guess": _column(((item.name, item.guess) for item in program.coordinates), 1),
-        "angles": _angles(program),
     }
     return fill("octave/script.m.jinja", data)
+
+
+def _assembly(code: InlineProgram) -> str:
+    """Return the function that finds the position at the first time."""
+    program = code.program
+    angles = [k for k, item in enumerate(program.coordinates) if item.unit == "rad"]
+    data = {
+        "name": program.name,
+        "fingerprint": program.fingerprint,
+        "n": len(program.coordinates),
+        "angles": _numbers(angles),
+        "may_turn": _numbers(_turning(program)),
+        "blocks": "\n".join(f"    {line}" for line in _blocks(code)),
+        **{name: repr(getattr(criteria, name)) for name in CRITERIA},
+    }
+    return fill("octave/assemble.m.jinja", data)

@@ -5,12 +5,12 @@ import pytest
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Basis, ProfileFunction, Symbol, VectorSymbol
 from kincompile.calculus.rotations import turned
-from kincompile.calculus.symbols import Contact, Frame, contact_i, i, j, s_i, unit
+from kincompile.calculus.symbols import Contact, PlaneFrame, contact_i, i, j, s_i, unit
 from kincompile.calculus.template import Template
 
 
 def test_that_a_frame_names_its_symbols_by_its_body() -> None:
-    frame = Frame("k")
+    frame = PlaneFrame("k")
     assert (frame.r, frame.phi) == (VectorSymbol("r_k"), Symbol("phi_k"))
     assert frame.rates == (VectorSymbol("r_k_dot"), Symbol("phi_k_dot"))
 

@@ -174,6 +174,96 @@ def test_that_random_linkages_agree_with_complex_steps(seed):
     assert_complex_steps(solution, kc.sensitivities(solution, [*"abcdws"]))
 
 
+def coupled_equations(seed):
+    """Return five equations of five unknowns that need all of each other, and are random."""
+    rng = np.random.default_rng(seed)
+    x = sympy.symbols("x1:6")
+    names = {"a": 0.3, "b": -0.2, "w": 0.7}
+    a, b, w = sympy.symbols("a b w")
+    weights = rng.uniform(-0.2, 0.2, (5, 5)).tolist()
+    phases = rng.uniform(0, 6, 5).tolist()
+    equations = [
+        x[k]
+        - sum(c * sympy.sin(y + a * z) for c, y, z in zip(row, x, x[::-1], strict=True))
+        - b * sympy.cos(w * kc.t + phase) * x[k - 1] ** 2 - a * kc.t
+        for k, (row, phase) in enumerate(zip(weights, phases, strict=True))
+    ]  # fmt: skip
+    return kc.ConstraintSystem(
+        "coupled", coordinates=x, equations=equations, guess=[0.1] * 5, parameters=names
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_that_large_blocks_are_eliminated_too(seed):
+    solution = kc.solve(kc.compile(coupled_equations(seed)), np.linspace(0, 1, 6))
+    assert solution.success, solution.message
+    assert_complex_steps(solution, kc.sensitivities(solution, ["a", "b", "w"]))
+
+
+@pytest.mark.parametrize("name", ["jansen", "four_bar", "slider_crank"])
+def test_that_points_which_are_not_trusted_are_solved_by_matrices(name, example_named, monkeypatch):
+    model = slider_crank() if name == "slider_crank" else example_named(name).model
+    solution = kc.solve(kc.compile(model), np.linspace(0, model.end, 5))
+    names = tuple(solution.parameters)[:4]
+    column = solution.coordinates[-1]
+    usual, few = (kc.sensitivities(solution, names, of=x) for x in (None, column))
+    monkeypatch.setattr(
+        "kincompile.runtime.results.sensitivities.SMALLEST_DETERMINANT", 2.0
+    )  # every determinant is smaller than twice the largest
+    assert_complex_steps(solution, kc.sensitivities(solution, names))
+    matrices = kc.sensitivities(solution, names, of=column)
+    for part in ("q_p", "q_dot_p", "q_ddot_p", "y_p", "y_dot_p", "y_ddot_p"):
+        np.testing.assert_allclose(getattr(few, part), getattr(matrices, part), atol=1e-9)
+    np.testing.assert_allclose(few.q_ddot_p[..., 0, :], usual.q_ddot_p[..., -1, :], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("target", "name", "columns"),
+    [("numpy", "jansen", ["G.y", "leg.phi"]), ("c", "four_bar", "rocker.phi")],
+)
+def test_that_few_columns_of_many_parameters_are_those_of_all(
+    target, name, columns, example_named, request
+):
+    if target == "c":
+        request.getfixturevalue("quick_compiler")
+    model = example_named(name).model
+    solution = kc.solve(kc.compile(model, target), np.linspace(0, 1, 5))
+    every = kc.sensitivities(solution, tuple(solution.parameters))
+    few = kc.sensitivities(solution, tuple(solution.parameters), of=columns)
+    assert len(few.coordinates) == 1
+    for column in (*few.coordinates, *few.outputs):
+        for ending in ("", "_dot", "_ddot"):
+            for by in every.parameters:
+                close(few[column + ending, by], every[column + ending, by])
+    with pytest.raises(InputError, match=r"no column 'crank\.phi'"):
+        few["crank.phi", "a"]
+
+
+def test_that_an_output_of_rates_goes_backward_too():
+    solution = kc.solve(kc.compile(slider_crank()), TIMES)
+    every, few = (kc.sensitivities(solution, [*VALUES], of=x) for x in (None, "slope"))
+    close(few.y_p, every.y_p[..., 1:, :])
+    close(few.y_dot_p, every.y_dot_p[..., 1:, :])
+    assert np.isnan(few.y_ddot_p).all()
+    assert few.q_p.shape == (3, 0, 4)
+
+
+def test_that_parameter_sets_are_differentiated_by_few_columns():
+    module = kc.compile(slider_crank())
+    solution = kc.solve(module, TIMES, p={"L": np.array([0.25, 0.3]), "e": np.array([0.0, 0.03])})
+    every, few = (kc.sensitivities(solution, [*VALUES], of=x) for x in (None, "rod.phi"))
+    assert few.q_ddot_p.shape == (2, 3, 1, 4)
+    close(few["rod.phi_ddot", "e"], every["rod.phi_ddot", "e"])
+
+
+def test_what_is_said_of_columns_that_are_none():
+    solution = kc.solve(kc.compile(slider_crank()), TIMES)
+    with pytest.raises(InputError, match=r"no coordinate or output 'rod\.ph'; did you mean"):
+        kc.sensitivities(solution, "r", of="rod.ph")
+    with pytest.raises(InputError, match="derivatives of rates come with them"):
+        kc.sensitivities(solution, "r", of=["rod.phi_dot"])
+
+
 def close(found, known):
     np.testing.assert_allclose(found, known, rtol=1e-11, atol=1e-11)
 

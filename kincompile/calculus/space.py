@@ -1,0 +1,128 @@
+"""Frames in space: a position r and Euler parameters p = (e0, e1, e2, e3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from kincompile.calculus.expressions import Rotated, VectorSymbol, dot
+from kincompile.calculus.symbols import Frame
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from kincompile.calculus.expressions import (
+        Components,
+        Expression,
+        Rotation,
+        Scalar,
+        Value,
+        Vector,
+    )
+    from kincompile.calculus.symbols import CoordinateSymbol
+
+
+@dataclass(frozen=True, slots=True)
+class EulerRotation:
+    """The rotation by Euler parameters, A = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~.
+
+    This is A = E G^T of Haug, chapter 9: homogeneous of degree 2 in p. So A v is a symmetric
+    bilinear form of p and p, its derivative along w is twice that form of p and w, and its second
+    derivative along w and u twice that of w and u; a third is zero.
+    """
+
+    p: VectorSymbol
+
+    letters: ClassVar[str] = "ABB"
+    formula: ClassVar[str] = "(e0^2 - e^T e) I + 2 e e^T + 2 e0 e~"
+    names: ClassVar[tuple[str, ...]] = tuple(f"A{row}{column}" for row in "123" for column in "123")
+    symbols: ClassVar[tuple[str, ...]] = names
+
+    @property
+    def coordinates(self) -> tuple[Expression, ...]:
+        """The Euler parameters."""
+        return (self.p,)
+
+    @property
+    def constraints(self) -> tuple[Scalar, ...]:
+        """The norm: p^T p - 1."""
+        return (dot(self.p, self.p) - 1,)
+
+    def tidy(self, vector: Vector, along: tuple[Expression, ...]) -> Vector:
+        """Return the derivative of A v with its directions, which may change places, in order."""
+        return Rotated(self, vector, tuple(sorted(along, key=repr)))
+
+    def entries(
+        self, coordinates: tuple[Components, ...], call: Callable[[str, Value], Value]
+    ) -> Components:
+        """Return the nine entries of A, row by row."""
+        del call
+        ((e0, e1, e2, e3),) = coordinates
+        f1, f2, f3 = e1 + e1, e2 + e2, e3 + e3
+        same, other = e0**2 - e3**2, e1**2 - e2**2
+        p12, p13, p23 = f1 * e2, f1 * e3, f2 * e3
+        p01, p02, p03 = e0 * f1, e0 * f2, e0 * f3
+        last = e0**2 + e3**2 - (e1**2 + e2**2)
+        return (
+            same + other, p12 - p03, p13 + p02,
+            p12 + p03, same - other, p23 - p01,
+            p13 - p02, p23 + p01, last,
+        )  # fmt: skip
+
+    def components(
+        self,
+        entries: Components,
+        vector: Components,
+        along: tuple[Components, ...],
+        expand: Callable[[Expression], Components],
+    ) -> Components:
+        """Return A v, or its derivative: twice the form of p and a direction, or of two."""
+        if not along:
+            rows = entries[:3], entries[3:6], entries[6:]
+            return tuple(_dot(row, vector) for row in rows)
+        p, w = along if len(along) == 2 else (expand(self.p), *along)
+        p0, w0 = p[0], w[0] + w[0]
+        e, f = p[1:], tuple(item + item for item in w[1:])
+        same, by_e, by_f = p0 * w0 - _dot(e, f), _dot(f, vector), _dot(e, vector)
+        turns = zip(_cross(e, vector), _cross(f, vector), strict=True)
+        return tuple(
+            same * v + a * by_e + b * by_f + (w0 * c + p0 * d)
+            for v, a, b, (c, d) in zip(vector, e, f, turns, strict=True)
+        )
+
+
+def _dot(left: Components, right: Components) -> Value:
+    first, *others = (a * b for a, b in zip(left, right, strict=True))
+    for item in others:
+        first = first + item
+    return first
+
+
+def _cross(left: Components, right: Components) -> Components:
+    (a1, a2, a3), (b1, b2, b3) = left, right
+    return a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1
+
+
+@dataclass(frozen=True, slots=True)
+class SpatialFrame(Frame):
+    """The frame of a body in space: position r, Euler parameters p, and its rotation."""
+
+    letters: ClassVar[tuple[str, ...]] = ("x", "y", "z", "e0", "e1", "e2", "e3")
+    ground: ClassVar[tuple[int, ...]] = (0, 0, 0, 1, 0, 0, 0)
+    size: ClassVar[int] = 3
+
+    @property
+    def p(self) -> VectorSymbol:
+        """The Euler parameters of the body."""
+        return VectorSymbol(f"p_{self.index}", 4)
+
+    def motion(self, order: int) -> tuple[CoordinateSymbol, ...]:
+        """Return r and p, or their time derivatives of the given order."""
+        r, p = (rate(f"{letter}_{self.index}", order) for letter in "rp")
+        return VectorSymbol(r, self.size), VectorSymbol(p, 4)
+
+    @property
+    def rotation(self) -> Rotation:
+        """The rotation by p."""
+        return EulerRotation(self.p)

@@ -1,0 +1,1 @@
+"""Mechanisms in space: bodies with Euler parameters and their joints; `kincompile.spatial`."""

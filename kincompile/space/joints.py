@@ -1,0 +1,325 @@
+"""Joints in space: stacks of the primitives.
+
+Each body carries a point s and a right-handed triad (f, g, h) of unit vectors, h along the axis.
+Rows are "j minus i".
+"""
+
+from __future__ import annotations
+
+from kincompile.calculus.expressions import (
+    Angle,
+    Basis,
+    Expression,
+    Perpendicular,
+    Pi,
+    Scalar,
+    Symbol,
+    dot,
+)
+from kincompile.calculus.rotations import turned
+from kincompile.calculus.symbols import C
+from kincompile.model import arguments as argument
+from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.constraint import constraint_type
+from kincompile.space.constraint import SpatialConstraint, SpatialPoints
+from kincompile.space.symbols import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
+
+XYZ = ("x", "y", "z")
+
+
+def parallel() -> tuple[Scalar, Scalar]:
+    """Return f_i^T h_j and g_i^T h_j: the axes are parallel."""
+    return dot(i.A(f_i), j.A(h_j)), dot(i.A(g_i), j.A(h_j))
+
+
+def on_line() -> tuple[Scalar, Scalar]:
+    """Return f_i^T d and g_i^T d: the point of body j is on the axis of body i."""
+    return dot(i.A(f_i), separation()), dot(i.A(g_i), separation())
+
+
+def angle_from(reference: Scalar) -> Scalar:
+    """Return the angle of f_j about h_i from f_i, less a reference: the one nearest to it.
+
+    So the number of turns is that of the reference, and no other root has the residual zero.
+    """
+    cosine, sine = dot(i.A(f_i), j.A(f_j)), dot(i.A(g_i), j.A(f_j))
+    c, s = (dot(axis, turned(reference, Basis())) for axis in (Basis(), Perpendicular(Basis())))
+    return Angle(sine * c - cosine * s, cosine * c + sine * s)
+
+
+@constraint_type
+class Spherical(SpatialPoints):
+    """A point on body i and a point on body j coincide: a ball joint."""
+
+    source = "Haug 9.4"
+    row_names = XYZ
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return d."""
+        return (separation(),)
+
+
+@constraint_type
+class Axes(SpatialConstraint):
+    """A constraint of two axes, given by direction; the types are its subclasses."""
+
+    i: BodyLike = argument.body("i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    j: BodyLike = argument.body("j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
+
+
+@constraint_type
+class Parallel(Axes):
+    """An axis of body i and an axis of body j are parallel."""
+
+    source = "Haug 9.4"
+    row_names = ("f", "g")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return f_i^T h_j and g_i^T h_j."""
+        return parallel()
+
+
+@constraint_type
+class PointOnLine(SpatialConstraint):
+    """A point on body j lies on an axis of body i."""
+
+    source = "Haug 9.4"
+    row_names = ("f", "g")
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return f_i^T d and g_i^T d."""
+        return on_line()
+
+
+@constraint_type
+class InPlane(SpatialConstraint):
+    """A point on body j lies in a plane of body i, given by a point and its normal."""
+
+    source = "Haug 9.4"
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    normal_i: PointLike = argument.axis("h_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return h_i^T d."""
+        return (dot(i.A(h_i), separation()),)
+
+
+@constraint_type
+class RelativeTranslation(SpatialConstraint):
+    """A point on body j is at C along an axis of body i, counted from a point on the axis."""
+
+    source = "Haug 9.4"
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+    value: ValueLike = argument.value()
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return h_i^T d - C."""
+        return (dot(i.A(h_i), separation()) - C,)
+
+
+@constraint_type
+class RevoluteSpherical(SpatialConstraint):
+    """A rod of length C with a hinge on body i, about an axis, and a ball on body j."""
+
+    source = "Haug 9.4"
+    row_names = ("plane", "distance")
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+    distance: ValueLike = argument.distance()
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return h_i^T d and d^T d - C^2."""
+        d = separation()
+        return dot(i.A(h_i), d), dot(d, d) - C**2
+
+
+@constraint_type
+class PointsAndAxes(SpatialConstraint):
+    """A joint of an axis of body i and an axis of body j; the types are its subclasses."""
+
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
+
+
+@constraint_type
+class Revolute(PointsAndAxes):
+    """Body j turns about an axis of body i: a hinge."""
+
+    source = "Haug 9.4"
+    row_names = (*XYZ, "f", "g")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return d, f_i^T h_j and g_i^T h_j."""
+        return separation(), *parallel()
+
+
+@constraint_type
+class Cylindrical(PointsAndAxes):
+    """Body j turns about an axis of body i and slides along it."""
+
+    source = "Haug 9.4"
+    row_names = ("parallel_f", "parallel_g", "line_f", "line_g")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return f_i^T h_j, g_i^T h_j, f_i^T d and g_i^T d."""
+        return *parallel(), *on_line()
+
+
+@constraint_type
+class Planar(PointsAndAxes):
+    """A plane of body j slides on a plane of body i; the axes are their normals."""
+
+    source = "Haug 9.4"
+    row_names = ("parallel_f", "parallel_g", "plane")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return f_i^T h_j, g_i^T h_j and h_i^T d."""
+        return *parallel(), dot(i.A(h_i), separation())
+
+
+@constraint_type
+class Universal(PointsAndAxes):
+    """Two axes at a right angle meet in a cross: Hooke's joint."""
+
+    source = "Haug 9.4"
+    row_names = (*XYZ, "cross")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return d and h_i^T h_j."""
+        return separation(), dot(i.A(h_i), j.A(h_j))
+
+
+@constraint_type
+class RevoluteCylindrical(PointsAndAxes):
+    """A hinge about the axis of body i meets at a right angle a slide along that of body j."""
+
+    source = "Haug 9.4"
+    row_names = ("cross", "line_f", "line_g")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return h_i^T h_j, f_j^T d and g_j^T d."""
+        d = separation()
+        return dot(i.A(h_i), j.A(h_j)), dot(j.A(f_j), d), dot(j.A(g_j), d)
+
+
+@constraint_type
+class Triads(SpatialConstraint):
+    """A joint of a triad of body i and a triad of body j; the types are its subclasses."""
+
+    i: BodyLike = argument.body("i")
+    point_i: PointLike = argument.point("s_i", on="i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    cross_i: PointLike = argument.cross("f_i", on="i")
+    j: BodyLike = argument.body("j")
+    point_j: PointLike = argument.point("s_j", on="j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
+    cross_j: PointLike = argument.cross("f_j", on="j")
+
+
+@constraint_type
+class Translational(Triads):
+    """Body j slides along an axis of body i without turning; its cross is at a right angle."""
+
+    source = "Haug 9.4"
+    row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "cross")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return the rows of a cylindrical joint and f_i^T f_j."""
+        return *parallel(), *on_line(), dot(i.A(f_i), j.A(f_j))
+
+
+@constraint_type
+class Fixed(Triads):
+    """Body j does not move on body i: the triads stay the same."""
+
+    source = "Haug 9.4"
+    row_names = (*XYZ, "f", "g", "cross")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return d, f_i^T h_j, g_i^T h_j and f_i^T g_j."""
+        return separation(), *parallel(), dot(i.A(f_i), j.A(g_j))
+
+
+@constraint_type
+class ConstantVelocity(Triads):
+    """Two shafts meet in a point and turn at the same rate, whatever the angle between them."""
+
+    source = "OndselSolver"
+    row_names = (*XYZ, "cross")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return d and f_i^T g_j + g_i^T f_j."""
+        return separation(), dot(i.A(f_i), j.A(g_j)) + dot(i.A(g_i), j.A(f_j))
+
+
+@constraint_type
+class Screw(Triads):
+    """Body j turns about an axis of body i and advances by the pitch in each turn."""
+
+    source = "Haug 9.4"
+    row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "advance")
+    pitch: ValueLike = argument.radius("pitch", "Advance in one turn")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return the rows of a cylindrical joint and h_i^T d - pitch theta/(2 pi).
+
+        Of all theta it is the one nearest to 2 pi h_i^T d/pitch, whatever the number of turns.
+        """
+        turn = 2 * Pi() / Symbol("pitch")
+        rest = angle_from(turn * dot(i.A(h_i), separation()))
+        return *parallel(), *on_line(), -rest / turn
+
+
+@constraint_type
+class RelativeRotation(SpatialConstraint):
+    """The angle of the cross of body j from that of body i, about the axis of body i, is C."""
+
+    source = "Haug 9.4"
+    i: BodyLike = argument.body("i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    cross_i: PointLike = argument.cross("f_i", on="i")
+    j: BodyLike = argument.body("j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
+    cross_j: PointLike = argument.cross("f_j", on="j")
+    angle: ValueLike = argument.value("rad")
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return theta - C with theta = atan2(g_i^T f_j, f_i^T f_j), the one nearest to C."""
+        return (angle_from(C),)

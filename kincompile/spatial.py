@@ -1,0 +1,13 @@
+"""Mechanisms in space: bodies with Euler parameters, and their joints.
+
+    from kincompile import spatial
+
+    m = spatial.Mechanism("pendulum")
+    rod = m.body("rod", (0.1, 0, 0))
+    m.add(spatial.Revolute("A", m.ground, (0, 0, 0), (0, 1, 0), rod, (-0.1, 0, 0), (0, 1, 0)))
+
+Everything that is not a body or a joint is called as in the plane.
+"""
+
+from kincompile.space.catalogue import *  # noqa: F403
+from kincompile.space.mechanism import Mechanism as Mechanism
