@@ -6,7 +6,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
-(DOCS / "generated" / "extra").mkdir(parents=True, exist_ok=True)  # Sphinx looks for it at once
+(DOCS / "made" / "extra").mkdir(parents=True, exist_ok=True)  # Sphinx looks for it at once
 
 import kincompile  # noqa: E402 - of this checkout
 
@@ -23,7 +23,7 @@ extensions = [
     "docs.builders.mathml",
     "docs.builders.site",
 ]
-exclude_patterns = ["builders", "generated/extra"]
+exclude_patterns = ["builders", "made/extra"]
 suppress_warnings = ["myst.header"]  # tables of the benchmarks stand two levels below
 
 myst_enable_extensions = ["colon_fence"]
@@ -38,9 +38,9 @@ add_module_names = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = "kincompile"
-html_static_path = ["static"]
-html_css_files = ["site.css"]
-html_extra_path = ["generated/extra"]
+html_static_path = ["static", "../templates/derivation/math.css"]  # the font of formulas
+html_css_files = ["math.css", "site.css"]
+html_extra_path = ["made/extra"]
 html_math_renderer = "mathml"
 html_show_sourcelink = False
 html_copy_source = False

@@ -8,7 +8,7 @@ import tempfile
 from base64 import b64encode
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from markdown_it import MarkdownIt
 
@@ -67,8 +67,7 @@ def model_of(lesson: str) -> Mechanism:
         path = Path(folder, name)
         path.write_text(text, encoding="utf-8")
         model = kc.read_model(path)
-    assert isinstance(model, kc.Mechanism)
-    return model
+    return cast("Mechanism", model)
 
 
 def sketches() -> dict[str, str]:
@@ -146,9 +145,12 @@ def _index() -> str:
 
 def _entry(lesson: str) -> str:
     links = {
-        "slides.html": "slides", "live.html": "live", "derivation.slides.html": "derivation as slides",
-        "derivation.html": "derivation", "exercise/students/01/exercise.html": "exercise of student 01",
+        "slides.html": "slides",
+        "live.html": "live",
+        "derivation.slides.html": "derivation as slides",
+        "derivation.html": "derivation",
+        "exercise/students/01/exercise.html": "exercise of student 01",
         "exercise/instructor/solutions.html": "solutions",
-    }  # fmt: skip
+    }
     shown = " · ".join(f'<a href="{lesson}/{file}">{what}</a>' for file, what in links.items())
     return f"<h2>{escape(title(lesson))}</h2><p>{shown}</p>"

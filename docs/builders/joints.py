@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import sympy
@@ -79,7 +79,8 @@ def assembled(m: kc.Mechanism) -> dict[str, float]:
 def _derivation(kind: type[Constraint]) -> Derivation:
     m = mechanism_of(kind)
     (constraint,) = m.constraints
-    return kc.derivation(m, assembled(m), constraint=constraint.name, levels=("vector",))
+    found = kc.derivation(m, assembled(m), constraint=constraint.name, levels=("vector",))
+    return cast("Derivation", found)
 
 
 def _picture(derivation: Derivation) -> str:

@@ -1,6 +1,7 @@
 """The tutorials as notebooks: their text, their programs, their commands.
 
-A program that is kept as a file is a cell that writes the file; where that is a model, the next cell shows it.
+A program that is kept as a file is a cell that writes the file. Where that is a model, the next
+cell shows it.
 """
 
 from __future__ import annotations

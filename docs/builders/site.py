@@ -1,7 +1,7 @@
-"""The pages of the site that are made: examples, public names, benchmarks, and what lies outside docs/.
+"""The pages of the site that are made: examples, names, benchmarks, and what lies outside docs/.
 
-A Sphinx extension. Before Sphinx looks for pages, they are written into docs/generated; when it reads a
-page, links that are good in a checkout become links of the site.
+A Sphinx extension. Before Sphinx looks for pages, they are written into docs/made. When it
+reads a page, links that are good in a checkout become links of the site.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
     from sphinx.application import Sphinx
 
-GENERATED = DOCS / "generated"
+GENERATED = DOCS / "made"
 
 OUTSIDE = {
     "README.md": "index",
-    "CONTRIBUTING.md": "generated/contributing",
-    "CHANGELOG.md": "generated/changelog",
-    "benchmarks/README.md": "generated/benchmarks",
-    "examples/README.md": "generated/gallery",
-    "examples": "generated/gallery",
-    "examples/notebooks/README.md": "generated/notebooks",
+    "CONTRIBUTING.md": "made/contributing",
+    "CHANGELOG.md": "made/changelog",
+    "benchmarks/README.md": "made/benchmarks",
+    "examples/README.md": "made/gallery",
+    "examples": "made/gallery",
+    "examples/notebooks/README.md": "made/notebooks",
 }
 """Pages of the checkout, and those of the site that show them."""
 
@@ -84,26 +84,26 @@ def _address(path: str) -> str:
     if place.parts[0] == "docs":
         return f"/{place.relative_to('docs')}"
     if place.parent == PurePosixPath("examples") and place.suffix in (".py", ".toml"):
-        return f"/generated/examples/{place.stem}.md"
+        return f"/made/examples/{place.stem}.md"
     return f"/{normpath('../' + path)}"
 
 
 def _read(app: Sphinx, name: str, source: list[str]) -> None:
     """Give a page that is read its links, and names and pages what is made."""
     del app
-    if not name.startswith("generated/"):
+    if not name.startswith("made/"):
         folder = PurePosixPath("docs", name).parent
         source[0] = in_the_site(source[0], str(folder))
     if name.startswith("course/"):
         source[0] = course.LIVE.sub(_live(f"lesson_{PurePosixPath(name).name}"), source[0])
     if name == "names":
-        source[0] = _with_links(source[0]) + _toctree("generated/api/*")
+        source[0] = _with_links(source[0]) + _toctree("made/api/*")
     if name == "guides":
         source[0] = source[0].replace("emitted_modules\n```", f"emitted_modules\n{_others()}```")
 
 
 def _others() -> str:
-    """Return the pages of docs/ that no page lists: a new one is a guide until it is put elsewhere."""
+    """Return the pages of docs/ that no page lists: a new one is a guide at first."""
     lists = "\n".join(path.read_text(encoding="utf-8") for path in DOCS.glob("*.md"))
     listed = set(re.findall(r"^[\w/]+$", lists, re.MULTILINE))
     return "".join(f"{path.stem}\n" for path in sorted(DOCS.glob("*.md"))
@@ -207,7 +207,7 @@ def _with_links(text: str) -> str:
 
     def linked(match: re.Match[str]) -> str:
         name = match[1]
-        return f"[{match[0]}](/generated/api/{name}.md)" if name in known else match[0]
+        return f"[{match[0]}](/made/api/{name}.md)" if name in known else match[0]
 
     lines = text.splitlines()
     for k, line in enumerate(lines):
@@ -219,7 +219,7 @@ def _with_links(text: str) -> str:
 
 def _api_page(name: str) -> str:
     """Return the page of a public name, which autodoc fills."""
-    lines = [f".. currentmodule:: kincompile", "", *_directive(name, getattr(kc, name))]
+    lines = [".. currentmodule:: kincompile", "", *_directive(name, getattr(kc, name))]
     return "\n".join([f"# {name}", "", "```{eval-rst}", *lines, "```", ""])
 
 
@@ -229,7 +229,7 @@ def _directive(name: str, value: object) -> Iterator[str]:
     elif inspect.isclass(value):
         yield f".. autoclass:: {name}"
         if name in CONSTRAINTS:
-            yield from ("", f"Picture, equation and sense: :doc:`/joints`.")
+            yield from ("", "Picture, equation and sense: :doc:`/joints`.")
         elif not issubclass(value, Exception | Warning):
             yield "   :members:"
     elif inspect.isfunction(value):

@@ -24,8 +24,7 @@ class CamFollower(CamConstraint):
     )
     use = (
         'cam, roller = m.body("cam", guess=(1, 1, 0.3)), m.body("roller", guess=(2.2, 1.2, 0.5))',
-        'm.add(kc.CamFollower("touch", cam, (0, 0), 0.8 + 0.15 * sympy.cos(kc.alpha), '
-        "roller, (0, 0), 0.3, guess=(0, kc.pi)))",
+        'm.add(kc.CamFollower("touch", cam, (0.2, 0), 0.8, roller, (0, 0), 0.3, guess=(0, kc.pi)))',
     )
     row_names = ("x", "y", "tangent")
     contacts = (contact_i, contact_j)
@@ -56,8 +55,7 @@ class CamFlatFollower(CamConstraint):
     use = (
         'cam, tappet = m.body("cam", guess=(1.4, 1, 0.3)), '
         'm.body("tappet", guess=(1.6, 2.1, 0.05))',
-        'm.add(kc.CamFlatFollower("touch", cam, (0, 0), 0.8 + 0.15 * sympy.cos(kc.alpha), '
-        "tappet, (0, 0), (1, 0), guess=1.2))",
+        'm.add(kc.CamFlatFollower("touch", cam, (0.2, 0), 0.8, tappet, (0, 0), (1, 0), guess=1.2))',
     )
     row_names = ("contact", "tangent")
     contacts = (contact_i,)
@@ -86,7 +84,7 @@ class PointFollower(CamConstraint):
     use = (
         'lever, disc = m.body("lever", guess=(2.6, 1.5, 0.4)), m.body("disc", guess=(1, 1, 0.3))',
         'm.add(kc.PointFollower("groove", lever, (-0.7, 0), disc, (0, 0), '
-        "0.9 + 0.15 * sympy.cos(2 * kc.alpha)))",
+        "0.9 + sympy.cos(2 * kc.alpha) / 7))",
     )
     row_names = ("x", "y")
     contacts = (contact_j,)

@@ -1,4 +1,4 @@
-"""The tutorials, as their notebooks: they follow from the pages, run, and print what the pages say."""
+"""The tutorials as notebooks: they follow from the pages, run, and print what the pages say."""
 
 import doctest
 import json

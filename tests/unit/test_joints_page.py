@@ -11,7 +11,6 @@ from docs.builders.places import DOCS
 from kincompile.model.catalogue import CONSTRAINTS
 
 TYPES = [pytest.param(kind, id=name) for name, kind in CONSTRAINTS.items()]
-I, J = slice(0, 3), slice(3, 6)
 
 
 def test_that_the_page_follows_from_the_catalogue(request):
@@ -90,5 +89,5 @@ def test_that_the_pictures_are_those_of_the_catalogue():
     for name, drawn in joints.pictures().items():
         kept = (DOCS / "images" / name).read_text(encoding="utf-8")
         assert re.sub(r"[\d.]+", "", kept) == re.sub(r"[\d.]+", "", drawn)
-        numbers = [np.array(re.findall(r"\d+\.?\d*", text), float) for text in (kept, drawn)]
-        np.testing.assert_allclose(*numbers, atol=0.15)
+        before, now = (np.array(re.findall(r"\d+\.?\d*", text), float) for text in (kept, drawn))
+        np.testing.assert_allclose(before, now, atol=0.15)

@@ -38,7 +38,7 @@ README, COMMANDS, NAMES, JOINTS = (
     for page in ("README.md", "docs/command_line.md", "docs/names.md", "docs/joints.md")
 )
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-PAGES += [ROOT / "examples" / "README.md", *sorted((ROOT / "docs").glob("[!g]*/*.md"))]
+PAGES += [ROOT / "examples" / "README.md", *sorted((ROOT / "docs").glob("[!m]*/*.md"))]
 
 BLOCK = re.compile(
     r"(?:^<!-- (?P<action>\w+): (?P<name>\S+) -->\n)?^```(?P<language>\w*)\n(?P<text>.*?)^```$",
