@@ -38,6 +38,13 @@ from kincompile.model.expressions import alpha as alpha
 from kincompile.model.expressions import deg as deg
 from kincompile.model.expressions import pi as pi
 from kincompile.model.expressions import t as t
+from kincompile.model.loads import FollowerForce as FollowerForce
+from kincompile.model.loads import Force as Force
+from kincompile.model.loads import HingeFriction as HingeFriction
+from kincompile.model.loads import SliderFriction as SliderFriction
+from kincompile.model.loads import Spring as Spring
+from kincompile.model.loads import Torque as Torque
+from kincompile.model.loads import TorsionSpring as TorsionSpring
 from kincompile.model.mechanism import Mechanism as Mechanism
 from kincompile.model.sketch import Sketch as Sketch
 from kincompile.model.system import ConstraintSystem as ConstraintSystem

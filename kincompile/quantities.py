@@ -39,6 +39,8 @@ class Quantity:
         otherwise an entry belongs to one constraint.
     about
         A sentence for the comments of emitted code.
+    of_loads
+        Whether only a mechanism with masses or forces has it.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Quantity:
     reads: tuple[str, ...]
     adds: bool
     about: str
+    of_loads: bool = False
 
     @property
     def is_matrix(self) -> bool:
@@ -86,6 +89,15 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity(
         "outputs_q", "outputs", "coordinates", ACCELERATED, False, "Jacobian of the outputs by q."
     ),
+    Quantity("M", "coordinates", "coordinates", AT_POSITION, True, "Mass matrix M(q).", True),
+    Quantity(
+        "Q", "coordinates", "none", MOVING, True,
+        "Generalised forces: M q_ddot + Phi_q^T lambda = Q(q, q_dot, t).", True,
+    ),
+    Quantity("Q_q", "coordinates", "coordinates", MOVING, True, "Jacobian of Q by q.", True),
+    Quantity(
+        "Q_q_dot", "coordinates", "coordinates", MOVING, True, "Jacobian of Q by q_dot.", True
+    ),
 )  # fmt: skip
 """All quantities, in the order in which they are computed."""
 
@@ -102,9 +114,13 @@ WHOLE = ("position", "observe")
 """Those of them that are code of their own, in place of code for each of their quantities."""
 
 
-def quantities_of(*, has_outputs: bool) -> tuple[Quantity, ...]:
-    """Return the quantities of a mechanism, in order: those of outputs where it has any."""
-    return tuple(item for item in QUANTITIES if has_outputs or item.rows != "outputs")
+def quantities_of(*, has_outputs: bool, has_loads: bool = False) -> tuple[Quantity, ...]:
+    """Return the quantities of a mechanism, in order: those of outputs and loads if it has any."""
+    return tuple(
+        item
+        for item in QUANTITIES
+        if (has_outputs or item.rows != "outputs") and (has_loads or not item.of_loads)
+    )
 
 
 OF_EQUATIONS = tuple(item for item in QUANTITIES if item.rows == "equations")

@@ -24,8 +24,7 @@ const cam_by_table = (() => {
     const FORMAT = 3;
     const FINGERPRINT = "fc5b7a69973968d964191eadf6c68e9b";
     const N_COORDINATES = 7;
-    const N_EQUATIONS = 7;
-    const COORDINATES = [
+    const N_EQUATIONS = 7;    const COORDINATES = [
         "x_cam", "y_cam", "phi_cam", "x_follower", "y_follower", "phi_follower", "alpha_contact",
     ];
     const EQUATIONS = [
@@ -422,6 +421,11 @@ const cam_by_table = (() => {
             return x;
         }
 
+        /* The rows that determine the motion: all but those that repeat others. */
+        function independent({ REDUNDANT }, rows) {
+            return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(i)) : rows;
+        }
+
         /* x of A x = b from the factors of A. */
         function solve({ rows, order }, b) {
             const y = order.map(k => b[k]);
@@ -584,7 +588,7 @@ const cam_by_table = (() => {
 
             /* The factors of the dense matrix at a point, kept with it. */
             factors(at) {
-                at.dense ??= factor(this.model.rows_of(at, "Phi_q"));
+                at.dense ??= factor(independent(this.model, this.model.rows_of(at, "Phi_q")));
                 return at.dense;
             }
 
@@ -690,7 +694,8 @@ const cam_by_table = (() => {
 
         /* The whole correction. */
         function plainStep(equations, at) {
-            const factors = equations.factors(at), step = solve(factors, at.Phi.map(value => -value));
+            const factors = equations.factors(at), right = independent(equations.model, at.Phi);
+            const step = solve(factors, right.map(value => -value));
             if (factors.dependent.length || !allFinite(step)) return whySingular(at);
             const following = moved(equations, at, step);
             return following ? [following, norm(step)] : NOT_FINITE;
@@ -826,11 +831,13 @@ const cam_by_table = (() => {
 
             prepare(at) {
                 this.model.factor_at(at);
-                at.dense = this.isDense ? factor(this.model.rows_of(at, "Phi_q")) : null;
+                at.dense = null;
+                if (this.isDense) this.equations.factors(at);
             }
 
             solve(at, right, to) {
-                if (this.isDense) to.set(solve(at.dense, right)); else this.model.solve_at(at.F, right, to);
+                if (this.isDense) to.set(solve(at.dense, independent(this.model, right)));
+                else this.model.solve_at(at.F, right, to);
             }
 
             /* Newton's method from a prediction; says whether it converged. */

@@ -25,8 +25,7 @@ const four_bar = (() => {
     const FORMAT = 3;
     const FINGERPRINT = "026fefbfb06f3b341fb7723f8ec67fcb";
     const N_COORDINATES = 9;
-    const N_EQUATIONS = 9;
-    const COORDINATES = [
+    const N_EQUATIONS = 9;    const COORDINATES = [
         "x_crank", "y_crank", "phi_crank", "x_coupler", "y_coupler", "phi_coupler", "x_rocker",
         "y_rocker", "phi_rocker",
     ];
@@ -445,6 +444,11 @@ const four_bar = (() => {
             return x;
         }
 
+        /* The rows that determine the motion: all but those that repeat others. */
+        function independent({ REDUNDANT }, rows) {
+            return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(i)) : rows;
+        }
+
         /* x of A x = b from the factors of A. */
         function solve({ rows, order }, b) {
             const y = order.map(k => b[k]);
@@ -607,7 +611,7 @@ const four_bar = (() => {
 
             /* The factors of the dense matrix at a point, kept with it. */
             factors(at) {
-                at.dense ??= factor(this.model.rows_of(at, "Phi_q"));
+                at.dense ??= factor(independent(this.model, this.model.rows_of(at, "Phi_q")));
                 return at.dense;
             }
 
@@ -713,7 +717,8 @@ const four_bar = (() => {
 
         /* The whole correction. */
         function plainStep(equations, at) {
-            const factors = equations.factors(at), step = solve(factors, at.Phi.map(value => -value));
+            const factors = equations.factors(at), right = independent(equations.model, at.Phi);
+            const step = solve(factors, right.map(value => -value));
             if (factors.dependent.length || !allFinite(step)) return whySingular(at);
             const following = moved(equations, at, step);
             return following ? [following, norm(step)] : NOT_FINITE;
@@ -849,11 +854,13 @@ const four_bar = (() => {
 
             prepare(at) {
                 this.model.factor_at(at);
-                at.dense = this.isDense ? factor(this.model.rows_of(at, "Phi_q")) : null;
+                at.dense = null;
+                if (this.isDense) this.equations.factors(at);
             }
 
             solve(at, right, to) {
-                if (this.isDense) to.set(solve(at.dense, right)); else this.model.solve_at(at.F, right, to);
+                if (this.isDense) to.set(solve(at.dense, independent(this.model, right)));
+                else this.model.solve_at(at.F, right, to);
             }
 
             /* Newton's method from a prediction; says whether it converged. */

@@ -21,8 +21,7 @@ const problem_3_5_6 = (() => {
     const FORMAT = 3;
     const FINGERPRINT = "fa7adf382924fd70db26c5bd35276fee";
     const N_COORDINATES = 3;
-    const N_EQUATIONS = 3;
-    const COORDINATES = [
+    const N_EQUATIONS = 3;    const COORDINATES = [
         "x2", "y2", "phi3",
     ];
     const EQUATIONS = [
@@ -301,6 +300,11 @@ const problem_3_5_6 = (() => {
             return x;
         }
 
+        /* The rows that determine the motion: all but those that repeat others. */
+        function independent({ REDUNDANT }, rows) {
+            return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(i)) : rows;
+        }
+
         /* x of A x = b from the factors of A. */
         function solve({ rows, order }, b) {
             const y = order.map(k => b[k]);
@@ -463,7 +467,7 @@ const problem_3_5_6 = (() => {
 
             /* The factors of the dense matrix at a point, kept with it. */
             factors(at) {
-                at.dense ??= factor(this.model.rows_of(at, "Phi_q"));
+                at.dense ??= factor(independent(this.model, this.model.rows_of(at, "Phi_q")));
                 return at.dense;
             }
 
@@ -569,7 +573,8 @@ const problem_3_5_6 = (() => {
 
         /* The whole correction. */
         function plainStep(equations, at) {
-            const factors = equations.factors(at), step = solve(factors, at.Phi.map(value => -value));
+            const factors = equations.factors(at), right = independent(equations.model, at.Phi);
+            const step = solve(factors, right.map(value => -value));
             if (factors.dependent.length || !allFinite(step)) return whySingular(at);
             const following = moved(equations, at, step);
             return following ? [following, norm(step)] : NOT_FINITE;
@@ -705,11 +710,13 @@ const problem_3_5_6 = (() => {
 
             prepare(at) {
                 this.model.factor_at(at);
-                at.dense = this.isDense ? factor(this.model.rows_of(at, "Phi_q")) : null;
+                at.dense = null;
+                if (this.isDense) this.equations.factors(at);
             }
 
             solve(at, right, to) {
-                if (this.isDense) to.set(solve(at.dense, right)); else this.model.solve_at(at.F, right, to);
+                if (this.isDense) to.set(solve(at.dense, independent(this.model, right)));
+                else this.model.solve_at(at.F, right, to);
             }
 
             /* Newton's method from a prediction; says whether it converged. */

@@ -25,8 +25,7 @@ const slider_crank = (() => {
     const FORMAT = 3;
     const FINGERPRINT = "367a7ab757cf5203ac73fe4edd6c86ae";
     const N_COORDINATES = 9;
-    const N_EQUATIONS = 9;
-    const COORDINATES = [
+    const N_EQUATIONS = 9;    const COORDINATES = [
         "x_crank", "y_crank", "phi_crank", "x_rod", "y_rod", "phi_rod", "x_slider", "y_slider",
         "phi_slider",
     ];
@@ -392,6 +391,11 @@ const slider_crank = (() => {
             return x;
         }
 
+        /* The rows that determine the motion: all but those that repeat others. */
+        function independent({ REDUNDANT }, rows) {
+            return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(i)) : rows;
+        }
+
         /* x of A x = b from the factors of A. */
         function solve({ rows, order }, b) {
             const y = order.map(k => b[k]);
@@ -554,7 +558,7 @@ const slider_crank = (() => {
 
             /* The factors of the dense matrix at a point, kept with it. */
             factors(at) {
-                at.dense ??= factor(this.model.rows_of(at, "Phi_q"));
+                at.dense ??= factor(independent(this.model, this.model.rows_of(at, "Phi_q")));
                 return at.dense;
             }
 
@@ -660,7 +664,8 @@ const slider_crank = (() => {
 
         /* The whole correction. */
         function plainStep(equations, at) {
-            const factors = equations.factors(at), step = solve(factors, at.Phi.map(value => -value));
+            const factors = equations.factors(at), right = independent(equations.model, at.Phi);
+            const step = solve(factors, right.map(value => -value));
             if (factors.dependent.length || !allFinite(step)) return whySingular(at);
             const following = moved(equations, at, step);
             return following ? [following, norm(step)] : NOT_FINITE;
@@ -796,11 +801,13 @@ const slider_crank = (() => {
 
             prepare(at) {
                 this.model.factor_at(at);
-                at.dense = this.isDense ? factor(this.model.rows_of(at, "Phi_q")) : null;
+                at.dense = null;
+                if (this.isDense) this.equations.factors(at);
             }
 
             solve(at, right, to) {
-                if (this.isDense) to.set(solve(at.dense, right)); else this.model.solve_at(at.F, right, to);
+                if (this.isDense) to.set(solve(at.dense, independent(this.model, right)));
+                else this.model.solve_at(at.F, right, to);
             }
 
             /* Newton's method from a prediction; says whether it converged. */

@@ -23,6 +23,7 @@ from kincompile.calculus.expressions import (
     Power,
     Product,
     ProfileFunction,
+    Root,
     Rotated,
     Scalar,
     Scaled,
@@ -77,7 +78,7 @@ class Expansion:
     def __init__(self, environment: Environment, size: int = 2) -> None:
         self.environment = environment
         self._size = size
-        self._scalars: dict[Scalar, Value] = {}
+        self.scalars: dict[Scalar, Value] = {}
         self.vectors: dict[Vector, Components] = {}
 
     def components(self, expression: Expression) -> Components:
@@ -88,9 +89,9 @@ class Expansion:
 
     def scalar(self, expression: Scalar) -> Value:
         """Return the value of a scalar expression."""
-        if expression not in self._scalars:
-            self._scalars[expression] = self._scalar(expression)
-        return self._scalars[expression]
+        if expression not in self.scalars:
+            self.scalars[expression] = self._scalar(expression)
+        return self.scalars[expression]
 
     def vector(self, expression: Vector) -> Components:
         """Return the components of a vector expression."""
@@ -125,6 +126,8 @@ class Expansion:
             case Norm(vector):
                 squares = [item**2 for item in self.vector(vector)]
                 return environment.call("sqrt", reduce(add, squares))
+            case Root(square):
+                return environment.call("sqrt", self.scalar(square))
             case Angle(sine, cosine):
                 return environment.call("atan2", self.scalar(sine), self.scalar(cosine))
             case Dot(left, right):

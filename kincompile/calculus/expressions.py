@@ -142,9 +142,16 @@ class Power(Scalar):
 
 @dataclass(frozen=True, slots=True)
 class Norm(Scalar):
-    """The length of a constant vector."""
+    """The length of a vector."""
 
     vector: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Root(Scalar):
+    """The square root of a scalar."""
+
+    square: Scalar
 
 
 @dataclass(frozen=True, slots=True)

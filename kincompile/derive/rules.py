@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from fractions import Fraction
 from typing import overload
 
 from kincompile.calculus.expressions import (
@@ -17,10 +18,13 @@ from kincompile.calculus.expressions import (
     Angle,
     Dot,
     Expression,
+    Norm,
+    Number,
     Perpendicular,
     Power,
     Product,
     ProfileFunction,
+    Root,
     Rotated,
     Scalar,
     Scaled,
@@ -114,6 +118,11 @@ def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[R
             return Rule.PRODUCT, dot(along(left, direction, record), right) + dot(
                 left, along(right, direction, record)
             )
+        case Norm(vector) if along(vector, direction) != ZERO_VECTOR:
+            return Rule.CHAIN, dot(vector, along(vector, direction, record)) * expression**-1
+        case Root(square):
+            half = Number(Fraction(1, 2))
+            return Rule.CHAIN, half * along(square, direction, record) * expression**-1
         case Angle(sine, cosine):
             by_sine, by_cosine = (along(item, direction, record) for item in (sine, cosine))
             turn = cosine * by_sine - sine * by_cosine

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from kincompile.model.arguments import Kind
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from kincompile.model.constraint import Constraint
+    from kincompile.model.load import Load
 
 VERSION = 1
 """Version of the format, the value of the key `kincompile`."""
@@ -72,6 +73,8 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "coordinates": Field(_list("coordinate"), is_required=False),
         "sketch": Field({"$ref": "#/$defs/sketch"}, is_required=False),
         "constraints": Field(_list("constraint")),
+        "gravity": Field(_POINT, is_required=False),
+        "loads": Field(_list("load"), is_required=False),
         "points": Field(_list("point"), is_required=False),
         "outputs": Field(_list("output"), is_required=False),
     },
@@ -97,6 +100,11 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "name": Field(_NAME),
         "guess": Field({**_POINT, "minItems": 3, "maxItems": 3}, is_required=False),
         "outline": Field({"type": "array", "items": _POINT, "minItems": 3}, is_required=False),
+        "mass": Field(_EXPRESSION, is_required=False),
+        "inertia": Field(_EXPRESSION, is_required=False),
+        "centre": Field(_POINT, is_required=False),
+        "density": Field(_EXPRESSION, is_required=False),
+        "thickness": Field(_EXPRESSION, is_required=False),
     },
     "point": {"name": Field(_NAME), "body": Field(_NAME), "local": Field(_POINT)},
     "output": {
@@ -119,6 +127,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "times": Field(_VALUES),
         "values": Field(_VALUES),
         "velocities": Field({**_POINT}, is_required=False),
+        "over": Field(_EXPRESSION, is_required=False),
     },
     "Equation": {
         "type": Field({"const": "Equation"}),
@@ -160,6 +169,8 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
 
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
     Kind.VALUE: _VALUE,
+    Kind.LOAD: _VALUE,
+    Kind.LOADS: {"type": "array", "items": _VALUE, "minItems": 2, "maxItems": 2},
     Kind.DISTANCE: _VALUE,
     Kind.BODY: _NAME,
     Kind.POINT: _POINT,
@@ -170,15 +181,25 @@ _KINDS: Mapping[Kind, Mapping[str, Any]] = {
 
 def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
     """Return the fields of a constraint type: its arguments, and what drivers and cams have."""
-    fields = {"type": Field({"const": constraint.__name__}), "name": Field(_NAME)}
+    found = {"type": Field({"const": constraint.__name__}), "name": Field(_NAME)}
     for name, item in constraint.arguments().items():
-        fields[name] = Field(_KINDS.get(item.kind, _EXPRESSION))
+        found[name] = Field(_KINDS.get(item.kind, _EXPRESSION))
     if any(item.symbol == "C" for item in constraint.arguments().values()):
-        fields["corners"] = Field(_CORNERS, is_required=False)
+        found["corners"] = Field(_CORNERS, is_required=False)
     if constraint.contacts:
         guesses = {"type": "array", "items": _EXPRESSION, "minItems": len(constraint.contacts)}
-        fields["guess"] = Field({"anyOf": [_EXPRESSION, guesses]}, is_required=False)
-    return fields
+        found["guess"] = Field({"anyOf": [_EXPRESSION, guesses]}, is_required=False)
+    return found
+
+
+def load_fields(load: type[Load]) -> dict[str, Field]:
+    """Return the fields of a type of load: its arguments, those with a default left out or not."""
+    given = {item.name: item for item in fields(load)}
+    found = {"type": Field({"const": load.__name__}), "name": Field(_NAME)}
+    for name, item in load.arguments().items():
+        schema = _KINDS.get(item.kind, _EXPRESSION)
+        found[name] = Field(schema, is_required=given[name].default is MISSING)
+    return found
 
 
 def model_schema() -> dict[str, Any]:
@@ -187,6 +208,8 @@ def model_schema() -> dict[str, Any]:
     Whether a formula can be read and a body exists is checked by `kincompile inspect`.
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
+    from kincompile.model.loads import LOADS
+
     kinds = [_object(constraint_fields(item)) for item in CONSTRAINTS.values()]
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
@@ -206,6 +229,7 @@ def model_schema() -> dict[str, Any]:
             **tables,
             "part": {"oneOf": parts},
             "constraint": {"oneOf": [*kinds, _object(FIELDS["Equation"])]},
+            "load": {"oneOf": [_object(load_fields(item)) for item in LOADS.values()]},
         },
     }
 

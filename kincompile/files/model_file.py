@@ -31,6 +31,7 @@ from kincompile.files.file_format import (
     VERSION,
     Field,
     constraint_fields,
+    load_fields,
 )
 from kincompile.files.sketch_reader import SketchReader
 from kincompile.model.arguments import Kind
@@ -45,6 +46,7 @@ from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed, rate, shown, suggestion
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
     from pathlib import Path
 
     from kincompile.files.data_lines import Address
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
     from kincompile.model.arguments import Argument
     from kincompile.model.constraint import Constraint
     from kincompile.model.expressions import Scalars
+    from kincompile.model.load import Load
 
 Row = dict[str, Any]
 
@@ -118,12 +121,15 @@ class _ModelReader(SketchReader):
             self._declare_contacts(row)
         constraints = [self._constraint(*item) for item in rows]
         outputs = [self._output(*item) for item in self.rows(data, "outputs")]
+        loads = [self._load(*item) for item in self.rows(data, "loads")]
         content = {
             "parameters": drawn.parameters or parameters,
             "bodies": [*drawn.bodies, *(item for item in bodies if item)],
             "coordinates": dict(item for item in free if item),
             "constraints": [*drawn.constraints, *(item for item in constraints if item)],
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
+            "loads": [item for item in loads if item],
+            "gravity": self._pair_of(data, (), "gravity"),
         }
         return self._checked(name, content, options)
 
@@ -147,6 +153,7 @@ class _ModelReader(SketchReader):
         model = Mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
         model.constraints, model.outputs = content["constraints"], content["outputs"]
+        model.loads, model.gravity = content["loads"], content["gravity"]
         free = content["coordinates"]
         if self.problems and not (model.constraints and (model.bodies or free)):
             return None
@@ -162,6 +169,8 @@ class _ModelReader(SketchReader):
                 guess=list(free.values()),
                 bodies=model.bodies,
                 outputs=model.outputs,
+                loads=model.loads,
+                gravity=model.gravity,
                 **options,
             )
         except ModelError as error:
@@ -217,6 +226,12 @@ class _ModelReader(SketchReader):
         guess = row.get("guess", [0, 0, 0])
         start = self.expressions(guess, (*address, "guess"), self.names, "[x, y, phi]", 3)
         outline = self._outline(row.get("outline", []), (*address, "outline"))
+        heavy: dict[str, Any] = {
+            key: self.expression(row[key], (*address, key), self.names)
+            for key in ("mass", "inertia", "density", "thickness")
+            if key in row
+        }
+        centre = self._pair_of(row, address, "centre")
         if not name:
             return None
         if name == GROUND.name or name in self.bodies:
@@ -225,12 +240,19 @@ class _ModelReader(SketchReader):
             self.problem((*address, "name"), f"{name!r} is the name {whose} already")
             return None
         self.bodies[name] = address
-        body = Body(name, tuple(start), outline)
+        body = Body(name, tuple(start), outline, centre=centre, **heavy)
+        for title in (f"body {name!r}", f"Mass {name!r}"):
+            self.remember(title, address)
         for coordinate in body.coordinates:
             self.names[coordinate] = sympy.Symbol(coordinate)
             self.remember(f"guess of {coordinate}", (*address, "guess"))
         self.remember(f"outline of {name}", (*address, "outline"))
         return body
+
+    def _pair_of(self, row: Row, address: Address, key: str) -> Scalars:
+        """Return two numbers or formulas of a table, zeros where it has none."""
+        given = row.get(key, [0, 0])
+        return tuple(self.expressions(given, (*address, key), self.names, "[x, y]", 2))
 
     def _outline(self, given: Any, address: Address) -> tuple[Scalars, ...]:
         """Return the corners of a body's outline."""
@@ -271,12 +293,48 @@ class _ModelReader(SketchReader):
         name = self.name(row, address, "an output")
         self.remember(f"output {name!r}", address)
         unit = self.unit(row.get("unit", ""), (*address, "unit"), f"output {name!r}")
-        symbols = [item for item, value in self.names.items() if value.is_Symbol]
-        rates = [rate(item, order) for item in symbols for order in (1, 2)]
-        names = {**self.names, **{item: sympy.Symbol(item) for item in rates}}
-        found = self.expression(row.get("expression", 0), (*address, "expression"), names)
+        given = row.get("expression", 0)
+        found = self.expression(given, (*address, "expression"), self._moving_names())
         is_new = self._is_free(name, address, "output")
         return Output(name, found, unit) if is_new and complete else None
+
+    def _moving_names(self) -> dict[str, sympy.Expr]:
+        """Return the names that may occur in an output or a load: those of rates too."""
+        symbols = [item for item, value in self.names.items() if value.is_Symbol]
+        rates = [rate(item, order) for item in symbols for order in (1, 2)]
+        return {**self.names, **{item: sympy.Symbol(item) for item in rates}}
+
+    def _load(self, address: Address, row: Row) -> Load | None:
+        """Return a load, None where something is wrong with it."""
+        from kincompile.model.loads import LOADS
+
+        before = len(self.problems)
+        name = self.name(row, address, "a load")
+        kind = self._type_of(row, address, LOADS)
+        if kind is None:
+            return None
+        self._is_free(name, address, "load")
+        self.remember(f"{kind} {name!r}", address)
+        self.remember(f"the load {name!r}", address)
+        self.has_fields(address, row, load_fields(LOADS[kind]))
+        given = {
+            key: self._argument(item, row[key], (*address, key))
+            for key, item in LOADS[kind].arguments().items()
+            if key in row
+        }
+        for key in given:
+            self.remember(f"{kind} {name!r}, {key}", (*address, key))
+        return LOADS[kind](name, **given) if len(self.problems) == before else None
+
+    def _type_of(self, row: Row, address: Address, known: Collection[str]) -> str | None:
+        """Return the type of a constraint or a load."""
+        kind = row.get("type")
+        if isinstance(kind, str) and kind in known:
+            return kind
+        hint = suggestion(kind, known) if isinstance(kind, str) else ""
+        given = f"no type {shown(kind)}" if "type" in row else "no type"
+        self.problem((*address, "type"), f"there is {given}{hint}; types: {listed(known, 20)}")
+        return None
 
     def _declare_contacts(self, row: Row) -> None:
         """Declare the contact parameters of a cam, which any equation may name."""
@@ -288,12 +346,8 @@ class _ModelReader(SketchReader):
     def _constraint(self, address: Address, row: Row) -> Constraint | Equation | None:
         """Return a joint, a driver or a free equation, None where something is wrong with it."""
         before = len(self.problems)
-        kind = row.get("type")
-        known = (*CONSTRAINTS, "Equation")
-        if not isinstance(kind, str) or kind not in known:
-            hint = suggestion(kind, known) if isinstance(kind, str) else ""
-            given = f"no type {shown(kind)}" if "type" in row else "no type"
-            self.problem((*address, "type"), f"there is {given}{hint}; types: {listed(known, 20)}")
+        kind = self._type_of(row, address, (*CONSTRAINTS, "Equation"))
+        if kind is None:
             return None
         name = self.name(row, address, "a constraint")
         self._remember_constraint(kind, name, address)
@@ -354,7 +408,20 @@ class _ModelReader(SketchReader):
             return self._profile(given, address)
         if item.kind in (Kind.VALUE, Kind.DISTANCE):
             return self.driven(given, address)
+        if item.kind is Kind.LOAD:
+            return self._force(given, address)
+        if item.kind is Kind.LOADS:
+            if not isinstance(given, list) or len(given) != 2:
+                self.problem(address, f"expected [F_x, F_y], not {shown(given)}")
+                return 1.0, 1.0
+            return tuple(self._force(part, (*address, k)) for k, part in enumerate(given))
         return self.expression(given, address, self.names)
+
+    def _force(self, given: Any, address: Address) -> Any:
+        """Return a force: a formula in coordinates and rates too, or a table."""
+        if isinstance(given, dict):
+            return self.driven(given, address)
+        return self.expression(given, address, self._moving_names())
 
     def _body_name(self, given: Any, address: Address) -> str:
         if not isinstance(given, str):

@@ -171,10 +171,12 @@ class SketchReader(FieldReader):
             columns["ramp"] = self._free(given["ramp"], (*address, "ramp"))
         if "law" in given:
             columns["law"] = given["law"]
+        over = self._free(given["over"], (*address, "over")) if "over" in given else t
         if len(self.problems) > before:
             return 1.0
         try:
-            return (motion.table if kind == "table" else motion.sequence)(**columns)
+            made = (motion.table if kind == "table" else motion.sequence)(**columns)
+            return made.subs(t, over)
         except ModelError as error:
             for problem in error.problems:
                 self.problem(address, problem)

@@ -9,7 +9,7 @@ import sympy
 from sympy.printing.str import StrPrinter
 
 from kincompile.errors import ModelError
-from kincompile.files.file_format import SMOOTHNESS, VERSION
+from kincompile.files.file_format import SMOOTHNESS, VERSION, load_fields
 from kincompile.model.arguments import Kind
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.expressions import as_expression, as_sympy, deg, t
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from kincompile.model.expressions import Scalar
     from kincompile.model.laws import MotionLaw
     from kincompile.model.resolve import FreeEquation
+    from kincompile.model.resolve_loads import AppliedLoad
 
 
 @model_text.register(ConstraintSystem)
@@ -50,13 +51,16 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
             for item in system.body_points
         ],
         "outputs": _outputs(system),
+        "loads": [_load(item) for item in system.loads if type(item.written).__name__ != "Mass"],
         "constraints": [_constraint(item) for item in system.constraints],
     }
+    gravity = [value(item) for item in system.gravity]
     return {
         "kincompile": VERSION,
         "name": system.name,
         "length_unit": system.length_unit,
         "analysis": {"end": _end(system), "points": int(system.points)},
+        **({"gravity": gravity} if gravity != [0, 0] else {}),
         **{name: rows for name, rows in sections.items() if rows},
     }
 
@@ -75,7 +79,11 @@ def _parameter(item: Parameter) -> dict[str, Any]:
 def _body(item: Body) -> dict[str, Any]:
     row: dict[str, Any] = {"name": item.name, "guess": [value(number) for number in item.guess]}
     corners = [[value(number) for number in corner] for corner in item.outline]
-    return {**row, "outline": corners} if corners else row
+    row |= {"outline": corners} if corners else {}
+    given = {key: getattr(item, key) for key in ("mass", "inertia", "density", "thickness")}
+    row |= {key: value(number) for key, number in given.items() if number is not None}
+    centre = [value(number) for number in item.centre]
+    return {**row, "centre": centre} if centre != [0, 0] else row
 
 
 def _outputs(system: ConstraintSystem) -> list[dict[str, Any]]:
@@ -123,14 +131,31 @@ def _constraint(item: Joint | FreeEquation) -> dict[str, Any]:
     return row | _corners(item) | _guess(written)
 
 
+def _load(item: AppliedLoad) -> dict[str, Any]:
+    """Return a load; arguments that are zero, as their defaults are, are left out."""
+    written = item.written
+    row: dict[str, Any] = {"type": type(written).__name__, "name": written.name}
+    bodies = iter(item.bodies)
+    for name, argument in written.arguments().items():
+        if argument.kind is Kind.BODY:
+            row[name] = next(bodies).name
+        elif argument.symbol in item.points:
+            row[name] = [_scalar(number) for number in item.points[argument.symbol]]
+        else:
+            row[name] = _scalar(item.scalars[argument.symbol])
+    fields = load_fields(type(written))
+    return {key: x for key, x in row.items() if x != 0 or fields[key].is_required}
+
+
 def _corners(item: Joint | FreeEquation) -> dict[str, Any]:
     return {"corners": True} if item.corners else {}
 
 
 def _scalar(given: Scalar) -> Any:
     """Return a value: a table over time as its columns, anything else as a number or formula."""
-    if isinstance(given, TableLaw) and given.args == (t,) and not given.order:
-        return dict(zip(("times", "values", "velocities"), map(list, given.given), strict=True))
+    if isinstance(given, TableLaw) and not given.order:
+        table = dict(zip(("times", "values", "velocities"), map(list, given.given), strict=True))
+        return table if given.args == (t,) else {**table, "over": value(given.args[0])}
     return value(given)
 
 
@@ -210,7 +235,7 @@ def toml_text(data: dict[str, Any]) -> str:
             for row in content:
                 lines += ["", "[[constraints]]"]
                 lines += [f"{name} = {_toml(item)}" for name, item in row.items()]
-        elif isinstance(content, list):
+        elif isinstance(content, list) and isinstance(content[0], dict):
             lines += [f"{key} = [", *(f"    {_toml(row)}," for row in content), "]"]
         else:
             lines.append(f"{key} = {_toml(content)}")

@@ -69,13 +69,16 @@ class SolvePlan:
 
 
 def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan | None:
-    """Plan the solve of a square system; None where it is structurally singular.
+    """Plan the solve of the independent equations; None where they are structurally singular.
 
+    Redundant equations are left out: that they are met is for the solver to check.
     `is_straight` is for code that may not call LAPACK: larger blocks are eliminated too, with
     pivots that vary. The determinants are then these pivots.
     """
-    size = len(code.program.equations), len(code.program.coordinates)
-    return plan_entries(*size, jacobian_entries(code), is_straight=is_straight)
+    equations, redundant = code.program.equations, code.program.redundant
+    size = len(equations), len(code.program.coordinates)
+    left_out = frozenset(equations.index(name) for name in redundant)
+    return plan_entries(*size, jacobian_entries(code), left_out=left_out, is_straight=is_straight)
 
 
 def jacobian_entries(code: InlineProgram) -> list[tuple[int, int, Constant | None]]:
@@ -88,9 +91,13 @@ def plan_entries(
     column_count: int,
     entries: Iterable[tuple[int, int, Constant | None]],
     *,
+    left_out: Collection[int] = (),
     is_straight: bool = False,
 ) -> SolvePlan | None:
-    """Plan the solve of a matrix given by its entries, each a number or, where it varies, None."""
+    """Plan the solve of a matrix given by its entries, each a number or, where it varies, None.
+
+    Rows that are left out are inputs that nothing reads.
+    """
     graph = Graph()
     matrix: Matrix = {row: {} for row in range(row_count)}
     varying = []
@@ -102,6 +109,8 @@ def plan_entries(
             matrix[row][column] = graph.const(value)
     right = {row: graph.input(f"b[{row}]") for row in matrix}
     given = tuple(right.values())
+    for row in left_out:
+        del matrix[row]
     pivots, eliminated = _eliminate(graph, matrix, right)
     rows = sorted(matrix)
     columns = sorted(set(range(column_count)) - {pivot.column for pivot in pivots})

@@ -38,7 +38,8 @@ class Source:
     ----------
     kind
         ``"q"``, ``"q_dot"``, ``"q_ddot"``, ``"number"`` (an attribute), ``"value"`` (computed from
-        t, p and contact parameters), or an entry of the frames of bodies, as ``"frame_1.c"``.
+        t, p and coordinates), ``"moving"`` (computed from rates too), or an entry of the frames of
+        bodies, as ``"frame_1.c"``.
     index
         Index for each constraint, into the vector of that kind.
     """
@@ -123,7 +124,9 @@ class GroupedProgram:
     numbers
         Attributes that are plain numbers, shape (K,).
     values
-        Nodes of `program.values` that depend on t, p or contact parameters.
+        Nodes of `program.values` that depend on t, p or coordinates.
+    moving
+        Those that depend on rates too.
     frames
         The bodies, by kind.
     """
@@ -132,6 +135,7 @@ class GroupedProgram:
     groups: tuple[Group, ...]
     numbers: NDArray[np.float64]
     values: tuple[int, ...]
+    moving: tuple[int, ...]
     frames: tuple[FrameGroup, ...]
 
     def pattern(self) -> NDArray[np.intp]:
@@ -152,10 +156,10 @@ class GroupedProgram:
         return np.concatenate(places), np.concatenate(values)
 
 
-KINDS = ("q", "q_dot", "q_ddot", "number", "value")
+KINDS = ("q", "q_dot", "q_ddot", "number", "value", "moving")
 """Kinds of sources; entries of frames follow."""
 
-NUMBER, VALUE = 3, 4
+Q_DOT, NUMBER, VALUE, MOVING = 1, 3, 4, 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +203,10 @@ def _classify(program: Program, groups: Sequence[FrameGroup]) -> _Nodes:
     kind = np.full(len(nodes), VALUE)
     index = np.arange(len(nodes))
     number = np.full(len(nodes), np.nan)
+
+    def is_moving(node: int) -> bool:
+        return any(kind[k] in (Q_DOT, MOVING) for k in operands_of(nodes[node]))
+
     for node, (operation, *operands) in enumerate(nodes):
         if operation == "input" and operands[0] in places:
             kind[node], index[node] = places[operands[0]]
@@ -208,6 +216,8 @@ def _classify(program: Program, groups: Sequence[FrameGroup]) -> _Nodes:
             number[node] = -number[operands[0]]
         elif node in frames:
             kind[node], index[node] = frames[node]
+        if program.loads and kind[node] == VALUE and is_moving(node):
+            kind[node] = MOVING
     kind[~np.isnan(number)] = NUMBER
     return _Nodes(kinds, kind, index, number, _structures(nodes, kind, len(kinds)))
 
@@ -239,7 +249,8 @@ def group(program: Program) -> GroupedProgram:
         program,
         tuple(groups),
         np.array(builder.numbers),
-        tuple(builder.values),
+        tuple(builder.values["value"]),
+        tuple(builder.values["moving"]),
         frames,
     )
 
@@ -285,9 +296,8 @@ class _Builder:
         self._nodes, self._code = nodes, program.values
         self._quantities = program.quantities
         self._counts: dict[str, int] = {}
-        self._values: dict[int, int] = {}
         self.numbers: list[float] = []
-        self.values: list[int] = []
+        self.values: dict[str, dict[int, int]] = {"value": {}, "moving": {}}
 
     def groups(self, instances: list[Instance]) -> list[Group]:
         """Split the constraints of one kernel by their shape."""
@@ -395,15 +405,14 @@ class _Builder:
     def _source(self, nodes: Index) -> Source:
         """Return where an input comes from; numbers here and expressions there are all computed."""
         kinds = np.unique(self._nodes.kind[nodes])
-        kind = self._nodes.kinds[kinds[0]] if kinds.size == 1 else "value"
+        mixed = "moving" if MOVING in kinds or Q_DOT in kinds else "value"
+        kind = self._nodes.kinds[kinds[0]] if kinds.size == 1 else mixed
         if kind == "number":
             first = len(self.numbers)
             self.numbers += self._nodes.number[nodes].tolist()
             return Source(kind, np.arange(first, len(self.numbers)))
-        if kind == "value":
-            for node in nodes.tolist():
-                if node not in self._values:
-                    self._values[node] = len(self.values)
-                    self.values.append(node)
-            return Source(kind, np.array([self._values[node] for node in nodes.tolist()]))
+        if kind in self.values:
+            known = self.values[kind]
+            places = [known.setdefault(node, len(known)) for node in nodes.tolist()]
+            return Source(kind, np.array(places))
         return Source(kind, self._nodes.index[nodes])

@@ -27,7 +27,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class ConstraintRows:
-    """The rows of one constraint, or of one output.
+    """The rows of one constraint, of one output or of one load.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class InlineProgram:
     nodes
         The code.
     sections
-        One a constraint, in order of rows, then one an output.
+        One a constraint, in order of rows, then one an output, then one a load.
     hints
         Speaking names of nodes.
     frames
@@ -90,7 +90,7 @@ def inline(program: Program) -> InlineProgram:
         hints[graph.square(graph.input(rate(item.name)))] = f"{rate(item.name)}_sq"
     sections: list[ConstraintRows] = []
     shared: dict[str, dict[tuple[int, int], int]] = {}
-    for instance in (*program.instances, *program.observers):
+    for instance in program.parts:
         kernel = instance.kernel
         inputs = dict(zip(kernel.inputs, instance.bindings, strict=True))
         new = graph.instantiate(kernel.nodes, inputs)

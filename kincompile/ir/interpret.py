@@ -56,8 +56,8 @@ def interpret(
     Returns
     -------
     tuple of arrays
-        In the order of the table: Phi (..., m), Phi_q (..., m, n), nu (..., m), gamma (..., m), and
-        the outputs where there are any.
+        In the order of the table: Phi (..., m), Phi_q (..., m, n), nu (..., m), gamma (..., m), the
+        outputs where there are any, and M, Q and its Jacobians where there are loads.
     """
     q, q_dot = np.asarray(q), np.asarray(q_dot)
     q_ddot = 0 * q if q_ddot is None else np.asarray(q_ddot)
@@ -141,7 +141,7 @@ class Placed:
 def by_kernel(program: Program) -> list[tuple[Kernel, list[Instance]]]:
     """Return the instances of each kernel, which run together as arrays."""
     found: dict[int, tuple[Kernel, list[Instance]]] = {}
-    for instance in (*program.instances, *program.observers):
+    for instance in program.parts:
         found.setdefault(id(instance.kernel), (instance.kernel, []))[1].append(instance)
     return list(found.values())
 

@@ -209,7 +209,7 @@ def constraint_kernel(template: Template) -> Kernel:
                 (first + row, 0, item.node) for row, item in enumerate(expansion.components(vector))
             )
         first = len(outputs["Phi"])
-    return _kernel(template, environment, expansion, outputs)
+    return kernel_of(template, environment, expansion, outputs)
 
 
 def _nonzeros(
@@ -224,7 +224,7 @@ def _nonzeros(
     ]
 
 
-def _kernel(
+def kernel_of(
     template: Template,
     environment: KernelEnvironment,
     expansion: Expansion,
@@ -257,7 +257,9 @@ def _hints(template: Template, expansion: Expansion) -> tuple[Hint, ...]:
     return tuple(found)
 
 
-STEMS = {s_i: "{}", s_j: "{}", v_i: "axis_{}", v_j: "axis_{}"}
+STEMS = {
+    s_i: "{}", s_j: "{}", v_i: "axis_{}", v_j: "axis_{}", VectorSymbol("s_C"): "C"
+}  # fmt: skip
 """Names of turned points and directions, with that of the body; others have their symbol."""
 
 
@@ -314,7 +316,7 @@ def point_kernel() -> Kernel:
         ]
         found = along(found, motion)
     outputs["outputs_q"] = _nonzeros(expansion, by_column)
-    return _kernel(POINT, environment, expansion, outputs)
+    return kernel_of(POINT, environment, expansion, outputs)
 
 
 class _OutputConverter(Converter):

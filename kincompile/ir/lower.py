@@ -31,12 +31,13 @@ from kincompile.model.spline import PeriodicSpline, SplineTable
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from kincompile.ir.equation_shapes import SharedEquation
     from kincompile.model.bodies import Body
     from kincompile.model.expressions import Scalar
     from kincompile.model.points import PlacedPoint
+    from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.model.system import ConstraintSystem
 
 
@@ -58,6 +59,7 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
         own = tuple(None if name is None else columns[name] for name in names)
         instances.append(Instance(kernel, constraint, first_row, own, bindings))
     tables = _tables((*system.constraints, *system.observers))
+    tables |= _tables_in(value for item in system.loads for value in item.values())
     bodies = tuple(
         binder.frame_of(body, own)
         for body, own in zip(system.bodies, system.body_columns, strict=True)
@@ -69,6 +71,7 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
         own = tuple(None if name is None else columns[name] for name in item.columns)
         observers.append(Instance(kernel, item, len(system.equations), own, bindings, row))
         row += len(item.rows)
+    loads = tuple(binder.loaded(item, columns, len(system.equations)) for item in system.loads)
     return Program(
         system.name,
         system.coordinates,
@@ -78,10 +81,11 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
         tuple(graph.nodes),
         tuple(instances),
         tables,
-        _fingerprint(system, graph, [*instances, *observers], tables),
+        _fingerprint(system, graph, [*instances, *observers, *loads], tables),
         system.end,
         system.points,
         observers=tuple(observers),
+        loads=loads,
     )
 
 
@@ -143,6 +147,11 @@ def _tables(
                 values += item.expressions
             case ResolvedOutput():
                 values.append(item.value)
+    return _tables_in(values)
+
+
+def _tables_in(values: Iterable[Scalar]) -> dict[str, SplineTable]:
+    """Return the splines in expressions by name."""
     found: dict[str, SplineTable] = {}
     for value in values:
         if isinstance(value, sympy.Expr):
@@ -191,6 +200,18 @@ class _Binder:
             known |= dict(zip(attributes(symbol, len(point)), own, strict=True))
         return kernel, tuple(known[entry] for entry in kernel.inputs)
 
+    def loaded(self, load: AppliedLoad, columns: Mapping[str, int], row: int) -> Instance:
+        """Return a load as an instance of the kernel of its type."""
+        from kincompile.ir.loads import load_kernel, slopes
+
+        kernel = load_kernel(load.template, load.others, varies=load.varies)
+        known: dict[Input | str, int] = {}
+        known |= zip(self._inputs_of(load), self._known(load), strict=True)
+        known |= slopes(load, self._graph, self._value)
+        own = tuple(None if name is None else columns[name] for name in load.columns)
+        bindings = tuple(known[entry] for entry in kernel.inputs)
+        return Instance(kernel, load, row, own, bindings)
+
     def bind(self, joint: Joint, kernel: Kernel) -> tuple[int, ...]:
         """Return the node of each of the kernel's inputs."""
         known = self._known(joint)
@@ -228,7 +249,7 @@ class _Binder:
         """Return the node of a symbol by name, or of a number or expression."""
         return self._graph.input(value) if isinstance(value, str) else self._convert(value)
 
-    def _known(self, joint: Joint) -> list[int]:
+    def _known(self, joint: Joint | AppliedLoad) -> list[int]:
         """Return the nodes of coordinates, rates and frames, then of scalars and points."""
         known = [node for body in joint.bodies for node in self._body(body)]
         for name in joint.columns[len(joint.columns) - len(joint.template.contacts) :]:
@@ -244,14 +265,7 @@ class _Binder:
         What stands there is the same for all joints of a type.
         """
         if id(kernel) not in self._orders:
-            template = joint.template
-            known: list[Input] = []
-            for owner, item in enumerate(template.owners):
-                known += motion_of(template, owner, 0) + motion_of(template, owner, 1)
-                known += frame_entries(template, item) if item in template.frames else ()
-            known += [Attribute(symbol, 0, symbol) for symbol in joint.scalars if symbol != "C"]
-            for symbol, point in joint.points.items():
-                known += attributes(symbol, len(point))
+            known = self._inputs_of(joint)
             functions = [item for item in kernel.inputs if isinstance(item, Function)]
             places: dict[Input | str, int] = {
                 item: place for place, item in enumerate((*known, *functions))
@@ -259,6 +273,19 @@ class _Binder:
             order = tuple(places[item] for item in kernel.inputs), functions
             self._orders[id(kernel)] = kernel, order
         return self._orders[id(kernel)][1]
+
+    @staticmethod
+    def _inputs_of(joint: Joint | AppliedLoad) -> list[Input]:
+        """Return the inputs whose nodes `_known` gives."""
+        template = joint.template
+        known: list[Input] = []
+        for owner, item in enumerate(template.owners):
+            known += motion_of(template, owner, 0) + motion_of(template, owner, 1)
+            known += frame_entries(template, item) if item in template.frames else ()
+        known += [Attribute(symbol, 0, symbol) for symbol in joint.scalars if symbol != "C"]
+        for symbol, point in joint.points.items():
+            known += attributes(symbol, len(point))
+        return known
 
     def _value(self, value: Scalar) -> int:
         """Return the node of an attribute; a number that was there before costs little."""

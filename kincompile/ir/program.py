@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.points import OutputColumn, PlacedPoint
     from kincompile.model.resolve import FreeEquation, Joint
+    from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.model.spline import SplineTable
     from kincompile.quantities import Columns, Quantity, Rows
 
@@ -169,12 +170,12 @@ class OutputDerivatives(Observed):
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """One constraint, or one output: a kernel bound to rows, columns and attribute values.
+    """One constraint, output or load: a kernel bound to rows, columns and attribute values.
 
     Attributes
     ----------
     constraint
-        The constraint or output, for names and comments.
+        The constraint, output or load, for names and comments.
     first_row
         Row offset in the system.
     columns
@@ -186,7 +187,9 @@ class Instance:
     """
 
     kernel: Kernel
-    constraint: Joint | FreeEquation | ResolvedOutput | PlacedPoint | OutputDerivatives
+    constraint: (
+        Joint | FreeEquation | ResolvedOutput | PlacedPoint | OutputDerivatives | AppliedLoad
+    )
     first_row: int
     columns: tuple[int | None, ...]
     bindings: tuple[int, ...]
@@ -209,6 +212,11 @@ class Instance:
     def bodies(self) -> tuple[str, ...]:
         """Names of body i and body j, as far as the type has them."""
         return tuple(body.name for body in self.constraint.bodies)
+
+    @property
+    def is_load(self) -> bool:
+        """Whether it is a mass or a force."""
+        return "M" in self.kernel.outputs
 
     @property
     def rows(self) -> tuple[OutputColumn, ...]:
@@ -237,6 +245,8 @@ class Program:
         Why the equations cannot determine the coordinates; "" where they can.
     observers
         The outputs, an instance each; those of a point are one.
+    loads
+        The masses of bodies and the loads, an instance each.
     end, points
         The mechanism's own time grid, for a target that solves too.
     """
@@ -255,6 +265,12 @@ class Program:
     redundant: tuple[str, ...] = ()
     unsolvable: str = ""
     observers: tuple[Instance, ...] = ()
+    loads: tuple[Instance, ...] = ()
+
+    @property
+    def parts(self) -> tuple[Instance, ...]:
+        """Everything that gives entries of quantities: constraints, outputs and loads."""
+        return *self.instances, *self.observers, *self.loads
 
     @property
     def outputs(self) -> tuple[OutputColumn, ...]:
@@ -263,8 +279,8 @@ class Program:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The quantities that there are: those of outputs only where there are outputs."""
-        return quantities_of(has_outputs=bool(self.observers))
+        """The quantities that there are: those of outputs and of loads only where there are any."""
+        return quantities_of(has_outputs=bool(self.observers), has_loads=bool(self.loads))
 
     @property
     def corners(self) -> bool:

@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.ir.interpret import interpret
+from kincompile.model.resolve import Joint
 from kincompile.names import listed
 from kincompile.structure.counting import counting_problem
 from kincompile.structure.rank import RankReport, generic_rank
 from kincompile.structure.remedies import least_squares_will_do, surpluses
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from kincompile.ir.program import Program
+    from kincompile.model.resolve import FreeEquation
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.counting import Pattern
     from kincompile.structure.remedies import Surplus
@@ -42,6 +44,7 @@ def rank_report(
         np.array([item.guess for item in system.coordinates]) if guess is None else guess,
         np.array([item.unit == "rad" for item in system.coordinates]),
         driver_rows(system),
+        _rows(system, lambda item: isinstance(item, Joint) and item.written.is_own),
         float(system.end),
         system.equations,
     )
@@ -49,10 +52,15 @@ def rank_report(
 
 def driver_rows(system: ConstraintSystem) -> list[int]:
     """Return the rows of constraints that are functions of time."""
+    return _rows(system, lambda item: item.is_driver)
+
+
+def _rows(system: ConstraintSystem, wanted: Callable[[Joint | FreeEquation], bool]) -> list[int]:
+    """Return the rows of some of the constraints."""
     return [
         first + row
         for item, first in zip(system.constraints, system.row_offsets, strict=True)
-        if item.is_driver
+        if wanted(item)
         for row in range(len(item.equation_names))
     ]
 
@@ -86,6 +94,6 @@ def redundancy_warning(system: ConstraintSystem, found: Sequence[Surplus]) -> st
     """Return the warning about consistent redundant equations."""
     sentences = ". ".join(f"{item.text}; to remove it, {item.remedy}" for item in found)
     return (
-        f"{system.name!r} has redundant equations: all are solved together by least squares, and "
-        f"whether they agree is checked at every point. {sentences}"
+        f"{system.name!r} has redundant equations: the others are solved, and whether these "
+        f"agree is checked at every point. {sentences}"
     )

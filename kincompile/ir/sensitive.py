@@ -64,12 +64,12 @@ def with_sensitivities(program: Program, names: Sequence[str]) -> Program:
     -------
     Program
         With n (1 + k) coordinates, m (1 + k) equations and r (1 + k) outputs: the mechanism's own,
-        then those of each parameter in turn.
+        then those of each parameter in turn. It has no loads.
     """
     given = {item.name: item for item in program.parameters}
     check_names(program, names)
     graph = Graph(program.values)
-    larger = program
+    larger = replace(program, loads=())
     for number, name in enumerate(names, start=1):
         part = _Part(program, graph, given[name], number)
         larger = replace(

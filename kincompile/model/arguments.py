@@ -48,6 +48,8 @@ class Kind(Enum):
     VALUE = "a number or an expression of parameters and t"
     DISTANCE = "a positive distance, or an expression of parameters and t"
     PROFILE = "a radius rho(alpha) or a table (angles, radii)"
+    LOAD = "a number or an expression of parameters, t, coordinates and rates"
+    LOADS = "two components, each such an expression"
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,3 +144,28 @@ def profile(symbol: str) -> Any:
         "a table (angles [rad], radii) over one revolution."
     )
     return _declared(Kind.PROFILE, symbol, text)
+
+
+def attribute(symbol: str, text: str, unit: str = "", default: ValueLike | None = None) -> Any:
+    """Declare a number or an expression of parameters; with a default it may be left out."""
+    made = Argument(
+        Kind.SCALAR, symbol, f"{text}, a number or an expression of parameters.", "", unit
+    )
+    if default is None:
+        return field(metadata={"argument": made})
+    return field(default=default, metadata={"argument": made})
+
+
+def load(symbol: str, text: str, default: ValueLike | None = None) -> Any:
+    """Declare a force or a torque; with a default it may be left out."""
+    about = f"{text}, a number or an expression of parameters, t, coordinates and rates."
+    made = Argument(Kind.LOAD, symbol, about)
+    if default is None:
+        return field(metadata={"argument": made})
+    return field(default=default, metadata={"argument": made})
+
+
+def loads(symbol: str, text: str) -> Any:
+    """Declare the two components of a force."""
+    about = f"{text}, two numbers or expressions of parameters, t, coordinates and rates."
+    return field(metadata={"argument": Argument(Kind.LOADS, symbol, about)})

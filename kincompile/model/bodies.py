@@ -17,7 +17,7 @@ from kincompile.names import rate
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from kincompile.model.expressions import Scalars
+    from kincompile.model.expressions import Scalar, Scalars
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,8 +65,8 @@ PLANAR = BodyKind(
 class Body(Shown):
     """A planar rigid body with coordinates x, y [length] of its origin and angle phi [rad].
 
-    Made by `Mechanism.body`; the ground is `Mechanism.ground`. The corners of its outline, in its
-    own frame, are for pictures alone.
+    Made by `Mechanism.body`; the ground is `Mechanism.ground`. The corners of its outline are in
+    its own frame. Where it has a mass, that has an inertia about its centre, or is a plate's.
     """
 
     name: str
@@ -74,11 +74,22 @@ class Body(Shown):
     outline: Sequence[Scalars] = ()
     is_ground: bool = field(default=False, kw_only=True)
     kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
+    mass: Scalar | None = field(default=None, kw_only=True)
+    inertia: Scalar | None = field(default=None, kw_only=True)
+    centre: Scalars = field(default=(0, 0), kw_only=True)
+    density: Scalar | None = field(default=None, kw_only=True)
+    thickness: Scalar | None = field(default=None, kw_only=True)
 
     def to_text(self) -> str:
         """Return its name, coordinates and guess."""
         names = ", ".join(self.coordinates)
         return f"{self.name} with {names}, guess ({', '.join(map(str, self.guess))})"
+
+    @property
+    def is_heavy(self) -> bool:
+        """Whether it was given anything that belongs to a mass."""
+        given = (self.mass, self.inertia, self.density, self.thickness)
+        return any(item is not None for item in given) or tuple(self.centre) != (0, 0)
 
     @property
     def coordinates(self) -> tuple[str, ...]:

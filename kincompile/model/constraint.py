@@ -22,25 +22,23 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
+    from kincompile.calculus.symbols import Frame
     from kincompile.model.expressions import Scalar
 
     Numbers = Callable[[str], tuple[float | None, ...]]
     """Gives the numbers of a scalar or a point, by its symbol; None for one that is unknown."""
 
-Type = TypeVar("Type", bound="Constraint")
+Type = TypeVar("Type", bound="Element")
 
 
 @dataclass(frozen=True, repr=False)
-class Constraint(Shown):
-    """A joint, or a driver where its value is a function of `t`. Every type is a subclass.
+class Element(Shown):
+    """What has a name and arguments: a constraint, or a load.
 
-    A subclass declares its attributes as fields, in the book's order, and its Phi in vectors.
-    Phi_q, nu and gamma follow by differentiation. Its arguments are checked together with the whole
-    mechanism, by `Mechanism.system`. The types that come with the package are in `catalogue`.
+    Its arguments are checked together with the whole mechanism, by `Mechanism.system`.
     """
 
     name: str
-    corners: bool = field(default=False, kw_only=True)
 
     source: ClassVar[str] = ""
     """Where the textbook has it."""
@@ -50,16 +48,12 @@ class Constraint(Shown):
     """Which way its value counts, or what the guess decides."""
     use: ClassVar[tuple[str, str]] = ("", "")
     """How it is written, in two lines for a mechanism `m`: its bodies, and the constraint."""
-    row_names: ClassVar[tuple[str, ...]] = ()
-    """Names of the equations where there is more than one."""
     bodies: ClassVar[BodyKind] = PLANAR
     """The kind of bodies that it connects."""
     contacts: ClassVar[tuple[Contact, ...]] = ()
-    """Contact parameters: coordinates that belong to the constraint."""
-    simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
-    """Pairs: where this one of two equations depends on others, the type that keeps the other."""
-    replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"
-    """The advice to take the simpler type, in words."""
+    """Contact parameters: coordinates that belong to the element."""
+    is_load: ClassVar[bool] = False
+    """Whether it is a mass or a force, which adds no equation."""
 
     def to_text(self) -> str:
         """Return its name and arguments, bodies by name."""
@@ -71,11 +65,6 @@ class Constraint(Shown):
     def __repr__(self) -> str:
         """Return type, name and arguments."""
         return f"<{type(self).__name__} {self.to_text()}>"
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return the constraint in vectors, with the attributes as symbols."""
-        raise NotImplementedError
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
@@ -110,6 +99,44 @@ class Constraint(Shown):
 
     @classmethod
     @cache
+    def frames(cls) -> tuple[Frame, ...]:
+        """Return the frames of the bodies that it connects."""
+        bodies = [item.symbol for item in cls.arguments().values() if item.kind is Kind.BODY]
+        return tuple(cls.bodies.frame(symbol) for symbol in bodies)
+
+    @classmethod
+    def further(cls) -> dict[str, str]:
+        """Return what its docstring says of its name and of arguments that all types share."""
+        return {"name": "Name of the load."}
+
+
+@dataclass(frozen=True, repr=False)
+class Constraint(Element):
+    """A joint, or a driver where its value is a function of `t`. Every type is a subclass.
+
+    A subclass declares its attributes as fields, in the book's order, and its Phi in vectors.
+    Phi_q, nu and gamma follow by differentiation. The types that come with the package are in
+    `catalogue`.
+    """
+
+    corners: bool = field(default=False, kw_only=True)
+
+    row_names: ClassVar[tuple[str, ...]] = ()
+    """Names of the equations where there is more than one."""
+    simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
+    """Pairs: where this one of two equations depends on others, the type that keeps the other."""
+    is_own: ClassVar[bool] = False
+    """Whether it is an equation of a body itself, which no joint makes superfluous."""
+    replaced_by: ClassVar[str] = "a {simpler}, which keeps {kept}"
+    """The advice to take the simpler type, in words."""
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return the constraint in vectors, with the attributes as symbols."""
+        raise NotImplementedError
+
+    @classmethod
+    @cache
     def owners(cls) -> dict[str, str]:
         """Return, by the symbol of each point and direction, that of the body it is fixed in."""
         return {item.symbol: item.on for item in cls.arguments().values() if item.on}
@@ -137,9 +164,12 @@ class Constraint(Shown):
     @cache
     def template(cls) -> Template:
         """Return the template of this type, made once."""
-        bodies = [item.symbol for item in cls.arguments().values() if item.kind is Kind.BODY]
-        frames = tuple(cls.bodies.frame(symbol) for symbol in bodies)
-        return Template(cls.__name__, frames, cls.contacts, cls.Phi())
+        return Template(cls.__name__, cls.frames(), cls.contacts, cls.Phi())
+
+    @classmethod
+    def keeping_others(cls, lost: Sequence[str]) -> type[Constraint] | None:
+        """Return the type that keeps its equations but those rows, where there is one."""
+        return next((other for row, other in cls.simpler if [row] == list(lost)), None)
 
     @classmethod
     def equations_of(cls, name: str) -> tuple[str, ...]:
@@ -163,28 +193,41 @@ class Constraint(Shown):
         """Names of the contact parameters."""
         return self.contacts_of(self.name)
 
+    @classmethod
+    def further(cls) -> dict[str, str]:
+        """Return what its docstring says of its name, of contacts and of corners."""
+        equations = _listed("equation", cls.equations_of("name"))
+        entries = {"name": f"Name of the constraint; its {equations}."}
+        if cls.contacts:
+            contacts = _listed("contact parameter", cls.contacts_of("name"))
+            start = "Where Newton's method begins [rad], 0 if not given"
+            entries["guess"] = f"{start}; the {contacts}."
+        corners = "Of a driver, whether its velocity may jump; see docs/motion_laws.md."
+        return entries | {"corners": corners}
+
 
 @dataclass_transform(
     frozen_default=True,
     field_specifiers=(
-        argument.angle, argument.axis, argument.body, argument.cross, argument.distance,
-        argument.point, argument.profile, argument.radius, argument.value, argument.vector, field,
+        argument.angle, argument.attribute, argument.axis, argument.body, argument.cross,
+        argument.distance, argument.load, argument.loads, argument.point, argument.profile,
+        argument.radius, argument.value, argument.vector, field,
     ),
 )  # fmt: skip
 def constraint_type(cls: type[Type]) -> type[Type]:
-    """Make a class a constraint type: a frozen dataclass whose docstring has its arguments."""
+    """Make a class a type of constraint or load: a dataclass whose docstring has its arguments."""
     made = dataclass(frozen=True, repr=False)(cls)
     made.__doc__ = _documentation(made)
     _take_points(made)
     return made
 
 
-def _take_points(cls: type[Constraint]) -> None:
+def _take_points(cls: type[Element]) -> None:
     """Let a named point stand where a type wants a body and a point on it."""
     init = cls.__init__
 
     @wraps(init)
-    def taking_points(self: Constraint, *given: object, **named: object) -> None:
+    def taking_points(self: Element, *given: object, **named: object) -> None:
         flat: list[object] = []
         for item in given:
             flat += (item.body, item.local) if isinstance(item, BodyPoint) else (item,)
@@ -196,21 +239,18 @@ def _take_points(cls: type[Constraint]) -> None:
     cls.__init__ = taking_points  # type: ignore[method-assign]
 
 
-def _documentation(cls: type[Constraint]) -> str:
+def _documentation(cls: type[Element]) -> str:
     """Return the docstring of a type with its arguments, in NumPy's form."""
     given = cls.arguments()
     bodies = {item.symbol: name for name, item in given.items() if item.kind is Kind.BODY}
     ground = "; one of the two may be the ground" if len(bodies) > 1 else ""
-    equations = _listed("equation", cls.equations_of("name"))
-    entries = {"name": f"Name of the constraint; its {equations}."}
+    further = cls.further()
+    entries = {"name": further.pop("name")}
     for name, item in given.items():
         on = bodies.get(item.on, "")
         place = _place(cls.bodies, item.on, on)
         entries[name] = item.text.format(on=on, ground=ground, place=place)
-    if cls.contacts:
-        contacts = _listed("contact parameter", cls.contacts_of("name"))
-        entries["guess"] = f"Where Newton's method begins [rad], 0 if not given; the {contacts}."
-    entries["corners"] = "Of a driver, whether its velocity may jump; see docs/motion_laws.md."
+    entries |= further
     lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]
     for name, text in entries.items():
         lines += [name, textwrap.fill(text, 92, initial_indent="    ", subsequent_indent="    ")]

@@ -18,9 +18,10 @@ from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.model.bodies import Coordinate
+    from kincompile.model.resolve_loads import AppliedLoad
 
 
 class CheckedSystem(Protocol):
@@ -33,6 +34,10 @@ class CheckedSystem(Protocol):
     @property
     def constraints(self) -> Sequence[Joint | FreeEquation]:
         """The constraints, in order."""
+
+    @property
+    def loads(self) -> Sequence[AppliedLoad]:
+        """The masses and the loads."""
 
 
 class MatrixViews:
@@ -80,6 +85,28 @@ class MatrixViews:
     def gamma(self) -> sympy.ImmutableDenseMatrix:
         """The right side of the acceleration equation, shape (m, 1)."""
         return _column([row.gamma for row in assemble(self.system())])
+
+    @property
+    def M(self) -> sympy.ImmutableDenseMatrix:
+        """The mass matrix, shape (n, n); without masses it is zero."""
+        system = self.system()
+        n = len(system.coordinates)
+        entries: dict[tuple[int, int], sympy.Expr] = {}
+        for row, column, value in _entries(system, "M"):
+            entries[row, column] = entries.get((row, column), sympy.S.Zero) + value
+        return sympy.ImmutableDenseMatrix(n, n, lambda i, j: entries.get((i, j), sympy.S.Zero))
+
+    @property
+    def Q(self) -> sympy.ImmutableDenseMatrix:
+        """Generalised forces, those of weight and of inertia among them, shape (n, 1).
+
+        The equations of motion are M q_ddot + Phi_q^T lambda = Q.
+        """
+        system = self.system()
+        forces: list[sympy.Expr] = [sympy.S.Zero] * len(system.coordinates)
+        for row, _, value in _entries(system, "Q"):
+            forces[row] += value
+        return _column(forces)
 
     def _repr_html_(self) -> str:
         try:
@@ -142,3 +169,15 @@ def _joint_rows(joint: Joint) -> list[EquationRow]:
             known = {name: entry for name, entry in by_name if name is not None}
             rows.append(EquationRow(Phi, known, nu, gamma))
     return rows
+
+
+def _entries(system: CheckedSystem, quantity: str) -> Iterator[tuple[int, int, sympy.Expr]]:
+    """Yield row, column and value of what each load adds to M or to Q."""
+    places = {item.name: k for k, item in enumerate(system.coordinates)}
+    for load in system.loads:
+        expansion = Expansion(SymbolicEnvironment(load))
+        columns = [None if name is None else places[name] for name in load.columns]
+        for row, column, value in load.entries(quantity):
+            at, by = columns[row], columns[column] if quantity == "M" else 0
+            if at is not None and by is not None:
+                yield at, by, expansion.scalar(value)

@@ -9,7 +9,7 @@ import sympy
 
 from kincompile.errors import ModelError
 from kincompile.model.bodies import GROUND, Body, Parameter, default_values
-from kincompile.model.constraint import Constraint
+from kincompile.model.constraint import Constraint, Element
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import evaluate
 from kincompile.model.matrices import MatrixViews
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from kincompile.model.arguments import BodyLike, PointLike
     from kincompile.model.expressions import Scalar, Scalars
 
-Item = TypeVar("Item", bound=Constraint | Equation)
+Item = TypeVar("Item", bound=Element | Equation)
 
 
 class Mechanism(MatrixViews, TextViews):
@@ -47,6 +47,8 @@ class Mechanism(MatrixViews, TextViews):
     ----------
     ground
         The fixed frame.
+    gravity
+        Acceleration of gravity (g_x, g_y), none at first: ``m.gravity = (0, -9.81)``.
     """
 
     fixed: ClassVar[Body] = GROUND
@@ -63,6 +65,8 @@ class Mechanism(MatrixViews, TextViews):
         self.parameters: list[Parameter] = []
         self.constraints: list[Constraint | Equation] = []
         self.outputs: list[BodyPoint | Output] = []
+        self.loads: list[Element] = []
+        self.gravity: Scalars = (0, 0)
 
     @property
     def end(self) -> float:
@@ -103,7 +107,18 @@ class Mechanism(MatrixViews, TextViews):
         self.parameters.append(Parameter(name, cast("float", default), unit, limits))
         return sympy.Symbol(str(name))
 
-    def body(self, name: str, guess: Scalars = (0, 0, 0), outline: Sequence[Scalars] = ()) -> Body:
+    def body(
+        self,
+        name: str,
+        guess: Scalars = (0, 0, 0),
+        outline: Sequence[Scalars] = (),
+        *,
+        mass: Scalar | None = None,
+        inertia: Scalar | None = None,
+        centre: Scalars = (0, 0),
+        density: Scalar | None = None,
+        thickness: Scalar | None = None,
+    ) -> Body:
         """Add a body with coordinates (x, y, phi) and return it.
 
         Parameters
@@ -117,8 +132,18 @@ class Mechanism(MatrixViews, TextViews):
             Corners (xi, eta) of a closed polygon in the body's frame [length], in order, numbers or
             expressions of parameters: what the body looks like. Without, it is drawn as a link
             through its joint points. The outlines of bodies added before hide it.
+        mass, inertia
+            Mass, and moment of inertia about the centre of mass, numbers or expressions of
+            parameters; both or none.
+        centre
+            Centre of mass (xi, eta) in the body's frame [length].
+        density, thickness
+            In place of the three: those of a plate with this outline.
         """
-        body = Body(name, guess, outline)
+        body = Body(
+            name, guess, outline, mass=mass, inertia=inertia, centre=centre, density=density,
+            thickness=thickness,
+        )  # fmt: skip
         self.bodies.append(body)
         return body
 
@@ -166,11 +191,14 @@ class Mechanism(MatrixViews, TextViews):
         return expression
 
     def add(self, constraint: Item) -> Item:
-        """Add a joint, a driver or a free equation, and return it.
+        """Add a joint, a driver, a free equation or a load, and return it.
 
         Its equations are the next rows of the system, its contact parameters the next coordinates.
         """
-        self.constraints.append(constraint)
+        if isinstance(constraint, Element) and constraint.is_load:
+            self.loads.append(constraint)
+        else:
+            self.constraints.append(cast("Constraint | Equation", constraint))
         return constraint
 
     def written(self) -> list[Constraint | Equation]:
@@ -191,6 +219,8 @@ class Mechanism(MatrixViews, TextViews):
             parameters=self.parameters,
             bodies=self.bodies,
             outputs=self.outputs,
+            loads=self.loads,
+            gravity=self.gravity,
             ground=self.ground,
             length_unit=self.length_unit,
             end=self.end_given,

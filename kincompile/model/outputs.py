@@ -206,7 +206,7 @@ def _resolved(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput 
     given = output.expression
     value = checked_expression(given, where, declared, scope, unit=unit, is_output=True)
     if isinstance(value, sympy.Expr):
-        _rates(value, where, scope)
+        highest_rate(value, where, scope)
     if value is None or len(scope.problems) > before:
         return None
     occurring = {scope.motion[name][0] for name in symbol_names(value) if name in scope.motion}
@@ -215,11 +215,11 @@ def _resolved(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput 
     return ResolvedOutput(output.name, value, unit, columns, output)
 
 
-def _rates(value: sympy.Basic, where: str, scope: Scope) -> int:
+def highest_rate(value: sympy.Basic, where: str, scope: Scope) -> int:
     """Return the highest order of rates in an expression, -1 where nothing in it moves."""
     if isinstance(value, sympy.Symbol):
         return scope.motion.get(value.name, ("", -1))[1]
-    order = max((_rates(part, where, scope) for part in value.args), default=-1)
+    order = max((highest_rate(part, where, scope) for part in value.args), default=-1)
     if isinstance(value, rate):
         if order == 2:
             problem = f"{where}: {value} would be a third derivative; rates go to the second"

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from kincompile.calculus.template import Template
     from kincompile.model.arguments import Argument
-    from kincompile.model.constraint import Constraint
+    from kincompile.model.constraint import Constraint, Element
     from kincompile.model.equation import Equation
 
 
@@ -87,7 +87,7 @@ class Joint:
     @property
     def text(self) -> str:
         """The constraint in words, for comments: bodies, points, values."""
-        return _text(self.written)
+        return text_of(self.written)
 
     @property
     def corners(self) -> bool:
@@ -163,9 +163,9 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     scalars: dict[str, Scalar] = {}
     points: dict[str, Point] = {}
     profiles: dict[str, sympy.Expr] = {}
-    title = _title(constraint)
-    if constraint.bodies is not scope.ground.kind:
-        scope.problems.append(f"{title}: {_KIND_PROBLEM[len(scope.ground.kind.axes)]}")
+    title = title_of(constraint)
+    if problem := kind_problem(constraint, scope):
+        scope.problems.append(f"{title}: {problem}")
         return None
     corners = _corners(constraint.corners, title, scope)
     for name, item in constraint.arguments().items():
@@ -186,8 +186,8 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
         )
     known = [body for body in bodies if body is not None]
     if len(known) == len(bodies):
-        _check_bodies(constraint, known, scope)
-    _check_whole(constraint, scalars, points, scope)
+        check_bodies(constraint, known, scope)
+    check_whole(constraint, scalars, points, scope)
     if len(scope.problems) > before:
         return None
     return Joint(
@@ -202,12 +202,21 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
 
 
 _KIND_PROBLEM = {
-    2: "it is a constraint of bodies in space; take the one of kincompile for bodies in the plane",
-    3: "it is a constraint of bodies in the plane; take the one of kincompile.spatial",
+    2: "it is a {} of bodies in space; take the one of kincompile for bodies in the plane",
+    3: "it is a {} of bodies in the plane; take the one of kincompile.spatial",
 }
 
 
-def _title(constraint: Constraint) -> str:
+def kind_problem(constraint: Element, scope: Scope) -> str | None:
+    """Return a message about a constraint or a load of another kind of bodies, or None."""
+    if constraint.bodies is scope.ground.kind:
+        return None
+    what = "load" if constraint.is_load else "constraint"
+    return _KIND_PROBLEM[len(scope.ground.kind.axes)].format(what)
+
+
+def title_of(constraint: Element) -> str:
+    """Return the type and the name of a constraint or a load, for messages."""
     return f"{type(constraint).__name__} {constraint.name!r}"
 
 
@@ -218,18 +227,17 @@ def _corners(given: Any, title: str, scope: Scope) -> bool:
     return given is True
 
 
-def _check_bodies(constraint: Constraint, bodies: list[Body], scope: Scope) -> None:
-    """Check that a joint has something to constrain."""
-    what = _title(constraint)
+def check_bodies(constraint: Element, bodies: list[Body], scope: Scope) -> None:
+    """Check that a joint or a load has something to act on."""
+    what = title_of(constraint)
     if len(bodies) == 2 and bodies[0] == bodies[1]:
+        kind = "load between two bodies needs" if constraint.is_load else "joint connects"
         scope.problems.append(
-            f"{what}: bodies i and j are both {bodies[0].name!r}; a joint connects two different "
-            "bodies"
+            f"{what}: bodies i and j are both {bodies[0].name!r}; a {kind} two different bodies"
         )
     elif len(bodies) == 1 and bodies[0].is_ground:
-        scope.problems.append(
-            f"{what}: the ground cannot be constrained; name a body of the mechanism"
-        )
+        done = "feels no force" if constraint.is_load else "cannot be constrained"
+        scope.problems.append(f"{what}: the ground {done}; name a body of the mechanism")
 
 
 def _scalar(given: Any, item: Argument, where: str, scope: Scope, *, corners: bool) -> Scalar:
@@ -303,10 +311,10 @@ def _of_alpha(rho: sympy.Expr, scope: Scope) -> sympy.Expr:
     return cast("sympy.Expr", rho.xreplace(named))
 
 
-def _check_whole(
-    constraint: Constraint, scalars: Mapping[str, Scalar], points: Mapping[str, Point], scope: Scope
+def check_whole(
+    constraint: Element, scalars: Mapping[str, Scalar], points: Mapping[str, Point], scope: Scope
 ) -> None:
-    """Check what involves several arguments of a constraint."""
+    """Check what involves several arguments of a constraint or a load."""
 
     def numbers(symbol: str) -> tuple[float | None, ...]:
         given = points[symbol] if symbol in points else (scalars[symbol],)
@@ -314,11 +322,11 @@ def _check_whole(
 
     problem = constraint.problem(numbers)
     if problem is not None:
-        scope.problems.append(f"{_title(constraint)}: {problem}")
+        scope.problems.append(f"{title_of(constraint)}: {problem}")
 
 
-def _text(constraint: Constraint) -> str:
-    """Return a constraint's arguments in a line, for instance `ground (0, 0) - crank (-a/2, 0)`."""
+def text_of(constraint: Element) -> str:
+    """Return arguments in a line, for instance `ground (0, 0) - crank (-a/2, 0)`."""
     parts: list[str] = []
     for name, item in constraint.arguments().items():
         given = getattr(constraint, name)
@@ -330,6 +338,8 @@ def _text(constraint: Constraint) -> str:
             parts.append(text if item.kind is Kind.POINT else f"axis {text}")
         elif item.kind is Kind.PROFILE:
             parts.append("profile table" if isinstance(given, tuple | list) else "profile")
-        else:
+        elif item.kind is Kind.LOADS:
+            parts.append("({}, {})".format(*given))
+        elif not constraint.is_load or given != 0:  # most springs have no damper
             parts.append(f"{name} {given}")
     return " ".join(parts)

@@ -42,7 +42,9 @@ from kincompile.model.text_views import TextViews
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from kincompile.model.constraint import Constraint
+    from kincompile.model.constraint import Constraint, Element
+    from kincompile.model.expressions import Scalars
+    from kincompile.model.resolve_loads import AppliedLoad
 
 
 class ConstraintSystem(MatrixViews, TextViews):
@@ -65,9 +67,11 @@ class ConstraintSystem(MatrixViews, TextViews):
         Bodies, whose coordinates come first.
     outputs
         `Output` and `BodyPoint`, as `Mechanism.output` and `Mechanism.point` make them.
+    loads
+        Springs, forces and the like.
     ground
         The fixed frame of the bodies.
-    length_unit, end, points
+    gravity, length_unit, end, points
         As for `Mechanism`.
 
     Attributes
@@ -87,6 +91,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         The named points.
     observers : tuple of PlacedPoint or ResolvedOutput
         The points, whose coordinates are outputs, then the other outputs, in order.
+    loads : tuple of AppliedLoad
+        The masses of bodies, then the loads in order.
 
     Raises
     ------
@@ -96,7 +102,7 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
-        "ground", "length_unit", "name", "observers", "parameters", "points",
+        "gravity", "ground", "length_unit", "loads", "name", "observers", "parameters", "points",
     )  # fmt: skip
 
     name: str
@@ -108,6 +114,8 @@ class ConstraintSystem(MatrixViews, TextViews):
     ground: Body
     body_points: tuple[BodyPoint, ...]
     observers: tuple[PlacedPoint | ResolvedOutput, ...]
+    loads: tuple[AppliedLoad, ...]
+    gravity: Scalars
     length_unit: str
     end: float
     end_given: Scalar
@@ -123,6 +131,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         guess: Sequence[float] | Mapping[Any, float] | None = None,
         bodies: Iterable[Body] = (),
         outputs: Iterable[BodyPoint | Output] = (),
+        loads: Iterable[Element] = (),
+        gravity: Scalars = (0, 0),
         ground: Body = GROUND,
         length_unit: str = "m",
         end: Scalar = 1.0,
@@ -150,6 +160,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         scope = _scope(bodies, found, declared, problems, ground)
         constraints = _resolved(written, scope)
         observers = resolved_observers(body_points, asked, scope, length_unit)
+        applied = _loads(bodies, members(loads, "loads", problems), gravity, scope, written)
         if not written:
             problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
         if not found and not bodies:
@@ -160,8 +171,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         values = {
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
-            "observers": observers, "ground": ground, "length_unit": length_unit, "end": last,
-            "end_given": end, "points": points,
+            "observers": observers, "loads": applied, "gravity": gravity, "ground": ground,
+            "length_unit": length_unit, "end": last, "end_given": end, "points": points,
         }  # fmt: skip
         _fill(self, values)
 
@@ -173,12 +184,12 @@ class ConstraintSystem(MatrixViews, TextViews):
         return self
 
     def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
-        """Return the same system with these points as its outputs, and no others."""
+        """Return the same system with these points as its outputs, no others, and no loads."""
         scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
         observers = resolved_observers(points, (), scope, self.length_unit)
         values = {key: getattr(self, key) for key in self.__slots__}
         other = ConstraintSystem.__new__(ConstraintSystem)
-        _fill(other, {**values, "body_points": tuple(points), "observers": observers})
+        _fill(other, {**values, "body_points": tuple(points), "observers": observers, "loads": ()})
         return other
 
     def joint_points(self) -> tuple[BodyPoint, ...]:
@@ -234,6 +245,22 @@ class ConstraintSystem(MatrixViews, TextViews):
         """Return name and sizes."""
         sizes = f"{len(self.coordinates)} coordinates, {len(self.equations)} equations"
         return f"<ConstraintSystem {self.name!r}: {sizes}>"
+
+
+def _loads(
+    bodies: Iterable[Body],
+    loads: Sequence[Any],
+    gravity: Scalars,
+    scope: Scope,
+    constraints: Iterable[Constraint | Equation],
+) -> tuple[AppliedLoad, ...]:
+    """Return the masses and the loads; a model that has none does not import what they need."""
+    if not loads and not any(body.is_heavy for body in bodies):
+        return ()
+    from kincompile.model.resolve_loads import check_named, resolved_loads
+
+    check_named(loads, (item.name for item in constraints), scope.problems)
+    return resolved_loads(bodies, loads, gravity, scope)
 
 
 def _fill(system: ConstraintSystem, values: Mapping[str, Any]) -> None:

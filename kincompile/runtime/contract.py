@@ -39,8 +39,10 @@ _CONSTANTS: dict[str, type] = {
 
 
 def present_in(module: ModuleType) -> tuple[Quantity, ...]:
-    """Return the quantities of a module: those of outputs where it has any."""
-    return quantities.quantities_of(has_outputs=hasattr(module, "OUTPUTS"))
+    """Return the quantities of a module: those of outputs and of loads where it has any."""
+    return quantities.quantities_of(
+        has_outputs=hasattr(module, "OUTPUTS"), has_loads=hasattr(module, "LOADS")
+    )
 
 
 def functions(module: ModuleType) -> tuple[str, ...]:

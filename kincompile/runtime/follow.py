@@ -16,7 +16,7 @@ from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.march import March, Outcome, State, distance
 from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
-from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
+from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem, rates_agree
 from kincompile.runtime.singular.events import (
     DOUBTS,
     branch_switch,
@@ -190,7 +190,9 @@ class _Way:
         start, scales = np.ascontiguousarray(outcome.position.q), self._march.scales
         reached = march(inputs, start, *scales, states, motion.residual, status, iterations)
         motion.put(0, outcome)
-        if reached < inputs.t.size:
+        if reached < inputs.t.size or not np.all(
+            rates_agree(inputs.code, inputs.t, inputs.p, states)
+        ):
             return False
         motion.status[1:], motion.iterations[1:] = status[1:], iterations[1:]
         motion.statistics["compiled"] = inputs.t.size

@@ -29,7 +29,7 @@ from kincompile.criteria import (
 )
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, largest
-from kincompile.runtime.problem import within
+from kincompile.runtime.problem import rates_agree, within
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -107,8 +107,15 @@ def solve_grid(march: March, times: Array, first: State, result: GridResult) -> 
     assert code.lanes is not None
     reference = equations.reference
     floats = Planned(code, equations.p.tolist(), code.lanes.floats)
-    state = (x.tolist() for x in (first.point.q, first.q_dot, first.q_ddot, first.determinants))
-    nodes = _coarse_march(floats, _Node(0, *state), times, reference.tolist())
+    q, q_dot, q_ddot, determinants = (
+        x.tolist() for x in (first.point.q, first.q_dot, first.q_ddot, first.determinants)
+    )
+    if code.redundant:  # the careful march has one determinant, of all equations
+        start = floats.evaluate(q, float(times[0]))
+        floats.factor(start)
+        determinants = list(start.factors[1])
+    node = _Node(0, q, q_dot, q_ddot, determinants)
+    nodes = _coarse_march(floats, node, times, reference.tolist())
     reached = nodes[-1].index + 1
     _interpolate(nodes, times[:reached], result.q)
     signed = np.array([node.determinants for node in nodes])
@@ -245,5 +252,7 @@ def _solve_block(
         good = good & np.isfinite(sum(rows))
     for values, least in zip(point.factors[1], smallest, strict=True):
         good = good & (values / least > 1)
+    p = march.equations.p
+    good = good & rates_agree(engine.code, t, p, (point.q, *rates))
     result.residual[block] = largest(point.Phi, t.size)
     result.good[block] = good

@@ -212,8 +212,8 @@ def read_inputs(
     require_square(code)
     if method == "grid" and code.lanes is None:
         problems.append(
-            f"{code.name} goes from point to point, as all redundant mechanisms and those in the "
-            "grouped form do: use method='march', or compile it with form='inline'."
+            f"{code.name} goes from point to point, as all mechanisms in the grouped form do: use "
+            "method='march', or compile it with form='inline'."
         )
     if problems:
         raise InputError(problems)

@@ -360,7 +360,7 @@ class Dense:
             return Rates(q_dot, nothing, movement)
         q_ddot = self.solve(point, gamma)
         agree = _agree(point.Phi_q, q_dot, sides[:, 0]) and _agree(point.Phi_q, q_ddot, gamma)
-        return Rates(q_dot, q_ddot, movement, agree)
+        return Rates(q_dot, q_ddot, movement, bool(agree))
 
     def determinants(self, point: Point, before: Point) -> Array:
         """Return the determinants of the blocks; without any, one relative to the point before."""
@@ -386,6 +386,8 @@ class Dense:
 
     def _blocks(self, point: Point) -> Array | None:
         """Return the determinants of the blocks that the module knows, if it knows any."""
+        if self.code.redundant:
+            return None  # those of the planned solve are of the independent equations alone
         if point.factors is None and self.code.lanes is not None:
             point.factors = self._planned(point)
         elif point.factors is None and self._stages is not None:
@@ -406,13 +408,29 @@ class Dense:
         return np.array(found, dtype=np.float64)
 
 
-def _agree(matrix: Array, rates: Array, sides: Array) -> bool:
-    """Say whether redundant equations are all met by the rates that solve them best."""
-    if matrix.shape[0] == matrix.shape[1]:
+def _agree(matrix: Array, rates: Array, sides: Array) -> Any:
+    """Say whether redundant equations are all met by the rates: at a point (n,), or at each (N, n).
+
+    `matrix` and `sides` have one axis more and as many.
+    """
+    if matrix.shape[-2] == matrix.shape[-1]:
         return True
-    terms = np.abs(matrix) @ np.abs(rates) + np.abs(sides)
-    missing = np.abs(matrix @ rates - sides)
-    return bool(np.max(missing) <= AGREEMENT * np.max(terms))
+    rates = rates[..., np.newaxis]
+    terms = (np.abs(matrix) @ np.abs(rates))[..., 0] + np.abs(sides)
+    missing = np.abs((matrix @ rates)[..., 0] - sides)
+    return np.max(missing, axis=-1) <= AGREEMENT * np.max(terms, axis=-1)
+
+
+def rates_agree(code: Code, t: Array, p: Array, states: Sequence[Array]) -> Any:
+    """Say at which points redundant equations are all met by rates that solve the others.
+
+    `states` are position, velocity and acceleration, shape (n, N) each.
+    """
+    if not code.redundant:
+        return True
+    q, q_dot, q_ddot = (state.T for state in states)
+    Phi_q, nu, gamma = code.Phi_q(q, t, p), code.nu(q, t, p), code.gamma(q, q_dot, t, p)
+    return _agree(Phi_q, q_dot, nu) & _agree(Phi_q, q_ddot, gamma)
 
 
 def solve_linear(matrix: Array, sides: Array) -> Array:

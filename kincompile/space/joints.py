@@ -6,6 +6,8 @@ Rows are "j minus i".
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from kincompile.calculus.expressions import (
     Angle,
     Basis,
@@ -23,6 +25,11 @@ from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
 from kincompile.space.constraint import SpatialConstraint, SpatialPoints
 from kincompile.space.symbols import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.model.constraint import Constraint
 
 XYZ = ("x", "y", "z")
 
@@ -174,6 +181,15 @@ class Revolute(PointsAndAxes):
 
     source = "Haug 9.4"
     row_names = (*XYZ, "f", "g")
+    replaced_by = "a {simpler}"
+
+    @classmethod
+    def keeping_others(cls, lost: Sequence[str]) -> type[Constraint] | None:
+        """Return the joint that leaves out as many of its directions and of its turns."""
+        slides, turns = (sum(row in rows for row in lost) for rows in (XYZ, "fg"))
+        return {(1, 0): Cylindrical, (0, 1): Universal, (0, 2): Spherical, (1, 2): PointOnLine}.get(
+            (slides, turns)
+        )
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:

@@ -23,7 +23,7 @@ class Mechanism(PlanarMechanism):
 
     fixed = GROUND
 
-    def body(
+    def body(  # type: ignore[override]  # a place and an orientation; it has no mass yet
         self, name: str, position: Scalars = (0, 0, 0), orientation: Any = (1, 0, 0, 0)
     ) -> SpatialBody:
         """Add a body and return it.

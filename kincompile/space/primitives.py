@@ -16,6 +16,7 @@ class Normalization(SpatialConstraint):
     """The Euler parameters of a body have the length one: the body's own equation."""
 
     source = "Haug 9.3"
+    is_own = True
     body: BodyLike = argument.body("i")
 
     @staticmethod

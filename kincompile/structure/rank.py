@@ -49,6 +49,10 @@ ASIDE = (0.1, 0.03, 0.01, 1e-3, 1e-4)
 ON_MANIFOLD = 0.25
 """Part of such a step that assembling the joints may change: else it led to another branch."""
 
+NEARLY, MISSED = 1e-3, 10.0
+"""How much, in scales of the equations, joints that cannot be assembled may miss each other to be
+told apart, and how many times that the rows that differ by it may be independent of the others."""
+
 UNSURE = 1e-3
 """What stands for `DEPENDENT` where no position is settled: each is wrong by the root of that."""
 
@@ -107,6 +111,7 @@ def generic_rank(
     guess: Array,
     angular: NDArray[np.bool_],
     drivers: Sequence[int],
+    own: Sequence[int],
     end: float,
     names: Sequence[str],
 ) -> RankReport:
@@ -122,6 +127,8 @@ def generic_rank(
         Which coordinates are angles.
     drivers
         Rows that are functions of time.
+    own
+        Rows of bodies themselves: they come first, so that no joint makes them redundant.
     end
         The motion lasts from 0 to this time.
     names
@@ -133,7 +140,7 @@ def generic_rank(
         If an equation has no finite value, or derivative, anywhere near the guess.
     """
     with np.errstate(all="ignore"):
-        analysis = _Analysis(evaluate, guess, angular, drivers, end)
+        analysis = _Analysis(evaluate, guess, angular, drivers, own, end)
         undefined = [names[row] for row in analysis.undefined()]
         if undefined:
             raise InputError(
@@ -153,6 +160,7 @@ class _Analysis:
         guess: Array,
         angular: NDArray[np.bool_],
         drivers: Sequence[int],
+        own: Sequence[int],
         end: float,
     ) -> None:
         random = np.random.default_rng(SEED)
@@ -174,7 +182,8 @@ class _Analysis:
         terms = np.max(np.where(np.isfinite(sizes), sizes, 0.0), axis=0)
         self._terms = np.where(terms > 0, terms, 1.0)
         self._drivers = list(drivers)
-        self._joints = [row for row in range(terms.size) if row not in set(drivers)]
+        others = {*drivers, *own}
+        self._joints = [*own, *(row for row in range(terms.size) if row not in others)]
 
     def undefined(self) -> list[int]:
         """Return the rows that are most seldom finite, where no state has all of them finite."""
@@ -189,13 +198,15 @@ class _Analysis:
         """Analyse the joints, then the drivers, then whether all can hold together."""
         q, held, settled = self._assemble(self._joints, self._q, self._t)
         chosen = held & settled if (held & settled).any() else held
-        order = [*self._joints, *self._drivers]
+        order, limit = [*self._joints, *self._drivers], DEPENDENT
         if chosen.any():
-            limit = DEPENDENT if settled[chosen].all() else UNSURE
-            matrix = self._beside(q[chosen], self._t[chosen], limit)
+            sure = DEPENDENT if settled[chosen].all() else UNSURE
+            matrix = self._beside(q[chosen], self._t[chosen], sure)
+        elif nearly := self._nearly_assembled(q):
+            q, matrix, limit = nearly
         else:  # which joints are too many, if any, shows elsewhere too
             q, matrix = self._q, max(self._scaled(self._q[1:], self._t[1:]), key=_rank)
-        kept, dependent = _split(matrix, order)
+        kept, dependent = _split(matrix, order, limit)
         # A joint that holds at an assembled state, and depends on others beside it, repeats them.
         repeating = [row for row in dependent if row not in self._drivers and chosen.any()]
         doubtful = [row for row in dependent if row not in repeating]
@@ -216,6 +227,22 @@ class _Analysis:
             nearest=nearest[0],
             residuals=self._evaluate(nearest, self._t[:1])[0][0],
         )
+
+    def _nearly_assembled(self, q: Array) -> tuple[Array, Array, float] | None:
+        """Return where joints almost hold that cannot hold exactly, and what depends on others.
+
+        There a row that would repeat others, were the lengths right, differs from them by about as
+        much as the equations are missed. The others can be assembled. Returns states, Phi_q at the
+        best of them and the limit for what depends; None where that is not the case.
+        """
+        missed = np.max(np.abs(self._weighted(q, self._t, self._joints)[0]), axis=1)
+        best = int(np.argmin(missed))
+        if len(self._terms) <= q.shape[1] or not missed[best] <= NEARLY:
+            return None
+        matrix, limit = self._scaled(q, self._t)[best], max(DEPENDENT, MISSED * missed[best])
+        kept, dependent = _split(matrix, self._joints, limit)
+        _, held, _ = self._assemble(kept, q, self._t)
+        return (q, matrix, limit) if dependent and held.any() else None
 
     def _beside(self, q: Array, t: Array, limit: float) -> Array:
         """Return Phi_q at the best of some assembled states, or where it has a larger rank beside.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -37,6 +38,9 @@ class Surplus:
         The type of constraint that keeps them; "" where there is none.
     advice
         How to say so, with places for ``{simpler}`` and ``{kept}``.
+    miss
+        The largest of its equations' values where those hold that they depend on; NaN where that
+        is nowhere.
     """
 
     constraint: str
@@ -48,6 +52,7 @@ class Surplus:
     others: tuple[str, ...]
     instead: str
     advice: str
+    miss: float
 
     @property
     def text(self) -> str:
@@ -61,7 +66,8 @@ class Surplus:
                 "derivatives are zero"
             )
         if self.conflicting:
-            return f"{verdict}: {what} contradict{s} {partners}"
+            by = "" if math.isnan(self.miss) else f", by {self.miss:.4g} at the start"
+            return f"{verdict}: {what} contradict{s} {partners}{by}"
         demands = "demands" if len(self.repeats) == 1 else "demand"
         return (
             f"{verdict}: {what} repeat{s} what {partners} {demands}, harmless as long as the "
@@ -130,6 +136,7 @@ def surpluses(system: ConstraintSystem, ranks: RankReport) -> tuple[Surplus, ...
                     conflicting,
                     tuple(dict.fromkeys(owner[other].name for other in partners)),
                     tuple(name for name in item.equation_names if name not in dependent),
+                    max(abs(ranks.residuals[row]) for row in own) if ranks.assembled else math.nan,
                 )
             )
     return tuple(found)
@@ -141,16 +148,18 @@ def _surplus(
     conflicting: bool,
     repeats: tuple[str, ...],
     others: tuple[str, ...],
+    miss: float,
 ) -> Surplus:
     kind, instead, advice = "Equation", "", ""
     if isinstance(item, Joint):
         kind, advice = item.template.type_name, item.written.replaced_by
         lost = [name.removeprefix(f"{item.name}.") for name in equations]
-        rest = [other.__name__ for row, other in item.written.simpler if [row] == lost]
-        instead = rest[0] if rest else ""
+        simpler = item.written.keeping_others(lost)
+        instead = simpler.__name__ if simpler else ""
     return Surplus(
-        item.name, kind, item.is_driver, equations, conflicting, repeats, others, instead, advice
-    )
+        item.name, kind, item.is_driver, equations, conflicting, repeats, others, instead, advice,
+        miss,
+    )  # fmt: skip
 
 
 def missing_drivers(system: ConstraintSystem, ranks: RankReport) -> tuple[MissingDriver, ...]:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
+    from kincompile.ir.program import Instance
 
 
 def header(code: InlineProgram, first: int = 0) -> list[str]:
@@ -27,7 +28,16 @@ def header(code: InlineProgram, first: int = 0) -> list[str]:
         lines += labelled("p", [f"{item.name}{_unit(item.unit)}" for item in program.parameters])
     if program.observers:
         lines += labelled("y", [f"{item.name}{_unit(item.unit)}" for item in program.outputs])
-    return [*lines, "", *table(rows)]
+    lines += ["", *table(rows)]
+    if program.loads:
+        lines += ["", *table([("load", "", "source"), *map(_load, program.loads)])]
+    return lines
+
+
+def _load(item: Instance) -> tuple[str, str, str]:
+    """Return type and name, bodies and source of a load."""
+    name = f'{item.kernel.name} "{item.name}"'
+    return name, " - ".join(item.bodies), item.constraint.source
 
 
 def constants(code: InlineProgram, level: int, pair: str) -> dict[str, object]:
@@ -70,7 +80,12 @@ def short_title(section: ConstraintRows, first: int = 0) -> str:
 
 
 def title(section: ConstraintRows, first: int = 0) -> str:
-    """Return rows, type, name and points of a constraint, for a comment above its rows."""
+    """Return rows, type, name and points of a constraint, for a comment above its rows.
+
+    The last load has the sums over all of them.
+    """
+    if section.instance.is_load:
+        return "sums over masses and loads"
     return f"{short_title(section, first)}: {section.instance.constraint.text}"
 
 

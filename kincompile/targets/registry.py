@@ -28,21 +28,18 @@ class Listed:
         Whether this process can call its code.
     has_grouped_form
         Whether it has a form for large mechanisms.
-    has_least_squares
-        Whether a motion with equations that repeat others is solved for, by least squares.
     """
 
     folder: str
     endings: tuple[str, ...]
     is_loadable: bool = False
     has_grouped_form: bool = False
-    has_least_squares: bool = False
 
 
 TARGETS = {
     "numpy": Listed(
         "kincompile.targets.numpy", (".py",),
-        is_loadable=True, has_grouped_form=True, has_least_squares=True,
+        is_loadable=True, has_grouped_form=True,
     ),
     "c": Listed("kincompile.targets.c", (".c", ".h"), is_loadable=True),
     "octave": Listed("kincompile.targets.octave", (".m",)),

@@ -50,6 +50,11 @@ function upperSolution(rows, b) {
     return x;
 }
 
+/* The rows that determine the motion: all but those that repeat others. */
+function independent({ REDUNDANT }, rows) {
+    return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(i)) : rows;
+}
+
 /* x of A x = b from the factors of A. */
 function solve({ rows, order }, b) {
     const y = order.map(k => b[k]);

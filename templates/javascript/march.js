@@ -13,11 +13,13 @@ class March {
 
     prepare(at) {
         this.model.factor_at(at);
-        at.dense = this.isDense ? factor(this.model.rows_of(at, "Phi_q")) : null;
+        at.dense = null;
+        if (this.isDense) this.equations.factors(at);
     }
 
     solve(at, right, to) {
-        if (this.isDense) to.set(solve(at.dense, right)); else this.model.solve_at(at.F, right, to);
+        if (this.isDense) to.set(solve(at.dense, independent(this.model, right)));
+        else this.model.solve_at(at.F, right, to);
     }
 
     /* Newton's method from a prediction; says whether it converged. */

@@ -92,7 +92,7 @@ class Problem {
 
     /* The factors of the dense matrix at a point, kept with it. */
     factors(at) {
-        at.dense ??= factor(this.model.rows_of(at, "Phi_q"));
+        at.dense ??= factor(independent(this.model, this.model.rows_of(at, "Phi_q")));
         return at.dense;
     }
 
@@ -198,7 +198,8 @@ const moved = (equations, at, step, part = 1) => {
 
 /* The whole correction. */
 function plainStep(equations, at) {
-    const factors = equations.factors(at), step = solve(factors, at.Phi.map(value => -value));
+    const factors = equations.factors(at), right = independent(equations.model, at.Phi);
+    const step = solve(factors, right.map(value => -value));
     if (factors.dependent.length || !allFinite(step)) return whySingular(at);
     const following = moved(equations, at, step);
     return following ? [following, norm(step)] : NOT_FINITE;

@@ -8,6 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile.runtime.engine.code import attach
 
 
 def pendulum(*extra):
@@ -275,18 +276,32 @@ def test_that_what_is_written_twice_does_no_harm(compiled, extra):
     )
 
 
-@pytest.mark.parametrize(("target", "language"), [("c", "C"), ("javascript", "JavaScript")])
-def test_that_code_without_least_squares_says_that_it_has_no_solve(target, language):
-    with pytest.warns(kc.RedundantConstraintWarning, match=r"again\.x, again\.y repeat"):
-        emitted = kc.emit(pendulum(PIN), target)
-    assert emitted.unsolvable == (
-        "'pendulum' has equations that repeat others, again.x, again.y, and the "
-        f"{language} target has no solve by least squares: use the target 'numpy', or replace "
-        "their constraint by one with fewer equations"
-    )
-    comment = " ".join(line.lstrip("/ ") for line in emitted.source.splitlines()[:9])
-    assert f"There is no solve: {emitted.unsolvable}." in comment
-    assert "pendulum_solve" not in emitted.source
+@pytest.mark.parametrize("method", ["grid", "march"])
+def test_that_a_grid_solves_the_independent_equations_and_checks_the_others(build, method):
+    t = np.linspace(0, 1, 401)
+    with pytest.warns(kc.RedundantConstraintWarning):
+        module = kc.compile(build["double_parallelogram"]())
+    solution = kc.solve(module, t, method=method)
+    check_motion(solution, double_parallelogram_at, t + 0.8, 1.0)
+    assert (solution.statistics["coarse"] > 0) == (method == "grid")
+
+
+@pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
+def test_that_equations_that_agree_in_position_alone_end_the_motion():
+    """A second driver has the value of the first at every time of the grid, and another rate."""
+    module = kc.compile(pendulum(kc.AbsoluteAngle("again", "rod", kc.t)))
+    names = list(module.EQUATIONS)
+    original = vars(module)["nu"]
+
+    def wrong(q, t, p=module.DEFAULTS):
+        nu = np.array(original(q, t, p))
+        nu[..., names.index("again")] += 0.01
+        return nu
+
+    vars(module)["nu"] = wrong
+    attach(module)
+    solution = kc.solve(module, np.linspace(0, 1, 101))
+    assert not solution.success
 
 
 @pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")

@@ -53,7 +53,9 @@ def emit_grouped(grouped: GroupedProgram) -> Emitted:
         module.add_places(quantity)
     groups = [line for item in grouped.groups for line in module.group(item)]
     frames = [module.frames(item) for item in grouped.frames]
-    module.code += ["", "", *module.values()]
+    module.code += ["", "", *module.values("values", grouped.values, "q")]
+    if grouped.moving:
+        module.code += ["", "", *module.values("moving", grouped.moving, "q, q_dot")]
     pattern, varies = module.arrays["pattern"], module.varies
     constants = np.where(varies, np.nan, module.arrays["constants"])
     stages = plan_solving(program, pattern[:, 0], pattern[:, 1], constants)
@@ -167,17 +169,17 @@ class _Module:
         kinds = ", ".join(f'"{kind}"' for kind in item.kinds)
         return f'Frames("{item.name}", _{item.name}, ({kinds},)),'
 
-    def values(self) -> list[str]:
-        """Return the function of the values that depend on t, p and contact parameters."""
+    def values(self, name: str, wanted: Sequence[int], states: str) -> list[str]:
+        """Return the function of values that depend on t, p and coordinates, or rates too."""
         program = self.program
-        nodes, new = pruned(program.values, self.grouped.values)
+        nodes, new = pruned(program.values, wanted)
         table = NameTable((*RESERVED, *program.tables))
         names = input_names(program, table, {node[1] for node in nodes if node[0] == "input"})
-        entries = tuple(Entry(k, 0, new[node]) for k, node in enumerate(self.grouped.values))
-        code = self._inline(tuple(nodes), {"values": entries}, {})
-        listing, body = self._body(code, ("values",), names, table)
+        entries = tuple(Entry(k, 0, new[node]) for k, node in enumerate(wanted))
+        code = self._inline(tuple(nodes), {name: entries}, {})
+        listing, body = self._body(code, (name,), names, table)
         unpack = [f"{name} = {vector}[{k}]" for vector, k, name in inputs_read(program, listing)]
-        return ["def _values(f, q, t, p):", *(f"    {line}" for line in (*unpack, *body))]
+        return [f"def _{name}(f, {states}, t, p):", *(f"    {line}" for line in (*unpack, *body))]
 
     def _inline(
         self,
@@ -251,7 +253,9 @@ def _data(
         "nonzeros": nonzeros,
         "k": len(program.parameters),
         "has_outputs": bool(program.outputs),
+        "has_moving": bool(module.grouped.moving),
         "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
+        "loads": tuple_text(f'"{item.name}"' for item in program.loads),
         "output_units": indented(
             wrapped(f'"{item.name}": "{item.unit}"' for item in program.outputs)
         ),

@@ -121,6 +121,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "solvability": solvability_text(program),
         "has_outputs": bool(program.outputs),
         "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
+        "loads": tuple_text(f'"{item.name}"' for item in program.loads),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
         "units": tuple_text((f'"{unit}"' for unit in units), WIDTH - 44),
@@ -168,7 +169,7 @@ def _results(program: Program) -> Iterator[str]:
     }
     results: dict[str, list[str]] = {}
     for quantity in program.quantities:
-        rows, name = sizes[quantity.rows], f"_{quantity.name.upper()}"
+        rows, name = sizes[quantity.rows], _result(quantity.name)
         if not quantity.is_matrix:
             results.setdefault(f"({rows},), range({rows})", []).append(name)
             continue
@@ -177,9 +178,14 @@ def _results(program: Program) -> Iterator[str]:
         places = f"{pattern} @ ({columns}, 1)"
         results[f"({rows}, {columns}), {places}, {constants}"] = [name]
         size = f"len({pattern})"
-        results[f"({size},), range({size}), {constants}"] = [f"{name}_NONZEROS"]
+        results[f"({size},), range({size}), {constants}"] = [_result(f"{quantity.name}_nonzeros")]
     for arguments, names in results.items():
         yield f"{' = '.join(names)} = _Quantity({arguments})"
+
+
+def _result(name: str) -> str:
+    """Return the name of the result of a function; of M and Q it must not be that of the code."""
+    return f"_{name.upper()}" if name != name.upper() else f"_{name}_RESULT"
 
 
 def _functions(code: InlineProgram) -> Iterator[str]:
@@ -194,7 +200,7 @@ def _functions(code: InlineProgram) -> Iterator[str]:
         kernel = next(key for key, own in found.items() if quantity.name in own)
         computed = found[kernel]
         skip = sum(counts[item] for item in computed[: computed.index(quantity.name)])
-        result = f"_{name.upper()}"
+        result = _result(name)
         yield from lines
         states = ", ".join(quantity.states)
         yield f"    return _evaluate(_{kernel}, {skip}, {result}, t, p, {states})\n\n"

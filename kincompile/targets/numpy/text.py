@@ -28,8 +28,7 @@ def solvability_text(program: Program) -> str:
     if program.redundant:
         names = tuple_text(f'"{name}"' for name in program.redundant)
         lines += [
-            "# equations that repeat others at every assembled position; "
-            "a solve is one of least squares",
+            "# equations that repeat others at every assembled position; a solve leaves them out",
             f"REDUNDANT = {names}",
         ]
     if program.unsolvable:

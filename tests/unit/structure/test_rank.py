@@ -19,7 +19,7 @@ def report(equations, guess, *, drivers=(), angular=None, end=1.0):
 
     flags = np.zeros(guess.size, dtype=bool) if angular is None else np.array(angular)
     names = [f"e{k}" for k in range(len(equations))]
-    return generic_rank(evaluate, guess, flags, drivers, end, names)
+    return generic_rank(evaluate, guess, flags, drivers, (), end, names)
 
 
 CIRCLE = (lambda x, t: x[0] ** 2 + x[1] ** 2 - 1, lambda x: (2 * x[0], 2 * x[1]))
