@@ -15,6 +15,7 @@ from kincompile.derivation.document import Figure
 from kincompile.derivation.slides import ATTRIBUTES
 from kincompile.derivation.svg import standalone_svg
 from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from kincompile.model.constraint import Constraint
 
 BEGIN, END = "<!-- catalogue -->\n", "<!-- end of catalogue -->\n"
+SPACE, END_OF_SPACE = "<!-- catalogue of space -->\n", "<!-- end of catalogue of space -->\n"
 """What stands between these lines of the page is written here."""
 
 
@@ -102,5 +104,23 @@ def _equation(derivation: Derivation) -> str:
 def page() -> str:
     """Return the page, with what follows from the catalogue."""
     text = (DOCS / "joints.md").read_text(encoding="utf-8")
-    before, rest = text.split(BEGIN)
-    return before + BEGIN + catalogue_text() + END + rest.split(END)[1]
+    for begin, written, end in (
+        (BEGIN, catalogue_text(), END),
+        (SPACE, space_table(), END_OF_SPACE),
+    ):
+        before, rest = text.split(begin)
+        text = before + begin + written + end + rest.split(end)[1]
+    return text
+
+
+def space_table() -> str:
+    """Return the table of the types in space."""
+    rows = [
+        "| Constraint | what it is | arguments after the name | equations |",
+        "| --- " * 4 + "|",
+    ]
+    for name, kind in IN_SPACE.items():
+        what = inspect.cleandoc(str(kind.__doc__)).partition("\n")[0]
+        arguments = ", ".join(kind.arguments())
+        rows.append(f"| `{name}` | {what} | {arguments} | {max(len(kind.row_names), 1)} |")
+    return "\n".join(rows) + "\n"

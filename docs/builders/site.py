@@ -16,6 +16,7 @@ import kincompile as kc
 from docs.builders import benchmark_plots, course, pictures
 from docs.builders.places import DOCS, EXAMPLES, ROOT, write
 from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,6 +45,7 @@ NAMED_BY_FILE = re.compile(r"\[[\w/.]+\.md\]\((?=[^)]*\.md\))")
 def setup(app: Sphinx) -> dict[str, bool]:
     """Connect with Sphinx."""
     app.connect("builder-inited", lambda _: write_pages())
+    app.connect("env-get-outdated", lambda *_: ["guides", "names"])  # they list other pages
     app.connect("source-read", _read)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -61,6 +63,7 @@ def write_pages() -> None:
         pages[f"examples/{name}.md"] = _example_page(name)
     for name in documented_names():
         pages[f"api/{name}.md"] = _api_page(name)
+    pages["api/spatial.md"] = _spatial_page()
     write(GENERATED, pages)
     write(GENERATED, benchmark_plots.plots())
     _write_motions()
@@ -221,6 +224,14 @@ def _api_page(name: str) -> str:
     """Return the page of a public name, which autodoc fills."""
     lines = [".. currentmodule:: kincompile", "", *_directive(name, getattr(kc, name))]
     return "\n".join([f"# {name}", "", "```{eval-rst}", *lines, "```", ""])
+
+
+def _spatial_page() -> str:
+    """Return the page of the names in space."""
+    classes = "".join(f".. autoclass:: kincompile.spatial.{name}\n\n" for name in IN_SPACE)
+    mechanism = ".. autoclass:: kincompile.spatial.Mechanism\n   :members:\n\n"
+    head = "# spatial\n\nMechanisms in space: `from kincompile import spatial`."
+    return f"{head}\n\n```{{eval-rst}}\n{mechanism}{classes}```\n"
 
 
 def _directive(name: str, value: object) -> Iterator[str]:
