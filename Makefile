@@ -16,11 +16,12 @@ DEMO_READY := $(VENV)/demo.stamp
 TEST_READY := $(VENV)/test.stamp
 PAGES_READY := $(VENV)/pages.stamp
 LINT_READY := $(VENV)/lint.stamp
+DOCS_READY := $(VENV)/docs.stamp
 BENCH_READY := $(VENV)/bench.stamp
 
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-slow lint format types goldens update-goldens bench clean
+.PHONY: help demo test test-all test-slow lint format types goldens update-goldens docs pictures course bench clean
 
 help:
 	@echo "make demo            compile the wrecker boom, run it, show it on a page"
@@ -29,6 +30,8 @@ help:
 	@echo "make types           mypy                          make bench        the benchmarks"
 	@echo "make goldens         compare generated/ with re-emission, under several hash seeds"
 	@echo "make update-goldens  rewrite generated/"
+	@echo "make docs            the site: open site/index.html     make course   lessons to take along"
+	@echo "make pictures        the pictures, the notebooks and docs/joints.md"
 	@echo "make clean           remove what make has made"
 
 $(VENV_READY): .ci/make-venv
@@ -94,7 +97,26 @@ goldens: $(TEST_READY)
 
 # Fails by design after a rewrite, so that nothing passes by updating.
 update-goldens: $(TEST_READY)
-	@$(PYTEST) tests/goldens tests/unit/test_readme.py --update-goldens -k 'golden or table'
+	@$(PYTEST) tests/goldens tests/unit/test_joints_page.py --update-goldens -k 'golden or catalogue'
+
+$(DOCS_READY): $(DEMO_READY)
+	@echo "Installing what makes the site into $(VENV)"
+	@$(PIP) --editable '.[docs]'
+	@touch $@
+
+# A warning is an error: a link that leads nowhere, a page that no page lists, a docstring that cannot be read.
+docs: $(DOCS_READY)
+	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -b html docs site
+	@echo "The site begins at site/index.html"
+
+# What the README and docs/ show, made by the tool; tests compare it.
+pictures: $(DOCS_READY)
+	@for what in pictures joints notebooks; do $(BIN)/python -m docs.builders $$what || exit 1; done
+
+course: $(DOCS_READY)
+	@rm -rf course
+	@$(BIN)/python -m docs.builders course course
+	@echo "The course begins at course/index.html"
 
 # A peer that cannot be installed here is skipped, and the tables say so.
 $(BENCH_READY): $(DEMO_READY)
@@ -107,5 +129,5 @@ bench: $(BENCH_READY)
 	@for part in points analysis scale variants page; do $(BIN)/python -m benchmarks.$$part || exit 1; done
 
 clean:
-	@rm -rf $(VENV) demo build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	@rm -rf $(VENV) demo site course docs/made build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -34,7 +34,8 @@ def __getattr__(name: str) -> Any:
     if name not in homes and (name[:1].isupper() or _CATALOGUE in sys.modules):
         homes = _HOME | dict.fromkeys(_constraint_types(), _CATALOGUE)
     if name not in homes:
-        near = suggestion(name, homes)
+        catalogue = sys.modules.get(_CATALOGUE)
+        near = (catalogue.meant_by(name) if catalogue else "") or suggestion(name, homes)
         raise AttributeError(f"module 'kincompile' has no attribute {name!r}{near}")
     module = homes[name]
     if not module.startswith(_WITHOUT_SYMPY):

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
 FORMAT = 3
-"""The format of emitted modules, as docs/architecture.md has it."""
+"""The format of emitted modules, as docs/contract.md has it."""
 
 Rows = Literal["equations", "coordinates", "outputs"]
 Columns = Literal["none", "coordinates", "parameters"]

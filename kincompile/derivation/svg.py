@@ -24,9 +24,14 @@ def as_svg(picture: Picture) -> str:
     return svg_element(picture, "".join(_label(item, picture.height) for item in picture.labels))
 
 
+def standalone_svg(picture: Picture) -> str:
+    """Return a picture with its labels as the text of an image."""
+    return as_svg(picture).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+
+
 def svg_address(picture: Picture) -> str:
     """Return a picture as the address of an image, which holds it."""
-    svg = as_svg(picture).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+    svg = standalone_svg(picture)
     return f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}"
 
 

@@ -17,6 +17,15 @@ class CamFollower(CamConstraint):
     """Two profiles touch: a common point and a common tangent."""
 
     source = "Haug 3.4"
+    known_as = "cam with a roller, roller follower, disc cam, cam pair"
+    positive = (
+        "A contact angle is counted counterclockwise in the frame of its body; its guess "
+        "decides which sides touch."
+    )
+    use = (
+        'cam, roller = m.body("cam", guess=(1, 1, 0.3)), m.body("roller", guess=(2.2, 1.2, 0.5))',
+        'm.add(kc.CamFollower("touch", cam, (0.2, 0), 0.8, roller, (0, 0), 0.3, guess=(0, kc.pi)))',
+    )
     row_names = ("x", "y", "tangent")
     contacts = (contact_i, contact_j)
     i: BodyLike = argument.body("i")
@@ -38,6 +47,16 @@ class CamFlatFollower(CamConstraint):
     """A cam (body i) touches a flat face of the follower (body j)."""
 
     source = "Haug 3.4"
+    known_as = "cam with a flat follower, flat-faced follower, mushroom follower, tappet"
+    positive = (
+        "axis lies along the face. The contact angle is counted counterclockwise in the frame "
+        "of the cam; its guess decides which side touches."
+    )
+    use = (
+        'cam, tappet = m.body("cam", guess=(1.4, 1, 0.3)), '
+        'm.body("tappet", guess=(1.6, 2.1, 0.05))',
+        'm.add(kc.CamFlatFollower("touch", cam, (0.2, 0), 0.8, tappet, (0, 0), (1, 0), guess=1.2))',
+    )
     row_names = ("contact", "tangent")
     contacts = (contact_i,)
     cam: BodyLike = argument.body("i")
@@ -60,6 +79,13 @@ class PointFollower(CamConstraint):
     """A point of body i runs on a profile of body j: a pin in a curved slot."""
 
     source = "Haug 3.4.32"
+    known_as = "pin in a curved slot, cam groove, cam track, knife-edge follower"
+    positive = "The contact angle is counted counterclockwise in the frame of body j."
+    use = (
+        'lever, disc = m.body("lever", guess=(2.6, 1.5, 0.4)), m.body("disc", guess=(1, 1, 0.3))',
+        'm.add(kc.PointFollower("groove", lever, (-0.7, 0), disc, (0, 0), '
+        "0.9 + sympy.cos(2 * kc.alpha) / 7))",
+    )
     row_names = ("x", "y")
     contacts = (contact_j,)
     i: BodyLike = argument.body("i")

@@ -42,6 +42,12 @@ class Element(Shown):
 
     source: ClassVar[str] = ""
     """Where the textbook has it."""
+    known_as: ClassVar[str] = ""
+    """What engineers call it, and search for, separated by commas."""
+    positive: ClassVar[str] = ""
+    """Which way its value counts, or what the guess decides."""
+    use: ClassVar[tuple[str, str]] = ("", "")
+    """How it is written, in two lines for a mechanism `m`: its bodies, and the constraint."""
     bodies: ClassVar[BodyKind] = PLANAR
     """The kind of bodies that it connects."""
     contacts: ClassVar[tuple[Contact, ...]] = ()

@@ -24,6 +24,15 @@ class Gear(Constraint):
     """
 
     source = "Haug 3.4.1"
+    known_as = "gear pair, spur gears, gear wheels, planetary gear, ring gear, friction wheels"
+    positive = (
+        "Two positive radii are external gears, which turn opposite ways; a negative radius "
+        "is an internal gear."
+    )
+    use = (
+        'small, large = m.body("small", guess=(0.8, 1, 0.4)), m.body("large", guess=(2.3, 1, 0.2))',
+        'm.add(kc.Gear("mesh", small, (0, 0), 0.5, 0, large, (0, 0), 1, kc.pi))',
+    )
     i: BodyLike = argument.body("i")
     centre_i: PointLike = argument.point("s_i", on="i", what="Centre")
     radius_i: ValueLike = argument.radius("R_i")
@@ -59,6 +68,17 @@ class RackAndPinion(Constraint):
     """
 
     source = "Haug 3.4"
+    known_as = "rack, pinion, rolling wheel, wheel that rolls without slipping"
+    positive = (
+        "The pinion is to the left of the line from P to Q; rolling from P to Q it turns "
+        "clockwise against the rack."
+    )
+    use = (
+        'rack, pinion = m.body("rack", guess=(1.6, 0.5, 0.1)), '
+        'm.body("pinion", guess=(1.9, 1.1, 0.6))',
+        'm.add(kc.RackAndPinion("mesh", rack, (-1.2, 0), (1.2, 0), 0, pinion, (0, 0), 0.6, '
+        "-kc.pi / 2))",
+    )
     row_names = ("roll", "pitch")
     rack: BodyLike = argument.body("i")
     point_p: PointLike = argument.point("s_P", on="i", what="Point P of the pitch line")

@@ -21,6 +21,12 @@ class Revolute(PointToPoint):
     """A point on body i and a point on body j coincide."""
 
     source = "Haug 3.3.10"
+    known_as = "pin, pin joint, hinge, bearing, turning pair, R joint, pivot"
+    positive = "It has no value. Exchanging i and j turns the signs of its rows."
+    use = (
+        'crank, rod = m.body("crank", guess=(1, 0.7, 0.6)), m.body("rod", guess=(2.8, 0.9, -0.3))',
+        'm.add(kc.Revolute("A", crank, (1, 0), rod, (-1, 0)))',
+    )
     row_names = ("x", "y")
     simpler = (("x", RelativeY), ("y", RelativeX))
     replaced_by = (
@@ -51,6 +57,16 @@ class RevoluteTranslational(PointAndAxis):
     """A point on body j keeps the distance C from an axis of body i, counted to its left."""
 
     source = "Haug 3.3"
+    known_as = (
+        "slot, pin in a slot, pin in a straight slot, sliding block with a pin, half joint, "
+        "Scotch yoke"
+    )
+    positive = "C counts to the left of axis_i, looking along it; 0 puts the point on the axis."
+    use = (
+        'lever, crank = m.body("lever", guess=(1, 0.6, 0.35)), '
+        'm.body("crank", guess=(2.6, 1.8, 0.9))',
+        'm.add(kc.RevoluteTranslational("slot", lever, (0, 0), (1, 0), crank, (-0.6, 0), 0))',
+    )
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -63,6 +79,12 @@ class TranslationalDistance(PointAndAxis):
     """A point on body j is at C along an axis of body i, counted from a point on the axis."""
 
     source = "Haug 3.5"
+    known_as = "stroke, linear drive, piston drive, cylinder in a telescope"
+    positive = "C counts along axis_i, from point_i."
+    use = (
+        'boom, stick = m.body("boom", guess=(1, 0.6, 0.3)), m.body("stick", guess=(3.0, 1.5, 0.6))',
+        'm.add(kc.TranslationalDistance("stroke", boom, (0, 0), (1, 0), stick, (-0.5, 0), 1.5))',
+    )
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -75,6 +97,17 @@ class Translational(Constraint):
     """Body j slides along an axis of body i without turning: the two axes stay on one line."""
 
     source = "Haug 3.3.13"
+    known_as = (
+        "slider, prismatic joint, sliding pair, P joint, guide, rail, linear bearing, telescope"
+    )
+    positive = (
+        "It has no value: the way along the axis is free. The axes may point alike or "
+        "oppositely; the guess decides."
+    )
+    use = (
+        'boom, stick = m.body("boom", guess=(1, 0.6, 0.3)), m.body("stick", guess=(2.9, 1.3, 0.3))',
+        'm.add(kc.Translational("guide", boom, (0.5, 0), (1, 0), stick, (-0.3, 0), (1, 0)))',
+    )
     row_names = ("normal", "parallel")
     simpler = (("normal", RelativeAngle), ("parallel", RevoluteTranslational))
     i: BodyLike = argument.body("i")

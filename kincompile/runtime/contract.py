@@ -1,4 +1,4 @@
-"""The contract of an emitted module (docs/architecture.md), as a check."""
+"""The contract of an emitted module (docs/contract.md), as a check."""
 
 from __future__ import annotations
 

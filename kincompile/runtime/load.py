@@ -47,7 +47,7 @@ def load(path: str | os.PathLike[str]) -> ModuleType:
     Returns
     -------
     module
-        With the names of the contract in docs/architecture.md.
+        With the names of the contract in docs/contract.md.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def from_source(
     Returns
     -------
     module
-        With the names of the contract in docs/architecture.md.
+        With the names of the contract in docs/contract.md.
 
     Raises
     ------

@@ -14,8 +14,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 NOT_SOURCE = shutil.ignore_patterns(
-    ".*_cache", ".git", ".hypothesis", ".venv", "*.egg-info", "__pycache__", "build", "demo", "dist"
-)
+    ".*_cache", ".git", ".hypothesis", ".venv", "*.egg-info", "__pycache__", "build", "demo",
+    "dist", "made", "site",
+)  # fmt: skip
 
 USER_SCRIPT = '''\
 """What a user does, in a folder of the user's own."""
@@ -129,12 +130,20 @@ def test_the_sdist_holds_what_the_tests_need(distributions: Path) -> None:
     checkout = distributions / "checkout"
     wanted = {
         PurePosixPath(path.relative_to(checkout).as_posix())
-        for folder in ("kincompile", "templates", "generated", "tests", "examples")
+        for folder in ("kincompile", "templates", "generated", "tests", "examples", "docs")
         for path in (checkout / folder).rglob("*")
         if path.is_file()
     }
     assert {name.parts[0] for name in wanted} >= {"templates", "generated", "tests", "examples"}
     assert wanted - names == set()
+
+
+@pytest.mark.slow
+def test_that_an_index_would_take_them(distributions: Path) -> None:
+    pytest.importorskip("twine", reason="twine is not installed")
+    files = [*distributions.glob("kincompile-*.whl"), *distributions.glob("kincompile-*.tar.gz")]
+    assert len(files) == 2
+    run(sys.executable, "-m", "twine", "check", "--strict", *files, cwd=distributions)
 
 
 @pytest.mark.slow
@@ -163,6 +172,10 @@ def test_the_wheel_compiles_and_solves_outside_the_checkout(
     constraints = ROOT / ".ci" / "constraints.txt"
     run(python, "-m", "pip", "install", "--quiet", "-c", constraints, wheel, cwd=elsewhere)
     run(python, script, cwd=elsewhere)
+
+    # As the README says it: activate, then the command is there.
+    activated = f". {environment}/bin/activate && kincompile --version"
+    run("sh", "-c", activated, cwd=elsewhere)
 
     # The command, and what it wrote where kincompile is not needed any more.
     command = environment / "bin" / "kincompile"

@@ -39,6 +39,25 @@ def test_that_a_misspelt_name_is_answered_with_the_right_one(wrong: str) -> None
         getattr(kc, wrong)
 
 
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("Pin", "Revolute"),
+        ("PinJoint", "Revolute"),
+        ("Slot", "RevoluteTranslational"),
+        ("Slider", "Translational"),
+        ("Prismatic", "Translational"),
+        ("Cylinder", "Distance"),
+        ("Weld", "RelativeAngle"),
+        ("Motor", "AbsoluteAngle"),
+        ("Rack", "RackAndPinion"),
+    ],
+)
+def test_that_a_name_of_engineers_is_answered_with_the_type(name: str, kind: str) -> None:
+    with pytest.raises(AttributeError, match=rf"did you mean '{kind}', known as .*\?"):
+        getattr(kc, name)
+
+
 @pytest.mark.parametrize("name", ["solve", "Solution", "InputError", "nonsense", "_private"])
 def test_that_names_of_the_runtime_do_not_load_sympy(name: str) -> None:
     code = f"import kincompile as kc, sys; hasattr(kc, {name!r}); print('sympy' in sys.modules)"

@@ -39,7 +39,7 @@ DRIVERS = "_drivers"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LaneFunctions:
-    """The code of a module itself, on numbers of any kind; see docs/architecture.md.
+    """The code of a module itself, on numbers of any kind; see docs/contract.md.
 
     Attributes
     ----------

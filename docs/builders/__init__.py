@@ -1,0 +1,1 @@
+"""What `make docs`, `make pictures` and `make course` write: pages, pictures, lessons."""

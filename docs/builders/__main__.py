@@ -1,0 +1,20 @@
+"""`python -m docs.builders WHAT [FOLDER]`: write pictures, pages, notebooks or the course kit."""
+
+from __future__ import annotations
+
+import sys
+
+from docs.builders import course, joints, notebooks, pictures
+from docs.builders.places import DOCS, write
+
+WRITERS = {
+    "pictures": lambda: write(
+        DOCS / "images", {**joints.pictures(), **course.sketches(), **pictures.drawn()}
+    ),
+    "joints": lambda: write(DOCS, {"joints.md": joints.page()}),
+    "notebooks": lambda: write(notebooks.FOLDER, notebooks.notebooks()),
+    "course": lambda: course.make(sys.argv[2:]),
+}
+
+if __name__ == "__main__":
+    WRITERS[sys.argv[1]]()

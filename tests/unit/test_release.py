@@ -1,0 +1,66 @@
+"""One version, extras that users expect, a citation, issue templates that ask for the model."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import kincompile as kc
+
+ROOT = Path(__file__).resolve().parents[2]
+EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+    "optional-dependencies"
+]
+FOR_DEVELOPERS = {"test", "pages", "docs", "bench", "lint"}
+
+
+def text(path: str) -> str:
+    return (ROOT / path).read_text(encoding="utf-8")
+
+
+def test_that_there_is_one_version():
+    assert re.fullmatch(r"\d+\.\d+\.\d+", kc.__version__)
+    (cited,) = re.findall(r"^version: (.*)$", text("CITATION.cff"), re.MULTILINE)
+    assert cited == kc.__version__
+    assert 'version = { attr = "kincompile.__version__" }' in text("pyproject.toml")
+    released = re.findall(r"^## \[?(\d+\.\d+\.\d+)", text("CHANGELOG.md"), re.MULTILINE)
+    assert released[:1] in ([], [kc.__version__])
+
+
+def test_that_the_changelog_has_a_section_on_generated_code():
+    newest = re.split(r"^## ", text("CHANGELOG.md"), flags=re.MULTILINE)[1]
+    assert "\n### Generated code\n" in newest
+
+
+def test_that_all_is_every_extra_for_users():
+    (all_of,) = EXTRAS["all"]
+    names = re.fullmatch(r"kincompile\[(.*)\]", all_of)
+    assert names is not None
+    assert set(names[1].split(",")) == set(EXTRAS) - FOR_DEVELOPERS - {"all"}
+
+
+@pytest.mark.parametrize("page", ["docs/install.md"])
+def test_that_extras_for_users_are_explained(page):
+    rows = set(re.findall(r"^\| `(\w+)` \|", text(page), re.MULTILINE))
+    assert rows == set(EXTRAS) - FOR_DEVELOPERS
+
+
+def test_that_extras_which_pages_name_exist():
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("**/*.md"), *ROOT.glob("kincompile/**/*.py")]
+    named = {
+        name
+        for page in pages
+        if "made" not in page.parts
+        for names in re.findall(r"'(?:\.|kincompile)\[([\w,]+)\]'", page.read_text("utf-8"))
+        for name in names.split(",")
+    }
+    assert named
+    assert named - set(EXTRAS) == set()
+
+
+def test_that_issue_templates_ask_for_the_model():
+    for form in (ROOT / ".github" / "ISSUE_TEMPLATE").glob("w*.yml"):
+        assert "id: model" in form.read_text(encoding="utf-8")
+    wrong = text(".github/ISSUE_TEMPLATE/wrong_result.yml")
+    assert re.search(r"id: model.*?required: true", wrong, re.DOTALL)
