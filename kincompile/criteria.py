@@ -143,6 +143,12 @@ SMALLEST_PART = 2.0**-20
 MAX_SUBSTEPS = 10_000
 """Sub-steps between two times after which the march is given up, about a second."""
 
+PATIENCE = 8
+"""Sub-steps after one that was too long before a longer one is tried again."""
+
+OTHER_SIZE = 100.0
+"""How many times smaller or larger an equation must have become to be measured again."""
+
 # Newton's method from a guess
 
 LARGEST_ANGLE = 0.5
@@ -269,18 +275,19 @@ def size_of(
     float
         In the unit of the lengths; 0.0 where the equations are linear in them.
     """
-    lengths, angles = (np.where(angular == kind, probe_of(q.size), 0.0) for kind in (False, True))
-    Phi, entries = evaluate(q + angles)  # at no special pose
+    probe = probe_of(q.size)
+    Phi, entries = evaluate(q + np.where(angular, probe, 0.0))  # at no special pose
     if pattern is None:
         pattern = np.argwhere(np.ones((Phi.size, q.size)))
-    turns = angular[pattern[:, 1]]
-    slopes = _largest_of_rows(pattern, np.where(turns, 0.0, np.abs(entries)), Phi.size)
-    arms = _largest_of_rows(pattern, np.where(turns, np.abs(entries), 0.0), Phi.size)
-    size = _largest(arms[slopes > 0] / slopes[slopes > 0])
+    rows, columns = pattern.T
+    largest = _largest_of_rows(rows + Phi.size * angular[columns], entries, 2 * Phi.size)
+    slopes, arms = largest[: Phi.size], largest[Phi.size :]
+    has_length = slopes > 0
+    size = _largest(arms[has_length] / slopes[has_length])
     if size:
         return size
     farthest = _largest(q[~angular]) or 1.0
-    step = SMALL_PART * farthest
+    lengths, step = np.where(angular, 0.0, probe), SMALL_PART * farthest
     near = _bends(evaluate, pattern, q, step * lengths)
     if near.size:
         size = float(np.min(near, where=near > 10 * step, initial=np.inf))
@@ -314,23 +321,25 @@ def _bends(
     Phi, entries = evaluate(q)
     change = np.abs(evaluate(q + step)[1] - entries) / _largest(step)
     bends, slopes = (
-        _largest_of_rows(pattern, values, Phi.size) for values in (change, np.abs(entries))
+        _largest_of_rows(pattern[:, 0], values, Phi.size) for values in (change, entries)
     )
     curved = bends * _largest(step) > CONSTANT * slopes
     bends, slopes, Phi = bends[curved], slopes[curved], np.abs(Phi[curved])
     return np.asarray(np.maximum(slopes / bends, np.sqrt(Phi / bends)))
 
 
-def _largest_of_rows(pattern: Any, entries: NDArray[np.float64], m: int) -> NDArray[np.float64]:
-    """Return the largest of the entries of each row, 0.0 where it has none."""
+def _largest_of_rows(rows: Any, entries: NDArray[np.float64], m: int) -> NDArray[np.float64]:
+    """Return the largest size of the entries of each row, 0.0 where it has none."""
     largest = np.zeros(m)
-    np.maximum.at(largest, pattern[:, 0], entries)
+    np.maximum.at(largest, rows, np.abs(entries))
     return largest
 
 
 def _largest(values: NDArray[np.float64]) -> float:
     """Return the largest size of finite values, 0.0 where there is none."""
-    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+    sizes = np.abs(values)
+    largest = float(sizes.max(initial=0.0))
+    return largest if largest < np.inf else float(sizes.max(where=np.isfinite(sizes), initial=0.0))
 
 
 @cache

@@ -890,7 +890,7 @@ static void complete(strip *b, const scales *s, size_t count, outcome *o)
         for (size_t k = 0; k < count; k++) {
             const double size = fabs(answer[i][k]) * s->inverse[i][k];
             o->sensitivity[k] = size <= o->sensitivity[k] ? o->sensitivity[k] : size;
-            total[k] += b->q_dot[i][k] + b->q_ddot[i][k];
+            total[k] += b->q[i][k] + b->q_dot[i][k] + b->q_ddot[i][k];
         }
     for (size_t k = 0; k < count; k++) {
         const int holds = excess[k] == 0, finite = total[k] - total[k] == 0;

@@ -326,7 +326,8 @@ const slider_crank = (() => {
         const [SINGULAR_SENSITIVITY, TOO_NEAR] = [10000000.0, 100000.0];
         const [NEARLY_SINGULAR, KINK, SMOOTH] = [30.0, 8.0, 1e-09];
         const [SMALL_ERROR, LARGE_ERROR, ALLOWED_PART] = [0.05, 0.5, 0.25];
-        const [SMALLEST_PART, MAX_SUBSTEPS] = [9.5367431640625e-07, 10000];
+        const [SMALLEST_PART, MAX_SUBSTEPS, PATIENCE] = [9.5367431640625e-07, 10000, 8];
+        const OTHER_SIZE = 100.0;
         const [LONGEST_ARC, FIRST_ARC, SHORTEST_ARC] = [0.05, 0.01, 1e-09];
         const [MAX_ARCS, ARC_CORRECTIONS, STRAIGHT] = [400, 12, 0.98];
         const [SMALL_CORRECTION, TOLERABLE_CORRECTION] = [1e-12, 1e-07];
@@ -816,7 +817,8 @@ const slider_crank = (() => {
                 for (let k = 0; k < n; k += 1) rounding[k] = ROUNDING * Math.abs(at.q[k]);
                 let last = Infinity;
                 model.position_at(at);
-                for (this.iterations = 1; this.iterations <= most; this.iterations += 1) {
+                for (let iteration = 0; iteration < most; iteration += 1) {
+                    this.iterations += 1;
                     this.prepare(at);
                     this.solve(at, at.Phi, change);
                     let size = -Infinity;
@@ -833,7 +835,6 @@ const slider_crank = (() => {
                     }
                     last = size;
                 }
-                this.iterations = most;
                 return false;
             }
 
@@ -897,7 +898,7 @@ const slider_crank = (() => {
                and doubled where they do not. */
             advance(from, t, most = MAX_ITERATIONS) {
                 const spare = () => this.model.point(this.equations.p);
-                let h = t - from.t, state = from, to = spare(), status = NOT_CONVERGED;
+                let h = t - from.t, state = from, to = spare(), status = NOT_CONVERGED, wait = 0;
                 const smallest = Math.min(Math.abs(h), this.timeOf(from)) * SMALLEST_PART;
                 for (let count = 0; count < MAX_SUBSTEPS; count += 1) {
                     const isWhole = Math.abs(h) >= Math.abs(t - state.t);
@@ -907,12 +908,13 @@ const slider_crank = (() => {
                     if (isNear && !isWhole) status = SINGULAR;
                     if (isWhole && to.isThere) return { status, state: isGood ? to : state, position: to };
                     if (isGood && !isNear) {
-                        [state, to] = [to, spare()];
-                        h *= 2;
+                        // After a step that was too long the next ones are no longer.
+                        [state, to, wait] = [to, spare(), Math.max(wait - 1, 0)];
+                        if (!wait || Math.abs(2 * h) >= Math.abs(t - state.t)) h *= 2;
                     } else if (Math.abs(h) <= smallest) {
                         return { status, state, position: null };
                     } else {
-                        h /= 2;
+                        [h, wait] = [h / 2, PATIENCE];
                     }
                 }
                 return { status: NOT_CONVERGED, state, position: null, isExhausted: true };
@@ -949,13 +951,14 @@ const slider_crank = (() => {
             const corners = cornersOf(model, Float64Array.from(times), p, guess);
             const timeOf = k => times[k] + corners[k];
             let outcome = start(model, p, guess, timeOf(0));
-            const march = new March(outcome.equations);
             const { equations, other = null, strays = false } = outcome;
+            let march = new March(equations);
             Object.assign(motion, { equations, other, strays });
             record(motion, 0, outcome, model);
+            motion.iterations[0] = outcome.iterations;
             let from = outcome.state, to = model.point(p);
             for (let k = 1; k < count && outcome.status === CONVERGED; k += 1) {
-                march.isDense = false;
+                Object.assign(march, { isDense: false, iterations: 0 });
                 const status = march.step(from, to, timeOf(k), MAX_CORRECTIONS);
                 if (status === CONVERGED && to.sensitivity <= TOO_NEAR) {
                     outcome = { status, state: to, position: to };
@@ -966,6 +969,12 @@ const slider_crank = (() => {
                 }
                 march.isDense = true;
                 outcome = march.advance(from, timeOf(k));
+                const fresh = isDoubtful(outcome) && measuredAgain(march, from);
+                if (fresh) {
+                    [march, motion.equations] = [fresh, fresh.equations];
+                    outcome = march.advance(from, timeOf(k));
+                }
+                motion.iterations[k] = march.iterations;
                 if (!outcome.position && !outcome.isExhausted) outcome = giveUp(motion.equations, outcome, timeOf(k));
                 record(motion, k, outcome, model);
                 // Rates near a singularity are too uncertain to predict from: the point before serves.
@@ -985,12 +994,25 @@ const slider_crank = (() => {
             return motion;
         }
 
+        /* Whether a point was not reached, or is nearly singular, by the scales so far. */
+        function isDoubtful({ status, state, isExhausted }) {
+            return !isExhausted && (status !== CONVERGED || state.sensitivity > TOO_NEAR);
+        }
+
+        /* The march by the equations measured where the motion has come to, if they are others there: exp(-x)
+           is not nearly singular at x = 20, it is small. */
+        function measuredAgain({ equations, iterations }, { q, t }) {
+            const fresh = new Problem(equations.model, equations.p, q, t);
+            const isOther = (now, i) => now < equations.magnitude[i] / OTHER_SIZE || now > equations.magnitude[i] * OTHER_SIZE;
+            return fresh.magnitude.some(isOther) && Object.assign(new March(fresh), { isDense: true, iterations });
+        }
+
         /* Assemble the mechanism at the first time. */
         function start(model, p, guess, t) {
             const rough = new Problem(model, p, guess, t);
-            const attempt = assemble(rough, t, Float64Array.from(guess));
+            const attempt = assemble(rough, t, Float64Array.from(guess)), iterations = attempt.corrections.length;
             if (attempt.status !== CONVERGED) {
-                return { status: attempt.status, equations: rough, state: null, position: null, nearest: attempt.last };
+                return { status: attempt.status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
             }
             const march = new March(rough), at = attempt.last;
             march.isDense = true;
@@ -1001,7 +1023,7 @@ const slider_crank = (() => {
             const equations = new Problem(model, p, at.q, t);
             const elsewhere = attempt.other?.q.map((x, k) => (x - at.q[k]) / rough.reference[k]);
             return {
-                status, equations, state: status === CONVERGED ? at : null, position: at,
+                status, iterations, equations, state: status === CONVERGED ? at : null, position: at,
                 other: elsewhere ? involved(model, elsewhere) : null,
                 strays: rough.leavesBranch(rough.evaluate(guess, t), at),
             };

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.criteria import RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
+from kincompile.criteria import OTHER_SIZE, RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
 from kincompile.names import listed
 from kincompile.runtime.engine.engine import Point
 from kincompile.runtime.engine.staged import Staged
@@ -38,10 +38,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.singular.events import Event, Passage
 
     Progress: TypeAlias = Callable[[int, int], object]
-
-
-OTHER = 100.0
-"""How many times smaller or larger an equation must have become to be measured again."""
 
 
 @dataclass(slots=True, eq=False)
@@ -345,7 +341,7 @@ class _Way:
         """
         fresh = self._march_at(state.point.q, self._march.engine, state.t)
         now, before = fresh.equations.magnitude, self._march.equations.magnitude
-        if not ((now < before / OTHER) | (now > before * OTHER)).any():
+        if not ((now < before / OTHER_SIZE) | (now > before * OTHER_SIZE)).any():
             return False
         self._march = fresh
         return True

@@ -17,6 +17,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from operator import mul, sub
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from kincompile.criteria import (
 )
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, largest
-from kincompile.runtime.problem import rates_agree, within
+from kincompile.runtime.problem import rates_agree
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,8 +41,9 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.planned import Lanes
     from kincompile.runtime.march import State
 
-BLOCK = 3000
-"""Points at a time, so that intermediate arrays stay in the cache."""
+BLOCK = 45_000
+"""Coordinates of points at a time: so many that what is done once for all costs little, so few that
+intermediate arrays stay in the cache."""
 
 LARGEST_DISPLACEMENT = 1e-3
 """Distance from the interpolation, in radians or sizes of the mechanism, that is still trusted."""
@@ -57,9 +59,9 @@ the grid about 1e-6 from their place."""
 LARGEST_ERROR = 0.0015
 """Error of the prediction above which a coarse step is not trusted."""
 
-LAST_COARSE_CORRECTION = 1e-7
-"""Correction, in scales, with which a coarse step ends: what it leaves is as its square, and nobody
-sees it in the interpolation."""
+LAST_COARSE_CORRECTION = 1e-5
+"""Correction, in scales, with which a coarse step ends: the square of it, which is what it leaves,
+and what it changes in the rates are below the error of the interpolation."""
 
 SMALLEST_STEP_COUNT = 8
 """No coarse step is longer than this part of the grid."""
@@ -115,16 +117,16 @@ def solve_grid(march: March, times: Array, first: State, result: GridResult) -> 
         floats.factor(start)
         determinants = list(start.factors[1])
     node = _Node(0, q, q_dot, q_ddot, determinants)
-    nodes = _coarse_march(floats, node, times, reference.tolist())
+    nodes = _coarse_march(floats, node, times, (1 / reference).tolist())
     reached = nodes[-1].index + 1
     _interpolate(nodes, times[:reached], result.q)
     signed = np.array([node.determinants for node in nodes])
     smallest = np.copysign(SMALLEST_DETERMINANT * np.max(np.abs(signed), axis=0), signed[0])
     batch = March(equations, Planned(code, equations.p), march.tolerance)
-    parts = max(1, round(reached / BLOCK))
+    parts = max(1, round(reached * reference.size / BLOCK))
     edges = np.linspace(0, reached, parts + 1).astype(int).tolist()
     for start, stop in itertools.pairwise(edges):
-        _solve_block(batch, times[start:stop], result, slice(start, stop), smallest, reference)
+        _solve_block(batch, times[start:stop], result, slice(start, stop), smallest)
     return len(nodes)
 
 
@@ -140,7 +142,7 @@ class _Node:
 
 
 def _coarse_march(
-    engine: Planned, first: _Node, times: Array, reference: Sequence[float]
+    engine: Planned, first: _Node, times: Array, per_scale: Sequence[float]
 ) -> list[_Node]:
     """Follow the motion over a time grid in as few steps as the prediction allows.
 
@@ -153,7 +155,7 @@ def _coarse_march(
         node = nodes[-1]
         index = min(node.index + stride, last)
         try:
-            step = _coarse_step(engine, node, index, times, reference)
+            step = _coarse_step(engine, node, index, times, per_scale)
         except (ArithmeticError, ValueError):
             step = None
         error = LARGEST_ERROR * 8 if step is None else step[1]
@@ -167,22 +169,21 @@ def _coarse_march(
 
 
 def _coarse_step(
-    engine: Planned, node: _Node, index: int, times: Array, reference: Sequence[float]
+    engine: Planned, node: _Node, index: int, times: Array, per_scale: Sequence[float]
 ) -> tuple[_Node, float] | None:
     """Return the point at `index` and the error of its prediction; None without convergence."""
     t = float(times[index])
     h = t - float(times[node.index])
     half = 0.5 * h
-    q: Any = [
+    predicted = [
         x + h * (v + half * a) for x, v, a in zip(node.q, node.q_dot, node.q_ddot, strict=True)
     ]
-    predicted = q
+    q: Any = predicted
     for _ in range(MAX_CORRECTIONS):
         point = engine.evaluate(q, t)
         correction = engine.solve(point, point.Phi)
-        q = [x - d for x, d in zip(q, correction, strict=True)]
-        size = max([abs(d) / s for d, s in zip(correction, reference, strict=True)])
-        if size <= LAST_COARSE_CORRECTION:
+        q = list(map(sub, q, correction))
+        if max(map(abs, map(mul, correction, per_scale))) <= LAST_COARSE_CORRECTION:
             break
     else:
         return None
@@ -193,9 +194,9 @@ def _coarse_step(
         return None
     if any(x * y <= 0 for x, y in zip(determinants, node.determinants, strict=True)):
         return None
-    error = max([abs(x - y) / s for x, y, s in zip(q, predicted, reference, strict=True)])
-    rates = zip(q_dot, node.q_dot, node.q_ddot, reference, strict=True)
-    kink = abs(h) * max([abs(w - v - h * a) / s for w, v, a, s in rates])
+    error = max(map(abs, map(mul, map(sub, q, predicted), per_scale)))
+    rates = zip(q_dot, node.q_dot, node.q_ddot, per_scale, strict=True)
+    kink = abs(h) * max([abs(w - v - h * a) * s for w, v, a, s in rates])
     if kink > KINK_UNSEEN * (error + SMOOTH_UNSEEN):
         return None
     return _Node(index, q, q_dot, q_ddot, determinants), error
@@ -216,7 +217,7 @@ def _interpolate(nodes: list[_Node], times: Array, q: Array) -> None:
     for between, (start, stop) in zip(
         coefficients, itertools.pairwise(index.tolist()), strict=True
     ):
-        q[:, start:stop] = between @ basis[:, start:stop]
+        np.matmul(between, basis[:, start:stop], out=q[:, start:stop])
     q[:, nodes[-1].index] = nodes[-1].q
 
 
@@ -237,19 +238,16 @@ def _hermite(s: Array) -> Array:
     ))  # fmt: skip
 
 
-def _solve_block(
-    march: March, t: Array, result: GridResult, block: slice, smallest: Array, reference: Array
-) -> None:
+def _solve_block(march: March, t: Array, result: GridResult, block: slice, smallest: Array) -> None:
     """Correct a block of interpolated positions twice, and solve for velocity and acceleration."""
     engine, rates = march.engine, (result.q_dot[:, block], result.q_ddot[:, block])
     assert isinstance(engine, Planned)
-    found = march.correct_together(result.q[:, block], t, CORRECTIONS_ON_GRID)
-    point = found.point
-    good = found.good & within(found.first, LARGEST_DISPLACEMENT * reference)
+    found = march.correct_together(result.q[:, block], t, CORRECTIONS_ON_GRID, LARGEST_DISPLACEMENT)
+    point, good = found.point, found.good
     for rows, lanes in zip(rates, engine.velocity_and_acceleration(point), strict=True):
         for row, lane in zip(rows, lanes, strict=True):
             row[:] = lane
-        good = good & np.isfinite(sum(rows))
+    good = good & np.isfinite(sum(map(sum, rates)))
     for values, least in zip(point.factors[1], smallest, strict=True):
         good = good & (values / least > 1)
     p = march.equations.p

@@ -220,7 +220,7 @@ def read_inputs(
     on_grid = method == "grid" or (
         method is None and values[0].size >= SMALLEST_GRID and code.lanes is not None
     )
-    without = () if guess is not None else code.without_guess()
+    without = () if guess is not None else code.without_guess
     return Inputs(code, *values, method, on_grid, through == "smooth", sets, sweep, without)
 
 
@@ -249,7 +249,7 @@ def _times(t: ArrayLike, problems: list[str]) -> NDArray[np.float64]:
     if not np.isfinite(times).all():
         index = int(np.argmin(np.isfinite(times)))
         problems.append(f"t[{index}] is {times[index]}: times must be finite numbers.")
-    elif not (np.all(np.diff(times) >= 0) or np.all(np.diff(times) <= 0)):
+    elif not ((times[1:] >= times[:-1]).all() or (times[1:] <= times[:-1]).all()):
         problems.append("t goes back and forth: sort the times, up or down (t = np.sort(t)).")
     return times
 

@@ -24,6 +24,7 @@ from kincompile.criteria import (
     LAST_CORRECTION,
     MAX_SUBSTEPS,
     NEARLY_SINGULAR,
+    PATIENCE,
     RESIDUAL_FACTOR,
     ROUNDING,
     SINGULAR_SENSITIVITY,
@@ -44,9 +45,6 @@ if TYPE_CHECKING:
 
 SIGN_OF_LIFE = 256
 """Sub-steps between two times after which progress is shown."""
-
-PATIENCE = 8
-"""Sub-steps after one that was too long before a longer one is tried again."""
 
 SAME_DETERMINANT = 0.5
 """Part of a determinant down to which Phi_q counts as no nearer to singular."""
@@ -133,14 +131,11 @@ class Corrected:
         Where it converged.
     iterations : int or ndarray of int, shape (N,)
         How many corrections were applied.
-    first
-        Of a batch the first correction, a row each.
     """
 
     point: Point
     good: Any
     iterations: Any
-    first: Any = None
 
 
 class March:
@@ -191,28 +186,33 @@ class March:
             last = size
         return Corrected(engine.evaluate(q, t), False, most)
 
-    def correct_together(self, q: Array, t: Any, most: int) -> Corrected:
-        """Run Newton's method on a batch, in place; what has converged stays where it is."""
+    def correct_together(self, q: Array, t: Any, most: int, reach: float = np.inf) -> Corrected:
+        """Run Newton's method on a batch, in place; what has converged stays where it is.
+
+        Good is what did so, and was moved by less than `reach`, in scales, in the first iteration.
+        """
         equations, engine = self.equations, self.engine
         rounding = ROUNDING * np.abs(q[:, [0, -1]]).max(axis=1)
         loose, tight = (x * equations.reference + rounding for x in (self.tolerance, self._tight))
         done, iterations = np.zeros(q.shape[1], bool), np.zeros(q.shape[1], int)
-        first: Any = None
-        for _ in range(most):
+        good: Any = True
+        for iteration in range(most):
             point = engine.evaluate(q, t)
             change = engine.solve(point, point.Phi)
+            if done.any():
+                change = [np.where(done, 0.0, lane) for lane in change]
             for row, lane in zip(q, change, strict=True):
-                row -= np.where(done, 0.0, lane) if done.any() else lane
+                row -= lane
             iterations += ~done
-            if first is None:  # what it leaves is seen by a second one only
-                first = change
+            if iteration == 0:  # what it leaves is seen by a second one only
+                good = within(change, reach * equations.reference)
                 continue
             done = done | within(change, loose)
             if done.all():
                 break
         if not (done.all() and all_within(change, tight)):
             point = engine.evaluate(q, t)
-        return Corrected(point, done & equations.holds(point, self._residual), iterations, first)
+        return Corrected(point, good & done & equations.holds(point, self._residual), iterations)
 
     def complete(self, point: Point, before: State | None = None) -> tuple[State, Checks]:
         """Solve for velocity and acceleration; say where all is as it must be, and what it is else.

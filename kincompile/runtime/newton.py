@@ -249,8 +249,8 @@ def assemble(
     found = plain.status is Status.CONVERGED
     if not plain.points or (found and equations.is_settled(plain.points)):
         return plain
-    if (careful := equations.careful()) is not equations:
-        return assemble(careful, t, guess, *limits)
+    if not equations.is_careful:
+        return assemble(equations.careful(), t, guess, *limits)
     good = [plain]
     if not found or equations.strays(plain.points[0], plain.last):
         attempts = [plain]

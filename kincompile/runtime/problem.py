@@ -120,15 +120,18 @@ class Problem:
         wanted = self.engine.signs(guess)
         return all(wanted) and self.engine.signs(found) != wanted
 
+    @property
+    def is_careful(self) -> bool:
+        """Whether matrices are dense and code is in Python, or the mechanism too large for it."""
+        is_written = isinstance(self.engine, Dense) and self.engine.is_written
+        return is_written or self.place.size > LARGEST_CAREFUL
+
     def careful(self) -> Problem:
-        """Give the same with dense matrices and code in Python, unless they are too large.
+        """Give the same with dense matrices and code in Python.
 
         Where Newton's method throws an iterate far, the last digit decides where it ends: so it has
         to be the same in all forms of a module.
         """
-        is_careful = isinstance(self.engine, Dense) and self.engine.is_written
-        if is_careful or self.place.size > LARGEST_CAREFUL:
-            return self
         return replace(self, engine=Dense(self.code, self.p, is_written=True))
 
     @property
@@ -154,10 +157,9 @@ class Problem:
 
         In compiled code it must not have gone far: where it ends then, rounding would decide.
         """
-        guess = way[0].q
-        if not self.away(way[-1].q, guess) <= SETTLED:
-            return False
-        return self.careful() is self or all(self.away(at.q, guess) <= THROWN for at in way)
+        iterates = np.array([point.q for point in way]).T
+        away = self.away(iterates, iterates[:, :1])
+        return bool(away[-1] <= SETTLED and (self.is_careful or (away <= THROWN).all()))
 
     def other_side(self, point: Point) -> Array:
         r"""Give about where a mechanism can be assembled beyond the nearest singular position.

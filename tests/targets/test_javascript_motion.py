@@ -18,7 +18,7 @@ FACTORS = ((1.0, 1.0), (0.9, 1.1), (0.6, 1.5), (0.3, 2.0))
 
 SOLVE = """JSON.stringify(JOBS.map(([t, p, guess]) => {
   const motion = MODEL.solver.solve(MODEL, t, p, guess), event = MODEL.solver.explain(motion);
-  const arrays = ["q", "q_dot", "q_ddot", "y", "y_dot", "y_ddot", "status", "near"];
+  const arrays = ["q", "q_dot", "q_ddot", "y", "y_dot", "y_ddot", "status", "near", "iterations"];
   const found = Object.fromEntries(arrays.map(name => [name, Array.from(motion[name])]));
   const { size, magnitude, noise } = motion.equations;
   return [{ ...found, scales: [[size], Array.from(magnitude), Array.from(noise)] }, event];
@@ -203,3 +203,24 @@ def test_that_redundant_equations_are_left_out_of_the_solve(solved, case_named):
     module = kc.compile(model)
     ((found, event),) = solved(model, [[t.tolist(), [], module.GUESS.tolist()]])
     compare(found, event, kc.solve(module, t))
+
+
+@pytest.mark.parametrize("end", [40, 400])
+def test_that_an_equation_that_becomes_small_is_not_singular(solved, end):
+    t = np.linspace(0, end, 41).tolist()
+    model = free("decay", sympy.exp(-x) - sympy.exp(-kc.t))
+    ((found, event),) = solved(model, [[t, [], [0]]])
+    assert event is None
+    assert found["status"] == [0] * len(t)
+    np.testing.assert_allclose(found["q"], t, rtol=0, atol=1e-7 * end)
+    assert kc.solve(kc.compile(model), t, guess=[0]).success
+
+
+def test_that_a_gap_takes_as_many_steps_as_in_the_runtime(solved):
+    """After a step that was too long the next ones are no longer: fewer fail."""
+    model = free("wave", x - sympy.sin(kc.t))
+    solution = kc.solve(kc.compile(model), [0, 300.0], guess=[0])
+    ((found, _),) = solved(model, [[[0, 300.0], [], [0]]])
+    np.testing.assert_allclose(found["q"], [0, np.sin(300.0)], rtol=0, atol=1e-9)
+    assert found["iterations"][0] == solution.iterations[0]
+    assert found["iterations"][1] == pytest.approx(solution.iterations[1], rel=0.03)

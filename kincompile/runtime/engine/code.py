@@ -112,6 +112,8 @@ class Code:
         Rows and columns of Phi_q's entries.
     bodies
         Of each body its name, the number of its first coordinate, and how many it has.
+    without_guess
+        Bodies whose guess is zero throughout, as it is where none is given.
     angular : ndarray of bool, shape (n,)
         Which coordinates have the scale of angles: these, and Euler parameters.
     may_turn : ndarray of bool, shape (n,)
@@ -149,6 +151,7 @@ class Code:
     guess: Array
     pattern: NDArray[np.signedinteger[Any]]
     bodies: tuple[tuple[str, int, int], ...]
+    without_guess: tuple[str, ...]
     angular: NDArray[np.bool_]
     may_turn: NDArray[np.bool_]
     position: Callable[..., tuple[Array, Array]]
@@ -172,12 +175,6 @@ class Code:
         """Return the places of the Euler parameters of each body in space: p and -p are one."""
         spatial = SPATIAL_COORDINATES
         return [slice(k + 3, k + count) for _, k, count in self.bodies if count == spatial]
-
-    def without_guess(self) -> tuple[str, ...]:
-        """Return the bodies whose guess is zero throughout, as it is where none is given."""
-        given = np.concatenate(((0,), np.cumsum(self.guess != 0))).tolist()
-        bodies = self.bodies
-        return tuple(body for body, first, size in bodies if given[first] == given[first + size])
 
     def owners(self) -> dict[str, str]:
         """Return the body of each coordinate; one that belongs to none stands for itself."""
@@ -211,6 +208,7 @@ def attach(module: ModuleType) -> Code:
         guess=names["GUESS"],
         pattern=names["PATTERN"],
         bodies=names.get("BODIES", ()),
+        without_guess=_without_guess(names),
         angular=angular,
         may_turn=is_angle | _without_body(names, coordinates),
         position=names["position"],
@@ -267,6 +265,13 @@ def _observing(
 
     found: Callable[..., None] = names.get("observe_into", observe_into)
     return found
+
+
+def _without_guess(names: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the bodies whose guess is zero throughout."""
+    given = np.concatenate(((0,), np.cumsum(names["GUESS"] != 0))).tolist()
+    bodies = names.get("BODIES", ())
+    return tuple(body for body, first, size in bodies if given[first] == given[first + size])
 
 
 def _without_body(names: Mapping[str, Any], coordinates: Sequence[str]) -> NDArray[np.bool_]:
