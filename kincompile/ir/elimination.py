@@ -99,14 +99,7 @@ def plan_entries(
     Rows that are left out are inputs that nothing reads.
     """
     graph = Graph()
-    matrix: Matrix = {row: {} for row in range(row_count)}
-    varying = []
-    for row, column, value in entries:
-        if value is None:
-            matrix[row][column] = graph.input(f"Phi_q[{row}, {column}]")
-            varying.append((row, column, matrix[row][column]))
-        else:
-            matrix[row][column] = graph.const(value)
+    matrix, varying = matrix_of(graph, row_count, entries)
     right = {row: graph.input(f"b[{row}]") for row in matrix}
     given = tuple(right.values())
     for row in left_out:
@@ -126,7 +119,7 @@ def plan_entries(
         is_small = len(block.rows) <= LARGEST_CLOSED_FORM
         solve = _eliminate_block if is_straight and not is_small else _solve_block
         determinants += solve(graph, block, matrix, right, solution)
-    _substitute(graph, pivots, eliminated, right, solution)
+    substitute(graph, pivots, eliminated, right, solution)
     if len(solution) < column_count:
         return None
     return SolvePlan(
@@ -138,6 +131,26 @@ def plan_entries(
         tuple(determinants),
         tuple(solution[column] for column in sorted(solution)),
     )
+
+
+def matrix_of(
+    graph: Graph, row_count: int, entries: Iterable[tuple[int, int, Constant | None]]
+) -> tuple[Matrix, list[tuple[int, int, int]]]:
+    """Return nodes of a matrix by row and column, and of the entries that are inputs."""
+    matrix: Matrix = {row: {} for row in range(row_count)}
+    varying = []
+    for row, column, value in entries:
+        if value is None:
+            matrix[row][column] = graph.input(entry_name(row, column))
+            varying.append((row, column, matrix[row][column]))
+        else:
+            matrix[row][column] = graph.const(value)
+    return matrix, varying
+
+
+def entry_name(row: int, column: int) -> str:
+    """Return the name of an entry of the matrix in a plan."""
+    return f"Phi_q[{row}, {column}]"
 
 
 def _remainder(
@@ -153,7 +166,7 @@ def _remainder(
     return right
 
 
-def _substitute(
+def substitute(
     graph: Graph,
     pivots: Sequence[Pivot],
     eliminated: Matrix,
@@ -177,25 +190,33 @@ def _eliminate(
     pivots: list[Pivot] = []
     eliminated: Matrix = {}
     while (pivot := _cheapest(graph, matrix, any_pivot)) is not None:
-        row = matrix.pop(pivot.row)
-        for other, entries in matrix.items():
-            if pivot.column not in entries:
-                continue
-            factor = graph.div(entries.pop(pivot.column), row[pivot.column])
-            for column, node in row.items():
-                if column == pivot.column:
-                    continue
-                change = graph.mul(factor, node)
-                updated = (
-                    graph.sub(entries[column], change) if column in entries else graph.neg(change)
-                )
-                entries[column] = updated
-                if graph.value_of(updated) == 0:
-                    del entries[column]
-            right[other] = graph.sub(right[other], graph.mul(factor, right[pivot.row]))
         pivots.append(pivot)
-        eliminated[pivot.row] = row
+        eliminated[pivot.row] = eliminate(graph, matrix, right, pivot)
     return pivots, eliminated
+
+
+def eliminate_constants(graph: Graph, matrix: Matrix, right: dict[int, int]) -> list[Pivot]:
+    """Eliminate with plain numbers as long as there are such, and return the pivots."""
+    return _eliminate(graph, matrix, right)[0]
+
+
+def eliminate(graph: Graph, matrix: Matrix, right: dict[int, int], pivot: Pivot) -> dict[int, int]:
+    """Eliminate a coordinate from all other rows; return the row of the pivot, taken out."""
+    row = matrix.pop(pivot.row)
+    for other, entries in matrix.items():
+        if pivot.column not in entries:
+            continue
+        factor = graph.div(entries.pop(pivot.column), row[pivot.column])
+        for column, node in row.items():
+            if column == pivot.column:
+                continue
+            change = graph.mul(factor, node)
+            updated = graph.sub(entries[column], change) if column in entries else graph.neg(change)
+            entries[column] = updated
+            if graph.value_of(updated) == 0:
+                del entries[column]
+        right[other] = graph.sub(right[other], graph.mul(factor, right[pivot.row]))
+    return row
 
 
 def _cheapest(graph: Graph, matrix: Matrix, any_pivot: bool) -> Pivot | None:
@@ -247,7 +268,7 @@ def _eliminate_block(
     sides = {row: _remainder(graph, matrix[row], own, right[row], solution) for row in block.rows}
     pivots, eliminated = _eliminate(graph, part, sides, any_pivot=True)
     if not part:
-        _substitute(graph, pivots, eliminated, sides, solution)
+        substitute(graph, pivots, eliminated, sides, solution)
     return [eliminated[pivot.row][pivot.column] for pivot in pivots]
 
 
