@@ -304,20 +304,22 @@ def _forces_module(code: InlineProgram, target: str, is_planned: bool) -> Module
     return None if program is None else _observing(program, target)
 
 
-def _dynamic_modules(
-    code: InlineProgram, system: ConstraintSystem, target: str
-) -> DynamicModules:
+def _dynamic_modules(code: InlineProgram, system: ConstraintSystem, target: str) -> DynamicModules:
     """Return the compiled equations of motion, for `kc.simulate`."""
-    from kincompile.ir.accelerations import observing_accelerations, observing_corrections
+    from kincompile.ir.accelerations import (
+        observing_accelerations,
+        observing_corrections,
+        require_masses,
+    )
     from kincompile.ir.redundancy import independence
-    from kincompile.model.masses import require_masses
     from kincompile.runtime.engine.code import DynamicModules
 
-    require_masses(system)
+    require_masses(code)
     redundant, free = independence(system, code.program)
     left_out = {system.equations.index(name) for name in redundant}
-    programs = observing_accelerations(code, left_out), observing_corrections(code, left_out)
-    return DynamicModules(*(_observing(item, target) for item in programs), redundant, free)
+    accelerations = _observing(observing_accelerations(code, left_out), target)
+    corrections = _observing(observing_corrections(code, left_out), target)
+    return DynamicModules(accelerations, corrections, redundant, free)
 
 
 def _observing(program: Program, target: str) -> ModuleType:

@@ -18,13 +18,15 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from kincompile.cli.shared import Command
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
 
-def motion_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a motion: its times, and the values of parameters."""
-    options = (
+def time_options(command: Command) -> Command:
+    """Add the options of times, and of values of parameters."""
+    return _with(
+        command,
         click.option("--start", default="0", metavar="T", help="First time.  [default: 0]"),
         click.option(
             "--end",
@@ -36,34 +38,49 @@ def motion_options(command: Callable[..., None]) -> Callable[..., None]:
             type=click.IntRange(min=1),
             help="Number of equally spaced times from start to end.  [default: the model's own]",
         ),
-        click.option(
-            "--grid",
-            metavar="NAME=FIRST:LAST:STEP",
-            help="Times at which a coordinate has these values, such as crank.phi=0:360deg:1deg.",
-        ),
         set_option("parameter"),
-        click.option(
-            "--through",
-            type=click.Choice(["smooth"]),
-            help="Go on past a bifurcation, along the smooth branch.",
-        ),
-        click.option(
-            "--assembly",
-            type=int,
-            metavar="N",
-            help="Start in the N-th of the ways that `kincompile assemblies` lists.",
-        ),
     )
+
+
+def motion_options(command: Command) -> Command:
+    """Add the options of a motion: its times, and the values of parameters."""
+    return time_options(
+        _with(
+            command,
+            click.option(
+                "--grid",
+                metavar="NAME=FIRST:LAST:STEP",
+                help="Times at which a coordinate has these values, as crank.phi=0:360deg:1deg.",
+            ),
+            click.option(
+                "--through",
+                type=click.Choice(["smooth"]),
+                help="Go on past a bifurcation, along the smooth branch.",
+            ),
+            click.option(
+                "--assembly",
+                type=int,
+                metavar="N",
+                help="Start in the N-th of the ways that `kincompile assemblies` lists.",
+            ),
+        )
+    )
+
+
+def _with(command: Command, *options: Callable[[Command], Command]) -> Command:
+    """Add options in order."""
     for option in reversed(options):
         command = option(command)
     return command
 
 
-def set_values(model: Mechanism | ConstraintSystem, given: Sequence[str]) -> dict[str, float]:
-    """Return the numbers of the options ``--set``, by name."""
+def set_values(
+    model: Mechanism | ConstraintSystem, given: Sequence[str], option: str = "--set"
+) -> dict[str, float]:
+    """Return the numbers of options such as ``--set``, by name."""
     from kincompile.cli import values
 
-    return values.set_values(model, given)
+    return values.set_values(model, given, option)
 
 
 def motion_times(

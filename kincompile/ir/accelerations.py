@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.criteria import SPATIAL_COORDINATES
+from kincompile.errors import StructuralError
 from kincompile.ir.augmented import plan_augmented
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.graph import Graph
@@ -23,13 +24,31 @@ from kincompile.ir.inline import Entry
 from kincompile.ir.observing import observing_program
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
-from kincompile.names import correction, force_units, rate, solved
+from kincompile.names import correction, force_units, listed, rate, solved
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
+
+
+def require_masses(code: InlineProgram) -> None:
+    """Refuse a mechanism some bodies of which have no mass.
+
+    Raises
+    ------
+    StructuralError
+        With the bodies, and what to do.
+    """
+    heavy = {entry.row for entry in code.entries("M") if entry.row == entry.column}
+    light = [body.name for body in code.program.bodies if not heavy.issuperset(body.columns)]
+    if light:
+        have = "has" if len(light) == 1 else "have"
+        raise StructuralError(
+            f"{code.program.name}: {listed(light)} {have} no mass, and how a body without mass "
+            "moves no force decides: give mass=... and inertia=... to m.body, however small."
+        )
 
 
 def observing_accelerations(code: InlineProgram, left_out: Collection[int] = ()) -> Program:

@@ -20,8 +20,7 @@ whose number does not depend on that of the parameters.
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, TypeVar
@@ -29,8 +28,6 @@ from typing import TYPE_CHECKING, TypeVar
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve
 from kincompile.ir.graph import Graph
-from kincompile.ir.kernels import pruned_kernel
-from kincompile.ir.program import Instance, OutputDerivatives
 from kincompile.ir.observing import observing_program
 from kincompile.ir.sensitive import check_names
 from kincompile.ir.straight_solve import StraightSolve

@@ -7,17 +7,14 @@ from typing import TYPE_CHECKING, Any, cast
 
 import sympy
 
-from kincompile.errors import StructuralError
 from kincompile.model.expressions import NotAnExpressionError, as_expression, as_sympy
 from kincompile.model.loads import Mass
-from kincompile.names import listed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from kincompile.model.bodies import Body
     from kincompile.model.scope import Scope
-    from kincompile.model.system import ConstraintSystem
 
 
 def mass_of(body: Body, gravity: Any, scope: Scope) -> Mass | None:
@@ -67,24 +64,6 @@ def _of_plate(body: Body, where: str, gravity: Any, scope: Scope) -> Mass | None
         return None
     mass = density * thickness * area
     return Mass(body.name, body, mass, density * thickness * second, centre, gravity)
-
-
-def require_masses(system: ConstraintSystem) -> None:
-    """Refuse a mechanism some bodies of which have no mass.
-
-    Raises
-    ------
-    StructuralError
-        With the bodies, and what to do.
-    """
-    heavy = {load.name for load in system.loads if isinstance(load.written, Mass)}
-    light = [body.name for body in system.bodies if body.name not in heavy]
-    if light:
-        have = "has" if len(light) == 1 else "have"
-        raise StructuralError(
-            f"{system.name}: {listed(light)} {have} no mass, and how a body without mass moves no "
-            "force decides: give mass=... and inertia=... to m.body, however small."
-        )
 
 
 def plate(

@@ -128,7 +128,7 @@ class Equations:
         return bool(self.joints.holds(point, RESIDUAL_FACTOR * TOLERANCE))
 
     def scaled(self, point: Point) -> Array:
-        """Return Phi_q of independent equations, in which all coordinates and equations count alike."""
+        """Return Phi_q of independent equations, all coordinates and equations to one scale."""
         matrix = self.joints.weights()[:, np.newaxis] * point.Phi_q * self.scale
         return np.asarray(matrix[self.independent])
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
-from kincompile.runtime.singular.events import Event, involved
+from kincompile.runtime.singular import events as singular
+from kincompile.runtime.singular.events import LOCK_UP, Event, involved
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -24,15 +25,20 @@ PASSAGE, STOP, SINGULAR = "passage", "stop", "singular configuration"
 """Kinds of events of a simulation."""
 
 SENTENCES = {
-    PASSAGE: "{name} is {value:.6g} at t = {t:.10g}.",
-    STOP: "{name} comes to its stop, {value:.6g}, at t = {t:.10g}, and the motion ends there.",
+    PASSAGE: "{name} is {value:.6g} at t = {t}.",
+    STOP: "{name} comes to its stop, {value:.6g}, at t = {t}, and the motion ends there.",
     SINGULAR: (
-        "Singular configuration at t = {t:.10g}: Phi_q loses rank there, so that no equation of "
+        "Singular configuration at t = {t}: Phi_q loses rank there, so that no equation of "
         "motion tells how {bodies} go on. Change a length slightly, begin anew beyond it, or let "
         "through='smooth' step across it."
     ),
+    LOCK_UP: singular.SENTENCES[LOCK_UP],
 }
 """What is said of them."""
+
+NEAR = 1e-3
+"""Singular value of the scaled Phi_q, relative to its largest, that explains why a motion ended: it
+falls as the square root of the time that is left."""
 
 SMALL = 1e-7
 """Singular value of the scaled Phi_q, relative to its largest, that is zero at an event."""
@@ -149,7 +155,14 @@ class Watch:
         found = self._rank_at(t, y)
         if found is None or not found.is_lost(SMALL):
             return None
-        return self._event_at(t, y, found.movement)
+        return self._event_at(SINGULAR, t, y, found.movement)
+
+    def lock_up_at(self, t: float, y: Array) -> Event | None:
+        """Return the event of a state at which the motion ended near a singular configuration."""
+        found = self._rank_at(t, y)
+        if found is None or not found.is_lost(NEAR):
+            return None
+        return self._event_at(LOCK_UP, t, y, found.movement)
 
     def _away(self, t: float, y: Array) -> Array:
         """Return how far the columns are above the values that are looked for."""
@@ -159,13 +172,13 @@ class Watch:
         if self._outputs:
             values = code.module.observe(q, q_dot, np.zeros(n), t, self._inputs.p)[0]
             known |= zip(self._outputs, np.asarray(values).tolist(), strict=True)
-        return np.array([known[name] for name in self._names]) - self._values
+        return np.asarray([known[name] for name in self._names] - self._values)
 
     def _located(self, k: int, t0: float, t1: float, state: States) -> Event:
         t = root(lambda time: float(self._away(time, state(time))[k]), t0, t1)
         q = state(t)[: self._equations.n]
         name = self._names[k]
-        text = SENTENCES[self._kinds[k]].format(name=name, value=self._values[k], t=t)
+        text = SENTENCES[self._kinds[k]].format(name=name, value=self._values[k], t=f"{t:.10g}")
         owner = self._inputs.code.owners().get(name)
         return Event(self._kinds[k], t, () if owner is None else (owner,), text, q, {})
 
@@ -180,7 +193,7 @@ class Watch:
         if before is None or now is None:
             return None
         if now.is_lost(CLOSE):
-            return self._event_at(t1, y, now.movement)
+            return self._event_at(SINGULAR, t1, y, now.movement)
 
         def determinant(t: float) -> float:
             found = self._matrix(t, state(t))
@@ -199,13 +212,13 @@ class Watch:
         matrix = self._matrix(t, y)
         return None if matrix is None or not len(matrix) else Rank(matrix)
 
-    def _event_at(self, t: float, y: Array, movement: Array) -> Event:
+    def _event_at(self, kind: str, t: float, y: Array, movement: Array) -> Event:
         code, n = self._inputs.code, self._equations.n
         share = movement / np.abs(movement).max()
         bodies = involved(code, share)
-        text = SENTENCES[SINGULAR].format(t=t, bodies=listed(bodies))
+        text = SENTENCES[kind].format(t=f"{t:.10g}", bodies=listed(bodies))
         shares = dict(zip(code.coordinates, share.tolist(), strict=True))
-        return Event(SINGULAR, t, bodies, text, y[:n].copy(), shares)
+        return Event(kind, t, bodies, text, y[:n].copy(), shares)
 
 
 def root(function: Callable[[float], float], t0: float, t1: float) -> float:

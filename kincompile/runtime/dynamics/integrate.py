@@ -39,6 +39,12 @@ WORDS = {
 """What is said of a simulation."""
 
 
+COLUMNS = (
+    "q", "q_dot", "q_ddot", "kinetic", "work", "drift", "residual", "status", "steps"
+)  # fmt: skip
+"""Arrays with an entry for each point."""
+
+
 class Integration:
     """A simulation and what it found, N times and n coordinates.
 
@@ -111,16 +117,16 @@ class Integration:
     def _step(self, solver: Stepper) -> bool:
         """Take a step with all points within it; say whether the motion goes on."""
         before, y = solver.t, solver.y
-        solver.step(float(self.t[self._index]))
+        solver.step()
         self._taken += 1
         self._total += 1
         if solver.problem or not np.isfinite(solver.y).all():
             text = WORDS["step"].format(problem=solver.problem or "the rates are not finite")
-            self._fail(before, self._watch.singular_at(before, y), text, Status.NOT_CONVERGED)
+            self._fail(before, self._watch.lock_up_at(before, y), text, Status.NOT_CONVERGED)
             return False
         held, drift = self._equations.corrected(solver.t, solver.y)
         if not math.isfinite(drift):
-            event = self._watch.singular_at(before, y)
+            event = self._watch.lock_up_at(before, y)
             self._fail(before, event, WORDS["drift"], Status.NOT_CONVERGED)
             return False
         self._moved = max(self._moved, drift)
@@ -197,7 +203,7 @@ class Integration:
             k -= 1
         self._index = k
         self.t = np.append(self.t[:k], event.t)
-        for name in ("q", "q_dot", "q_ddot", "kinetic", "work", "drift", "residual", "status", "steps"):
+        for name in COLUMNS:
             setattr(self, name, getattr(self, name)[: k + 1])
         self._put(event.t, state(event.t))
 

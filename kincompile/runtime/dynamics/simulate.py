@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from kincompile.runtime.engine.code import Array
     from kincompile.runtime.follow import Progress
     from kincompile.runtime.inputs import Inputs, Values
 
@@ -90,7 +88,7 @@ def simulate(
         time; the motion goes on, or it ends there.
     method : {"DOP853", "Radau", "CVODE"}
         SciPy's explicit method of order 8 or its implicit one of order 5, or the multistep method
-        of SUNDIALS for stiff systems (``pip install 'kincompile[stiff]'``), without events.
+        of SUNDIALS for stiff systems (``pip install 'kincompile[stiff]'``).
     rtol, atol : float
         Relative tolerance of a step; absolute one, in radians and sizes of the mechanism and per
         second, without it as `rtol`.
@@ -124,7 +122,9 @@ def simulate(
     SolveError
         With `throw`, when a point was not reached; `.solution` has what was found.
     """
-    inputs = read_inputs(module, t, p, guess, TOLERANCE, MAX_ITERATIONS, None, through, may_move=True)
+    inputs = read_inputs(
+        module, t, p, guess, TOLERANCE, MAX_ITERATIONS, None, through, may_move=True
+    )
     modules = dynamic_modules(module)
     names = inputs.code.coordinates
     _check(inputs, rtol, atol, max_step)

@@ -31,24 +31,25 @@ class Stepper(Protocol):
 
     Attributes
     ----------
-    t, y
-        Time and state after the last step.
     problem
         Why it can go no further; "" as long as it can.
-    may_jump
-        Whether a state may be put in its place.
     """
 
-    t: float
-    y: Array
     problem: str
-    may_jump: bool
 
-    def step(self, target: float) -> None:
-        """Take a step, not beyond the last time, of multistep methods to the target."""
+    @property
+    def t(self) -> float:
+        """Time after the last step."""
+
+    @property
+    def y(self) -> Array:
+        """State after the last step."""
+
+    def step(self) -> None:
+        """Take a step, not beyond the last time."""
 
     def put(self, y: Array) -> None:
-        """Go on from another state."""
+        """Go on from another state, where that is possible."""
 
     def between(self) -> Callable[[float], Array]:
         """Return the states within the last step."""
@@ -83,14 +84,12 @@ def stepper(
     """
     if method not in METHODS:
         raise InputError(f"method is {method!r}: give one of {', '.join(METHODS)}.")
-    make = _Multistep if method == "CVODE" else _OneStep
+    make: type[_OneStep | _Multistep] = _Multistep if method == "CVODE" else _OneStep
     return make(method, rate, t, y, tolerance, max_step)
 
 
 class _OneStep:
     """A solver of SciPy."""
-
-    may_jump = True
 
     def __init__(
         self, method: str, rate: Rate, t: Array, y: Array, tolerance: tuple[float, Array],
@@ -108,15 +107,16 @@ class _OneStep:
 
     @property
     def t(self) -> float:
+        """Time after the last step."""
         return float(self._solver.t)
 
     @property
     def y(self) -> Array:
+        """State after the last step."""
         return np.asarray(self._solver.y)
 
-    def step(self, target: float) -> None:
+    def step(self) -> None:
         """Take one step."""
-        del target
         try:
             self._solver.step()
         except ValueError:  # numbers that are not finite, in the linear algebra of Radau
@@ -138,8 +138,6 @@ class _OneStep:
 class _Multistep:
     """CVODE of SUNDIALS, from scikit-sundae."""
 
-    may_jump = False
-
     def __init__(
         self, method: str, rate: Rate, t: Array, y: Array, tolerance: tuple[float, Array],
         max_step: float,
@@ -155,15 +153,15 @@ class _Multistep:
         rtol, atol = tolerance
         longest = max_step if np.isfinite(max_step) else 0.0
         finite = np.where(np.isfinite(atol), atol, LARGE)
-        self.problem, self.t, self.y = "", float(t[0]), y
+        self.problem, self.t, self.y, self._end = "", float(t[0]), y, float(t[-1])
         self._solver = CVODE(
             into, rtol=rtol, atol=finite, max_step=longest, max_num_steps=MOST_STEPS
         )
         self._solver.init_step(self.t, y)
 
-    def step(self, target: float) -> None:
-        """Go to the next time that was asked for."""
-        found = self._solver.step(target)
+    def step(self) -> None:
+        """Take one step."""
+        found = self._solver.step(self._end, "onestep", tstop=self._end)
         if not found.success:
             self.problem = f"CVODE says: {found.message}"
             return
@@ -173,8 +171,8 @@ class _Multistep:
         """Do nothing: the history stays."""
 
     def between(self) -> Callable[[float], Array]:
-        """Return the state at the end, where alone it is known."""
-        return lambda _: self.y
+        """Return the interpolation of its history, which a request for a time behind it gives."""
+        return lambda t: np.asarray(self._solver.step(t).y)
 
 
 MOST_STEPS = 100_000

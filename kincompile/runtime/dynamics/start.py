@@ -6,8 +6,7 @@ velocities those of the least kinetic energy: what nobody sets in motion is at r
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from kincompile.names import column_name, listed, rate, suggestion
 from kincompile.runtime.singular.reach import missed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from kincompile.runtime.dynamics.equations import Equations
     from kincompile.runtime.engine.code import Array
@@ -35,7 +34,7 @@ LARGEST_TURN = 1.0
 
 
 def given_values(
-    code_names: Sequence[str], given: Mapping[str, float], order: int, what: str
+    code_names: Sequence[str], given: Mapping[str, Any], order: int, what: str
 ) -> dict[int, float]:
     """Return values by column from a mapping of names, of rates with or without ``_dot``.
 
@@ -53,7 +52,7 @@ def given_values(
         if name not in code_names:
             near = suggestion(name, code_names) or "."
             problems.append(f"{what}: there is no coordinate {key!r}{near}")
-        elif not np.isscalar(value) or not np.isreal(value) or not np.isfinite(float(value)):
+        elif not (isinstance(value, int | float | np.number) and np.isfinite(value)):
             problems.append(f"{what} of {key!r} is {value!r}: give a finite number.")
         else:
             found[code_names.index(name)] = float(value)

@@ -122,52 +122,51 @@ def test_that_the_double_pendulum_moves_as_its_taylor_series(method, error):
     np.testing.assert_allclose(energy, -4.905, atol=10 * error)
 
 
-def test_that_every_example_accelerates_as_its_equations_say(target_module):
+@pytest.mark.parametrize(
+    ("name", "target"),
+    [
+        *((name, "numpy") for name, _ in heavy_examples()),
+        ("four_bar", "c"),
+        *(pytest.param(name, "c", marks=pytest.mark.slow) for name, _ in heavy_examples()),
+    ],
+)
+def test_that_every_example_accelerates_as_its_equations_say(name, target, quick_compiler):
     """Against LAPACK on the matrix of the equations of motion, at states on no manifold."""
-    for name, model in heavy_examples():
-        equations, module = target_module(model)
-        n, rng = module.N_COORDINATES, np.random.default_rng(len(name))
-        q = module.GUESS + 0.2 * rng.normal(size=n)
-        q_dot, t = rng.normal(size=n), 0.07
-        M, Q, Phi_q = module.M(q, t), module.Q(q, q_dot, t), module.Phi_q(q, t)
-        m = len(Phi_q)
-        both = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
-        found = equations.rate(t, np.concatenate((q, q_dot, [0.0])))
-        x = np.linalg.solve(both, np.concatenate((Q, module.gamma(q, q_dot, t))))
-        scale = np.linalg.cond(both) * 1e-15 * np.abs(x[:n]).max()
-        np.testing.assert_allclose(found[n:-1], x[:n], rtol=1e-9, atol=scale, err_msg=name)
+    equations, module = equations_of(dict(heavy_examples())[name], target)
+    n, rng = module.N_COORDINATES, np.random.default_rng(len(name))
+    q = module.GUESS + 0.2 * rng.normal(size=n)
+    q_dot, t = rng.normal(size=n), 0.07
+    M, Q, Phi_q = module.M(q, t), module.Q(q, q_dot, t), module.Phi_q(q, t)
+    m = len(Phi_q)
+    both = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
+    found = equations.rate(t, np.concatenate((q, q_dot, [0.0])))
+    x = np.linalg.solve(both, np.concatenate((Q, module.gamma(q, q_dot, t))))
+    scale = np.linalg.cond(both) * 1e-15 * np.abs(x[:n]).max()
+    np.testing.assert_allclose(found[n:-1], x[:n], rtol=1e-9, atol=scale)
 
 
-@pytest.fixture(params=["numpy", "c"])
-def target_module(request, quick_compiler):
-    """Return a function that gives the equations of motion of a model, and its module."""
-
-    def build(model):
-        module = kc.compile(model, target=request.param)
-        modules = _dynamic_modules(inline(lower(model.system())), model.system(), request.param)
-        inputs = read_inputs(module, [0.0], None, None, 1e-10, 50, may_move=True)
-        return Equations(inputs, modules), module
-
-    return build
+def equations_of(model, target="numpy"):
+    """Return the equations of motion of a model as they are compiled, and its module."""
+    module = kc.compile(model, target=target)
+    modules = _dynamic_modules(inline(lower(model.system())), model.system(), target)
+    inputs = read_inputs(module, [0.0], None, None, 1e-10, 50, may_move=True)
+    return Equations(inputs, modules), module
 
 
 def test_that_a_state_goes_back_to_its_constraints_by_the_way_the_masses_measure():
-    model = four_bar()
-    module = kc.compile(model)
-    modules = _dynamic_modules(inline(lower(model.system())), model.system(), "numpy")
-    equations = Equations(read_inputs(module, [0.0], None, None, 1e-10, 50, may_move=True), modules)
+    equations, module = equations_of(four_bar())
     rng = np.random.default_rng(3)
     found = kc.simulate(module, [0, 0.1])
-    q, v = found.q[1] + 1e-3 * rng.normal(size=9), rng.normal(size=9)
+    q, v = found.q[1] + 1e-6 * rng.normal(size=9), rng.normal(size=9)
     held, drift = equations.corrected(0.0, np.concatenate((q, v, [0.0])))
-    assert 1e-4 < drift < 10
+    assert 0.1 < drift < 100
     position, speed = held[:9], held[9:-1]
     assert np.abs(module.Phi(position, 0.0)).max() < 1e-14
     Phi_q, M = module.Phi_q(position, 0.0), module.M(position, 0.0)
     assert np.abs(Phi_q @ speed).max() < 1e-12
     # No movement that the constraints allow changes the distance: the kick is a reaction.
     free = np.linalg.svd(Phi_q)[2][8:]
-    np.testing.assert_allclose(free @ M @ (speed - v), 0, atol=1e-2 * np.abs(M @ (speed - v)).max())
+    np.testing.assert_allclose(free @ M @ (speed - v), 0, atol=1e-4 * np.abs(M @ (speed - v)).max())
 
 
 @pytest.mark.parametrize("model", [double_pendulum(), four_bar()], ids=lambda m: m.name)
@@ -184,7 +183,7 @@ def test_that_energy_and_constraints_are_kept(model):
 
 def test_that_a_driver_and_a_free_arm_move_together():
     """A pendulum on a crank that is driven, against its one equation in the angle."""
-    from scipy.integrate import solve_ivp
+    from scipy.integrate import solve_ivp  # type: ignore[attr-defined]  # a star there
 
     m = kc.Mechanism("whirl")
     m.gravity = (0, -G)
@@ -250,7 +249,10 @@ def test_that_redundant_bars_move_as_without_them():
         return m
 
     t = np.linspace(0, 0.15, 6)
-    two, three = (kc.simulate(kc.compile(parallelogram(k)), t, rtol=1e-11) for k in (2, 3))
+    two, three = (
+        kc.simulate(kc.compile(parallelogram(k)), t, position={"bar0.phi": 1}, rtol=1e-11)
+        for k in (2, 3)
+    )
     assert three.success
     np.testing.assert_allclose(three["coupler.y"], two["coupler.y"], atol=1e-8)
 
@@ -262,6 +264,7 @@ class TestEvents:
         m = kc.Mechanism("fall")
         m.gravity = (0, -G)
         m.body("stone", (0, 2, 0), mass=1, inertia=1)
+        m.add(kc.AbsoluteX("wire", "stone", (0, 0), 0))
         m.output("height", m.bodies[0].y * 2)
         module = kc.compile(m)
         found = kc.simulate(
@@ -280,7 +283,8 @@ class TestEvents:
         a, b, c = (
             m.body(name, place, mass=1, inertia=0.02)
             for name, place in (
-                ("crank", (0.05, 0.087, 1)), ("coupler", (0.35, 0.17, 0)), ("rocker", (0.55, 0.087, 1)),
+                ("crank", (0.05, 0.087, 1)), ("coupler", (0.35, 0.17, 0)),
+                ("rocker", (0.55, 0.087, 1)),
             )
         )  # fmt: skip
         m.add(kc.Revolute("O", m.ground, (0, 0), a, (-0.1, 0)))
@@ -302,16 +306,16 @@ class TestEvents:
         across = kc.simulate(module, np.linspace(0, 1, 11), through="smooth", **options)
         assert across.success
         np.testing.assert_allclose(across["crank.phi"], 1 - 2 * across.t, atol=1e-6)
-        with pytest.raises(kc.SolveError, match="stopped at t = 0.5") as caught:
+        with pytest.raises(kc.SolveError, match=r"stopped at t = 0\.5") as caught:
             kc.simulate(module, np.linspace(0, 1, 11), throw=True, **options)
         assert np.isfinite(caught.value.solution.q[:5]).all()
 
     def test_that_a_driver_beyond_its_range_is_named(self):
         model = four_bar()
-        model.add(kc.AbsoluteAngle("pull", "rocker", 1.2 - 2 * kc.t))
+        model.add(kc.AbsoluteAngle("pull", "rocker", 2.1 - 0.5 * kc.t))
         found = kc.simulate(kc.compile(model), np.linspace(0, 2, 21))
         assert not found.success
-        assert found.events[0].kind == "singular configuration"
+        assert found.events[0].kind == "lock-up"
         assert "crank" in found.events[0].bodies
         reach = kc.solve(kc.compile(model), np.linspace(0, 2, 21))
         assert found.events[0].t == pytest.approx(reach.events[0].t, abs=1e-4)
@@ -323,19 +327,20 @@ class TestBadInput:
     def test_that_a_body_without_mass_is_named(self):
         m = double_pendulum()
         m.body("ghost", (1, 1, 0))
-        with pytest.raises(kc.StructuralError, match="ghost has no mass.*give mass="):
+        with pytest.raises(kc.StructuralError, match=r"ghost has no mass.*give mass="):
             kc.simulate(kc.compile(m), [0, 1])
 
     def test_that_a_mechanism_without_loads_is_refused(self):
         m = kc.Mechanism("bare")
         m.body("rod")
+        m.add(kc.AbsoluteX("wire", "rod", (0, 0), 0))
         with pytest.raises(kc.InputError, match="no masses and no forces"):
             kc.simulate(kc.compile(m), [0, 1])
 
     def test_that_contradicting_joints_are_named(self):
         m = double_pendulum()
         m.add(kc.AbsoluteX("wall", "first", (-0.5, 0), 0.3))
-        with pytest.raises(kc.StructuralError, match="wall.*contradict"):
+        with pytest.raises(kc.StructuralError, match=r"wall.*contradict"):
             kc.simulate(kc.compile(m), [0, 1])
 
     @pytest.mark.parametrize(
@@ -359,7 +364,7 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("options", "text"),
         [
-            ({"position": {"crank.phi": 3, "rocker.phi": 1}}, "with phi_crank, phi_rocker as given"),
+            ({"position": {"crank.phi": 3, "rocker.phi": 1}}, "phi_crank, phi_rocker as given"),
             ({"velocity": {"crank.phi": 3, "rocker.phi": 1}}, "cannot all be as given.*phi_crank"),
         ],
     )
@@ -373,6 +378,7 @@ class TestBadInput:
     def test_that_a_force_without_value_ends_the_motion_and_loses_nothing(self):
         m = kc.Mechanism("blow")
         stone = m.body("stone", (1, 0, 0), mass=1, inertia=1)
+        m.add(kc.AbsoluteY("wire", stone, (0, 0), 0))
         m.add(kc.Force("pull", stone, (0, 0), (-1 / stone.x**2, 0)))
         found = kc.simulate(kc.compile(m), np.linspace(0, 2, 21), guess={"stone.x": 1})
         assert not found.success
