@@ -46,6 +46,9 @@ SMALL = 1e-7
 CLOSE = 1e-10
 """The same of a state that was not looked for."""
 
+PARTS = 8
+"""Parts of a step at whose ends a value is looked at: what it passes twice within one is missed."""
+
 LOCATED = 1e-12
 """How exactly an event is located, relative to the length of the step and to its time."""
 
@@ -137,10 +140,13 @@ class Watch:
         """Return what happens in a step, in order, and remember its end."""
         found: list[Event] = []
         if self._names:
-            now = np.sign(self._away(t1, state(t1)))
-            for k in np.flatnonzero((self._signs != 0) & (now != self._signs)).tolist():
-                found.append(self._located(k, t0, t1, state))
-            self._signs = now
+            for part in range(1, PARTS + 1):
+                first, last = (t0 + (t1 - t0) * x / PARTS for x in (part - 1, part))
+                last = t1 if part == PARTS else last
+                now = np.sign(self._away(last, state(last)))
+                for k in np.flatnonzero((self._signs != 0) & (now != self._signs)).tolist():
+                    found.append(self._located(k, first, last, state))
+                self._signs = now
         singular = self._singular(t0, t1, state)
         if singular is not None:
             found.append(singular)

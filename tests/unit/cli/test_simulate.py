@@ -9,8 +9,7 @@ MODEL = """
 kincompile = 1
 name = "drop"
 gravity = [0, -10]
-end = 1
-points = 5
+analysis = { end = 1.0, points = 5 }
 bodies = [{ name = "stone", mass = 2, inertia = 1 }]
 constraints = [
     { type = "AbsoluteX", name = "wire", body = "stone", point = [0, 0], value = 0 },
