@@ -128,7 +128,7 @@ def test_that_redundant_equations_are_left_out_of_the_start(octave, case_named, 
         e.real, e.imag, phi, velocity.real, velocity.imag, rates[0],
         acceleration.real, acceleration.imag, rates[1],
     ])  # fmt: skip
-    rows = np.reshape(found["found"], expected.shape)
+    rows = np.reshape(found["found"], expected.shape, order="F")
     np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-9)
 
 
