@@ -11,7 +11,7 @@ from tests.spatial_models import slider_crank
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 AXES_SEEN = "[stage.view.right, stage.view.up]"
-VIEWS = {
+VIEWS: dict[str, tuple[Any, Any]] = {
     "front": ([1, 0, 0], [0, 0, 1]),
     "side": ([0, 1, 0], [0, 0, 1]),
     "top": ([1, 0, 0], [0, 1, 0]),
