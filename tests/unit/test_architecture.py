@@ -57,6 +57,7 @@ DEFERRED = {
     "kincompile.ir.lower",
     "kincompile.model.system",
     "kincompile.targets.registry",
+    "kincompile.view.worlds",
 }
 
 Sources = Mapping[str, str]  # module name -> source
