@@ -9,6 +9,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import escaped, listed
+from kincompile.sweep.worker import Writer
 from kincompile.sweep.zarr_store import ZarrStore
 
 if TYPE_CHECKING:
@@ -19,13 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.sweep.contents import Contents
-
-
-class Writer(Protocol):
-    """What writes a chunk; a worker may have a copy of it."""
-
-    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the values of a chunk, by name."""
 
 
 class Store(Writer, Protocol):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import warnings
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -25,9 +25,15 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.engine.code import Array
     from kincompile.sweep.layout import Layout
-    from kincompile.sweep.store import Writer
 
 _MODULES: dict[str, ModuleType] = {}
+
+
+class Writer(Protocol):
+    """What writes a chunk; a worker may have a copy of it."""
+
+    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
+        """Keep the values of a chunk, by name."""
 
 
 @dataclass(frozen=True, slots=True)
