@@ -265,7 +265,7 @@ def problem(
     place, probe = np.abs(q), probe_of(m)
     floor = float(ROUNDING * (place[~angular] / size).max(initial=0.0))
     equations = Problem(code, engine, p, angular, size, reference, place, floor, probe, np.zeros(m))
-    generic = equations.at(q + reference * equations.probe[: q.size], t)
+    generic = equations.at(q + reference * probe_of(q.size), t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
         equations.magnitude = rounded(equations.terms(generic, reference))
         here = equations.terms(generic, reference + equations.place)
@@ -428,8 +428,6 @@ def rates_agree(code: Code, t: Array, p: Array, states: Sequence[Array]) -> Any:
 
     `states` are position, velocity and acceleration, shape (n, N) each.
     """
-    if not code.redundant:
-        return True
     q, q_dot, q_ddot = (state.T for state in states)
     Phi_q, nu, gamma = code.Phi_q(q, t, p), code.nu(q, t, p), code.gamma(q, q_dot, t, p)
     return _agree(Phi_q, q_dot, nu) & _agree(Phi_q, q_ddot, gamma)

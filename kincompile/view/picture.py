@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import Array, Mark, PlaneFrame
+    from kincompile.view.marks import Array, BodyFrame, Mark
 
 WIDTH, TALLEST = 480.0, 340.0
 """Largest sides of a picture [points]."""
@@ -105,7 +105,7 @@ class Arrow:
     name: str
     start: Array
     end: Array
-    frame: PlaneFrame
+    frame: BodyFrame
     is_vector: bool = True
 
 
@@ -125,7 +125,7 @@ def picture(
     q: Array,
     title: str,
     arrows: Sequence[Arrow] = (),
-    focus: Iterable[PlaneFrame] | None = None,
+    focus: Iterable[BodyFrame] | None = None,
 ) -> Picture:
     """Draw a mechanism.
 
@@ -180,11 +180,11 @@ class _Scale:
         return np.asarray(MARGIN + self._factor * (points - self._low), dtype=np.float64)
 
 
-def _opacity(mark: Mark, shown: set[PlaneFrame] | None) -> float:
+def _opacity(mark: Mark, shown: set[BodyFrame] | None) -> float:
     return 1.0 if shown is None or moves_with(mark) <= shown else FAINT
 
 
-def colour_of(frame: PlaneFrame) -> str:
+def colour_of(frame: BodyFrame) -> str:
     """Return the colour of a body, or of the ground."""
     return (
         GROUND_COLOUR if frame == GROUND_FRAME else HUES["light"][frame.index % len(HUES["light"])]
