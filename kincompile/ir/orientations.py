@@ -129,7 +129,7 @@ class Samples:
     def value(self, node: int) -> Array:
         """Return the values of a node, shape (K,)."""
         self._extend(node)
-        return self._values[node]
+        return np.broadcast_to(self._values[node], (STATES,))
 
     def is_zero(self, node: int) -> bool:
         """Return whether a number vanishes at all states."""
