@@ -4,6 +4,7 @@ import itertools
 import json
 import shutil
 import subprocess
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -74,7 +75,8 @@ def test_that_solids_are_closed_and_have_their_volume():
     for shape in SOLIDS:
         for piece in SOLIDS[shape]:
             if piece.is_area and piece.on in ("axis", "reach", "line") and not piece.every:
-                assert piece.corners[0][2] == piece.corners[-1][2] == 0  # it ends in points
+                outs = np.array(piece.corners, dtype=float)[:, 2]
+                assert outs[0] == outs[-1] == 0  # so that it is closed
 
 
 def test_that_normals_point_outwards():
@@ -143,15 +145,14 @@ def test_that_a_rod_ends_at_its_points(motion):
     np.testing.assert_allclose(
         [part.points.mean(axis=0) for part in ends], [(0, 0, 0), (1, 2, 2)], atol=1e-14
     )
-    np.testing.assert_allclose(
-        [part.normal for part in ends], np.array([(-1, -2, -2), (1, 2, 2)]) / 3
-    )
+    normals = np.array([part.normal for part in ends], dtype=float)
+    np.testing.assert_allclose(normals, np.array([(-1, -2, -2), (1, 2, 2)]) / 3)
 
 
 @pytest.mark.parametrize(("view", "axes"), [("front", [0, 2]), ("side", [1, 2]), ("top", [0, 1])])
 def test_that_a_drawing_has_its_true_size_in_a_standard_view(motion, drawn, tmp_path, view, axes):
     path = kc.draw(motion, tmp_path / "drawing.svg", view=view, true_size=True, trace=["tip"])
-    root = ET.parse(path).getroot()
+    root: Any = ET.parse(path).getroot()
     left, top, wide, tall = map(float, root.get("viewBox").split())
     pixel = float(root.get("width").removesuffix("mm")) / wide / 1000
     (name,) = root.findall(f"{SVG}text")
