@@ -58,7 +58,8 @@ def columns_of(module: ModuleType, names: Iterable[str] | str | None) -> list[Co
     """
     if names is None:
         names = getattr(module, "OUTPUTS", ()) or module.COORDINATES
-    found, problems = [], []
+    found: list[Column] = []
+    problems: list[str] = []
     for name in (names,) if isinstance(names, str) else names:
         try:
             found.append(column_of(module, name))

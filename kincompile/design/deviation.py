@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_LAWS: Any = stats
+"""SciPy makes its distributions at run time, where a type checker does not see them."""
+
 DISTRIBUTIONS = ("normal", "uniform", "truncated")
 """Names of distributions."""
 
@@ -81,11 +84,11 @@ class Deviation:
         """The distribution of the deviation, one of `scipy.stats`."""
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         if self.distribution == "normal":
-            return stats.norm(middle, half / self.sigmas)
+            return _LAWS.norm(middle, half / self.sigmas)
         if self.distribution == "uniform":
-            return stats.uniform(self.low, self.high - self.low)
+            return _LAWS.uniform(self.low, self.high - self.low)
         if self.distribution == "truncated":
-            return stats.truncnorm(-self.sigmas, self.sigmas, middle, half / self.sigmas)
+            return _LAWS.truncnorm(-self.sigmas, self.sigmas, middle, half / self.sigmas)
         return self.distribution
 
     def deviations(self, parts: Array) -> Array:
@@ -132,7 +135,7 @@ def _is_number(value: object) -> bool:
     return is_real and not isinstance(value, bool) and math.isfinite(float(str(value)))
 
 
-def read_deviation(given: object, where: str) -> Deviation:
+def read_deviation(given: Any, where: str) -> Deviation:
     """Return a deviation that is given as one, as a number for both limits, or as two limits.
 
     Raises
@@ -146,8 +149,8 @@ def read_deviation(given: object, where: str) -> Deviation:
         match given:
             case [low, high]:
                 return Deviation(low, high)
-            case _ if _is_number(given) and given > 0:  # type: ignore[operator]
-                return Deviation(-given, given)  # type: ignore[operator]
+            case _ if _is_number(given) and given > 0:
+                return Deviation(-given, given)
     except InputError as error:
         raise InputError([f"{where}: {problem}" for problem in error.problems]) from None
     raise InputError(
@@ -155,7 +158,7 @@ def read_deviation(given: object, where: str) -> Deviation:
     )
 
 
-def read_clearance(given: object, where: str) -> Clearance:
+def read_clearance(given: Any, where: str) -> Clearance:
     """Return the clearance of a joint that is given as a number.
 
     Raises
@@ -163,6 +166,6 @@ def read_clearance(given: object, where: str) -> Clearance:
     InputError
         If it is none; `where` begins the message.
     """
-    if _is_number(given) and given > 0:  # type: ignore[operator]
-        return Clearance(float(given))  # type: ignore[arg-type]
+    if _is_number(given) and given > 0:
+        return Clearance(float(given))
     raise InputError(f"{where} is {given!r}: give the radial clearance, a positive length")

@@ -102,10 +102,11 @@ def tolerance(
         If the nominal mechanism does not move through all times.
     """
     model = require_mechanism(model, "kc.tolerance")
-    sources, clearances = _sources(model, tolerances, clearances or {}), clearances or {}
+    loose = clearances or {}
+    sources = _sources(model, tolerances, loose)
     if not isinstance(samples, int | np.integer) or not 0 <= samples <= MOST_SAMPLES:
         raise InputError(f"samples is {samples!r}: give a whole number up to {MOST_SAMPLES:,}.")
-    module = compile_model(with_clearances(model, clearances))
+    module = compile_model(with_clearances(model, loose))
     columns = columns_of(module, of)
     times = np.linspace(0.0, model.end, model.points) if t is None else t
     nominal = solve(module, times, dict(p or {}), dict(guess or {}), throw=True)
