@@ -104,7 +104,8 @@ def tolerance(
     model = require_mechanism(model, "kc.tolerance")
     loose = clearances or {}
     sources = _sources(model, tolerances, loose)
-    if not isinstance(samples, int | np.integer) or not 0 <= samples <= MOST_SAMPLES:
+    wanted: Any = samples  # whatever its type says
+    if not isinstance(wanted, int | np.integer) or not 0 <= wanted <= MOST_SAMPLES:
         raise InputError(f"samples is {samples!r}: give a whole number up to {MOST_SAMPLES:,}.")
     module = compile_model(with_clearances(model, loose))
     columns = columns_of(module, of)
