@@ -63,6 +63,9 @@ from kincompile.runtime.results.write import write as write
 from kincompile.runtime.singular.assemblies import assemblies as assemblies
 from kincompile.runtime.singular.events import Event as Event
 from kincompile.runtime.solve import solve as solve
+from kincompile.runtime.statics.equilibrium import Equilibrium as Equilibrium
+from kincompile.runtime.statics.equilibrium import equilibria as equilibria
+from kincompile.runtime.statics.equilibrium import equilibrium as equilibrium
 from kincompile.runtime.status import Status as Status
 from kincompile.runtime.times import times_at as times_at
 from kincompile.sweep.result import Sweep as Sweep

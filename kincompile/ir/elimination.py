@@ -13,12 +13,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import Constant, Graph, Node
+from kincompile.ir.orientations import name_of, orientations_of, sampled, small_rotations
 from kincompile.structure.blocks import Block, block_triangular
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.orientations import Orientation
 
 Matrix = dict[int, dict[int, int]]
 """Nodes of the entries by row and column."""
@@ -78,7 +83,15 @@ def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan |
     equations, redundant = code.program.equations, code.program.redundant
     size = len(equations), len(code.program.coordinates)
     left_out = frozenset(equations.index(name) for name in redundant)
-    return plan_entries(*size, jacobian_entries(code), left_out=left_out, is_straight=is_straight)
+    orientations = orientations_of(code.program)
+    return plan_entries(
+        *size,
+        jacobian_entries(code),
+        left_out=left_out,
+        is_straight=is_straight,
+        orientations=orientations,
+        states=sampled(code) if orientations else {},
+    )
 
 
 def jacobian_entries(code: InlineProgram) -> list[tuple[int, int, Constant | None]]:
@@ -93,17 +106,20 @@ def plan_entries(
     *,
     left_out: Collection[int] = (),
     is_straight: bool = False,
+    orientations: Sequence[Orientation] = (),
+    states: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> SolvePlan | None:
     """Plan the solve of a matrix given by its entries, each a number or, where it varies, None.
 
-    Rows that are left out are inputs that nothing reads.
+    Rows that are left out are inputs that nothing reads. Where there are `orientations`, `states`
+    are values of the inputs.
     """
     graph = Graph()
     matrix: Matrix = {row: {} for row in range(row_count)}
     varying = []
     for row, column, value in entries:
         if value is None:
-            matrix[row][column] = graph.input(f"Phi_q[{row}, {column}]")
+            matrix[row][column] = graph.input(name_of(row, column))
             varying.append((row, column, matrix[row][column]))
         else:
             matrix[row][column] = graph.const(value)
@@ -112,22 +128,28 @@ def plan_entries(
     for row in left_out:
         del matrix[row]
     pivots, eliminated = _eliminate(graph, matrix, right)
+    rotations = small_rotations(graph, orientations, states or {}, column_count, matrix, right)
     rows = sorted(matrix)
-    columns = sorted(set(range(column_count)) - {pivot.column for pivot in pivots})
+    settled = {pivot.column for pivot in pivots}.union(*(item.columns for item in rotations))
+    columns = sorted(set(range(column_count)) - settled)
+    columns += [column for item in rotations for column in item.turns]
+    solution = {column: node for item in rotations for column, node in item.solution.items()}
     if len(rows) != len(columns):
         return None
-    pattern = [(row, column) for row in rows for column in sorted(matrix[row])]
+    pattern = [(row, k) for row in rows for k in sorted(matrix[row].keys() - solution.keys())]
     blocks = block_triangular(rows, columns, pattern)
     if blocks is None:
         return None
-    solution: dict[int, int] = {}
     determinants: list[int] = []
     for block in blocks:
         is_small = len(block.rows) <= LARGEST_CLOSED_FORM
         solve = _eliminate_block if is_straight and not is_small else _solve_block
         determinants += solve(graph, block, matrix, right, solution)
+        for item in rotations:
+            if not item.is_finished and solution.keys() >= set(item.turns):
+                item.finish(matrix, solution)
     _substitute(graph, pivots, eliminated, right, solution)
-    if len(solution) < column_count:
+    if not solution.keys() >= set(range(column_count)):
         return None
     return SolvePlan(
         tuple(graph.nodes),
@@ -136,7 +158,7 @@ def plan_entries(
         tuple(pivots),
         blocks,
         tuple(determinants),
-        tuple(solution[column] for column in sorted(solution)),
+        tuple(solution[column] for column in range(column_count)),
     )
 
 

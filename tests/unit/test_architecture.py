@@ -52,6 +52,7 @@ DEFERRED = {
     "kincompile.cli",
     "kincompile.cli.motion",
     "kincompile.compiler",
+    "kincompile.files.dimensions",
     "kincompile.files.file_format",
     "kincompile.files.model_file",
     "kincompile.ir.lower",

@@ -48,7 +48,7 @@ KEYWORDS = (
 
 RESERVED: tuple[str, ...] = (
     *KEYWORDS, "at", "lane", "t", "far", "exact", "F", "right", "to", "PI", "LANES",
-    "square", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
+    "square", "angle_of", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
     "fabs", "fmax", *ELEMENTARY,
 )  # fmt: skip
 """Names that the functions of a mechanism use."""
@@ -247,6 +247,7 @@ def _elementary(program: Program, called: Collection[str], largest: int) -> str:
     data = {
         "alone": [long for short, long in (("cos", "cosine"), ("sin", "sine")) if short in called],
         "tables": "\n\n".join(_splines(program)),
+        "has_angles": "atan2" in called,
         "order": max(
             (len(row) for item in program.tables.values() for row in item.coefficients), default=0
         ),
