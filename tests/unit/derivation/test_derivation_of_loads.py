@@ -1,11 +1,14 @@
 """The part of a derivation on masses and loads: its numbers are those of the module and of D1."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import kincompile as kc
 from kincompile.calculus.expressions import Expression
 from kincompile.derivation.document import Display, Math, Table, Verbatim
+from kincompile.derivation.formulas import Equated
 from tests.unit.dynamics.test_inverse import slider_crank
 
 
@@ -20,14 +23,14 @@ def model():
 
 
 @pytest.fixture(scope="module")
-def loads(model):
+def loads(model) -> dict[str, Any]:
     """Return the sections of loads by anchor."""
     page = kc.derivation(model, 0.15)
     (chapter,) = (item for item in page.sections if item.anchor == "loads")
     return {item.anchor: item for item in chapter.sections}
 
 
-def numbers(table):
+def numbers(table: Any) -> dict[str, float]:
     """Return the last cells of a table by the names in its first."""
     return {
         ", ".join(run.text for run in row[0] if isinstance(run, Verbatim)): row[-1][0].formula.value
@@ -68,6 +71,7 @@ def test_that_the_multipliers_are_those_of_inverse_dynamics(model, loads):
 def test_that_work_and_energy_are_shown_as_they_were_written(loads):
     energy, work = loads["load-crank"].sections[1].blocks
     assert isinstance(energy, Display)
+    assert isinstance(energy.formula, Equated)
     assert isinstance(energy.formula.parts[1], Expression)
     page = kc.derivation(slider_crank()).to_markdown()
     assert r"\delta W {} = ( m \, \mathbf{g} )^{T} \delta (" in page
