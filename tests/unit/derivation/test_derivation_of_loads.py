@@ -38,6 +38,12 @@ def numbers(table: Any) -> dict[str, float]:
     }
 
 
+def symbol_of(table: Any) -> str:
+    """Return the quantity that a table is of."""
+    letter: str = table.header[1][0].formula.letter
+    return letter
+
+
 def test_that_what_loads_add_sums_up_to_q_and_m(model, loads):
     module = kc.compile(model)
     solution = kc.solve(module, [0.15])
@@ -50,9 +56,10 @@ def test_that_what_loads_add_sums_up_to_q_and_m(model, loads):
     for anchor, section in loads.items():
         if anchor == "motion":
             continue
-        for table in section.sections[3].blocks:
+        tables: Any = section.sections[3].blocks
+        for table in tables:
             assert isinstance(table, Table)
-            symbol = table.header[1][0].formula.letter
+            symbol = symbol_of(table)
             for names, value in numbers(table).items():
                 found[symbol][tuple(places[name] for name in names.split(", "))] += value
     for name, value in known.items():
