@@ -1,6 +1,7 @@
 """A four-bar whose counterweights keep its centre of mass in place: nothing shakes the ground.
 
-Source: full force balance of Berkof and Lowen (1969), dimensions ours. With `share` = 0 there are no counterweights, with 1 the balance is complete.
+Source: full force balance of Berkof and Lowen (1969), dimensions ours.
+With `share` = 0 there are no counterweights, with 1 the balance is complete.
 """
 
 import numpy as np
