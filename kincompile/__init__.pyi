@@ -10,6 +10,9 @@ from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
 from kincompile.derivation.derivation import derivation as derivation
+from kincompile.design.deviation import Deviation as Deviation
+from kincompile.design.tolerance import tolerance as tolerance
+from kincompile.design.tolerance_analysis import ToleranceAnalysis as ToleranceAnalysis
 from kincompile.errors import AssemblyWarning as AssemblyWarning
 from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
 from kincompile.errors import ContractError as ContractError
@@ -22,6 +25,7 @@ from kincompile.errors import RedundantConstraintWarning as RedundantConstraintW
 from kincompile.errors import SingularConfigurationWarning as SingularConfigurationWarning
 from kincompile.errors import SolveError as SolveError
 from kincompile.errors import StructuralError as StructuralError
+from kincompile.errors import SweepError as SweepError
 from kincompile.errors import TemplateError as TemplateError
 from kincompile.errors import UnsupportedError as UnsupportedError
 from kincompile.exercises.kit import exercise as exercise
@@ -60,8 +64,15 @@ from kincompile.runtime.results.write import write as write
 from kincompile.runtime.singular.assemblies import assemblies as assemblies
 from kincompile.runtime.singular.events import Event as Event
 from kincompile.runtime.solve import solve as solve
+from kincompile.runtime.statics.equilibrium import Equilibrium as Equilibrium
+from kincompile.runtime.statics.equilibrium import equilibria as equilibria
+from kincompile.runtime.statics.equilibrium import equilibrium as equilibrium
+from kincompile.runtime.statics.flywheel import Flywheel as Flywheel
+from kincompile.runtime.statics.flywheel import flywheel as flywheel
 from kincompile.runtime.status import Status as Status
 from kincompile.runtime.times import times_at as times_at
+from kincompile.sweep.result import Sweep as Sweep
+from kincompile.sweep.sweep import sweep as sweep
 from kincompile.verify.verify import verify as verify
 from kincompile.view.animation import animate as animate
 from kincompile.view.draw import draw as draw

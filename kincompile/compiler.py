@@ -21,7 +21,7 @@ import warnings
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,7 +41,7 @@ from kincompile.targets.emission import emit_program
 from kincompile.targets.registry import TARGETS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -223,18 +223,9 @@ def compile(  # noqa: A001 - the public name kc.compile
     )
     from kincompile.runtime.load import from_source
 
-    loadable = [name for name, item in TARGETS.items() if item.is_loadable]
-    if target not in loadable:
-        raise UnsupportedError(
-            f"only modules of the targets {listed(loadable)} can be loaded, not {target!r}; "
-            f"kc.emit(model, {target!r}).write(folder) gives the files"
-        )
-    _check_target(target, form)
     with _without_collector():
         system = system_of(model)
-        if target == "c" and _is_grouped(system, form):
-            LOG.info("%s is in grouped form, which C does not have: it stays NumPy's", system.name)
-            target = "numpy"
+        target = _loadable(target, system, form)
         code = _lowered(system, form)
         # The NumPy module has the constants, the checks and the careful march of the compiled one.
         emitted = emit_program("numpy", code)
@@ -257,6 +248,42 @@ def compile(  # noqa: A001 - the public name kc.compile
             )
             vars(module)[DYNAMICS] = cache(partial(_dynamic_modules, code, system, target))
     return remember_model(module, system)
+
+
+def _loadable(target: str, system: ConstraintSystem, form: str | None) -> str:
+    """Return the target whose module is loaded: of a large mechanism NumPy's, not C's."""
+    loadable = [name for name, item in TARGETS.items() if item.is_loadable]
+    if target not in loadable:
+        raise UnsupportedError(
+            f"only modules of the targets {listed(loadable)} can be loaded, not {target!r}; "
+            f"kc.emit(model, {target!r}).write(folder) gives the files"
+        )
+    _check_target(target, form)
+    if target == "c" and _is_grouped(system, form):
+        LOG.info("%s is in grouped form, which C does not have: it stays NumPy's", system.name)
+        return "numpy"
+    return target
+
+
+def emit_loadable(
+    model: Mechanism | ConstraintSystem, target: str
+) -> tuple[str, str, Mapping[str, NDArray[Any]], Mapping[str, str]]:
+    """Return what another process makes the module from that `compile` gives.
+
+    Returns
+    -------
+    str, str, mapping
+        Name, text and arrays of the NumPy module.
+    mapping
+        The files of C that replace its functions, text by name; none for ``target="numpy"``.
+    """
+    with _without_collector():
+        system = system_of(model)
+        target = _loadable(target, system, None)
+        code = _lowered(system, None)
+        native = emit_program(target, code).files if target == "c" else {}
+        emitted = emit_program("numpy", code)
+        return system.name, emitted.source, emitted.arrays, native
 
 
 def _joint_points(system: ConstraintSystem) -> ModuleType:

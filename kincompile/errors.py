@@ -117,6 +117,31 @@ class SolveError(KincompileError, ArithmeticError):
         return str(self.args[0])
 
 
+class SweepError(KincompileError, RuntimeError):
+    """A sweep was stopped by its executor: a worker died, or could not do its work.
+
+    Parameters
+    ----------
+    message : str
+        What the executor says, what is kept, and what to do.
+    sweep : kincompile.sweep.result.Sweep
+        What was solved before.
+
+    Attributes
+    ----------
+    sweep : kincompile.sweep.result.Sweep
+        What was solved before; the status of the rest is -1.
+    """
+
+    def __init__(self, message: str, sweep: Any) -> None:
+        super().__init__(escaped_lines(message), sweep)
+        self.sweep = sweep
+
+    def __str__(self) -> str:
+        """Return the message alone; what was solved is in `sweep`."""
+        return str(self.args[0])
+
+
 class InternalError(KincompileError):
     """A bug of kincompile, not of the caller.
 

@@ -446,8 +446,8 @@ const four_bar = (() => {
         }
 
         /* The rows that determine the motion: all but those that repeat others. */
-        function independent({ REDUNDANT }, rows) {
-            return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(i)) : rows;
+        function independent({ EQUATIONS, REDUNDANT }, rows) {
+            return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(EQUATIONS[i])) : rows;
         }
 
         /* x of A x = b from the factors of A. */

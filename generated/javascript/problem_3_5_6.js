@@ -302,8 +302,8 @@ const problem_3_5_6 = (() => {
         }
 
         /* The rows that determine the motion: all but those that repeat others. */
-        function independent({ REDUNDANT }, rows) {
-            return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(i)) : rows;
+        function independent({ EQUATIONS, REDUNDANT }, rows) {
+            return REDUNDANT ? Array.from(rows).filter((_, i) => !REDUNDANT.includes(EQUATIONS[i])) : rows;
         }
 
         /* x of A x = b from the factors of A. */

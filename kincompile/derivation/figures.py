@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from kincompile.calculus.expressions import Vector
     from kincompile.derivation.evaluation import Evaluation
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import Array, PlaneFrame
+    from kincompile.view.marks import Array, BodyFrame
 
 SHORTEST = 0.4
 """Length of the shortest vector that is drawn, in sizes of marks."""
@@ -89,14 +89,14 @@ class Figures:
         title = f"{joint.name}: the vectors of its equation, at {self.evaluation.origin}"
         return picture(self._drawn, self.evaluation.q, title, arrows, self._frames(joint))
 
-    def _frames(self, joint: Joint) -> list[PlaneFrame]:
+    def _frames(self, joint: Joint) -> list[BodyFrame]:
         frames = self._geometry.frames
         return [frames.get(body.name, GROUND_FRAME) for body in joint.bodies]
 
-    def _place(self, frame: PlaneFrame, x: float = 0.0, y: float = 0.0) -> Array:
+    def _place(self, frame: BodyFrame, x: float = 0.0, y: float = 0.0) -> Array:
         return FramePoint(frame, (x, y)).at(self.evaluation.q)
 
-    def _axes(self, frame: PlaneFrame, index: str) -> Iterator[Arrow]:
+    def _axes(self, frame: BodyFrame, index: str) -> Iterator[Arrow]:
         """Yield the axes of a frame at its origin."""
         origin, length = self._place(frame), AXIS * self._drawn.size
         for letter, x, y in (("x", length, 0.0), ("y", 0.0, length)):
@@ -115,7 +115,7 @@ class Figures:
 
     def _fixed(self, joint: Joint) -> Iterator[Arrow]:
         """Yield the points of a joint from their origins, and its directions from their points."""
-        last: dict[PlaneFrame, Array] = {}
+        last: dict[BodyFrame, Array] = {}
         for item in joint.written.arguments().values():
             if item.kind is Kind.POINT:
                 place = self._geometry.point(joint, item.symbol)
@@ -124,7 +124,7 @@ class Figures:
                 yield Arrow(item.symbol, self._place(place.frame), end, place.frame)
             elif item.kind is Kind.AXIS:
                 frame = self._geometry.frame_of(joint, item.symbol)
-                x, y = self._geometry.pair(joint.points[item.symbol])
+                x, y = self._geometry.numbers(joint.points[item.symbol])
                 length = DIRECTION * self._drawn.size / np.hypot(x, y)
                 start = last.get(frame, self._place(frame))
                 way = self._place(frame, length * x, length * y) - self._place(frame)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import MISSING, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
+from kincompile.files.dimensions import PLANE, SPACE, dimensions
 from kincompile.model.arguments import Kind
-from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.model.laws import RISES
 from kincompile.names import MOST_CHARACTERS
 
@@ -48,9 +48,15 @@ _NAME: dict[str, Any] = {
 }  # fmt: skip
 _NUMBER: dict[str, Any] = {"type": "number"}
 _EXPRESSION: dict[str, Any] = {"$ref": "#/$defs/expression"}
-_POINT: dict[str, Any] = {
-    "type": "array", "items": _EXPRESSION, "minItems": 2, "maxItems": 2,
-}  # fmt: skip
+
+
+def _components(count: int) -> dict[str, Any]:
+    """Return the schema of so many numbers or formulas."""
+    return {"type": "array", "items": _EXPRESSION, "minItems": count, "maxItems": count}
+
+
+_POINT = _components(2)
+_TRIPLE = _components(3)
 _NUMBERS: dict[str, Any] = {"type": "array", "items": _NUMBER, "minItems": 6}
 _VALUES: dict[str, Any] = {"type": "array", "items": _EXPRESSION, "minItems": 3}
 _LAW: dict[str, Any] = {"enum": list(RISES)}
@@ -65,6 +71,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     "model": {
         "$schema": Field(_TEXT, is_required=False),
         "kincompile": Field({"const": VERSION}),
+        "space": Field({"enum": [PLANE, SPACE]}, is_required=False),
         "name": Field(_NAME),
         "length_unit": Field(_TEXT, is_required=False),
         "analysis": Field({"$ref": "#/$defs/analysis"}, is_required=False),
@@ -98,7 +105,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     },
     "body": {
         "name": Field(_NAME),
-        "guess": Field({**_POINT, "minItems": 3, "maxItems": 3}, is_required=False),
+        "guess": Field(_TRIPLE, is_required=False),
         "outline": Field({"type": "array", "items": _POINT, "minItems": 3}, is_required=False),
         "mass": Field(_EXPRESSION, is_required=False),
         "inertia": Field(_EXPRESSION, is_required=False),
@@ -138,6 +145,34 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
 }
 """Fields of the file itself, of its tables, and of a free equation."""
 
+IN_SPACE: Mapping[str, Mapping[str, Field]] = {
+    "model": {
+        **{key: item for key, item in FIELDS["model"].items() if key != "sketch"},
+        "space": Field({"const": SPACE}),
+        "bodies": Field(_list("spatial_body"), is_required=False),
+        "constraints": Field(_list("spatial_constraint")),
+        "points": Field(_list("spatial_point"), is_required=False),
+        "gravity": Field(_TRIPLE, is_required=False),
+    },
+    "body": {
+        "name": Field(_NAME),
+        "position": Field(_TRIPLE, is_required=False),
+        "orientation": Field(
+            {"anyOf": [_components(4), {**_TRIPLE, "items": _TRIPLE}]}, is_required=False
+        ),
+        **{key: Field(_TRIPLE, is_required=False) for key in ("axis", "x", "y", "z")},
+        "angle": Field(_EXPRESSION, is_required=False),
+    },
+    "point": {**FIELDS["point"], "local": Field(_TRIPLE)},
+}
+"""Fields of what is different in a file with ``space = 3``."""
+
+
+def fields_of(table: str, count: int = PLANE) -> Mapping[str, Field]:
+    """Return the fields of a table of a file in the plane, or in space."""
+    return IN_SPACE.get(table, FIELDS[table]) if count == SPACE else FIELDS[table]
+
+
 _MOTIONS = [{"$ref": "#/$defs/sequence"}, {"$ref": "#/$defs/table"}]
 _VALUE: dict[str, Any] = {"anyOf": [_EXPRESSION, *_MOTIONS]}
 _LINE: Mapping[str, Field] = {
@@ -173,17 +208,22 @@ _KINDS: Mapping[Kind, Mapping[str, Any]] = {
     Kind.LOADS: {"type": "array", "items": _VALUE, "minItems": 2, "maxItems": 2},
     Kind.DISTANCE: _VALUE,
     Kind.BODY: _NAME,
-    Kind.POINT: _POINT,
-    Kind.AXIS: _POINT,
     Kind.PROFILE: {"anyOf": [_EXPRESSION, {"$ref": "#/$defs/profile"}]},
 }
+
+
+def _kind(kind: Kind, count: int) -> Mapping[str, Any]:
+    """Return the schema of an argument, whose points have so many components."""
+    if kind in (Kind.POINT, Kind.AXIS):
+        return _components(count)
+    return _KINDS.get(kind, _EXPRESSION)
 
 
 def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
     """Return the fields of a constraint type: its arguments, and what drivers and cams have."""
     found = {"type": Field({"const": constraint.__name__}), "name": Field(_NAME)}
     for name, item in constraint.arguments().items():
-        found[name] = Field(_KINDS.get(item.kind, _EXPRESSION))
+        found[name] = Field(_kind(item.kind, len(constraint.bodies.axes)))
     if any(item.symbol == "C" for item in constraint.arguments().values()):
         found["corners"] = Field(_CORNERS, is_required=False)
     if constraint.contacts:
@@ -197,7 +237,7 @@ def load_fields(load: type[Load]) -> dict[str, Field]:
     given = {item.name: item for item in fields(load)}
     found = {"type": Field({"const": load.__name__}), "name": Field(_NAME)}
     for name, item in load.arguments().items():
-        schema = _KINDS.get(item.kind, _EXPRESSION)
+        schema = _kind(item.kind, len(load.bodies.axes))
         found[name] = Field(schema, is_required=given[name].default is MISSING)
     return found
 
@@ -208,9 +248,9 @@ def model_schema() -> dict[str, Any]:
     Whether a formula can be read and a body exists is checked by `kincompile inspect`.
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
+    in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in ("body", "point")}
     from kincompile.model.loads import LOADS
 
-    kinds = [_object(constraint_fields(item)) for item in CONSTRAINTS.values()]
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
     parts[0]["additionalProperties"] = {"anyOf": [_EXPRESSION, _POINT]}
@@ -219,19 +259,34 @@ def model_schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Mechanism for kincompile, format {VERSION}",
-        **model,
-        "anyOf": [{"required": ["constraints"]}, {"required": ["sketch"]}],
+        "type": "object",
+        "if": {"properties": {"space": {"const": SPACE}}, "required": ["space"]},
+        "then": {"$ref": "#/$defs/in_space"},
+        "else": {"$ref": "#/$defs/in_the_plane"},
         "$defs": {
+            "in_the_plane": {
+                **model,
+                "anyOf": [{"required": ["constraints"]}, {"required": ["sketch"]}],
+            },
+            "in_space": _object(IN_SPACE["model"]),
             "expression": {
                 "description": "a number, or a formula such as -a/2 + sin(omega*t)",
                 "type": ["number", "string"],
             },
             **tables,
+            **in_space,
             "part": {"oneOf": parts},
-            "constraint": {"oneOf": [*kinds, _object(FIELDS["Equation"])]},
+            "constraint": {"oneOf": _constraints(PLANE)},
+            "spatial_constraint": {"oneOf": _constraints(SPACE)},
             "load": {"oneOf": [_object(load_fields(item)) for item in LOADS.values()]},
         },
     }
+
+
+def _constraints(count: int) -> list[dict[str, Any]]:
+    """Return the schemas of all constraints in the plane, or in space."""
+    kinds = dimensions(count).constraints.values()
+    return [*(_object(constraint_fields(item)) for item in kinds), _object(FIELDS["Equation"])]
 
 
 def _object(fields: Mapping[str, Field]) -> dict[str, Any]:

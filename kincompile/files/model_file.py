@@ -23,7 +23,9 @@ from typing import TYPE_CHECKING, Any, cast
 import sympy
 
 from kincompile.errors import ModelError
+from kincompile.files.body_reader import BodyReader
 from kincompile.files.data_text import listed_problems, read_json, read_toml
+from kincompile.files.dimensions import PLANE, SPACE, dimensions
 from kincompile.files.file_format import (
     FIELDS,
     MOST_POINTS,
@@ -31,17 +33,14 @@ from kincompile.files.file_format import (
     VERSION,
     Field,
     constraint_fields,
+    fields_of,
     load_fields,
 )
-from kincompile.files.sketch_reader import SketchReader
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import GROUND, Body, Parameter
-from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.model.bodies import Parameter
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import alpha, t
-from kincompile.model.mechanism import Mechanism
 from kincompile.model.outputs import Output
-from kincompile.model.points import BodyPoint
 from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed, rate, shown, suggestion
 
@@ -50,11 +49,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from kincompile.files.data_lines import Address
-    from kincompile.files.data_text import Document
     from kincompile.model.arguments import Argument
     from kincompile.model.constraint import Constraint
-    from kincompile.model.expressions import Scalars
     from kincompile.model.load import Load
+    from kincompile.model.mechanism import Mechanism
 
 Row = dict[str, Any]
 
@@ -87,19 +85,15 @@ def read_data_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
     return model
 
 
-class _ModelReader(SketchReader):
+class _ModelReader(BodyReader):
     """Reads the sections of a model one after the other."""
-
-    def __init__(self, document: Document) -> None:
-        super().__init__(document)
-        self._taken: dict[tuple[str, str], Address] = {}
 
     def read(self) -> Mechanism | ConstraintSystem | None:
         """Return the model as far as it could be read, None where nothing is left of it."""
         data = self.document.data
         if not self._is_model(data):
             return None
-        fields = dict(FIELDS["model"])
+        fields = dict(fields_of("model", self.words.count))
         if "sketch" in data:  # it has constraints of its own
             fields["constraints"] = Field(fields["constraints"].schema, is_required=False)
         self.has_fields((), data, fields)
@@ -110,12 +104,12 @@ class _ModelReader(SketchReader):
             "length_unit": self.unit(data.get("length_unit", "m"), ("length_unit",), "lengths"),
             **self._analysis(data.get("analysis", {})),
         }
-        drawn = Mechanism(name)
-        if "sketch" in data:
+        drawn = self.words.mechanism(name)
+        if "sketch" in data and self.words.count == PLANE:
             drawn = self.drawn(name, options, parameters, data["sketch"])
-        bodies = [self._body(*item) for item in self.rows(data, "bodies")]
+        bodies = [self.body(*item) for item in self.rows(data, "bodies")]
         free = [self._coordinate(*item) for item in self.rows(data, "coordinates")]
-        points = [self._point(*item) for item in self.rows(data, "points")]
+        points = [self.point(*item) for item in self.rows(data, "points")]
         rows = self.rows(data, "constraints")
         for _, row in rows:
             self._declare_contacts(row)
@@ -129,7 +123,7 @@ class _ModelReader(SketchReader):
             "constraints": [*drawn.constraints, *(item for item in constraints if item)],
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
-            "gravity": self._pair_of(data, (), "gravity"),
+            "gravity": self.place(data, (), "gravity"),
         }
         return self._checked(name, content, options)
 
@@ -144,13 +138,23 @@ class _ModelReader(SketchReader):
             self.problem(
                 ("kincompile",), f"format {VERSION} is read here, not {given}; convert the file"
             )
+        elif not self._has_dimensions(data.get("space", PLANE)):
+            text = f"it is {PLANE} or {SPACE}, not {shown(data['space'])}"
+            self.problem(("space",), text)
         return not self.problems
+
+    def _has_dimensions(self, given: Any) -> bool:
+        """Return whether the file is of the plane or of space, and take its words."""
+        known = type(given) is int and given in (PLANE, SPACE)
+        if known:
+            self.words = dimensions(given)
+        return known
 
     def _checked(
         self, name: str, content: dict[str, Any], options: dict[str, Any]
     ) -> Mechanism | ConstraintSystem | None:
         """Return the model; its checks see what has been good so far."""
-        model = Mechanism(name, **options)
+        model = self.words.mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
         model.constraints, model.outputs = content["constraints"], content["outputs"]
         model.loads, model.gravity = content["loads"], content["gravity"]
@@ -164,13 +168,14 @@ class _ModelReader(SketchReader):
             return ConstraintSystem(
                 name,
                 coordinates=list(free),
-                equations=model.constraints,
+                equations=model.written(),
                 parameters=model.parameters,
                 guess=list(free.values()),
                 bodies=model.bodies,
                 outputs=model.outputs,
                 loads=model.loads,
                 gravity=model.gravity,
+                ground=model.ground,
                 **options,
             )
         except ModelError as error:
@@ -194,16 +199,6 @@ class _ModelReader(SketchReader):
         self.problem(("analysis", "points"), text)
         return found
 
-    def _is_free(self, name: str, address: Address, kind: str = "symbol") -> bool:
-        """Return whether a name is new among its kind, and take it."""
-        if not name:
-            return False
-        other = self._taken.setdefault((kind, name), address)
-        if other is not address:
-            line = self.document.line(other)
-            self.problem((*address, "name"), f"{name!r} is the name in line {line} already")
-        return other is address
-
     def _parameter(self, address: Address, row: Row) -> Parameter | None:
         complete = self.has_fields(address, row, FIELDS["parameter"])
         name = self.name(row, address, "a parameter")
@@ -218,51 +213,7 @@ class _ModelReader(SketchReader):
             limits = limits if len(self.problems) == known else None
         # The checks of the system make numbers of them.
         item = Parameter(name, cast("float", default), unit, cast("Any", limits))
-        return item if self._is_free(name, address) and complete else None
-
-    def _body(self, address: Address, row: Row) -> Body | None:
-        self.has_fields(address, row, FIELDS["body"])
-        name = self.name(row, address, "a body")
-        guess = row.get("guess", [0, 0, 0])
-        start = self.expressions(guess, (*address, "guess"), self.names, "[x, y, phi]", 3)
-        outline = self._outline(row.get("outline", []), (*address, "outline"))
-        heavy: dict[str, Any] = {
-            key: self.expression(row[key], (*address, key), self.names)
-            for key in ("mass", "inertia", "density", "thickness")
-            if key in row
-        }
-        centre = self._pair_of(row, address, "centre")
-        if not name:
-            return None
-        if name == GROUND.name or name in self.bodies:
-            other = self.bodies.get(name)
-            whose = f"of the body in line {self.document.line(other)}" if other else "of the frame"
-            self.problem((*address, "name"), f"{name!r} is the name {whose} already")
-            return None
-        self.bodies[name] = address
-        body = Body(name, tuple(start), outline, centre=centre, **heavy)
-        for title in (f"body {name!r}", f"Mass {name!r}"):
-            self.remember(title, address)
-        for coordinate in body.coordinates:
-            self.names[coordinate] = sympy.Symbol(coordinate)
-            self.remember(f"guess of {coordinate}", (*address, "guess"))
-        self.remember(f"outline of {name}", (*address, "outline"))
-        return body
-
-    def _pair_of(self, row: Row, address: Address, key: str) -> Scalars:
-        """Return two numbers or formulas of a table, zeros where it has none."""
-        given = row.get(key, [0, 0])
-        return tuple(self.expressions(given, (*address, key), self.names, "[x, y]", 2))
-
-    def _outline(self, given: Any, address: Address) -> tuple[Scalars, ...]:
-        """Return the corners of a body's outline."""
-        if not isinstance(given, list):
-            self.problem(address, f"expected a list of corners [xi, eta], not {shown(given)}")
-            return ()
-        return tuple(
-            tuple(self.expressions(corner, (*address, k), self.names, "[xi, eta]", 2))
-            for k, corner in enumerate(given)
-        )
+        return item if self.is_free(name, address) and complete else None
 
     def _coordinate(self, address: Address, row: Row) -> tuple[str, float | sympy.Expr] | None:
         self.has_fields(address, row, FIELDS["coordinate"])
@@ -271,21 +222,7 @@ class _ModelReader(SketchReader):
         if name:
             self.names[name] = sympy.Symbol(name)
             self.remember(f"guess of {name}", address)
-        return (name, guess) if self._is_free(name, address) else None
-
-    def _point(self, address: Address, row: Row) -> BodyPoint | None:
-        """Return a named point; its coordinates may occur in every formula."""
-        complete = self.has_fields(address, row, FIELDS["point"])
-        name = self.name(row, address, "a point")
-        self.remember(f"point {name!r}", address)
-        body = self._body_name(row.get("body", GROUND.name), (*address, "body"))
-        place = (*address, "local")
-        local = self.expressions(row.get("local", [0, 0]), place, self.names, "[xi, eta]", 2)
-        if not name or not self._is_free(name, address, "point") or not complete:
-            return None
-        point = BodyPoint(name, GROUND if body == GROUND.name else Body(body), tuple(local))
-        self.names |= dict(zip(point.output_names, (point.x, point.y), strict=True))
-        return point
+        return (name, guess) if self.is_free(name, address) else None
 
     def _output(self, address: Address, row: Row) -> Output | None:
         """Return an output: a formula in coordinates and rates, parameters and t."""
@@ -295,14 +232,14 @@ class _ModelReader(SketchReader):
         unit = self.unit(row.get("unit", ""), (*address, "unit"), f"output {name!r}")
         given = row.get("expression", 0)
         found = self.expression(given, (*address, "expression"), self._moving_names())
-        is_new = self._is_free(name, address, "output")
+        is_new = self.is_free(name, address, "output")
         return Output(name, found, unit) if is_new and complete else None
 
     def _moving_names(self) -> dict[str, sympy.Expr]:
         """Return the names that may occur in an output or a load: those of rates too."""
         symbols = [item for item, value in self.names.items() if value.is_Symbol]
         rates = [rate(item, order) for item in symbols for order in (1, 2)]
-        return {**self.names, **{item: sympy.Symbol(item) for item in rates}}
+        return {**self.names, **self.spins, **{item: sympy.Symbol(item) for item in rates}}
 
     def _load(self, address: Address, row: Row) -> Load | None:
         """Return a load, None where something is wrong with it."""
@@ -313,7 +250,7 @@ class _ModelReader(SketchReader):
         kind = self._type_of(row, address, LOADS)
         if kind is None:
             return None
-        self._is_free(name, address, "load")
+        self.is_free(name, address, "load")
         self.remember(f"{kind} {name!r}", address)
         self.remember(f"the load {name!r}", address)
         self.has_fields(address, row, load_fields(LOADS[kind]))
@@ -339,14 +276,16 @@ class _ModelReader(SketchReader):
     def _declare_contacts(self, row: Row) -> None:
         """Declare the contact parameters of a cam, which any equation may name."""
         kind, name = row.get("type"), row.get("name")
-        if isinstance(kind, str) and kind in CONSTRAINTS and isinstance(name, str):
-            contacts = CONSTRAINTS[kind].contacts_of(name)
+        known = self.words.constraints
+        if isinstance(kind, str) and kind in known and isinstance(name, str):
+            contacts = known[kind].contacts_of(name)
             self.names |= {contact: sympy.Symbol(contact) for contact in contacts}
 
     def _constraint(self, address: Address, row: Row) -> Constraint | Equation | None:
         """Return a joint, a driver or a free equation, None where something is wrong with it."""
         before = len(self.problems)
-        kind = self._type_of(row, address, (*CONSTRAINTS, "Equation"))
+        known = self.words.constraints
+        kind = self._type_of(row, address, (*known, "Equation"))
         if kind is None:
             return None
         name = self.name(row, address, "a constraint")
@@ -354,13 +293,13 @@ class _ModelReader(SketchReader):
         found = (
             self._equation(address, row, name)
             if kind == "Equation"
-            else self._joint(address, row, CONSTRAINTS[kind], name)
+            else self._joint(address, row, known[kind], name)
         )
         return found if len(self.problems) == before else None
 
     def _remember_constraint(self, kind: str, name: str, address: Address) -> None:
         """Note how the checks of the system call a constraint and its arguments."""
-        self._is_free(name, address, "constraint")
+        self.is_free(name, address, "constraint")
         for title in (f"{kind} {name!r}", f"equation {name!r}", f"equation '{name}."):
             self.remember(title, address)
 
@@ -401,9 +340,9 @@ class _ModelReader(SketchReader):
     def _argument(self, item: Argument, given: Any, address: Address) -> Any:
         """Return the value of a constraint's argument."""
         if item.kind is Kind.BODY:
-            return self._body_name(given, address)
+            return self.body_name(given, address)
         if item.kind in (Kind.POINT, Kind.AXIS):
-            return tuple(self.expressions(given, address, self.names, "[xi, eta]", 2))
+            return self.components(given, address, self.words.place)
         if item.kind is Kind.PROFILE:
             return self._profile(given, address)
         if item.kind in (Kind.VALUE, Kind.DISTANCE):
@@ -422,15 +361,6 @@ class _ModelReader(SketchReader):
         if isinstance(given, dict):
             return self.driven(given, address)
         return self.expression(given, address, self._moving_names())
-
-    def _body_name(self, given: Any, address: Address) -> str:
-        if not isinstance(given, str):
-            self.problem(address, f"expected the name of a body, not {shown(given)}")
-        elif given not in self.bodies and given != GROUND.name:
-            near = suggestion(given, self.bodies)
-            known = listed((GROUND.name, *self.bodies))
-            self.problem(address, f"there is no body {shown(given)}{near}; bodies are: {known}")
-        return str(given)
 
     def _profile(self, given: Any, address: Address) -> Any:
         """Return a radius as a formula in alpha, or as a table."""

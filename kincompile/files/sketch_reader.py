@@ -75,7 +75,7 @@ class SketchReader(FieldReader):
             return Mechanism(name)
         for point in mechanism.outputs:
             if isinstance(point, BodyPoint):
-                self.names |= dict(zip(point.output_names, (point.x, point.y), strict=True))
+                self.names |= dict(zip(point.output_names, point.coordinates, strict=True))
         return mechanism
 
     def _within(self, given: Row, section: str, kind: list[Any] | Row) -> Any:

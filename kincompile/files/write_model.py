@@ -9,6 +9,7 @@ import sympy
 from sympy.printing.str import StrPrinter
 
 from kincompile.errors import ModelError
+from kincompile.files.dimensions import SPACE
 from kincompile.files.file_format import SMOOTHNESS, VERSION, load_fields
 from kincompile.model.arguments import Kind
 from kincompile.model.constraint import CamConstraint, Constraint
@@ -52,15 +53,16 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         ],
         "outputs": _outputs(system),
         "loads": [_load(item) for item in system.loads if type(item.written).__name__ != "Mass"],
-        "constraints": [_constraint(item) for item in system.constraints],
+        "constraints": [_constraint(item) for item in system.constraints if not _is_own(item)],
     }
     gravity = [value(item) for item in system.gravity]
     return {
         "kincompile": VERSION,
         "name": system.name,
+        **({"space": SPACE} if len(system.ground.kind.axes) == SPACE else {}),
         "length_unit": system.length_unit,
         "analysis": {"end": _end(system), "points": int(system.points)},
-        **({"gravity": gravity} if gravity != [0, 0] else {}),
+        **({"gravity": gravity} if any(gravity) else {}),
         **{name: rows for name, rows in sections.items() if rows},
     }
 
@@ -76,8 +78,16 @@ def _parameter(item: Parameter) -> dict[str, Any]:
     return row | ({"range": list(item.range)} if item.range else {})
 
 
+def _is_own(item: Joint | FreeEquation) -> bool:
+    """Return whether it is an equation that a body brings itself."""
+    return isinstance(item, Joint) and item.written.is_own
+
+
 def _body(item: Body) -> dict[str, Any]:
-    row: dict[str, Any] = {"name": item.name, "guess": [value(number) for number in item.guess]}
+    guess = [value(number) for number in item.guess]
+    if len(item.kind.axes) == SPACE:
+        return {"name": item.name, "position": guess[:SPACE], "orientation": guess[SPACE:]}
+    row: dict[str, Any] = {"name": item.name, "guess": guess}
     corners = [[value(number) for number in corner] for corner in item.outline]
     row |= {"outline": corners} if corners else {}
     given = {key: getattr(item, key) for key in ("mass", "inertia", "density", "thickness")}
@@ -91,7 +101,7 @@ def _outputs(system: ConstraintSystem) -> list[dict[str, Any]]:
     named = {
         coordinate: sympy.Symbol(name)
         for item in system.body_points
-        for name, coordinate in zip(item.output_names, (item.x, item.y), strict=True)
+        for name, coordinate in zip(item.output_names, item.coordinates, strict=True)
     }
     rows = []
     for item in system.observers:
@@ -123,7 +133,7 @@ def _constraint(item: Joint | FreeEquation) -> dict[str, Any]:
         if argument.kind is Kind.BODY:
             row[name] = next(bodies).name
         elif argument.kind in (Kind.POINT, Kind.AXIS):
-            row[name] = [value(number) for number in item.points[argument.symbol]]
+            row[name] = [value(number) for number in getattr(written, name)]
         elif argument.kind is Kind.PROFILE:
             row[name] = _profile(written, name, item.profiles[argument.symbol])
         else:

@@ -15,13 +15,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.criteria import SPATIAL_COORDINATES
 from kincompile.errors import StructuralError
 from kincompile.ir.augmented import plan_augmented
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.graph import Graph
 from kincompile.ir.inline import Entry
 from kincompile.ir.observing import observing_program
+from kincompile.ir.orientations import orientations_of
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
 from kincompile.names import correction, force_units, listed, rate, solved
@@ -141,19 +141,15 @@ class _Motion:
     def _weighted(self) -> dict[int, int]:
         """Return the rows whose squares are added to M, with their weights.
 
-        They are those of coordinates without mass, and those of the Euler parameters of one body
-        alone. The weight makes what is added as large as the masses that the row connects.
+        They are those of coordinates without mass, and the norms of Euler parameters. The weight
+        makes what is added as large as the masses that the row connects.
         """
         graph, program = self.graph, self._code.program
         mass = {x.row: x.node for x in self._code.entries("M") if x.row == x.column}
-        spins = [
-            set(body.columns[3:])
-            for body in program.bodies
-            if len(body.columns) == SPATIAL_COORDINATES
-        ]
+        norms = {item.row for item in orientations_of(program)}
         weights = {}
         for row, entries in self._rows.items():
-            if mass.keys() >= entries.keys() and not any(own >= entries.keys() for own in spins):
+            if mass.keys() >= entries.keys() and row not in norms:
                 continue
             inertia, square = graph.const(0), graph.const(0)
             for column, node in entries.items():

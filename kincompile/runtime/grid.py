@@ -250,7 +250,7 @@ def _solve_block(march: March, t: Array, result: GridResult, block: slice, small
     good = good & np.isfinite(sum(map(sum, rates)))
     for values, least in zip(point.factors[1], smallest, strict=True):
         good = good & (values / least > 1)
-    p = march.equations.p
-    good = good & rates_agree(engine.code, t, p, (point.q, *rates))
+    if engine.code.redundant:
+        good = good & rates_agree(engine.code, t, march.equations.p, (point.q, *rates))
     result.residual[block] = largest(point.Phi, t.size)
     result.good[block] = good

@@ -75,7 +75,7 @@ class Inputs:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Variants:
+class Variants:
     """Parameter sets as they were given.
 
     Attributes
@@ -115,7 +115,7 @@ class _Variants:
         return np.meshgrid(*arrays, indexing="ij") if self.is_product else arrays
 
 
-def _read_variants(module: ModuleType, p: Values, product: bool) -> _Variants:
+def _read_variants(module: ModuleType, p: Values, product: bool) -> Variants:
     """Read parameters that may be those of several sets: see `solve`.
 
     Raises
@@ -124,9 +124,9 @@ def _read_variants(module: ModuleType, p: Values, product: bool) -> _Variants:
         When an array of sets has the wrong size or a value is not finite.
     """
     if isinstance(p, Mapping):
-        return _read_sweep(p, product)
+        return read_sweep(p, product)
     if not isinstance(p, np.ndarray) or p.ndim != 3:
-        return _Variants(p)
+        return Variants(p)
     count, one, size = p.shape
     if one != 1 or size != len(module.PARAMETERS) or count == 0 or p.dtype.kind not in "iuf":
         raise InputError(
@@ -141,11 +141,11 @@ def _read_variants(module: ModuleType, p: Values, product: bool) -> _Variants:
             f"parameter {module.PARAMETERS[which]!r} of variant {variant} is "
             f"{sets[variant, which]}: give a finite number."
         )
-    return _Variants(sets[0], sets)
+    return Variants(sets[0], sets)
 
 
-def _read_sweep(p: Mapping[str, Any], product: bool) -> _Variants:
-    """Read parameters by name, of which some have an array of values."""
+def read_sweep(p: Mapping[str, Any], product: bool) -> Variants:
+    """Read parameters by name, of which some have an array of values; see `solve`."""
     problems: list[str] = []
     common, sweep = dict(p), {}
     for name, given in p.items():
@@ -167,7 +167,7 @@ def _read_sweep(p: Mapping[str, Any], product: bool) -> _Variants:
             "pairs, so give them one length, or product=True (--product) to solve every "
             f"combination, {math.prod(sizes.values())} of them."
         )
-    return _Variants(common, None, sweep, product, tuple(problems))
+    return Variants(common, None, sweep, product, tuple(problems))
 
 
 def read_inputs(
@@ -196,7 +196,7 @@ def read_inputs(
         When the equations cannot determine the coordinates: what is wrong, and what to do.
     """
     _require_module(module)
-    given = _Variants(p) if product is None else _read_variants(module, p, product)
+    given = Variants(p) if product is None else _read_variants(module, p, product)
     problems = list(given.problems)
     values = (
         _times(t, problems),

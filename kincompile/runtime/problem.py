@@ -428,8 +428,6 @@ def rates_agree(code: Code, t: Array, p: Array, states: Sequence[Array]) -> Any:
 
     `states` are position, velocity and acceleration, shape (n, N) each.
     """
-    if not code.redundant:
-        return True
     q, q_dot, q_ddot = (state.T for state in states)
     Phi_q, nu, gamma = code.Phi_q(q, t, p), code.nu(q, t, p), code.gamma(q, q_dot, t, p)
     return _agree(Phi_q, q_dot, nu) & _agree(Phi_q, q_ddot, gamma)

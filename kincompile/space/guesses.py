@@ -23,6 +23,10 @@ ROUNDED = 1e-3
 """Up to which a length of p differs from one, or a matrix from a rotation, by rounded decimals."""
 
 
+EXACT = 1e-15
+"""Up to which a length is one: parameters that were written to a file are read as they were."""
+
+
 class OrientationError(ValueError):
     """What was given is no orientation."""
 
@@ -84,6 +88,8 @@ def _normalised(p: NDArray[np.float64]) -> tuple[Scalars, str]:
             "the Euler parameters have length zero, which is no orientation; (1, 0, 0, 0) is that "
             "of the ground"
         )
+    if abs(length - 1) < EXACT:
+        return tuple(p.tolist()), ""
     remark = f"the Euler parameters have length {length:.6g}, and were divided by it"
     return tuple((p / length).tolist()), remark if abs(length - 1) > ROUNDED else ""
 

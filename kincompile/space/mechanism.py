@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from kincompile.errors import KincompileWarning
 from kincompile.model.mechanism import Mechanism as PlanarMechanism
@@ -13,7 +13,7 @@ from kincompile.space.points import SpatialPoint
 from kincompile.space.primitives import Normalization
 
 if TYPE_CHECKING:
-    from kincompile.model.arguments import PointLike
+    from kincompile.model.arguments import BodyLike, PointLike
     from kincompile.model.constraint import Constraint
     from kincompile.model.equation import Equation
     from kincompile.model.expressions import Scalar, Scalars
@@ -83,6 +83,21 @@ class Mechanism(PlanarMechanism):
         body = SpatialBody(name, start, problem=problem)
         self.bodies.append(body)
         return body
+
+    def point(self, name: str, body: BodyLike, local: PointLike) -> SpatialPoint:
+        """Name a point of a body and return it, as `kincompile.Mechanism.point`.
+
+        Parameters
+        ----------
+        name
+            Name of the point; the columns of a solution are ``x_<name>``, ``y_<name>`` and
+            ``z_<name>`` [length], and their rates.
+        body
+            The body, or its name.
+        local
+            (xi, eta, zeta) in the body's frame [length], numbers or expressions of parameters.
+        """
+        return cast("SpatialPoint", super().point(name, body, local))
 
     def written(self) -> list[Constraint | Equation]:
         """Return the constraints, then the normalization of each body."""

@@ -6,13 +6,14 @@ import itertools
 from typing import TYPE_CHECKING
 
 from kincompile.view.marks import Hull, Polygon, moves_with
+from kincompile.view.worlds import PLANE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from kincompile.model.bodies import Body
     from kincompile.view.geometry import Geometry
-    from kincompile.view.marks import FramePoint, Mark, PlaneFrame, Point
+    from kincompile.view.marks import BodyFrame, FramePoint, Mark, Point
 
 SAME_POINT = 1e-9
 """Distance, relative to the coordinates, up to which two points of a body are one."""
@@ -24,7 +25,7 @@ def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Polygon]:
     From back to front: the first body hides what slides in it.
     """
     found = [
-        Polygon(geometry.frames[body.name], tuple(map(geometry.pair, body.outline)))
+        Polygon(geometry.frames[body.name], tuple(map(geometry.numbers, body.outline)))
         for body in bodies
         if len(body.outline)
     ]
@@ -32,7 +33,10 @@ def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Polygon]:
 
 
 def links(
-    frames: Iterable[PlaneFrame], attached: Iterable[FramePoint], marks: Sequence[Mark]
+    frames: Iterable[BodyFrame],
+    attached: Iterable[FramePoint],
+    marks: Sequence[Mark],
+    dimension: int = PLANE,
 ) -> list[Hull]:
     """Return the hulls of bodies without an outline; of one point only where no mark shows it.
 
@@ -44,16 +48,19 @@ def links(
         Points that joints hold.
     marks
         All other marks, outlines included.
+    dimension
+        2, or 3 in space, where a hull keeps all its points: its faces are found where it is drawn.
     """
     outlined = {mark.frame for mark in marks if isinstance(mark, Polygon)}
     shown = {frame for mark in marks for frame in moves_with(mark)}
     found = []
     for frame in sorted(set(frames) - outlined):
         own: list[Point] = [place.point for place in attached if place.frame == frame]
-        own += [(0.0, 0.0)] if len(_distinct(own)) < 2 else []
+        own += [(0.0,) * dimension] if len(_distinct(own)) < 2 else []
         points = _distinct(own)
         if len(points) > 1 or frame not in shown:
-            found.append(Hull(frame, _hull(points), tuple(own)))
+            corners = convex_chain(points) if dimension == PLANE else tuple(points)
+            found.append(Hull(frame, corners, tuple(own)))
     return found
 
 
@@ -61,14 +68,17 @@ def _distinct(points: Iterable[Point]) -> list[Point]:
     """Return the points without repetitions."""
     found: list[Point] = []
     for point in points:
-        x, y = map(float, point)
-        tolerance = SAME_POINT * (1 + max(abs(x), abs(y)))
-        if all(max(abs(float(a) - x), abs(float(b) - y)) > tolerance for a, b in found):
+        here = tuple(map(float, point))
+        tolerance = SAME_POINT * (1 + max(map(abs, here)))
+        if all(
+            max(abs(float(a) - x) for a, x in zip(other, here, strict=True)) > tolerance
+            for other in found
+        ):
             found.append(point)
     return found
 
 
-def _hull(points: Iterable[Point]) -> tuple[Point, ...]:
+def convex_chain(points: Iterable[Point]) -> tuple[Point, ...]:
     """Return the convex hull, counterclockwise; of points on a line the two ends.
 
     Andrew's monotone chain.

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -15,21 +16,23 @@ from kincompile.view.geometry import Geometry, JointGeometry
 from kincompile.view.joint_shapes import marks_of
 from kincompile.view.marks import (
     GROUND_FRAME,
+    BodyFrame,
     Dot,
     Drive,
     FramePoint,
     Mark,
     Pin,
-    PlaneFrame,
     Rail,
     Slider,
     Span,
+    Symbol,
     in_ground,
     moves_with,
     reach,
     shape_of,
 )
-from kincompile.view.shapes import SHAPES, tables
+from kincompile.view.shapes import SHAPES
+from kincompile.view.worlds import PLANE, SPACE, dimension_of, drawings_in, tables_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -93,7 +96,7 @@ class Drawing:
 
     name: str
     bodies: tuple[str, ...]
-    frames: tuple[PlaneFrame, ...]
+    frames: tuple[BodyFrame, ...]
     marks: tuple[Mark, ...]
     joints: tuple[JointLabel, ...]
     size: float
@@ -103,17 +106,28 @@ class Drawing:
         """The named points of bodies, in order."""
         return tuple(mark for mark in self.marks if isinstance(mark, Dot))
 
-    def extent(self, q: ArrayLike) -> tuple[float, float, float, float]:
-        """Return smallest x, largest x, smallest y, largest y of all marks.
+    @property
+    def is_spatial(self) -> bool:
+        """Whether its bodies move in space."""
+        return self.dimension > PLANE
+
+    @property
+    def dimension(self) -> int:
+        """Components of a point: 2, or 3 in space."""
+        return SPACE if self.frames and len(self.frames[0].columns) > SPACE else PLANE
+
+    def extent(self, q: ArrayLike) -> tuple[float, ...]:
+        """Return smallest x, largest x, smallest y, largest y of all marks, in space z too.
 
         Parameters
         ----------
         q : array_like, shape (n,) or (N, n)
             Positions; those that are not finite are left out.
         """
-        (x_low, y_low), (x_high, y_high) = _box(self.marks, _finite(q))
+        low, high = _box(self.marks, _finite(q), self.dimension)
         pad = 2 * self.size
-        return float(x_low - pad), float(x_high + pad), float(y_low - pad), float(y_high + pad)
+        ends = zip(low - pad, high + pad, strict=True)
+        return tuple(map(float, itertools.chain(*ends)))
 
     def to_json(self) -> dict[str, Any]:
         """Return the drawing as plain data; each mark has its type, in small letters, as `kind`."""
@@ -122,7 +136,8 @@ class Drawing:
             {"kind": type(mark).__name__.lower(), "shape": shape_of(mark), **asdict(mark)}
             for mark in self.marks
         ]
-        return data | {"overhang": OVERHANG * self.size, **tables()}
+        data["overhang"] = OVERHANG * self.size
+        return data | tables_in(self.dimension)
 
 
 def drawing(
@@ -152,7 +167,7 @@ def drawing(
     if not len(positions):
         positions = _finite(guess)
     joints = [item for item in system.constraints if isinstance(item, Joint)]
-    frames = tuple(PlaneFrame(k, tuple(own)) for k, own in enumerate(system.body_columns))
+    frames = tuple(BodyFrame(k, tuple(own)) for k, own in enumerate(system.body_columns))
     names = tuple(body.name for body in system.bodies)
     geometry = Geometry(
         joints,
@@ -160,20 +175,26 @@ def drawing(
         dict(zip(names, frames, strict=True)),
         positions,
     )
+    dimension = dimension_of(system)
+    drawings = drawings_in(dimension)
     by_joint = {
-        joint.name: marks_of(joint.written, JointGeometry(joint, geometry)) for joint in joints
+        joint.name: marks_of(joint.written, JointGeometry(joint, geometry), drawings)
+        for joint in joints
     }
     bodies: list[Mark] = [*outlines(system.bodies, geometry)]
     marks = _uncovered(itertools.chain(*by_joint.values()), set().union(*map(moves_with, bodies)))
     marks = [*bodies, *marks]
     dots = [Dot(item.name, geometry.on_body(item)) for item in system.body_points]
-    marks += links(frames, [*geometry.points(joints), *(dot.place for dot in dots)], marks)
+    attached = [*geometry.points(joints), *(dot.place for dot in dots)]
+    marks += links(frames, attached, marks, dimension)
     marks += dots
-    size = _size(marks, positions)
+    size = _size(marks, positions, dimension)
     places = {
         joint.name: _pointed_at(by_joint[joint.name], geometry.points([joint])) for joint in joints
     }
-    ordered = sorted((_lengthened(mark, OVERHANG * size) for mark in marks), key=_depth)
+    lengthened = [_lengthened(mark, OVERHANG * size) for mark in marks]
+    # In space what is nearer depends on the view.
+    ordered = lengthened if dimension > PLANE else sorted(lengthened, key=_depth)
     labels = _labels(system, places, geometry)
     return Drawing(system.name, names, frames, tuple(ordered), labels, size)
 
@@ -210,38 +231,45 @@ def _pointed_at(marks: Iterable[Mark], attached: Iterable[FramePoint]) -> FrameP
     return found[-1] if found else None
 
 
-def _box(marks: Iterable[Mark], q: Array) -> tuple[Array, Array]:
-    """Return the lower left and the upper right corner of the marks at positions q."""
-    fixed: dict[PlaneFrame, list[tuple[float, float, float]]] = {}
+def _box(marks: Iterable[Mark], q: Array, dimension: int) -> tuple[Array, Array]:
+    """Return the lowest and the highest coordinates of the marks at positions q."""
+    fixed: dict[BodyFrame, list[tuple[float, ...]]] = {}
     for mark in marks:
         for place, radius in reach(mark):
             fixed.setdefault(place.frame, []).append((*place.point, radius))
     if not fixed or not len(q):
-        return np.array((-1.0, -1.0)), np.array((1.0, 1.0))
+        return np.full(dimension, -1.0), np.full(dimension, 1.0)
     low, high = [], []
     for frame, circles in fixed.items():
         numbers = np.array(circles)
-        points, radii = in_ground(q[:, None], frame, numbers[:, :2]), numbers[:, 2:]
+        points, radii = in_ground(q[:, None], frame, numbers[:, :-1]), numbers[:, -1:]
         low.append((points - radii).min(axis=(0, 1)))
         high.append((points + radii).max(axis=(0, 1)))
     return np.min(low, axis=0), np.max(high, axis=0)
 
 
-def _size(marks: Iterable[Mark], q: Array) -> float:
+def _size(marks: Iterable[Mark], q: Array, dimension: int) -> float:
     """Return a part of the diagonal of the marks; of a single point, of a unit length."""
-    low, high = _box(marks, q)
-    return (float(np.hypot(*(high - low))) or 1.0) / PARTS
+    low, high = _box(marks, q, dimension)
+    return (float(functools.reduce(np.hypot, high - low)) or 1.0) / PARTS
 
 
 def _lengthened(mark: Mark, overhang: float) -> Mark:
     """Return a guide with an overhang, so that its block never stands at its end."""
-    if not isinstance(mark, Rail) or mark.style not in ("guide", "slot"):
+    if not _is_guide(mark):
         return mark
     low, high = mark.reach
     return replace(mark, reach=(low - overhang, high + overhang))
 
 
-def _uncovered(marks: Iterable[Mark], outlined: set[PlaneFrame]) -> list[Mark]:
+def _is_guide(mark: Mark) -> TypeGuard[Rail | Symbol]:
+    """Return whether something slides on a mark."""
+    if isinstance(mark, Symbol):
+        return mark.follower is not None
+    return isinstance(mark, Rail) and mark.style in ("guide", "slot")
+
+
+def _uncovered(marks: Iterable[Mark], outlined: set[BodyFrame]) -> list[Mark]:
     """Return the marks without slides, sleeves and slots that other marks already show.
 
     A cylinder takes the place of its slide; two outlined bodies show by themselves how they slide.

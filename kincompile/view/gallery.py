@@ -19,6 +19,8 @@ from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
 from kincompile.view.drawing import drawing
 from kincompile.view.page_data import as_json
+from kincompile.view.page_scripts import WORLDS
+from kincompile.view.worlds import dimension_of
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -36,8 +38,8 @@ if TYPE_CHECKING:
 FRAMES = 120
 """Approximate number of points of a motion in the gallery."""
 
-SCRIPTS = ("player.js", "draw.js", "gallery.js")
-"""Scripts of the gallery, in order."""
+DRAWS = "return { View, drawShapes, paletteNow };"
+"""What the gallery takes of the scripts that draw."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +61,7 @@ class Gallery:
             _card(item.data, item.name, _sizes(item.data), f"{item.name}.html")
             for item in self.pages
         ]
-        return _filled("Mechanisms", cards)
+        return _filled("Mechanisms", cards, {len(item.data["extent"]) // 2 for item in self.pages})
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the pages and index.html to a folder, which is made, and return their paths.
@@ -158,7 +160,8 @@ def assembly_gallery(
         last = "the end" if solution.success else f"t = {data['arrays']['t'][-1]:g}"
         cards.append(_card(data, f"Assembly {number}", f"moves to {last}"))
     title = f"Assemblies of {escape(system.name)} at t = {t:g}"
-    return AssemblyGallery(module, positions, _filled(title, cards))
+    page = _filled(title, cards, {dimension_of(system)})
+    return AssemblyGallery(module, positions, page)
 
 
 def _moving(
@@ -181,15 +184,26 @@ def _moving(
     }
 
 
-def _filled(title: str, cards: Sequence[Mapping[str, str]]) -> str:
-    """Return a page of cards."""
+def _filled(title: str, cards: Sequence[Mapping[str, str]], dimensions: Iterable[int]) -> str:
+    """Return a page of cards: of mechanisms in the plane (dimension 2), in space (3), or both."""
+    worlds = ",\n".join(f"{dimension}: {_world(dimension)}" for dimension in sorted(dimensions))
     slots = {
         "title": title,
         "style": read("view/style.css") + read("view/gallery.css"),
-        "scripts": [read(f"view/{name}") for name in SCRIPTS],
+        "scripts": [
+            read("view/player.js"),
+            f"const worlds = {{\n{worlds} }};",
+            read("view/gallery.js"),
+        ],
         "cards": cards,
     }
     return fill("view/gallery.html.jinja", slots)
+
+
+def _world(dimension: int) -> str:
+    """Return the scripts that draw in the plane or in space, as a function of their own."""
+    scripts = "\n".join(read(f"view/{name}") for name in ("draw.js", WORLDS[dimension]))
+    return f"(() => {{\n{scripts}\n{DRAWS}\n}})()"
 
 
 def _card(data: Mapping[str, Any], name: str, sizes: str, file: str = "") -> dict[str, str]:

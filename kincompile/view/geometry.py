@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from kincompile.model.expressions import Scalar, Scalars
     from kincompile.model.points import BodyPoint
     from kincompile.model.resolve import Joint
-    from kincompile.view.marks import Array, PlaneFrame, Point
+    from kincompile.view.marks import Array, BodyFrame, Point
 
 PROFILE_POINTS = 180
 """Points of a cam profile: its chords are within 1.5e-4 of its radius."""
@@ -60,7 +61,7 @@ class Geometry:
 
     joints: Sequence[Joint]
     values: Mapping[str, float]
-    frames: Mapping[str, PlaneFrame]
+    frames: Mapping[str, BodyFrame]
     q: Array
 
     @cached_property
@@ -82,11 +83,11 @@ class Geometry:
         graph, converter = self._code
         return LiveNumber.of(number, graph, converter.convert(expression))
 
-    def pair(self, pair: Scalars) -> Point:
+    def numbers(self, vector: Scalars) -> Point:
         """Return the numbers of a point or a direction."""
-        return self.number(pair[0]), self.number(pair[1])
+        return tuple(map(self.number, vector))
 
-    def frame_of(self, joint: Joint, symbol: str) -> PlaneFrame:
+    def frame_of(self, joint: Joint, symbol: str) -> BodyFrame:
         """Return the frame in which a point of a joint is fixed."""
         owner = joint.written.owners()[symbol]
         if owner == GROUND.name:
@@ -97,12 +98,12 @@ class Geometry:
 
     def point(self, joint: Joint, symbol: str) -> FramePoint:
         """Return a point of a joint, in the frame of its body."""
-        return FramePoint(self.frame_of(joint, symbol), self.pair(joint.points[symbol]))
+        return FramePoint(self.frame_of(joint, symbol), self.numbers(joint.points[symbol]))
 
     def on_body(self, point: BodyPoint) -> FramePoint:
         """Return a named point of a body, in its frame."""
         frame = self.frames.get(point.body.name, GROUND_FRAME)
-        return FramePoint(frame, self.pair(point.local))
+        return FramePoint(frame, self.numbers(point.local))
 
     def points(self, joints: Iterable[Joint]) -> list[FramePoint]:
         """Return every point that joints hold; the pitch line of a rack is drawn as such."""
@@ -120,19 +121,19 @@ class Geometry:
         return tuple(self.number(value) for value in scalars if not depends_on(value, ("t",)))
 
     @cached_property
-    def bearings(self) -> dict[PlaneFrame, FramePoint]:
+    def bearings(self) -> dict[BodyFrame, FramePoint]:
         """The point of each frame's first revolute joint, one with the ground first."""
         revolutes = [joint for joint in self.joints if isinstance(joint.written, Revolute)]
         revolutes.sort(key=lambda joint: not _is_on_ground(joint))
-        found: dict[PlaneFrame, FramePoint] = {}
+        found: dict[BodyFrame, FramePoint] = {}
         for point in self.points(revolutes):
             found.setdefault(point.frame, point)
         return found
 
     @cached_property
-    def blocks(self) -> frozenset[PlaneFrame]:
+    def blocks(self) -> frozenset[BodyFrame]:
         """The frames with one point for all joints, in a revolute joint of moving bodies."""
-        points: dict[PlaneFrame, set[Point]] = {}
+        points: dict[BodyFrame, set[Point]] = {}
         for item in self.points(self.joints):
             points.setdefault(item.frame, set()).add(item.point)
         pinned = self.points(
@@ -174,7 +175,7 @@ class JointGeometry:
 
     def unit(self, symbol: str) -> Point:
         """Return a direction of the constraint, of length one."""
-        x, y = self.mechanism.pair(self.joint.points[symbol])
+        x, y = self.mechanism.numbers(self.joint.points[symbol])
         length = length_of(x, y) or 1.0
         return x / length, y / length
 
@@ -201,11 +202,11 @@ class JointGeometry:
     def span(self, first: str, second: str, style: str) -> Span:
         """Return the line between two points; a barrel is as long as it can be in the motion."""
         start, end = self.point(first), self.point(second)
-        apart = np.hypot(*(end.at(self.mechanism.q) - start.at(self.mechanism.q)).T)
+        apart = distances(start.at(self.mechanism.q), end.at(self.mechanism.q))
         barrel = BARREL * float(apart.min()) if style == "cylinder" else 0.0
         return Span(self.name, start, end, style, barrel)
 
-    def slider(self, place: FramePoint, axis: Point, guide: PlaneFrame | None = None) -> Slider:
+    def slider(self, place: FramePoint, axis: Point, guide: BodyFrame | None = None) -> Slider:
         """Return a block, along an axis of its own frame or of its guide's."""
         return Slider(self.name, place, axis, place.frame if guide is None else guide)
 
@@ -250,8 +251,8 @@ class JointGeometry:
         at_least
             Distances along the axis that it covers in any case.
         """
-        along = _along(self.mechanism.q, base, axis, follower)
-        ends = [float(along.min()), float(along.max()), *at_least]
+        ways = along(self.mechanism.q, base, axis, follower)
+        ends = [float(ways.min()), float(ways.max()), *at_least]
         start = (base.point[0] - offset * axis[1], base.point[1] + offset * axis[0])
         frame, reach = base.frame, (min(ends), max(ends))
         style = style or ("guide" if frame == GROUND_FRAME else "slot")
@@ -262,9 +263,15 @@ def _is_on_ground(joint: Joint) -> bool:
     return any(body.is_ground for body in joint.bodies)
 
 
-def _along(q: Array, base: FramePoint, axis: Point, follower: FramePoint) -> Array:
+def along(q: Array, base: FramePoint, axis: Point, follower: FramePoint) -> Array:
     """Return the distance of the follower along the axis, shape (N,)."""
     start = base.at(q)
-    tip = FramePoint(base.frame, (base.point[0] + axis[0], base.point[1] + axis[1]))
+    ahead = tuple(x + u for x, u in zip(base.point, axis, strict=True))
+    tip = FramePoint(base.frame, ahead)
     apart, direction = follower.at(q) - start, tip.at(q) - start
     return np.asarray(np.sum(apart * direction, axis=-1), dtype=np.float64)
+
+
+def distances(start: Array, end: Array) -> Array:
+    """Return how far points are from each other, shape (N,)."""
+    return np.asarray(functools.reduce(np.hypot, (end - start).T), dtype=np.float64)

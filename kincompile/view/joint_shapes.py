@@ -169,7 +169,11 @@ DRAWINGS: Mapping[type[Constraint], DrawJoint] = {
 """The function that draws each type of constraint."""
 
 
-def marks_of(constraint: Constraint, joint: JointGeometry) -> list[Mark]:
+def marks_of(
+    constraint: Constraint,
+    joint: JointGeometry,
+    drawings: Mapping[type[Constraint], DrawJoint] = DRAWINGS,
+) -> list[Mark]:
     """Return the marks of a constraint; a type without a drawing is drawn as the one it extends.
 
     Parameters
@@ -178,6 +182,8 @@ def marks_of(constraint: Constraint, joint: JointGeometry) -> list[Mark]:
         The constraint as written: its type decides.
     joint
         Its attributes as numbers, and the motion that its marks must fit.
+    drawings
+        The function that draws each type: those of the plane, or of space.
 
     Raises
     ------
@@ -185,10 +191,10 @@ def marks_of(constraint: Constraint, joint: JointGeometry) -> list[Mark]:
         If there is no drawing for the type.
     """
     for kind in type(constraint).__mro__:
-        if kind in DRAWINGS:
-            return DRAWINGS[kind](joint)
+        if kind in drawings:
+            return drawings[kind](joint)
     name = type(constraint).__name__
     raise UnsupportedError(
         f"there is no drawing for the type {name} of {constraint.name!r}; add a function to "
-        "DRAWINGS in kincompile/view/joint_shapes.py"
+        "DRAWINGS in kincompile/view/joint_shapes.py, of a type in space in solid_joints.py"
     )

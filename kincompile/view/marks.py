@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 
-Point: TypeAlias = tuple[float, float]
-"""Components (xi, eta) in a frame."""
+Point: TypeAlias = tuple[float, ...]
+"""Components (xi, eta) in a frame, in space (xi, eta, zeta)."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class PlaneFrame:
+class BodyFrame:
     """The axes of a body, or of the ground.
 
     Attributes
@@ -26,18 +26,19 @@ class PlaneFrame:
     index
         Index of the body in the mechanism; -1 for the ground.
     columns
-        Columns of q with its x, y and phi; none for the ground.
+        Columns of q with its x, y and phi, in space x, y, z and Euler parameters; none for the
+        ground.
     """
 
     index: int
     columns: tuple[int, ...]
 
 
-GROUND_FRAME = PlaneFrame(-1, ())
+GROUND_FRAME = BodyFrame(-1, ())
 """The frame of the ground."""
 
 
-def in_ground(q: Array, frame: PlaneFrame, points: Array | Point) -> Array:
+def in_ground(q: Array, frame: BodyFrame, points: Array | Point) -> Array:
     """Return where points of a frame are, in the axes of the ground.
 
     Parameters
@@ -46,14 +47,17 @@ def in_ground(q: Array, frame: PlaneFrame, points: Array | Point) -> Array:
         Positions.
     frame
         The frame of a body, or of the ground.
-    points : array_like, shape (..., 2)
+    points : array_like, shape (..., 2), in space (..., 3)
         Components in the frame; the leading axes broadcast against those of `q`.
 
     Returns
     -------
-    ndarray, shape (..., 2)
+    ndarray, shape (..., 2), in space (..., 3)
     """
-    xi, eta = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
+    local = np.asarray(points, dtype=np.float64)
+    if local.shape[-1] == 3:
+        return _in_space(q, frame, local)
+    xi, eta = np.moveaxis(local, -1, 0)
     if frame == GROUND_FRAME:
         x, y = np.zeros((2, *q.shape[:-1]))
         c, s = np.ones_like(x), np.zeros_like(x)
@@ -63,11 +67,22 @@ def in_ground(q: Array, frame: PlaneFrame, points: Array | Point) -> Array:
     return np.stack((x + c * xi - s * eta, y + s * xi + c * eta), axis=-1)
 
 
+def _in_space(q: Array, frame: BodyFrame, local: Array) -> Array:
+    """Return r + A s; Euler parameters of any length are those of an orientation."""
+    if frame == GROUND_FRAME:
+        return np.broadcast_to(local, np.broadcast_shapes((*q.shape[:-1], 3), local.shape))
+    own = q[..., list(frame.columns)]
+    r, e0, e = own[..., :3], own[..., 3:4], own[..., 4:]
+    across = np.cross(e, local)
+    square = e0**2 + np.sum(e * e, axis=-1, keepdims=True)
+    return np.asarray(r + local + 2 * (e0 * across + np.cross(e, across)) / square)
+
+
 @dataclass(frozen=True, slots=True)
 class FramePoint:
     """A point fixed in a frame."""
 
-    frame: PlaneFrame
+    frame: BodyFrame
     point: Point
 
     def at(self, q: Array) -> Array:
@@ -82,7 +97,7 @@ class Hull:
     `attached` are all its joint points, from which a page finds the hull for other parameters.
     """
 
-    frame: PlaneFrame
+    frame: BodyFrame
     points: tuple[Point, ...]
     attached: tuple[Point, ...] = ()
 
@@ -91,7 +106,7 @@ class Hull:
 class Polygon:
     """A body as the closed polygon that its author gave."""
 
-    frame: PlaneFrame
+    frame: BodyFrame
     points: tuple[Point, ...]
 
 
@@ -126,7 +141,7 @@ class Rail:
     """
 
     joint: str
-    frame: PlaneFrame
+    frame: BodyFrame
     base: Point
     axis: Point
     style: str
@@ -155,7 +170,7 @@ class Slider:
     joint: str
     place: FramePoint
     axis: Point
-    guide: PlaneFrame
+    guide: BodyFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +208,7 @@ class Contour:
     """
 
     joint: str
-    frame: PlaneFrame
+    frame: BodyFrame
     points: tuple[Point, ...]
     style: str
     centre: Point = (0.0, 0.0)
@@ -217,7 +232,38 @@ class Dot:
     place: FramePoint
 
 
-Mark: TypeAlias = Hull | Polygon | Pin | Rail | Slider | Span | Wheel | Contour | Drive | Dot
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """A solid that stands for a part of a joint in space, fixed in one frame.
+
+    Attributes
+    ----------
+    joint
+        The constraint.
+    shape
+        A name in `SOLIDS`.
+    place
+        Its origin.
+    axis, cross
+        Unit vectors in the frame of `place`: what it is turned about, and one at a right angle.
+    follower
+        What slides along its axis, where it is as long as the motion.
+    reach
+        Distances along the axis between which it is drawn.
+    """
+
+    joint: str
+    shape: str
+    place: FramePoint
+    axis: Point
+    cross: Point
+    follower: FramePoint | None = None
+    reach: tuple[float, float] = (0.0, 0.0)
+
+
+Mark: TypeAlias = (
+    Hull | Polygon | Pin | Rail | Slider | Span | Wheel | Contour | Drive | Dot | Symbol
+)
 
 
 def shape_of(mark: Mark) -> str:
@@ -233,12 +279,23 @@ def shape_of(mark: Mark) -> str:
             return "ring" if mark.is_internal else "wheel"
         case Contour():
             return "curved slot" if mark.style == "slot" else mark.style
+        case Symbol():
+            return mark.shape
         case Drive():
             return "turn" if mark.axis is None else "push"
     return type(mark).__name__.lower()
 
 
-def moves_with(mark: Mark) -> set[PlaneFrame]:
+def ends_of(mark: Symbol) -> tuple[Point, Point]:
+    """Return the two ends of what is drawn along the axis of a symbol, in its frame."""
+    first, last = (
+        tuple(x + far * u for x, u in zip(mark.place.point, mark.axis, strict=True))
+        for far in mark.reach
+    )
+    return first, last
+
+
+def moves_with(mark: Mark) -> set[BodyFrame]:
     """Return the frames in which a mark is fixed."""
     return {place.frame for place, _ in reach(mark)}
 
@@ -254,6 +311,8 @@ def reach(mark: Mark) -> list[tuple[FramePoint, float]]:
             points = (mark.start, mark.end)
         case Pin() | Span():
             return [(mark.first, 0.0), (mark.second, 0.0)]
+        case Symbol():
+            return [(FramePoint(mark.place.frame, end), 0.0) for end in ends_of(mark)]
         case Slider() | Drive() | Dot():
             return [(mark.place, 0.0)]
     return [(FramePoint(mark.frame, point), 0.0) for point in points]

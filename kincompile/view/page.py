@@ -17,7 +17,8 @@ from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
 from kincompile.view.page_data import as_json, page_data
-from kincompile.view.page_scripts import geometry_script, solver_script
+from kincompile.view.page_scripts import WORLDS, geometry_script, solver_script
+from kincompile.view.worlds import dimension_of
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ SCRIPTS = (
     "newton_panel.js", "live.js", "measures.js", "grab.js", "start.js",
 )  # fmt: skip
 """Scripts, in order: each uses those before it, and the emitted module."""
+
 
 FRAME_HEIGHT = "720px"
 """Height of a page inside a notebook."""
@@ -144,12 +146,18 @@ def page(
         "scripts": [
             solver_script(system),
             geometry_script(system, shown["drawing"]),
-            *(read(f"view/{name}") for name in SCRIPTS),
+            *(read(f"view/{name}") for name in scripts_for(dimension_of(system))),
         ],
         "still": shown.pop("still"),
         "data": as_json(shown),
     }
     return Page(system.name, fill("view/page.html.jinja", slots), shown)
+
+
+def scripts_for(dimension: int) -> list[str]:
+    """Return the scripts of a page of the plane or of space, in order."""
+    place = SCRIPTS.index("draw.js") + 1
+    return [*SCRIPTS[:place], WORLDS[dimension], *SCRIPTS[place:]]
 
 
 def _require_motion_of(system: ConstraintSystem, solution: Solution) -> None:

@@ -9,17 +9,18 @@ import numpy as np
 
 from kincompile.errors import InternalError
 from kincompile.view.marks import (
+    BodyFrame,
     Contour,
     Dot,
     Drive,
     Hull,
     Mark,
     Pin,
-    PlaneFrame,
     Polygon,
     Rail,
     Slider,
     Span,
+    Symbol,
     Wheel,
     in_ground,
     shape_of,
@@ -58,7 +59,7 @@ class Polyline:
         return self.stroke.is_area
 
     @property
-    def frame(self) -> PlaneFrame:
+    def frame(self) -> BodyFrame:
         """The frame whose colour it has."""
         return owner(self.mark, self.stroke.on)
 
@@ -97,12 +98,12 @@ def of_mark(mark: Mark, size: float) -> Iterable[Polyline]:
     return [Polyline(stroke, mark, size) for stroke in SHAPES[shape_of(mark)]]
 
 
-def owner(mark: Mark, on: str) -> PlaneFrame:
+def owner(mark: Mark, on: str) -> BodyFrame:
     """Return the frame whose colour a stroke of a mark has."""
     match mark:
         case Pin() | Span():
             return mark.first.frame if on in ("first", "barrel") else mark.second.frame
-        case Slider() | Wheel() | Drive() | Dot():
+        case Slider() | Wheel() | Drive() | Dot() | Symbol():
             return mark.place.frame
     return mark.frame
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import Array, PlaneFrame
+    from kincompile.view.marks import Array, BodyFrame
 
 WIDTH, HEIGHT = 960.0, 720.0
 """Largest sides of a picture [px]."""
@@ -314,7 +314,7 @@ def _dash(dash: str, line: float) -> str:
 # ---- colours ----
 
 
-def _hue(frame: PlaneFrame) -> str:
+def _hue(frame: BodyFrame) -> str:
     return f"body{frame.index % len(HUES['light'])}"
 
 

@@ -27,7 +27,7 @@ const columns = {
     const { data } = player;
     const groups = [
       ...ordersOf(['Outputs', 'Rates of outputs', 'Second rates of outputs'], named(data), 'y', data.outputs),
-      { title: 'Paths', items: stage.points.map(pathItem) },
+      { title: 'Paths', items: stage.points.flatMap(pathItems) },
       { title: 'Points', items: stage.points.flatMap(pointItems) },
       ...ordersOf(['Positions', 'Velocities', 'Accelerations'], data.coordinates, 'q', data.coordinates),
       { title: 'Residuals', items: residualItems(data) },
@@ -58,7 +58,7 @@ function entries(name, k, width) {
 
 /* Outputs, those of the model before the coordinates of its points. */
 function named({ outputs, drawing }) {
-  const dots = drawing.marks.filter(mark => mark.kind === 'dot').flatMap(({ name }) => [`x_${name}`, `y_${name}`]);
+  const dots = drawing.marks.filter(mark => mark.kind === 'dot').flatMap(({ name }) => AXES.map(axis => `${axis}_${name}`));
   const isDot = ({ name }) => dots.includes(name);
   return [...outputs.filter(output => !isDot(output)), ...outputs.filter(isDot)];
 }
@@ -84,17 +84,20 @@ function pointItems(point) {
   const unit = player.data.lengthUnit, name = titleOf(point);
   const speed = kind => state => Math.hypot(...ratesInWorld(state, point.frame, point.point)[kind]);
   const items = [
-    [`x of ${name}`, unit, state => stage.where(point, state)[0]],
-    [`y of ${name}`, unit, state => stage.where(point, state)[1]],
+    ...AXES.map((axis, k) => [`${axis} of ${name}`, unit, state => stage.where(point, state)[k]]),
     [`|v| of ${name}`, `${unit}/s`, speed('velocity')],
     [`|a| of ${name}`, `${unit}/s²`, speed('acceleration')],
   ];
   return items.map(([label, own, number]) => ({ label, unit: own, values: () => along(point, number) }));
 }
 
-function pathItem(point) {
-  const name = titleOf(point);
-  return { label: `path of ${name}`, unit: player.data.lengthUnit, path: [`x of ${name}`, `y of ${name}`] };
+/* The path of a point, in space as it is seen from above, from the front and from the side. */
+function pathItems(point) {
+  const name = titleOf(point), pairs = isSpatial ? ['xy', 'xz', 'yz'] : ['xy'];
+  return pairs.map(([first, second]) => ({
+    label: isSpatial ? `path of ${name} in ${first}${second}` : `path of ${name}`,
+    unit: player.data.lengthUnit, path: [`${first} of ${name}`, `${second} of ${name}`],
+  }));
 }
 
 /* A residual of exactly zero has no logarithm. */
@@ -128,7 +131,7 @@ function plottedFirst() {
   const output = outputs.find(({ name }) => moves(columns.find(name)));
   if (output) return RATES.map(([order]) => output.name + order);
   const dot = dots.find(({ name }) => moves(columns.find(`|v| of ${name}`)));
-  if (dot) return [`path of ${dot.name}`, `|v| of ${dot.name}`, `|a| of ${dot.name}`];
+  if (dot) return [pathItems(dot)[0].label, `|v| of ${dot.name}`, `|a| of ${dot.name}`];
   const name = liveliest();
   return RATES.map(([order]) => name + order);
 }
@@ -143,8 +146,7 @@ function liveliest() {
     const values = data.arrays[name].filter((value, place) => place % n === k && Number.isFinite(value));
     return values.reduce((most, value) => Math.max(most, Math.abs(value - values[0])), 0);
   });
-  const ofBodies = frames.length ? frames.flatMap(frame => frame.columns) : all;
-  const angles = frames.map(({ columns: [, , phi] }) => phi);
+  const [angles, ofBodies] = frames.length ? liveliestOf(frames) : [[], all];
   for (const [name, candidates] of [['q_ddot', angles], ['q_ddot', ofBodies], ['q', all]]) {
     const found = sizes(name, candidates), largest = Math.max(0, ...found);
     if (largest > 1e-9) return data.coordinates[candidates[found.indexOf(largest)]].name;

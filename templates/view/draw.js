@@ -1,69 +1,27 @@
 'use strict';
-/* The marks of a drawing on a canvas.
+/* The marks of a drawing on a canvas: what plane.js and space.js share.
 
    drawShapes(ctx, q, style) draws the mechanism at coordinates q, any number of times on one canvas.
    style: { view, palette } and, where wanted, alpha, ghost (one colour for everything), violated (a
    set of joint names that are drawn as broken), drawing (of another mechanism than the player's).
 
    What a mark looks like is in the data: drawing.shapes has the strokes of each shape, drawing.looks
-   what a stroke is drawn like (kincompile/view/shapes.py).  They are evaluated from the numbers of the
-   marks whenever they are drawn; fitMarks makes rails and barrels fit a motion. */
+   what a stroke is drawn like (kincompile/view/shapes.py, solid_shapes.py).  They are evaluated from the
+   numbers of the marks whenever they are drawn, by one of
+
+   plane.js, space.js    AXES and isSpatial; View, between the world and the screen; inWorld, inFrame,
+                         ratesInWorld: points of frames; drawMarks, areasOf: what is drawn
+
+   fitMarks makes rails and barrels fit a motion. */
 
 const GROUND = { index: -1, columns: [] };  // a frame: a body's index, and its columns of q
 const BARREL = 0.85;  // part of a cylinder's shortest length that its barrel has
-const TRUE_SIZES = new Set(['wheel', 'ring', 'rack']);  // teeth of gears are as far apart as those of racks
+const SAME_POINT = 1e-9;  // relative distance up to which two points of a body are one
 const THICK = 8;  // pixels of a mark's size from which on lines grow with it
 const DASHES = { '': [], '--': [5, 4], ':': [4, 3] };
 
 function isGround(frame) {
   return frame.index === GROUND.index;
-}
-
-/* The angle of a frame. */
-function angleOf(q, { columns: [, , phi] }) {
-  return phi === undefined ? 0 : q[phi];
-}
-
-/* World to screen: lengths are true, and the whole extent fits, unless a camera { zoom, centre } says
-   what is looked at. */
-class View {
-  constructor([left, right, low, high], width, height, margin, camera = null) {
-    this.fit = Math.min((width - 2 * margin) / (right - left), (height - 2 * margin) / (high - low));
-    this.scale = this.fit * (camera ? camera.zoom : 1);
-    const [x, y] = camera ? camera.centre : [(left + right) / 2, (low + high) / 2];
-    this.left = width / 2 - this.scale * x;
-    this.top = height / 2 + this.scale * y;
-  }
-
-  toScreen([x, y]) {
-    return [this.left + this.scale * x, this.top - this.scale * y];
-  }
-
-  toWorld([x, y]) {
-    return [(x - this.left) / this.scale, (this.top - y) / this.scale];
-  }
-}
-
-/* Where a point of a frame is. */
-function inWorld(q, frame, [xi, eta]) {
-  if (isGround(frame)) return [xi, eta];
-  const [x, y, phi] = frame.columns;
-  const c = Math.cos(q[phi]), s = Math.sin(q[phi]);
-  return [q[x] + c * xi - s * eta, q[y] + s * xi + c * eta];
-}
-
-/* Velocity and acceleration of a point of a frame. */
-function ratesInWorld(state, frame, [xi, eta]) {
-  if (isGround(frame)) return { velocity: [0, 0], acceleration: [0, 0] };
-  const { q, q_dot, q_ddot } = state, [x, y, phi] = frame.columns;
-  const c = Math.cos(q[phi]), s = Math.sin(q[phi]), w = q_dot[phi], a = q_ddot[phi];
-  const arm = [c * xi - s * eta, s * xi + c * eta];
-  return {
-    velocity: [q_dot[x] - w * arm[1], q_dot[y] + w * arm[0]],
-    acceleration: [
-      q_ddot[x] - a * arm[1] - w * w * arm[0], q_ddot[y] + a * arm[0] - w * w * arm[1],
-    ],
-  };
 }
 
 /* What is drawn with: positions on the screen, sizes and colours. */
@@ -121,20 +79,26 @@ class Pen {
     this.ctx.arc(x, y, Math.max(radius, 0.1), 0, 2 * Math.PI);
   }
 
-  /* One stroke of a mark, in the colours of its look. */
-  draw(mark, stroke) {
-    const { style, palette } = this, look = this.style.looks[stroke.look];
-    const points = pointsOfStroke(this, mark, stroke);
-    if (stroke.look === 'gap' && towards(points[0], points[1])[2] < 2) return;
-    this.path(points, stroke.is_area);
-    const [strong, tint] = this.colours(ownerOf(mark, stroke.on));
+  /* Colours of the line and of the area of a stroke, in its look. */
+  inks(mark, { look: name, on }) {
+    const { style, palette } = this, look = style.looks[name];
+    const [strong, tint] = this.colours(ownerOf(mark, on));
     const isViolated = style.violated && style.violated.has(mark.joint);
     const line = isViolated ? palette.bad : style.ghost ?? palette[look.line] ?? strong;
     const isSolid = look.face !== '' && look.face === look.line;
     const pale = isViolated ? palette.badTint : style.ghost ? palette.paper : palette[look.face] ?? tint;
-    if (stroke.is_area) this.fill(isSolid ? line : pale);
-    if (look.width) this.stroke(line, look.width * Math.max(1, this.unit / THICK), DASHES[look.dash]);
+    return { line, face: isSolid ? line : pale };
   }
+
+  /* A width of a look, in pixels. */
+  width(width) {
+    return width * Math.max(1, this.unit / THICK);
+  }
+}
+
+/* How far apart two places are. */
+function distanceBetween(from, to) {
+  return Math.hypot(...to.map((x, k) => x - from[k]));
 }
 
 /* The direction from one point to another, of length one, and the distance. */
@@ -156,112 +120,28 @@ function arrow(pen, from, to, colour, width = 2) {
   pen.fill(colour);
 }
 
-/* ---- the points of a stroke ---- */
-
 /* The frame whose colour a stroke of a mark has. */
 function ownerOf(mark, on) {
   if (mark.first) return on === 'first' || on === 'barrel' ? mark.first.frame : mark.second.frame;
   return mark.place ? mark.place.frame : mark.frame;
 }
 
-/* The points of a stroke on the screen; null interrupts a line. */
-function pointsOfStroke(pen, mark, stroke) {
-  const size = TRUE_SIZES.has(mark.shape) ? pen.size : pen.unit / pen.view.scale;
-  if (!stroke.corners.length) return curveOf(pen, mark, stroke, size);
-  const axes = axesOf(pen.q, mark, stroke.on);
-  if (stroke.on === 'circle') return around(pen, stroke, axes, size);
-  const { start, along: [x, y], length } = axes, points = [];
-  const placed = (part, ahead, left) => {
-    const far = part * length + ahead * size;
-    return pen.view.toScreen([start[0] + far * x - left * size * y, start[1] + far * y + left * size * x]);
-  };
-  const last = stroke.every ? Math.max(length / size, stroke.every) : 1;
-  for (let foot = stroke.every / 2; foot < last; foot += stroke.every || 1) {
-    for (const corner of stroke.corners) {
-      points.push(corner && placed(corner[0], corner[1] + foot, corner[2]));
+/* The convex hull of points, counterclockwise; of points on a line its two ends. */
+function hullOf(points) {
+  const turn = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+  const isNear = ([a, b], [x, y]) =>
+    Math.max(Math.abs(a - x), Math.abs(b - y)) <= SAME_POINT * (1 + Math.max(Math.abs(x), Math.abs(y)));
+  const found = points.filter((point, k) => !points.slice(0, k).some(other => isNear(other, point)));
+  const ordered = found.sort(([a, b], [x, y]) => a - x || b - y);
+  if (ordered.length < 3) return ordered;
+  return [ordered, ordered.slice().reverse()].flatMap(chain => {
+    const kept = [];
+    for (const point of chain) {
+      while (kept.length > 1 && turn(kept[kept.length - 2], kept[kept.length - 1], point) <= 0) kept.pop();
+      kept.push(point);
     }
-  }
-  return points;
-}
-
-/* The line a stroke is drawn on: its start, its direction of length one and its length. */
-function axesOf(q, mark, on) {
-  const at = place => inWorld(q, place.frame, place.point);
-  const between = (start, end, most = Infinity) => {
-    const [x, y, length] = towards(start, end);
-    return { start, along: [x, y], length: Math.min(length, most) };
-  };
-  if (mark.kind === 'rail') return between(...endsOf(mark).map(point => inWorld(q, mark.frame, point)));
-  if (mark.kind === 'span') return between(at(mark.first), at(mark.second), on === 'barrel' ? mark.barrel : Infinity);
-  if (on === 'line') return between(at(mark.first), at(mark.second));
-  const start = at(on === 'first' || on === 'second' ? mark[on] : mark.place);
-  if (mark.kind === 'wheel') {
-    const angle = mark.theta + angleOf(q, mark.place.frame);
-    return { start, along: [Math.cos(angle), Math.sin(angle)], length: mark.radius };
-  }
-  if (!mark.axis) return { start, along: [1, 0], length: 0 };
-  const turn = mark.guide ? angleOf(q, mark.guide) : 0, [x, y] = mark.axis;
-  const c = Math.cos(turn), s = Math.sin(turn);
-  return { start, along: [c * x - s * y, s * x + c * y], length: 0 };
-}
-
-function endsOf({ base, axis, reach }) {
-  return reach.map(far => [base[0] + far * axis[0], base[1] + far * axis[1]]);
-}
-
-/* A closed curve, widened: a circle, a polygon, or the hull of a link with round corners. */
-function curveOf(pen, mark, { grow, is_area }, size) {
-  let points = mark.points;
-  if (mark.kind === 'wheel') {
-    const [x, y] = mark.place.point, radius = mark.radius + grow * size;
-    points = CIRCLE.map(([c, s]) => [x + radius * c, y + radius * s]);
-  } else if (mark.kind === 'hull') points = rounded(points, grow * size);
-  else if (grow) points = points.map((point, k) => widened(points, k, grow * size));
-  const frame = mark.frame ?? mark.place.frame;
-  const curve = points.map(point => pen.at(frame, point));
-  return is_area ? curve : [...curve, curve[0]];
-}
-
-const CIRCLE = Array.from({ length: 180 }, (_, k) => [Math.cos(k * Math.PI / 90), Math.sin(k * Math.PI / 90)]);
-
-/* A corner of a smooth curve, moved outwards. */
-function widened(points, k, distance) {
-  const count = points.length;
-  const [x, y] = towards(points[(k + count - 1) % count], points[(k + 1) % count]);
-  return [points[k][0] + distance * y, points[k][1] - distance * x];
-}
-
-/* A convex polygon, counterclockwise, at a distance, with arcs around its corners. */
-function rounded(points, radius) {
-  const count = points.length, found = [];
-  const arc = ([x, y], first, turn) => {
-    const steps = 1 + Math.floor(turn / (Math.PI / 12));
-    for (let k = 0; k <= steps; k++) {
-      const angle = first + turn * k / steps;
-      found.push([x + radius * Math.cos(angle), y + radius * Math.sin(angle)]);
-    }
-  };
-  points.forEach((corner, k) => {
-    const [x0, y0, length] = towards(points[(k + count - 1) % count], corner);
-    const [x1, y1] = towards(corner, points[(k + 1) % count]);
-    const turn = Math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1);
-    arc(corner, Math.atan2(-x0, y0), length ? (turn + 2 * Math.PI) % (2 * Math.PI) : 2 * Math.PI);
+    return kept.slice(0, -1);
   });
-  return found;
-}
-
-/* Corners repeated around a circle. */
-function around(pen, { corners, every }, { start, along, length }, size) {
-  const count = Math.max(8, Math.round(2 * Math.PI * length / (every * size))), points = [];
-  const first = Math.atan2(along[1], along[0]);
-  for (let k = 0; k < count; k++) {
-    const c = Math.cos(first + 2 * Math.PI * k / count), s = Math.sin(first + 2 * Math.PI * k / count);
-    for (const corner of corners) {
-      const [side, out] = corner ? [corner[1] * size, length + corner[2] * size] : [];
-      points.push(corner && pen.view.toScreen([start[0] + out * c - side * s, start[1] + out * s + side * c]));
-    }
-  }
-  return points;
 }
 
 function drawShapes(ctx, q, style) {
@@ -270,7 +150,7 @@ function drawShapes(ctx, q, style) {
   ctx.save();
   ctx.globalAlpha = style.alpha ?? 1;
   Object.assign(ctx, { lineJoin: 'round', lineCap: 'round' });
-  for (const mark of drawing.marks) for (const stroke of drawing.shapes[mark.shape]) pen.draw(mark, stroke);
+  drawMarks(pen, drawing);
   ctx.restore();
 }
 
@@ -282,20 +162,24 @@ function fitMarks(motion) {
   const least = (values, from) => values.reduce((a, b) => Math.min(a, b), from);
   for (const mark of marks) {
     if (mark.kind === 'span' && mark.style === 'cylinder') {
-      mark.barrel = BARREL * least(states.map(q => axesOf(q, mark, 'line').length), Infinity);
-    } else if (mark.kind === 'rail') {
-      const over = mark.style === 'guide' || mark.style === 'slot' ? overhang : 0;
-      const along = [...mark.at_least, ...states.map(q => distanceAlong(q, mark))];
+      const [from, to] = [mark.first, mark.second];
+      const lengths = states.map(q => distanceBetween(
+        inWorld(q, from.frame, from.point), inWorld(q, to.frame, to.point)));
+      mark.barrel = BARREL * least(lengths, Infinity);
+    } else if (mark.follower) {
+      const over = mark.style === 'rack' || mark.style === 'face' ? 0 : overhang;
+      const along = [...mark.at_least ?? [0], ...states.map(q => distanceAlong(q, mark))];
       mark.reach = [least(along, Infinity) - over, over - least(along.map(x => -x), Infinity)];
     }
   }
 }
 
 /* How far along a rail its follower is. */
-function distanceAlong(q, { frame, base, axis, follower }) {
-  const [x, y] = inWorld(q, follower.frame, follower.point);
-  const from = inWorld(q, frame, base), to = inWorld(q, frame, [base[0] + axis[0], base[1] + axis[1]]);
-  return (x - from[0]) * (to[0] - from[0]) + (y - from[1]) * (to[1] - from[1]);
+function distanceAlong(q, mark) {
+  const { frame, point: base } = mark.place ?? { frame: mark.frame, point: mark.base }, { axis, follower } = mark;
+  const at = inWorld(q, follower.frame, follower.point);
+  const from = inWorld(q, frame, base), to = inWorld(q, frame, base.map((x, k) => x + axis[k]));
+  return at.reduce((sum, x, k) => sum + (x - from[k]) * (to[k] - from[k]), 0);
 }
 
 /* ---- colours ---- */

@@ -25,9 +25,15 @@ class Card {
       return;
     }
     const elapsed = motion.duration ? (motion.speed * seconds) % motion.duration : 0;
+    const { View, drawShapes } = worldOf(motion.data);
     const view = new View(extent, clientWidth, clientHeight, MARGIN);
     drawShapes(ctx, motion.between(elapsed).q, { view, palette, drawing });
   }
+}
+
+/* What draws a mechanism: in the plane, or in space. */
+function worldOf({ extent }) {
+  return worlds[extent.length / 2];
 }
 
 function startGallery() {
@@ -35,10 +41,11 @@ function startGallery() {
   if (!cards.length) return;
   const isStill = matchMedia('(prefers-reduced-motion: reduce)').matches;
   const atRest = card => (card.motion.data.rest ?? REST) * card.motion.duration / card.motion.speed;
-  let palette = paletteNow(cards[0].motion.data.drawing);
+  const { drawing } = cards[0].motion.data, { paletteNow } = worldOf(cards[0].motion.data);
+  let palette = paletteNow(drawing);
   const drawAll = () => cards.forEach(card => card.draw(atRest(card), palette));
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
-    palette = paletteNow(cards[0].motion.data.drawing);
+    palette = paletteNow(drawing);
     drawAll();
   });
   addEventListener('resize', drawAll);

@@ -15,9 +15,8 @@ class Grab {
     if (!hasMotion() || player.count < 2 || !player.state.isFound) return false;
     const frame = stage.bodyAt([event.offsetX, event.offsetY])?.frame;
     if (!frame || stage.fingers.size > 1) return false;
-    const { q } = player.state, [x, y] = inWorld(q, frame, [0, 0]), angle = angleOf(q, frame);
-    const [c, s] = [Math.cos(angle), Math.sin(angle)], [a, b] = [place[0] - x, place[1] - y];
-    this.held = { frame, point: [c * a + s * b, c * b - s * a], from: [event.clientX, event.clientY], isMoved: false };
+    const held = heldAt(player.state.q, frame, place, stage.view);
+    this.held = { ...held, from: [event.clientX, event.clientY], isMoved: false };
     stage.canvas.setPointerCapture(event.pointerId);
     return true;
   }
@@ -49,7 +48,7 @@ class Grab {
     const { duration } = player, now = Math.abs(player.state.time - player.t[0]);
     const apart = elapsed => {
       const state = player.between(this.within(elapsed));
-      return state.isFound ? towards(inWorld(state.q, this.held.frame, this.held.point), place)[2] : Infinity;
+      return state.isFound ? stage.view.apart(inWorld(state.q, this.held.frame, this.held.point), place) : Infinity;
     };
     const step = duration / (player.count - 1) / FINE, count = Math.ceil(REACH * duration / step);
     let best = now, least = apart(now);
@@ -75,9 +74,9 @@ class Grab {
     const last = player.count - 1, { size, frames } = player.data.drawing;
     if (!player.isFound(0) || !player.isFound(last)) return false;
     const ends = [player.row('q', 0), player.row('q', last)];
-    return frames.every(frame => [[0, 0], [10 * size, 0]].every(point => {
+    return frames.every(frame => [[0, 0], [10 * size, 0], [0, 10 * size]].every(point => {
       const [one, other] = ends.map(q => inWorld(q, frame, point));
-      return towards(one, other)[2] < 0.01 * size;
+      return distanceBetween(one, other) < 0.01 * size;
     }));
   }
 }

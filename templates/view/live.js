@@ -6,64 +6,9 @@
    live.reset()           back to what the page was made with */
 
 const PARTS = 50;  // the mechanism's diagonal in sizes of marks, as in kincompile/view/drawing.py
-const SAME_POINT = 1e-9;  // relative distance up to which two points of a body are one
 const REST = 120;  // milliseconds without a pull after which what takes longer is looked for
 
 /* ---- drawing: numbers that depend on parameters or on the motion ---- */
-
-/* The convex hull of points, counterclockwise; of points on a line its two ends. */
-function hullOf(points) {
-  const turn = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-  const isNear = ([a, b], [x, y]) =>
-    Math.max(Math.abs(a - x), Math.abs(b - y)) <= SAME_POINT * (1 + Math.max(Math.abs(x), Math.abs(y)));
-  const found = points.filter((point, k) => !points.slice(0, k).some(other => isNear(other, point)));
-  const ordered = found.sort(([a, b], [x, y]) => a - x || b - y);
-  if (ordered.length < 3) return ordered;
-  return [ordered, ordered.slice().reverse()].flatMap(chain => {
-    const kept = [];
-    for (const point of chain) {
-      while (kept.length > 1 && turn(kept[kept.length - 2], kept[kept.length - 1], point) <= 0) kept.pop();
-      kept.push(point);
-    }
-    return kept.slice(0, -1);
-  });
-}
-
-/* The points of a mark, each with the frame it is fixed in and how far the mark reaches beyond it. */
-function reachOf(mark) {
-  switch (mark.kind) {
-    case 'wheel': return [[mark.place.frame, mark.place.point, mark.radius]];
-    case 'pin': case 'span': return [mark.first, mark.second].map(({ frame, point }) => [frame, point, 0]);
-    case 'slider': case 'drive': case 'dot': return [[mark.place.frame, mark.place.point, 0]];
-    case 'rail': return mark.reach.map(s =>
-      [mark.frame, [mark.base[0] + s * mark.axis[0], mark.base[1] + s * mark.axis[1]], 0]);
-    default: return mark.points.map(point => [mark.frame, point, 0]);
-  }
-}
-
-/* Smallest x, largest x, smallest y, largest y of all marks over positions. */
-function boxOf(marks, positions) {
-  let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
-  const fixed = new Map();
-  for (const [frame, point, radius] of marks.flatMap(reachOf)) {
-    if (!fixed.has(frame.index)) fixed.set(frame.index, { columns: frame.columns, circles: [] });
-    fixed.get(frame.index).circles.push([point[0], point[1], radius]);
-  }
-  for (const { columns, circles } of fixed.values()) {
-    const isBody = columns.length > 0, [i, j, k] = columns;
-    for (const q of isBody ? positions : positions.slice(0, 1)) {
-      const [x, y, phi] = isBody ? [q[i], q[j], q[k]] : [0, 0, 0], c = Math.cos(phi), s = Math.sin(phi);
-      for (const [xi, eta, radius] of circles) {
-        const a = x + c * xi - s * eta, b = y + s * xi + c * eta;
-        if (a - radius < left) left = a - radius;
-        if (a + radius > right) right = a + radius;
-        if (b - radius < low) low = b - radius;
-        if (b + radius > high) high = b + radius;
-      }
-    }
-  }
-  return left <= right ? [left, right, low, high] : [-1, 1, -1, 1];
-}
 
 /* Give a drawing the numbers that parameters say. */
 function setNumbers(drawing, p) {
@@ -81,7 +26,7 @@ function setNumbers(drawing, p) {
     const widest = Math.max(...mark.points.map(([a, b]) => Math.hypot(a - x, b - y)));
     if (face) face.at_least = [-widest, widest];
   }
-  for (const mark of drawing.marks) if (mark.kind === 'hull') mark.points = hullOf(mark.attached.slice());
+  for (const mark of drawing.marks) if (mark.kind === 'hull') mark.points = hullFor(mark.attached);
 }
 
 /* Make rails, barrels and the sizes of marks fit a motion; returns its extent. */
@@ -92,12 +37,12 @@ function fitDrawing(drawing, motion) {
   const relative = drawing.overhang / drawing.size;
   drawing.overhang = 0;
   fitMarks(motion);
-  const [left, right, low, high] = boxOf(drawing.marks, positions);
-  drawing.size = (Math.hypot(right - left, high - low) || 1) / PARTS;
+  const box = boxOf(drawing.marks, positions);
+  drawing.size = (Math.hypot(...AXES.map((_, k) => box[2 * k + 1] - box[2 * k])) || 1) / PARTS;
   drawing.overhang = relative * drawing.size;
   fitMarks(motion);
-  const [a, b, c, d] = boxOf(drawing.marks, positions), pad = 2 * drawing.size;
-  return [a - pad, b + pad, c - pad, d + pad];
+  const pad = 2 * drawing.size;
+  return boxOf(drawing.marks, positions).map((x, k) => (k % 2 ? x + pad : x - pad));
 }
 
 /* ---- words: as the solver's own messages ---- */

@@ -122,15 +122,10 @@ class NewtonPanel {
 
   /* Bodies anywhere in the picture at any angle; other coordinates within a size or a radian. */
   random() {
-    const [left, right, low, high] = player.data.extent;
     const between = (a, b) => a + (b - a) * Math.random();
     const scale = newton.problem(this.model, this.p).reference;
     const guess = player.data.guess.map((value, k) => value + between(-scale[k], scale[k]));
-    for (const { columns: [x, y, phi] } of player.data.drawing.frames) {
-      guess[x] = between(left, right);
-      guess[y] = between(low, high);
-      guess[phi] = between(-Math.PI, Math.PI);
-    }
+    for (const frame of player.data.drawing.frames) placeAnywhere(guess, frame, player.data.extent, between);
     return guess;
   }
 

@@ -59,16 +59,16 @@ class NewtonStage {
     const bounds = player.data.extent.slice();
     if (this.scene === null || !this.isShown()) return bounds;
     if (this.drag) return this.drag.extent;  // what is dragged must not move by itself
-    const [left, right, low, high] = bounds;
-    const reach = FARTHEST * Math.max(right - left, high - low);
+    const ends = AXES.map((_, k) => [bounds[2 * k], bounds[2 * k + 1]]);
+    const reach = FARTHEST * Math.max(...ends.map(([low, high]) => high - low));
     const around = MARGIN * player.data.drawing.size;
     for (const q of [this.scene.guess, ...this.scene.iterates.map(iterate => iterate.q)]) {
       for (const { frame } of this.handles) {
-        const [x, y] = inWorld(q, frame, [0, 0]);
-        bounds[0] = Math.min(bounds[0], Math.max(x - around, left - reach));
-        bounds[1] = Math.max(bounds[1], Math.min(x + around, right + reach));
-        bounds[2] = Math.min(bounds[2], Math.max(y - around, low - reach));
-        bounds[3] = Math.max(bounds[3], Math.min(y + around, high + reach));
+        const place = inWorld(q, frame, [0, 0]);
+        ends.forEach(([low, high], k) => {
+          bounds[2 * k] = Math.min(bounds[2 * k], Math.max(place[k] - around, low - reach));
+          bounds[2 * k + 1] = Math.max(bounds[2 * k + 1], Math.min(place[k] + around, high + reach));
+        });
       }
     }
     return bounds;
@@ -131,13 +131,13 @@ class NewtonStage {
   }
 
   placeHandle({ frame, link, arm, atOrigin, atKnob }, view) {
-    const q = this.scene.guess, phi = angleOf(q, frame);
+    const q = this.scene.guess, [right, down] = knobOf(q, frame, view);
     const [x, y] = view.toScreen(inWorld(q, frame, [0, 0]));
-    const [knobX, knobY] = [x + KNOB * Math.cos(phi), y - KNOB * Math.sin(phi)];
+    const [knobX, knobY] = [x + KNOB * right, y + KNOB * down];
     const hull = player.data.drawing.marks.find(
       mark => mark.kind === 'hull' && mark.frame.index === frame.index);
     const corners = hull ? hull.points.map(point => view.toScreen(inWorld(q, frame, point))) : [];
-    link.setAttribute('points', corners.join(' '));
+    link.setAttribute('points', (isSpatial ? hullOf(corners) : corners).map(([a, b]) => `${a},${b}`).join(' '));
     for (const circle of atOrigin) setAttributes(circle, { cx: x, cy: y });
     for (const circle of atKnob) setAttributes(circle, { cx: knobX, cy: knobY });
     setAttributes(arm, { x1: x, y1: y, x2: knobX, y2: knobY });
@@ -165,10 +165,10 @@ class NewtonStage {
       const [x, y] = stage.view.toScreen(inWorld(this.scene.guess, frame, [0, 0]));
       const turn = Math.atan2(y - to[1], to[0] - x) - Math.atan2(y - from[1], from[0] - x);
       // The short way, so that whole turns add up.
-      this.change(frame, 0, 0, Math.atan2(Math.sin(turn), Math.cos(turn)));
+      this.change(frame, [0, 0], Math.atan2(Math.sin(turn), Math.cos(turn)));
     } else {
-      const [[x0, y0], [x1, y1]] = [from, to].map(point => stage.view.toWorld(point));
-      this.change(frame, x1 - x0, y1 - y0, 0);
+      const { scale } = stage.view;
+      this.change(frame, [(to[0] - from[0]) / scale, (from[1] - to[1]) / scale], 0);
     }
   }
 
@@ -181,8 +181,8 @@ class NewtonStage {
     const part = event.shiftKey ? 0.1 : 1;
     const step = part * STEP * stage.width / stage.view.scale, turn = part * TURN;
     const change = {
-      ArrowLeft: [-step, 0, 0], ArrowRight: [step, 0, 0], ArrowUp: [0, step, 0],
-      ArrowDown: [0, -step, 0], '+': [0, 0, turn], '=': [0, 0, turn], '-': [0, 0, -turn],
+      ArrowLeft: [[-step, 0], 0], ArrowRight: [[step, 0], 0], ArrowUp: [[0, step], 0],
+      ArrowDown: [[0, -step], 0], '+': [[0, 0], turn], '=': [[0, 0], turn], '-': [[0, 0], -turn],
     }[event.key];
     if (!change) return;
     this.change(frame, ...change);
@@ -190,9 +190,10 @@ class NewtonStage {
     event.stopPropagation();
   }
 
-  change({ columns }, ...moves) {
+  /* Move a body on the screen, to the right and up in lengths of the model, and turn it. */
+  change(frame, way, turn) {
     const guess = this.scene.guess.slice();
-    moves.forEach((value, k) => { guess[columns[k]] += value; });
+    moveBody(guess, frame, way, turn, stage.view);
     this.onGuess(guess);
   }
 }

@@ -30,14 +30,6 @@ function centrode(first, second) {
   });
 }
 
-/* Components of a point of the world in a frame. */
-function inFrame(q, frame, [x, y]) {
-  if (isGround(frame)) return [x, y];
-  const [column_x, column_y, phi] = frame.columns, [dx, dy] = [x - q[column_x], y - q[column_y]];
-  const c = Math.cos(q[phi]), s = Math.sin(q[phi]);
-  return [c * dx + s * dy, c * dy - s * dx];
-}
-
 const poles = {
   pairs: [],  // of frames whose poles are shown
   showsCentrodes: false,

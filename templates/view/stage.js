@@ -46,10 +46,9 @@ class Stage {
 
   resize() {
     this.type = fontSize();
-    const [left, right, low, high] = player.data.extent;
     const width = this.canvas.parentElement.clientWidth;
     const most = Math.max(240, innerHeight - (isProjected() ? 11 : 18) * this.type);
-    const wanted = isProjected() ? most : Math.max(0.45 * width, width * (high - low) / (right - left) + 4 * NEAR);
+    const wanted = isProjected() ? most : Math.max(0.45 * width, width / proportions(player.data.extent) + 4 * NEAR);
     const height = Math.max(220, Math.min(most, wanted));
     const dense = devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
@@ -101,7 +100,7 @@ class Stage {
     pen.stroke(palette.paper, 4);
     pen.stroke(colour, 2);
     // As many as have room, at equal times all the same.
-    const length = dots.reduce((sum, place, k) => (k ? sum + towards(dots[k - 1], place)[2] : 0), 0) * view.scale;
+    const length = dots.reduce((sum, place, k) => (k ? sum + distanceBetween(dots[k - 1], place) : 0), 0) * view.scale;
     const stride = [1, 2, 3, 4, 6, 8, 12].find(each => length * each > APART * dots.length) ?? 24;
     for (let k = 0; k < dots.length; k += stride) {
       pen.circle(view.toScreen(dots[k]), 3);
@@ -153,15 +152,15 @@ class Stage {
 
   /* A ring around the point, and arrows for velocity and acceleration. */
   drawPoint(point, state) {
-    const at = this.view.toScreen(this.where(point, state));
+    const place = this.where(point, state), at = this.view.toScreen(place);
     const pen = new Pen(this.ctx, state.q, this, player.data.drawing.size);
     const rates = ratesInWorld(state, point.frame, point.point);
     const most = greatestRates(point);
-    const length = ARROW * Math.min(this.width, this.height);
+    const length = ARROW * Math.min(this.width, this.height) / this.view.scale;
     for (const kind of ['acceleration', 'velocity']) {
       if (!(most[kind] > 0)) continue;
-      const [x, y] = rates[kind].map(part => part * length / most[kind]);
-      arrow(pen, at, [at[0] + x, at[1] - y], this.palette[kind], 2.5);
+      const end = place.map((x, k) => x + rates[kind][k] * length / most[kind]);
+      arrow(pen, at, this.view.toScreen(end), this.palette[kind], 2.5);
     }
     pen.circle(at, 1.3 * pen.unit);
     pen.stroke(this.palette.velocity, 2);
@@ -182,7 +181,7 @@ class Stage {
   bodyAt(at) {
     const { drawing } = player.data;
     const pen = new Pen(this.ctx, player.state.q, { view: this.view, palette: this.palette }, drawing.size);
-    const found = drawing.frames.findLast(frame => areasOf(pen, frame).some(points => isInside(points, at)));
+    const found = stacked(drawing.frames, player.state.q, this.view).findLast(frame => areasOf(pen, frame).some(points => isInside(points, at)));
     return found ? bodyTarget(found) : null;
   }
 
@@ -198,7 +197,7 @@ class Stage {
     for (const other of [point, ...this.points, ...this.places]) {
       const isOrigin = other.kind === 'origin of the body' && other !== point;
       if (isOrigin && other.frame.index !== point.frame.index) continue;
-      if (towards(at, this.where(other, state))[2] < least && !found.has(other.name)) found.set(other.name, other);
+      if (distanceBetween(at, this.where(other, state)) < least && !found.has(other.name)) found.set(other.name, other);
     }
     return [...found.values()];
   }
@@ -229,14 +228,14 @@ class Stage {
     const zoom = Math.min(CLOSEST, (this.camera?.zoom ?? 1) * factor);
     if (zoom <= 1 && factor < 1) return this.fit();
     const fixed = this.view.toWorld(at), scale = this.view.fit * zoom;
-    const centre = [fixed[0] - (at[0] - this.width / 2) / scale, fixed[1] + (at[1] - this.height / 2) / scale];
-    return this.look({ zoom, centre });
+    const way = this.view.way(-(at[0] - this.width / 2) / scale, (at[1] - this.height / 2) / scale);
+    return this.look({ zoom, centre: fixed.map((x, k) => x + way[k]) });
   }
 
   pan(right, down) {
-    const [x, y] = this.view.toWorld([this.width / 2, this.height / 2]);
-    const { scale } = this.view;
-    this.look({ zoom: this.camera?.zoom ?? 1, centre: [x - right / scale, y + down / scale] });
+    const centre = this.view.toWorld([this.width / 2, this.height / 2]), { scale } = this.view;
+    const way = this.view.way(-right / scale, down / scale);
+    this.look({ zoom: this.camera?.zoom ?? 1, centre: centre.map((x, k) => x + way[k]) });
   }
 
   fit() {
@@ -246,7 +245,7 @@ class Stage {
   look(camera) {
     this.camera = camera;
     // A finger scrolls the page while all is seen, and moves the drawing otherwise.
-    this.canvas.style.touchAction = camera ? 'none' : 'pan-y';
+    this.canvas.style.touchAction = camera || isSpatial ? 'none' : 'pan-y';
     player.refresh();
   }
 
@@ -270,7 +269,7 @@ class Stage {
     canvas.addEventListener('pointermove', event => {
       if (this.fingers.size < 2 && handled('move', event)) return;
       const before = this.fingers.get(event.pointerId);
-      if (before) this.moveFinger(event.pointerId, at(event), pressed);
+      if (before) this.moveFinger(event, at(event), pressed);
       else if (event.pointerType !== 'touch') this.hover(this.targetAt(event));
     });
     const up = event => {
@@ -293,8 +292,8 @@ class Stage {
   }
 
   /* One finger moves the drawing; two move it, and what was between them stays between them. */
-  moveFinger(id, to, pressed) {
-    const from = this.fingers.get(id);
+  moveFinger(event, to, pressed) {
+    const id = event.pointerId, from = this.fingers.get(id);
     const [other] = [...this.fingers].filter(([key]) => key !== id).map(([, place]) => place);
     if (other) {
       const [before, after] = [from, to].map(place => towards(place, other)[2]);
@@ -302,7 +301,8 @@ class Stage {
       this.pan((to[0] - from[0]) / 2, (to[1] - from[1]) / 2);
     } else {
       if (pressed && towards(pressed, to)[2] < CLICK) return;
-      this.pan(to[0] - from[0], to[1] - from[1]);
+      const isTurn = isSpatial && event.buttons === 1 && !event.shiftKey;
+      (isTurn ? orbit : this).pan(to[0] - from[0], to[1] - from[1]);
     }
     this.fingers.set(id, to);
   }
@@ -341,16 +341,7 @@ function middleOf(frame) {
   const own = player.data.drawing.marks.filter(mark => mark.points && mark.frame.index === frame.index);
   const corners = own.flatMap(mark => mark.points);
   if (!corners.length) return [0, 0];
-  return [0, 1].map(axis => corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length);
-}
-
-/* The areas that are drawn of a body. */
-function areasOf(pen, frame) {
-  const { marks, shapes } = player.data.drawing;
-  const own = (mark, stroke) => stroke.is_area && ownerOf(mark, stroke.on).index === frame.index;
-  const isBody = mark => !['pin', 'drive', 'dot'].includes(mark.kind);
-  return marks.filter(isBody).flatMap(mark => shapes[mark.shape].filter(stroke => own(mark, stroke))
-    .map(stroke => pointsOfStroke(pen, mark, stroke)));
+  return AXES.map((_, axis) => corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length);
 }
 
 /* Whether a place is inside a closed polygon: a ray to the right crosses its sides an odd number of times. */
@@ -415,12 +406,15 @@ function pathOf(point) {
    dots of several rounds do not mix. */
 function firstRound(line) {
   if (line.length < 4 || !line[0] || !line[1]) return 1;
-  const [x, y] = towards(line[0], line[1]);
+  const way = (from, to) => to.map((x, k) => x - from[k]);
+  const product = (a, b) => a.reduce((sum, x, k) => sum + x * b[k], 0);
+  const first = way(line[0], line[1]);
   for (let k = 2; k + 1 < line.length; k++) {
     if (!line[k] || !line[k + 1]) return 1;
-    const [u, v, step] = towards(line[k], line[k + 1]), [a, b, way] = towards(line[k], line[0]);
-    const isAlong = u * x + v * y > 0.9 && way * Math.abs(u * b - v * a) < step / 2;
-    const part = way * (u * a + v * b) / step;
+    const step = way(line[k], line[k + 1]), back = way(line[k], line[0]), square = product(step, step);
+    const part = product(step, back) / square, aside = back.map((x, i) => x - part * step[i]);
+    const isAlong = product(step, first) > 0.9 * Math.sqrt(square * product(first, first))
+      && product(aside, aside) < square / 4;
     if (isAlong && part >= 0 && part <= 1) return (k + part) / (line.length - 1);
   }
   return 1;

@@ -108,6 +108,7 @@ const KEYS = {
   0: () => stage.fit(),
   PageUp: () => stage.zoom(1.25),
   PageDown: () => stage.zoom(0.8),
+  ...(isSpatial && orbit.keys),
 };
 const MOVES = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const MOVE = 40;  // pixels that a key moves the drawing
@@ -123,7 +124,8 @@ function connectKeys() {
     const onDrawing = target === stage.canvas;
     const move = event.altKey && onDrawing && MOVES[event.key];
     const isPage = event.key.startsWith('Page') && !onDrawing;
-    const action = move ? () => stage.pan(MOVE * move[0], MOVE * move[1]) : !event.altKey && !isPage && KEYS[event.key];
+    const mover = isSpatial && !event.shiftKey ? orbit : stage;
+    const action = move ? () => mover.pan(MOVE * move[0], MOVE * move[1]) : !event.altKey && !isPage && KEYS[event.key];
     if (isTaken || !action) return;
     event.preventDefault();
     action(event);
@@ -136,13 +138,13 @@ function connectKeys() {
    are such, since the others go in circles. */
 function traceLongest() {
   if (stage.traced.size) return;
-  const pins = player.data.drawing.marks.filter(mark => mark.kind === 'pin');
+  const pins = player.data.drawing.marks.filter(mark => mark.kind === 'pin' || mark.style === 'gap');
   const hung = new Set(pins.filter(pin => isGround(pin.first.frame)).map(pin => pin.second.frame.index));
   const free = stage.points.filter(point => !hung.has(point.frame.index));
   const candidates = free.length ? free : stage.points;
   const length = point => {
     const path = pathOf(point).line.filter(place => place !== null);
-    return path.reduce((sum, place, k) => (k ? sum + towards(path[k - 1], place)[2] : 0), 0);
+    return path.reduce((sum, place, k) => (k ? sum + distanceBetween(path[k - 1], place) : 0), 0);
   };
   const lengths = candidates.map(length), longest = Math.max(...lengths);
   if (longest > player.data.drawing.size) stage.traced.add(candidates[lengths.indexOf(longest)]);
@@ -220,6 +222,7 @@ function start() {
     stage.pointer = new Grab();
     stage.listen();
     tools.build();
+    if (isSpatial) orbit.build();
     traceLongest();
   }
   newtonPanel(byId('panel-newton'));

@@ -121,7 +121,7 @@ async function copied(text) {
 const points = {
   build(panel) {
     const unit = player.data.lengthUnit;
-    const titles = [`x [${unit}]`, `y [${unit}]`, `|v| [${unit}/s]`, `|a| [${unit}/s²]`];
+    const titles = [...AXES.map(axis => `${axis} [${unit}]`), `|v| [${unit}/s]`, `|a| [${unit}/s²]`];
     const table = tableOf(['point', 'path', ...titles, 'what']);
     this.table = table;
     this.rows = [];
@@ -136,7 +136,7 @@ const points = {
     box.addEventListener('change', () => stage.toggleTrace(point));
     const holder = cell('');
     holder.append(box);
-    row.append(cell(point.name, 'th'), holder, cell(''), cell(''), cell(''), cell(''), cell(point.kind));
+    row.append(cell(point.name, 'th'), holder, ...AXES.map(() => cell('')), cell(''), cell(''), cell(point.kind));
     row.addEventListener('pointerenter', () => stage.hover(point));
     row.addEventListener('pointerleave', () => stage.hover(null));
     box.addEventListener('focus', () => stage.hover(point));
@@ -150,17 +150,18 @@ const points = {
     const body = document.createElement('select');
     body.setAttribute('aria-label', 'Body');
     body.append(...player.data.drawing.bodies.map((name, index) => new Option(name, index)));
-    const [xi, eta] = ['xi', 'eta'].map(name => {
+    const local = AXES.map((_, k) => {
+      const name = ['xi', 'eta', 'zeta'][k];
       const input = document.createElement('input');
       Object.assign(input, { type: 'number', step: 'any', value: '0', ariaLabel: name });
       return input;
     });
     const add = document.createElement('button');
     add.textContent = 'Trace this point';
-    form.append('Point of ', body, ' at ', xi, eta, add);
+    form.append('Point of ', body, ' at ', ...local, add);
     form.addEventListener('submit', event => {
       event.preventDefault();
-      const at = [Number(xi.value), Number(eta.value)];
+      const at = local.map(input => Number(input.value));
       const { bodies, frames } = player.data.drawing;
       const name = `${bodies[body.value]} (${at.join(', ')})`;
       const point = { name, kind: 'chosen', frame: frames[body.value], point: at };
@@ -175,13 +176,13 @@ const points = {
     const unit = player.data.lengthUnit;
     for (const { row, box, point } of this.rows) {
       box.checked = stage.traced.has(point);
-      const [x, y] = stage.where(point, state);
+      const place = stage.where(point, state);
       const { velocity, acceleration } = ratesInWorld(state, point.frame, point.point);
-      const values = [x, y, Math.hypot(...velocity), Math.hypot(...acceleration)];
+      const values = [...place, Math.hypot(...velocity), Math.hypot(...acceleration)];
       row.cells[1].style.background = stage.traced.has(point) ? stage.colourOf(point) : '';
       values.forEach((value, k) => {
-        const per = ['', '', '/s', '/s²'][k];
-        row.cells[2 + k].textContent = units.text(k > 1 && !state.isFound ? NaN : value, unit + per);
+        const per = ['/s', '/s²'][k - AXES.length] ?? '';
+        row.cells[2 + k].textContent = units.text(per && !state.isFound ? NaN : value, unit + per);
       });
     }
   },

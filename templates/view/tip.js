@@ -26,29 +26,18 @@ function tipTitle(text) {
 
 /* A point: every name at its place, then its position, velocity and acceleration. */
 function pointTip(point, state) {
-  const unit = player.data.lengthUnit, [x, y] = stage.where(point, state);
+  const unit = player.data.lengthUnit, place = stage.where(point, state);
   const here = stage.together(point, state);
   const names = here.map(({ name, kind }) => tipLine(`${name}: ${kind}`));
-  const lines = [tipLine(`x = ${units.text(x, unit)}, y = ${units.text(y, unit)} ${unit}`)];
+  const lines = [tipLine(`${AXES.map((axis, k) => `${axis} = ${units.text(place[k], unit)}`).join(', ')} ${unit}`)];
   if (state.isFound) {
     const rates = ratesInWorld(state, point.frame, point.point);
     for (const [sign, kind, per] of [['v', 'velocity', '/s'], ['a', 'acceleration', '/s²']]) {
-      const own = unit + per, [a, b] = rates[kind].map(part => units.text(part, own));
-      lines.push(tipLine(`${sign} = (${a}, ${b}), ${units.full(Math.hypot(...rates[kind]), own)}`, kind));
+      const own = unit + per, parts = rates[kind].map(part => units.text(part, own)).join(', ');
+      lines.push(tipLine(`${sign} = (${parts}), ${units.full(Math.hypot(...rates[kind]), own)}`, kind));
     }
   }
   return [tipTitle(here.map(({ name }) => name).join(', ')), ...names, ...lines];
-}
-
-/* A body: its angle and how it turns. */
-function bodyTip({ name, frame }, state) {
-  const [, , phi] = frame.columns, unit = player.data.coordinates[phi].unit;
-  const lines = [tipLine(`φ = ${units.full(state.q[phi], unit)}`)];
-  if (state.isFound) {
-    lines.push(tipLine(`ω = ${units.full(state.q_dot[phi], `${unit}/s`)}`, 'velocity'));
-    lines.push(tipLine(`α = ${units.full(state.q_ddot[phi], `${unit}/s²`)}`, 'acceleration'));
-  }
-  return [tipTitle(name), ' body', ...lines];
 }
 
 /* Beside the point or in a corner: the first place that hides the fewest other points. */

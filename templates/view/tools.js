@@ -29,29 +29,8 @@ const grid = {
 
   draw(ctx, view, palette) {
     const pen = new Pen(ctx, null, { view, palette }, player.data.drawing.size);
-    if (this.isShown) this.drawLines(pen, niceStep(GRID / view.scale));
+    if (this.isShown) drawGrid(pen, niceStep(GRID / view.scale));
     this.drawScale(pen, niceStep(0.12 * stage.width / view.scale));
-  },
-
-  drawLines(pen, step) {
-    const { view, palette, ctx } = pen, { width, height } = stage, unit = player.data.lengthUnit;
-    const [left, low] = view.toWorld([0, height]), [right, high] = view.toWorld([width, 0]);
-    const upright = multiples(step, left, right).map(x => [x, view.toScreen([x, 0])[0]]);
-    const level = multiples(step, low, high).map(y => [y, view.toScreen([0, y])[1]]);
-    const rule = (isAxis, line) => {
-      pen.path(line);
-      pen.stroke(isAxis ? palette.quiet : palette.line, isAxis ? 1.5 : 1);
-    };
-    for (const [x, at] of upright) rule(Math.abs(x) < step / 2, [[at, 0], [at, height]]);
-    for (const [y, at] of level) rule(Math.abs(y) < step / 2, [[0, at], [width, at]]);
-    Object.assign(ctx, { font: stage.font(), fillStyle: palette.quiet, textAlign: 'center', textBaseline: 'top' });
-    for (const [x, at] of upright) if (at > 40 && at < width - 70) ctx.fillText(stepText(x, step), at, 4);
-    ctx.textAlign = 'right';
-    ctx.fillText(`x [${unit}]`, width - 6, 4);
-    Object.assign(ctx, { textAlign: 'left', textBaseline: 'middle' });
-    for (const [y, at] of level) if (at > 40 && at < height - 40) ctx.fillText(stepText(y, step), 5, at);
-    ctx.textBaseline = 'top';
-    ctx.fillText(`y [${unit}]`, 5, 4);
   },
 
   /* A bar of a round length, at the lower right. */
@@ -74,7 +53,7 @@ const measure = {
   down(world) {
     if (!this.isOn) return false;
     const near = stage.near(stage.view.toScreen(world), NEAR);
-    this.take(near ?? { name: '', frame: GROUND, point: world });
+    if (near || !isSpatial) this.take(near ?? { name: '', frame: GROUND, point: world });
     return true;
   },
 
@@ -87,19 +66,21 @@ const measure = {
   found(state) {
     const [a, b, c] = this.points.map(({ frame, point }) => inWorld(state.q, frame, point));
     if (!b) return null;
-    const [x, y] = [b[0] - a[0], b[1] - a[1]];
-    const found = { x, y, distance: Math.hypot(x, y), slope: Math.atan2(y, x) };
+    const way = b.map((x, k) => x - a[k]);
+    const found = { way, distance: Math.hypot(...way), slope: isSpatial ? null : Math.atan2(way[1], way[0]) };
     if (!c) return found;
-    const turn = Math.atan2(c[1] - b[1], c[0] - b[0]) - Math.atan2(a[1] - b[1], a[0] - b[0]);
-    return { ...found, angle: Math.abs(Math.atan2(Math.sin(turn), Math.cos(turn))) };
+    const unit = to => to.map((x, k) => (x - b[k]) / distanceBetween(b, to)), [u, v] = [unit(a), unit(c)];
+    const angle = 2 * Math.atan2(distanceBetween(u, v), Math.hypot(...u.map((x, k) => x + v[k])));
+    return { ...found, angle };
   },
 
   text(state) {
     const found = this.found(state), unit = player.data.lengthUnit;
     if (!found) return this.points.length ? 'Choose a second point.' : 'Choose two points, or three for an angle.';
-    const { x, y, distance, slope, angle } = found;
+    const { way, distance, slope, angle } = found;
     const length = value => units.full(value, unit), turn = value => units.full(value, 'rad', Math.PI);
-    const line = `distance ${length(distance)}, Δx ${length(x)}, Δy ${length(y)}, slope ${turn(slope)}`;
+    const parts = [`distance ${length(distance)}`, ...AXES.map((axis, k) => `Δ${axis} ${length(way[k])}`)];
+    const line = [...parts, ...(slope === null ? [] : [`slope ${turn(slope)}`])].join(', ');
     return angle === undefined ? line : `angle ${turn(angle)}; first ${line}`;
   },
 
@@ -147,10 +128,11 @@ const tools = {
     const acts = { fit: () => stage.fit(), closer: () => stage.zoom(1.4), wider: () => stage.zoom(1 / 1.4) };
     for (const [id, act] of Object.entries(acts)) byId(id).addEventListener('click', act);
     this.buildMeasure();
-    this.buildPoles();
+    if (!isSpatial) this.buildPoles();
     this.buildLegend();
     stage.underlays.push((...given) => grid.draw(...given));
-    stage.overlays.push((...given) => measure.draw(...given), (...given) => poles.draw(...given));
+    stage.overlays.push((...given) => measure.draw(...given));
+    if (!isSpatial) stage.overlays.push((...given) => poles.draw(...given));
     const next = stage.pointer;
     stage.pointer = {
       down: (world, event) => measure.down(world) || next?.down?.(world, event),

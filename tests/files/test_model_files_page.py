@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import kincompile as kc
-from kincompile.files.file_format import FIELDS, PARTS
+from kincompile.files.file_format import FIELDS, IN_SPACE, PARTS
 from kincompile.files.safe_expressions import FUNCTIONS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "model_files.md").read_text(encoding="utf-8")
@@ -31,9 +31,21 @@ def test_that_the_drawing_is_a_shaper(tmp_path):
     np.testing.assert_allclose(feed.time_ratio, (np.pi + swing) / (np.pi - swing), rtol=1e-6)
 
 
+def test_that_the_file_in_space_moves(tmp_path):
+    file = tmp_path / "crossed_cranks.toml"
+    file.write_text(re.findall(r"^```toml\n(.*?)^```", PAGE, re.M | re.S)[2], encoding="utf-8")
+    found = kc.solve(kc.compile(kc.read(file)), np.linspace(0, 1, 11))
+    start = np.array([np.cos(0.3 + 2 * found.t), np.sin(0.3 + 2 * found.t), 0 * found.t])
+    end = np.array([found[f"end.{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(np.linalg.norm(end - start, axis=0), 3, rtol=1e-13)
+    rate = found["end.x_dot"]  # omega x (end - P) along x
+    np.testing.assert_allclose(found["spin"] * end[2], rate, rtol=1e-11)
+
+
 def test_that_each_table_has_its_fields():
     tables = ("model", "analysis", "parameter", "body", "coordinate", "point", "output", "sketch")
-    for fields in (*(FIELDS[table] for table in tables), *PARTS.values()):
+    given = (*(FIELDS[table] for table in tables), *IN_SPACE.values(), *PARTS.values())
+    for fields in given:
         for field in fields:
             assert f"`{field}`" in PAGE
 

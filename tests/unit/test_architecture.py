@@ -39,7 +39,7 @@ GROUND = {name for name, floor in FLOORS.items() if floor == 0}
 RUNTIME = "runtime"
 BOTH_SIDES = {
     *("__init__", "__main__", "compiler", "cli", "spatial"),
-    *("compare", "derivation", "exercises", "verify", "view"),
+    *("compare", "derivation", "design", "exercises", "sweep", "verify", "view"),
 }
 
 # Modules that may import kincompile inside a function. The lazy table of public names is what the
@@ -52,11 +52,13 @@ DEFERRED = {
     "kincompile.cli",
     "kincompile.cli.motion",
     "kincompile.compiler",
+    "kincompile.files.dimensions",
     "kincompile.files.file_format",
     "kincompile.files.model_file",
     "kincompile.ir.lower",
     "kincompile.model.system",
     "kincompile.targets.registry",
+    "kincompile.view.worlds",
 }
 
 Sources = Mapping[str, str]  # module name -> source

@@ -119,7 +119,7 @@ def files(
         "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),
         "outputs": indented(quoted(item.name for item in program.outputs), 2),
         "bodies": indented(wrapped(_bodies(program)), 2),
-        "redundant": ", ".join(str(program.equations.index(name)) for name in program.redundant),
+        "redundant": indented(quoted(program.redundant), 2),
         "corners": str(program.corners).lower(),
         "matrices": indented(_matrices(code), 2),
         "header": WRITE.heading(code),

@@ -179,11 +179,17 @@ def _turning(program: Program) -> list[int]:
     return [k for k, unit in enumerate(units) if unit == "rad" or not (unit or k in owned)]
 
 
+def _independent(program: Program) -> list[int]:
+    """Return the rows that determine the motion: all but those that repeat others."""
+    return [k for k, name in enumerate(program.equations) if name not in program.redundant]
+
+
 def _blocks(code: InlineProgram) -> list[str]:
     """Return rows and columns of the blocks whose determinant may change its sign."""
-    entries = jacobian_entries(code)
+    rows = {row: k for k, row in enumerate(_independent(code.program))}
+    entries = [(rows[i], j, number) for i, j, number in jacobian_entries(code) if i in rows]
     constant = {(row, column) for row, column, number in entries if number is not None}
-    size = len(code.program.equations), len(code.program.coordinates)
+    size = len(rows), len(code.program.coordinates)
     blocks = parts_of([entry[:2] for entry in entries], size).blocks
     return [
         f"{_numbers(block.rows)}, {_numbers(block.columns)};"
@@ -209,6 +215,8 @@ def _script(code: InlineProgram) -> str:
         "header": WRITE.header(code),
         "n": len(program.coordinates),
         "unsolvable": indented(_literal(piece) for piece in pieces(program.unsolvable)),
+        "has_redundant": bool(program.redundant),
+        "AGREEMENT": repr(criteria.AGREEMENT),
         "end": repr(end),
         "points": points,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 1),
@@ -229,6 +237,7 @@ def _assembly(code: InlineProgram) -> str:
         "n": len(program.coordinates),
         "angles": _numbers(angles),
         "may_turn": _numbers(_turning(program)),
+        "independent": _numbers(_independent(program)) if program.redundant else "",
         "blocks": "\n".join(f"    {line}" for line in _blocks(code)),
         **{name: repr(getattr(criteria, name)) for name in CRITERIA},
     }

@@ -12,6 +12,7 @@ import pytest
 import kincompile as kc
 from kincompile.targets.templates import template_root
 from kincompile.view.page import SCRIPTS, STYLES
+from kincompile.view.page_scripts import WORLDS
 
 
 def data_of(html):
@@ -200,7 +201,8 @@ def test_that_every_script_and_style_sheet_is_used():
     folder = template_root() / "view"
     here = {item.name for item in folder.iterdir() if item.name.endswith((".js", ".css"))}
     others = {"gallery.js", "gallery.css", "watch.js"}  # of other pages
-    assert here == {name for name in (*SCRIPTS, *STYLES) if "/" not in name} | others
+    used = {*SCRIPTS, *STYLES, *WORLDS.values()}
+    assert here == used | others
     assert "EventSource" not in kc.page(pendulum()).html
 
 

@@ -17,12 +17,12 @@ from kincompile.view.drawing import drawing
 from kincompile.view.joint_shapes import DRAWINGS
 from kincompile.view.marks import (
     GROUND_FRAME,
+    BodyFrame,
     Contour,
     Drive,
     FramePoint,
     Hull,
     Pin,
-    PlaneFrame,
     Polygon,
     Rail,
     Slider,
@@ -31,9 +31,7 @@ from kincompile.view.marks import (
 )
 
 GROUND = -1
-FRAMES = {GROUND: GROUND_FRAME} | {
-    k: PlaneFrame(k, (3 * k, 3 * k + 1, 3 * k + 2)) for k in range(4)
-}
+FRAMES = {GROUND: GROUND_FRAME} | {k: BodyFrame(k, (3 * k, 3 * k + 1, 3 * k + 2)) for k in range(4)}
 
 
 def at(body, point):
@@ -237,7 +235,7 @@ def test_that_a_body_of_one_joint_goes_to_its_origin():
 
 def test_that_a_frame_is_wherever_in_q_its_columns_are():
     q = np.array([9.0, np.pi / 2, 2.0, 9.0, 1.0])
-    place = FramePoint(PlaneFrame(0, (4, 2, 1)), (3, 4)).at(q)
+    place = FramePoint(BodyFrame(0, (4, 2, 1)), (3, 4)).at(q)
     np.testing.assert_allclose(place, (1 - 4, 2 + 3), atol=1e-12)
 
 

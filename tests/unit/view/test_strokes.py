@@ -10,7 +10,7 @@ import pytest
 
 from kincompile.targets.templates import read
 from kincompile.view.drawing import drawing
-from kincompile.view.marks import Hull, PlaneFrame, Rail, Span
+from kincompile.view.marks import BodyFrame, Hull, Rail, Span
 from kincompile.view.polylines import of_mark, polylines
 from kincompile.view.shapes import LOOKS, SHAPES
 
@@ -39,7 +39,7 @@ def in_the_page():
 
     def evaluated(drawn, positions):
         given = json.dumps({"drawing": drawn.to_json(), "positions": positions.tolist()})
-        program = read("view/draw.js") + PROGRAM
+        program = read("view/draw.js") + read("view/plane.js") + PROGRAM
         done = subprocess.run(
             ["node", "-e", program], input=given, capture_output=True, text=True, check=True
         )
@@ -84,7 +84,7 @@ def test_that_every_stroke_has_a_look():
 
 
 def test_that_a_link_is_wider_than_the_hull_of_its_joints_by_a_size():
-    triangle = Hull(PlaneFrame(0, (0, 1, 2)), ((0.0, 0.0), (4.0, 0.0), (0.0, 3.0)))
+    triangle = Hull(BodyFrame(0, (0, 1, 2)), ((0.0, 0.0), (4.0, 0.0), (0.0, 3.0)))
     (line,) = of_mark(triangle, 0.5)
     points = line.at(np.zeros(3))
     assert line.is_area

@@ -1,0 +1,154 @@
+"""Bodies and points of a model file, in the plane and in space."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import sympy
+
+from kincompile.files.dimensions import PLANE, Dimensions, dimensions
+from kincompile.files.file_format import fields_of
+from kincompile.files.sketch_reader import SketchReader
+from kincompile.model.bodies import GROUND, Body
+from kincompile.names import listed, shown, suggestion
+
+if TYPE_CHECKING:
+    from kincompile.files.data_lines import Address
+    from kincompile.files.data_text import Document
+    from kincompile.model.expressions import Scalars
+    from kincompile.model.points import BodyPoint
+
+Row = dict[str, Any]
+
+
+class BodyReader(SketchReader):
+    """Reads bodies and points, by the names that are known so far.
+
+    Attributes
+    ----------
+    words
+        Whether bodies are in the plane or in space.
+    spins
+        Angular velocities of bodies by name, which may occur in outputs.
+    """
+
+    def __init__(self, document: Document) -> None:
+        super().__init__(document)
+        self.words: Dimensions = dimensions(PLANE)
+        self.spins: dict[str, sympy.Expr] = {}
+        self._taken: dict[tuple[str, str], Address] = {}
+
+    def is_free(self, name: str, address: Address, kind: str = "symbol") -> bool:
+        """Return whether a name is new among its kind, and take it."""
+        if not name:
+            return False
+        other = self._taken.setdefault((kind, name), address)
+        if other is not address:
+            line = self.document.line(other)
+            self.problem((*address, "name"), f"{name!r} is the name in line {line} already")
+        return other is address
+
+    def body(self, address: Address, row: Row) -> Body | None:
+        """Return a body, None where its name is none or another's."""
+        self.has_fields(address, row, fields_of("body", self.words.count))
+        name = self.name(row, address, "a body")
+        read = self._flat if self.words.count == PLANE else self._spatial
+        body, places = read(name, address, row)
+        if not name:
+            return None
+        if name == GROUND.name or name in self.bodies:
+            other = self.bodies.get(name)
+            whose = f"of the body in line {self.document.line(other)}" if other else "of the frame"
+            self.problem((*address, "name"), f"{name!r} is the name {whose} already")
+            return None
+        self.bodies[name] = address
+        for title in (f"body {name!r}", f"Mass {name!r}"):
+            self.remember(title, address)
+        for coordinate, place in zip(body.coordinates, places, strict=True):
+            self.names[coordinate] = sympy.Symbol(coordinate)
+            self.remember(f"guess of {coordinate}", (*address, place))
+        self.spins |= {key: spin for key, spin, _ in body.on_request}
+        self.remember(f"outline of {name}", (*address, "outline"))
+        return body
+
+    def _flat(self, name: str, address: Address, row: Row) -> tuple[Body, tuple[str, ...]]:
+        """Return a body in the plane, and the field that has the guess of each coordinate."""
+        start = self.components(row.get("guess", [0] * 3), (*address, "guess"), "[x, y, phi]")
+        outline = self._outline(row.get("outline", []), (*address, "outline"))
+        heavy: dict[str, Any] = {
+            key: self.expression(row[key], (*address, key), self.names)
+            for key in ("mass", "inertia", "density", "thickness")
+            if key in row
+        }
+        centre = self.place(row, address, "centre")
+        return Body(name, start, outline, centre=centre, **heavy), ("guess",) * 3
+
+    def _spatial(self, name: str, address: Address, row: Row) -> tuple[Body, tuple[str, ...]]:
+        """Return a body in space, and the field that has the guess of each coordinate."""
+        before = len(self.problems)
+        given: dict[str, Any] = {
+            key: self.components(row[key], (*address, key), "[x, y, z]")
+            for key in ("position", "axis", "x", "y", "z")
+            if key in row
+        }
+        if "angle" in row:
+            given["angle"] = self.expression(row["angle"], (*address, "angle"), self.names)
+        if "orientation" in row:
+            place = (*address, "orientation")
+            given["orientation"] = self._orientation(row["orientation"], place)
+        if len(self.problems) > before:  # nothing is said of what stands in its place
+            given.clear()
+        body = self.words.mechanism("").body(name, **given)
+        turned = next((key for key in ("angle", "orientation") if key in row), "name")
+        return body, (*("position",) * 3, *(turned,) * 4)
+
+    def _orientation(self, given: Any, address: Address) -> Any:
+        """Return four Euler parameters, or the three rows of a rotation matrix."""
+        if isinstance(given, list) and len(given) == 3:
+            rows = enumerate(given)
+            return [self.components(row, (*address, k), "[., ., .]") for k, row in rows]
+        return self.components(given, address, "[e0, e1, e2, e3]")
+
+    def components(self, given: Any, address: Address, words: str) -> tuple[Any, ...]:
+        """Return numbers or formulas, as many as the words have: ``[xi, eta]``."""
+        return tuple(self.expressions(given, address, self.names, words, words.count(",") + 1))
+
+    def place(self, row: Row, address: Address, key: str) -> Scalars:
+        """Return a vector of a table in global directions, zeros where it has none."""
+        words = ("[x, y]", "[x, y, z]")[self.words.count - PLANE]
+        return self.components(row.get(key, [0] * self.words.count), (*address, key), words)
+
+    def _outline(self, given: Any, address: Address) -> tuple[Scalars, ...]:
+        """Return the corners of a body's outline."""
+        if not isinstance(given, list):
+            self.problem(address, f"expected a list of corners [xi, eta], not {shown(given)}")
+            return ()
+        return tuple(
+            self.components(corner, (*address, k), "[xi, eta]") for k, corner in enumerate(given)
+        )
+
+    def point(self, address: Address, row: Row) -> BodyPoint | None:
+        """Return a named point; its coordinates may occur in every formula."""
+        complete = self.has_fields(address, row, fields_of("point", self.words.count))
+        name = self.name(row, address, "a point")
+        self.remember(f"point {name!r}", address)
+        body = self.body_name(row.get("body", GROUND.name), (*address, "body"))
+        given = row.get("local", [0] * self.words.count)
+        local = self.components(given, (*address, "local"), self.words.place)
+        if not name or not self.is_free(name, address, "point") or not complete:
+            return None
+        ground = self.words.ground
+        owner = ground if body == ground.name else type(ground)(body)
+        point = self.words.mechanism.point_type(name, owner, local)
+        self.names |= dict(zip(point.output_names, point.coordinates, strict=True))
+        return point
+
+    def body_name(self, given: Any, address: Address) -> str:
+        """Return the name of a body that there is."""
+        if not isinstance(given, str):
+            self.problem(address, f"expected the name of a body, not {shown(given)}")
+        elif given not in self.bodies and given != GROUND.name:
+            near = suggestion(given, self.bodies)
+            known = listed((GROUND.name, *self.bodies))
+            self.problem(address, f"there is no body {shown(given)}{near}; bodies are: {known}")
+        return str(given)

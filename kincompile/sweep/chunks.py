@@ -1,0 +1,99 @@
+"""Chunks on an executor: never more of them under way than are needed to keep it busy."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import FIRST_COMPLETED, wait
+from contextlib import contextmanager
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from kincompile.errors import KincompileError
+from kincompile.sweep.worker import run
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from concurrent.futures import Executor, Future
+
+    from numpy.typing import NDArray
+
+    from kincompile.sweep.plan import Plan
+    from kincompile.sweep.worker import Job
+
+    Values = dict[str, NDArray[Any]] | None
+
+
+class StoppedError(Exception):
+    """The executor, or a worker, could not go on; says which exception that was."""
+
+
+PER_WORKER = 2
+"""Chunks under way for each worker: one that is solved, and one that waits."""
+
+
+def solved(
+    job: Job, plan: Plan, numbers: Iterable[int], executor: Executor | None, pending: int | None
+) -> Iterator[tuple[int, Values]]:
+    """Give the number of each chunk when it is done, with its values if nobody has written them.
+
+    Parameters
+    ----------
+    job, plan
+        What is to be done, and the variants of each chunk.
+    numbers
+        The chunks.
+    executor
+        Where they are solved; None for this process.
+    pending
+        How many are under way at a time; None for twice as many as there are workers.
+    """
+    if executor is None:
+        for number in numbers:
+            yield number, run(job, number, plan.sets(number))
+        return
+    left = iter(numbers)
+    waiting: dict[Future[Values], int] = {}
+    most = pending or PER_WORKER * _workers(executor)
+    try:
+        while True:
+            for number in islice(left, most - len(waiting)):
+                with _of_executor():
+                    future = executor.submit(run, job, number, plan.sets(number))
+                waiting[future] = number
+            if not waiting:
+                return
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                number = waiting.pop(future)
+                with _of_executor():
+                    values = future.result()
+                yield number, values
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+@contextmanager
+def _of_executor() -> Iterator[None]:
+    """Turn what an executor raises, which may be anything, into one exception.
+
+    Raises
+    ------
+    StoppedError
+        Where it is not an error that says itself what to do.
+    """
+    try:
+        yield
+    except KincompileError:
+        raise
+    except Exception as error:
+        name = type(error).__name__
+        raise StoppedError(f"{name}: {error}" if str(error) else name) from error
+
+
+def _workers(executor: Executor) -> int:
+    """Return how many workers an executor has; where it does not say, one for each processor."""
+    for name in ("_max_workers", "num_workers"):
+        found = getattr(executor, name, None)
+        if isinstance(found, int) and found > 0:
+            return found
+    return os.cpu_count() or 1

@@ -1,0 +1,211 @@
+"""What a store holds, whatever its format: arrays with dimensions and units, and their origin."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from kincompile.errors import InputError, package_of_extra
+from kincompile.names import escaped, listed
+from kincompile.runtime.results.columns import TIME_UNIT
+from kincompile.sweep.layout import PENDING, STATUS, TIME, Layout
+from kincompile.sweep.worker import Writer
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    import xarray
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.engine.code import Array
+    from kincompile.sweep.plan import Plan
+    from kincompile.sweep.worker import Job
+
+
+class Store(Writer, Protocol):
+    """Results as they come."""
+
+    IS_SHARED: bool
+    """Whether a worker writes its chunks itself."""
+
+    def done(self) -> NDArray[np.bool_]:
+        """Return which chunks are complete."""
+
+    def read(self, number: int, name: str) -> NDArray[Any]:
+        """Return the values of a chunk that is complete, of one array."""
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the results; those of a Zarr folder are read when they are used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """An array of the results: its dimensions, how long a chunk is along each, type and unit."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    shape: tuple[int, ...]
+    chunk: tuple[int, ...]
+    dtype: type
+    fill: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contents:
+    """What the results of a sweep consist of.
+
+    Attributes
+    ----------
+    name
+        Of the mechanism.
+    plan, layout
+        Its variants, and what is kept of each.
+    t : ndarray, shape (N,)
+        The times.
+    units
+        Of the parameters, by name.
+    marks
+        What decides the numbers, each by its digest: a store with other ones is of another sweep.
+    """
+
+    name: str
+    plan: Plan
+    layout: Layout
+    t: Array
+    units: Mapping[str, str]
+    marks: Mapping[str, str]
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """The arrays that chunks fill, statuses last: where they are, a chunk is complete."""
+        sizes, block = self.plan.sizes, self.plan.block
+        still = tuple(sizes), tuple(sizes.values()), block
+        moving = (*still[0], TIME), (*still[1], self.t.size), (*still[2], self.t.size)
+        found = [
+            Variable(
+                item.name, *(still if item.measure else moving), np.float64, math.nan, item.unit
+            )
+            for item in self.layout.kept
+        ]
+        over = moving if self.layout.over_time else still
+        return (*found, Variable(STATUS, *over, np.int8, PENDING, ""))
+
+    @property
+    def coordinates(self) -> dict[str, tuple[str, Array, str]]:
+        """Of each coordinate of the results its dimension, values and unit."""
+        axes = self.plan.axes()
+        found = {
+            name: (dimension, values, self.units.get(name, ""))
+            for name, (dimension, values) in axes.items()
+        }
+        return {**found, TIME: (TIME, self.t, TIME_UNIT)} if self.layout.over_time else found
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """The mechanism, the values of parameters that are not swept, and the marks."""
+        fixed = zip(self.plan.parameters, self.plan.common.tolist(), strict=True)
+        return {
+            "name": self.name,
+            "parameters": {name: x for name, x in fixed if name not in self.plan.sweep},
+            "sweep": dict(self.marks),
+        }
+
+    def region(self, number: int, name: str) -> tuple[slice, ...]:
+        """Return where a chunk stands in an array."""
+        region, item = self.plan.region(number), self.variable(name)
+        return (*region, slice(None)) if item.dimensions[-1] == TIME else region
+
+    def variable(self, name: str) -> Variable:
+        """Return the array of a name."""
+        return next(item for item in self.variables if item.name == name)
+
+    def blocks(self, number: int, values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        """Return the values of a chunk in the shape of its part of each array, statuses last."""
+        shape, names = self.plan.shape(number), [item.name for item in self.variables]
+        return {name: values[name].reshape(*shape, *values[name].shape[1:]) for name in names}
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays that chunks fill, empty."""
+        return {item.name: np.full(item.shape, item.fill, item.dtype) for item in self.variables}
+
+    def filled(self, store: Store) -> xarray.Dataset:
+        """Return the results of a store, read into memory."""
+        arrays = self.arrays()
+        for number in np.flatnonzero(store.done()).tolist():
+            for name, array in arrays.items():
+                array[self.region(number, name)] = store.read(number, name)
+        return self.dataset(arrays)
+
+    def dataset(self, arrays: Mapping[str, Any]) -> xarray.Dataset:
+        """Return arrays as a dataset with dimensions, coordinates and units."""
+        with package_of_extra("xarray", "tables"):
+            import xarray
+        variables = {
+            item.name: (item.dimensions, arrays[item.name], units(item.unit))
+            for item in self.variables
+        }
+        coordinates = {
+            name: (dimension, values, units(unit))
+            for name, (dimension, values, unit) in self.coordinates.items()
+        }
+        return xarray.Dataset(variables, coords=coordinates, attrs=self.about)
+
+
+def units(unit: str) -> dict[str, str]:
+    """Return the attributes of an array with a unit."""
+    return {"units": unit} if unit else {}
+
+
+def marks_of(job: Job, plan: Plan, given: Array, assembly: int | None) -> dict[str, str]:
+    """Return what decides the numbers of a sweep, each by its digest.
+
+    Of the start that is the guess as it was given, or the number of the assembly: the position that
+    is found from it may differ by rounding on another machine, where a sweep may go on.
+    """
+    sweep = [plan.common.tobytes(), str(plan.is_product).encode()]
+    for name, values in plan.sweep.items():
+        sweep += [name.encode(), values.tobytes()]
+    parts = {
+        "model": (job.sources.digest.encode(),),
+        "parameters": tuple(sweep),
+        "times": (job.t.tobytes(),),
+        "columns and measures": tuple(repr(item).encode() for item in job.layout.kept),
+        "start": (given.tobytes(), str(assembly).encode()),
+        "chunk": (str(plan.most).encode(),),
+    }
+    return {name: _digest(*part) for name, part in parts.items()}
+
+
+def _digest(*parts: bytes) -> str:
+    found = hashlib.sha256()
+    for part in parts:
+        found.update(len(part).to_bytes(8) + part)
+    return found.hexdigest()[:32]
+
+
+def require_same(path: Path, found: object, marks: Mapping[str, str]) -> None:
+    """Refuse a store that has the results of another sweep.
+
+    Raises
+    ------
+    InputError
+        With what is different.
+    """
+    shown = escaped(path)
+    if not isinstance(found, dict):
+        raise InputError(
+            f"{shown} is there, and no sweep wrote it: give another name, or remove it."
+        )
+    other = [name for name, mark in marks.items() if found.get(name) != mark]
+    if other:
+        raise InputError(
+            f"{shown} holds another sweep: {listed(other)} "
+            f"{'differs' if len(other) == 1 else 'differ'}. Give another name for this one, remove "
+            "that store, or go on with it as it was begun."
+        )

@@ -1,0 +1,148 @@
+"""What a sweep keeps of each variant: columns over time, measures, statuses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.errors import InputError
+from kincompile.names import listed, suggestion
+from kincompile.runtime.results.columns import TIME_UNIT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.results.solution import Solution
+
+TIME, STATUS = "t", "status"
+
+PENDING = -1
+"""The status of what has not been solved yet."""
+
+MEASURES = (
+    "least", "t_least", "greatest", "t_greatest", "stroke", "period", "time_ratio", "mean", "rms",
+)  # fmt: skip
+"""What can be kept of an output, as `sol.measures()` calls it."""
+
+OF_TIME = ("t_least", "t_greatest", "period")
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A number that is kept: a column, or a measure of an output.
+
+    Attributes
+    ----------
+    name, unit
+        What it is called in the results, for instance ``x_foot_stroke``, and its unit.
+    column
+        The column, or the output that is measured.
+    measure
+        One of `MEASURES`; "" of a column over time.
+    """
+
+    name: str
+    unit: str
+    column: str
+    measure: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """All that is kept, and whether statuses are those of points or of whole motions."""
+
+    kept: tuple[Kept, ...]
+
+    @property
+    def over_time(self) -> bool:
+        """Whether there are columns over time."""
+        return any(not item.measure for item in self.kept)
+
+    def values(self, solution: Solution) -> dict[str, NDArray[np.generic]]:
+        """Return what is kept of the variants of a solution: (B, N) over time, else (B,)."""
+        found: dict[str, NDArray[np.generic]] = {
+            item.name: solution[item.column] for item in self.kept if not item.measure
+        }
+        measured = [item for item in self.kept if item.measure]
+        for item in measured:
+            found[item.name] = np.full(len(solution.q), np.nan)
+        for number in np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else ():
+            measures = solution.variant(number).measures()
+            for item in measured:
+                value = getattr(measures[item.column], item.measure)
+                if value is not None:
+                    found[item.name][number] = value
+        status = solution.status
+        if not self.over_time:  # the first that is not good says what happened
+            first = np.argmax(~solution.good, axis=1)
+            status = status[np.arange(len(status)), first]
+        found[STATUS] = status.astype(np.int8)
+        return found
+
+
+def read_layout(
+    solution: Solution, columns: Sequence[str] | None, measures: Sequence[str]
+) -> Layout:
+    """Read what is to be kept.
+
+    Parameters
+    ----------
+    solution
+        One position of the mechanism, which knows its columns.
+    columns
+        Names of columns; None for all outputs, of a model without any all coordinates, unless there
+        are measures.
+    measures
+        Of outputs, as ``"foot.x.stroke"``.
+
+    Raises
+    ------
+    InputError
+        With every name that means nothing.
+    """
+    problems: list[str] = []
+    if columns is None:
+        columns = () if measures else solution.observed.names or solution.coordinates
+    kept: dict[str, Kept] = {}
+    for name in columns:
+        try:
+            column = solution.column(name)
+        except InputError as error:
+            problems += error.problems
+        else:
+            kept[column.name] = Kept(column.name, column.unit, column.name)
+    for name in measures:
+        try:
+            item = _measure(solution, name)
+        except InputError as error:
+            problems += error.problems
+        else:
+            kept[item.name] = item
+    if not kept and not problems:
+        problems.append("nothing is kept: name columns, or measures such as 'foot.x.stroke'.")
+    if problems:
+        raise InputError(problems)
+    return Layout(tuple(kept.values()))
+
+
+def _measure(solution: Solution, given: str) -> Kept:
+    """Read a measure, such as ``foot.x.stroke``."""
+    output, _, measure = given.rpartition(".")
+    if measure not in MEASURES or not output:
+        near = suggestion(measure, MEASURES) or "."
+        raise InputError(
+            f"there is no measure {given!r}{near} Write the output and what is measured of it, "
+            f"such as 'foot.x.stroke'; there are {listed(MEASURES)}."
+        )
+    column = solution.column(output)
+    if column.name not in solution.observed.names:
+        raise InputError(
+            f"{given!r}: {column.name} is no output, and measures are those of outputs. There are "
+            f"{listed(solution.observed.names)}: name a point or an output in the model."
+        )
+    unit = TIME_UNIT if measure in OF_TIME else "" if measure == "time_ratio" else column.unit
+    return Kept(f"{column.name}_{measure}", unit, column.name, measure)

@@ -1,0 +1,121 @@
+"""Which parameter sets a sweep solves, and how they are cut into chunks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from kincompile.runtime.engine.code import Array
+
+NUMBERS = 4_000_000
+"""Numbers of q, q_dot and q_ddot that a chunk has where its size is not given: 32 MB."""
+
+MOST = 2000
+"""Variants of a chunk where its size is not given."""
+
+VARIANT = "variant"
+"""The dimension of parameter sets that are not a grid."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The variants of a sweep, in chunks.
+
+    Attributes
+    ----------
+    parameters
+        Names of the k parameters of the module.
+    common : ndarray, shape (k,)
+        Values of those that are not swept.
+    sweep
+        Arrays of values, by the names of the parameters that are swept.
+    is_product
+        Whether every value of one goes with every value of the others; else they go in pairs.
+    most
+        Largest number of variants in a chunk.
+    """
+
+    parameters: tuple[str, ...]
+    common: Array
+    sweep: Mapping[str, Array]
+    is_product: bool
+    most: int
+
+    @cached_property
+    def sizes(self) -> dict[str, int]:
+        """The dimensions of the results and how long they are, without time."""
+        if self.is_product or len(self.sweep) == 1:
+            return {name: values.size for name, values in self.sweep.items()}
+        return {VARIANT: next(iter(self.sweep.values())).size}
+
+    @cached_property
+    def block(self) -> tuple[int, ...]:
+        """How long a chunk is along each dimension: consecutive variants, the last one fastest."""
+        left, found = self.most, list[int]()
+        for size in reversed(self.sizes.values()):
+            found.append(max(1, min(size, left)))
+            left = left // size
+        return tuple(reversed(found))
+
+    @cached_property
+    def chunks(self) -> tuple[int, ...]:
+        """How many chunks there are along each dimension."""
+        pairs = zip(self.sizes.values(), self.block, strict=True)
+        return tuple(-(-size // length) for size, length in pairs)
+
+    @property
+    def variants(self) -> int:
+        """How many variants there are."""
+        return math.prod(self.sizes.values())
+
+    def __len__(self) -> int:
+        """Return the number of chunks."""
+        return math.prod(self.chunks)
+
+    def place(self, number: int) -> tuple[int, ...]:
+        """Return where a chunk stands among the chunks along each dimension."""
+        return tuple(map(int, np.unravel_index(number, self.chunks)))
+
+    def region(self, number: int) -> tuple[slice, ...]:
+        """Return which variants a chunk has along each dimension."""
+        parts = zip(self.place(number), self.block, self.sizes.values(), strict=True)
+        return tuple(slice(k * n, min((k + 1) * n, size)) for k, n, size in parts)
+
+    def shape(self, number: int) -> tuple[int, ...]:
+        """Return how long a chunk is along each dimension; the last ones are shorter."""
+        return tuple(part.stop - part.start for part in self.region(number))
+
+    def axes(self) -> dict[str, tuple[str, Array]]:
+        """Return of each swept parameter its dimension and its values along that."""
+        first = next(iter(self.sizes))
+        return {
+            name: (name if name in self.sizes else first, values)
+            for name, values in self.sweep.items()
+        }
+
+    def swept(self, number: int) -> Sequence[Array]:
+        """Return the values of the swept parameters in the variants of a chunk, (B,) each."""
+        region, dimensions = self.region(number), tuple(self.sizes)
+        parts = [values[region[dimensions.index(name)]] for name, values in self.axes().values()]
+        grid = np.meshgrid(*parts, indexing="ij") if len(self.sizes) > 1 else parts
+        return [values.ravel() for values in grid]
+
+    def sets(self, number: int) -> Array:
+        """Return the parameters of the variants of a chunk, shape (B, k)."""
+        values = self.swept(number)
+        found = np.tile(self.common, (values[0].size, 1))
+        for name, column in zip(self.sweep, values, strict=True):
+            found[:, self.parameters.index(name)] = column
+        return found
+
+
+def chunk_size(coordinates: int, times: int) -> int:
+    """Return how many variants a chunk has where nobody says: so many that memory is bounded."""
+    return max(1, min(MOST, NUMBERS // (3 * max(coordinates, 1) * times)))

@@ -1,0 +1,76 @@
+"""Where the results of a sweep are kept: in memory, or in a folder that grows chunk by chunk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.errors import InputError
+from kincompile.names import escaped, listed
+from kincompile.sweep.parquet_store import ParquetStore
+from kincompile.sweep.zarr_store import ZarrStore
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    import xarray
+    from numpy.typing import NDArray
+
+    from kincompile.sweep.contents import Contents, Store
+
+
+class Memory:
+    """Results that are kept in this process."""
+
+    IS_SHARED = False
+
+    def __init__(self, contents: Contents) -> None:
+        self._contents = contents
+        self._done = np.zeros(len(contents.plan), dtype=bool)
+        self._arrays = contents.arrays()
+
+    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
+        """Keep the values of a chunk, by name."""
+        for name, block in self._contents.blocks(number, values).items():
+            self._arrays[name][self._contents.region(number, name)] = block
+        self._done[number] = True
+
+    def done(self) -> NDArray[np.bool_]:
+        """Return which chunks are complete."""
+        return self._done
+
+    def read(self, number: int, name: str) -> NDArray[Any]:
+        """Return the values of a chunk, of one array."""
+        found: NDArray[Any] = self._arrays[name][self._contents.region(number, name)]
+        return found
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the results."""
+        return self._contents.dataset(self._arrays)
+
+
+STORES: dict[str, type[ZarrStore | ParquetStore]] = {".zarr": ZarrStore, ".parquet": ParquetStore}
+"""Kinds of folders, by ending."""
+
+
+def open_store(path: str | os.PathLike[str] | None, contents: Contents) -> Store:
+    """Return the store of a sweep: begun now, or as an earlier run has left it.
+
+    Raises
+    ------
+    InputError
+        If the path does not say which kind it is, holds something else, or cannot be written to.
+    UnsupportedError
+        If the package that writes it is not installed.
+    """
+    if path is None:
+        return Memory(contents)
+    kind = STORES.get(Path(path).suffix)
+    if kind is None:
+        raise InputError(
+            f"cannot keep a sweep in {escaped(path)}: end its name in {listed(STORES)}."
+        )
+    return kind.opened(Path(path).absolute(), contents)

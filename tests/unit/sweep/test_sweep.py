@@ -1,0 +1,166 @@
+"""Sweeps give the numbers of the closed form, with dimensions, units and statuses."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import kincompile as kc
+from kincompile.sweep.plan import Plan
+from tests.unit.sweep.models import TIMES, crank, files_of, folding
+
+LENGTHS = np.array([0.2, 0.5, 0.9, 1.1, 1.7])
+SPEEDS = np.array([0.5, 1.0, 2.5])
+
+
+def sweep(model=None, p=None, **options):
+    """Sweep the crank over the grid of lengths and speeds, by NumPy, unless told otherwise."""
+    p = {"a": LENGTHS, "omega": SPEEDS} if p is None else p
+    options = {"product": True, "target": "numpy"} | options
+    return kc.sweep(model or crank(), p, **options)
+
+
+@pytest.mark.parametrize("chunk", [1, 2, 4, 15, 100])
+def test_a_grid_has_an_axis_for_each_parameter_and_the_numbers_of_the_closed_form(chunk):
+    found = sweep(columns=["tip.x", "tip.y_dot"], chunk=chunk).to_xarray()
+    assert dict(found.sizes) == {"a": 5, "omega": 3, "t": 9}
+    a, omega, t = LENGTHS[:, None, None], SPEEDS[:, None], TIMES
+    np.testing.assert_allclose(found["x_tip"], a * np.cos(omega * t), atol=1e-13)
+    np.testing.assert_allclose(found["y_tip_dot"], a * omega * np.cos(omega * t), atol=1e-13)
+    assert found["x_tip"].attrs["units"] == "m"
+    assert found["y_tip_dot"].attrs["units"] == "m/s"
+    assert (found["status"] == 0).all()
+
+
+def test_samples_go_in_pairs_and_are_coordinates():
+    found = sweep(p={"a": LENGTHS, "omega": LENGTHS}, product=False, columns=["x_tip"]).to_xarray()
+    assert found["x_tip"].dims == ("variant", "t")
+    expected = LENGTHS[:, None] * np.cos(LENGTHS[:, None] * TIMES)
+    np.testing.assert_allclose(found["x_tip"], expected, atol=1e-13)
+    np.testing.assert_array_equal(found.coords["omega"], LENGTHS)
+
+
+def test_measures_are_those_of_a_solution():
+    found = sweep(measures=["tip.x.stroke", "tip.y.t_greatest", "tip.x.mean"]).to_xarray()
+    assert dict(found.sizes) == {"a": 5, "omega": 3}
+    module = kc.compile(crank())
+    one = kc.solve(module, TIMES, {"a": 0.9, "omega": 2.5}).measures()
+    at = found.sel(a=0.9, omega=2.5)
+    assert float(at["x_tip_stroke"]) == one["tip.x"].stroke
+    assert float(at["y_tip_t_greatest"]) == pytest.approx(np.pi / 5)
+    assert float(at["x_tip_mean"]) == pytest.approx(0.9 * np.sin(5) / 5)
+    assert found["y_tip_t_greatest"].attrs["units"] == "s"
+
+
+def test_what_cannot_be_assembled_is_a_status_and_disturbs_nobody():
+    b = np.array([1.0, 0.1, 1.2])
+    found = sweep(folding(), {"b": b}, columns=["angle"], measures=["angle.mean"])
+    status, data = found.to_xarray()["status"].values, found.to_xarray()
+    assert (status[[0, 2]] == 0).all()
+    assert status[1].tolist() == [1, 4, 4, 4, 4]
+    assert np.isfinite(data["angle"].values[[0, 2]]).all()
+    assert np.isnan(data["angle_mean"].values).tolist() == [False, True, False]
+    assert found.statuses() == {"CONVERGED": 10, "NOT_CONVERGED": 1, "NOT_REACHED": 4}
+    assert "3 variants x 5 times; points: 10 CONVERGED, 1 NOT_CONVERGED" in str(found)
+
+
+def test_of_measures_alone_the_status_is_that_of_the_motion():
+    found = sweep(folding(), {"b": [1.0, 0.1]}, measures=["angle.mean"])
+    assert found.to_xarray()["status"].values.tolist() == [0, 1]
+
+
+def test_all_chunks_start_in_the_assembly_of_the_first_set():
+    b = np.linspace(0.8, 1.2, 9)
+    short = -np.arcsin(np.sin(0.3 + np.linspace(0, 0.1, 5)) / b[:, None])
+    options = {"model": folding(), "p": {"b": b}, "columns": ["angle"]}
+    for assembly in (1, 2):
+        for chunk in (1, 2, 9):
+            angle = sweep(**options, assembly=assembly, chunk=chunk)["angle"].values
+            np.testing.assert_allclose(np.sin(angle), np.sin(short), atol=1e-12)
+            assert np.ptp(np.sign(np.cos(angle))) == 0
+    far = sweep(**options, guess={"two.phi": 3.4, "two.x": 1})["angle"].values
+    np.testing.assert_allclose(far, np.pi - short, atol=1e-12)
+
+
+def test_the_outputs_are_kept_where_nothing_is_named():
+    assert list(sweep().to_xarray().data_vars) == ["x_tip", "y_tip", "status"]
+
+
+@pytest.mark.parametrize("kind", [ProcessPoolExecutor, ThreadPoolExecutor])
+def test_an_executor_changes_no_bit(kind):
+    alone = sweep(columns=["x_tip"], chunk=2)
+    with kind(2) as executor:
+        found = sweep(columns=["x_tip"], chunk=2, executor=executor)
+    assert found.to_xarray().identical(alone.to_xarray())
+
+
+def test_c_gives_the_numbers_too(quick_compiler):
+    found = sweep(columns=["tip.x"], target="c")
+    expected = LENGTHS[:, None, None] * np.cos(SPEEDS[:, None] * TIMES)
+    np.testing.assert_allclose(found["tip.x"], expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("ending", ["zarr", "parquet"])
+@pytest.mark.parametrize("product", [True, False])
+def test_a_folder_has_the_results_and_their_units(ending, product, tmp_path):
+    store = tmp_path / f"a.{ending}"
+    p = {"a": LENGTHS, "omega": SPEEDS if product else LENGTHS}
+    kept = {"p": p, "columns": ["x_tip"], "measures": ["tip.x.rms"], "chunk": 2}
+    found = sweep(**kept, product=product, store=store)
+    memory = sweep(**kept, product=product).to_xarray()
+    data = found.to_xarray().load()
+    assert data.equals(memory)
+    assert set(data.coords) == set(memory.coords)
+    assert data["x_tip_rms"].attrs["units"] == "m"
+    assert found.statuses() == {"CONVERGED": memory["x_tip"].size}
+
+
+def test_a_parquet_folder_is_a_table_for_others(tmp_path):
+    store = tmp_path / "a.parquet"
+    found = sweep(columns=["x_tip"], measures=["tip.x.rms"], chunk=2, store=store).to_xarray()
+    table = pd.read_parquet(store)
+    assert list(table) == ["a", "omega", "t", "x_tip", "x_tip_rms", "status"]
+    again = table.set_index(["a", "omega", "t"]).to_xarray()
+    np.testing.assert_array_equal(again["x_tip"], found["x_tip"])
+    only = sweep(measures=["tip.x.rms"], store=tmp_path / "b.parquet").to_xarray()
+    assert list(pd.read_parquet(tmp_path / "b.parquet")) == ["a", "omega", "x_tip_rms", "status"]
+    np.testing.assert_array_equal(only["x_tip_rms"], found["x_tip_rms"])
+
+
+@pytest.mark.parametrize("ending", ["zarr", "parquet"])
+def test_what_is_done_is_not_done_again(ending, tmp_path):
+    store, calls = tmp_path / f"a.{ending}", []
+    options = {"columns": ["x_tip"], "chunk": 2, "store": store}
+
+    class StopError(Exception):
+        pass
+
+    def stop(done, total):
+        if done >= 6:
+            raise StopError
+
+    with pytest.raises(StopError):
+        sweep(**options, progress=stop)
+    before = files_of(store)
+    place = store / "x_tip" / "c" / "0" / "0" if ending == "zarr" else store
+    (place / (".part" * (ending == "parquet") + "0.123.partial")).write_bytes(b"half")
+    sweep(**options, progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(done, 15) for done in (6, 8, 9, 11, 12, 14, 15)]
+    after = files_of(store)
+    assert after.items() >= before.items()
+    sweep(columns=["x_tip"], chunk=2, store=tmp_path / f"b.{ending}")
+    assert files_of(tmp_path / f"b.{ending}") == after
+
+
+@pytest.mark.parametrize(
+    ("sizes", "most"), [((7,), 3), ((5, 4), 6), ((5, 4), 3), ((2, 3, 4), 24), ((3, 1, 5), 1)]
+)
+def test_chunks_cover_every_variant_once_in_order(sizes, most):
+    names = "abc"[: len(sizes)]
+    sweep = {n: np.arange(float(size)) for n, size in zip(names, sizes, strict=True)}
+    plan = Plan(tuple(names), np.zeros(len(sizes)), sweep, True, most)
+    sets = np.concatenate([plan.sets(number) for number in range(len(plan))])
+    assert all(len(plan.sets(number)) <= most for number in range(len(plan)))
+    grid = np.meshgrid(*sweep.values(), indexing="ij")
+    assert sets.tolist() == np.column_stack([x.ravel() for x in grid]).tolist()
