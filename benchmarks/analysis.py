@@ -42,7 +42,7 @@ def main(points: int) -> None:
     """Measure and print."""
     before, targets = machine.load(), []
     for linkage in LINKAGES:
-        analyses, skipped = build(linkage, points)
+        analyses, skipped = build(linkage, points, builders())
         times = measure(analyses, linkage.times(points))
         print_table(
             f"{linkage.name}, {points} points, {len(linkage.guess)} coordinates",
@@ -85,12 +85,14 @@ def kincompile(linkage: Linkage, target: str) -> Analysis:
     return analyse
 
 
-def build(linkage: Linkage, points: int) -> tuple[dict[str, Analysis], dict[str, str]]:
+def build(
+    linkage: Linkage, points: int, contenders: Builders
+) -> tuple[dict[str, Analysis], dict[str, str]]:
     """Build all contenders, run each once, and require that their motions agree."""
     analyses: dict[str, Analysis] = {}
     skipped: dict[str, str] = {}
     times, wanted = linkage.times(points), None
-    for name, builder in builders().items():
+    for name, builder in contenders.items():
         try:
             analysis = builder(linkage)
             motion = analysis(times)

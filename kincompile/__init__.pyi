@@ -10,6 +10,9 @@ from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
 from kincompile.derivation.derivation import derivation as derivation
+from kincompile.design.deviation import Deviation as Deviation
+from kincompile.design.tolerance import tolerance as tolerance
+from kincompile.design.tolerance_analysis import ToleranceAnalysis as ToleranceAnalysis
 from kincompile.errors import AssemblyWarning as AssemblyWarning
 from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
 from kincompile.errors import ContractError as ContractError
@@ -60,6 +63,9 @@ from kincompile.runtime.results.write import write as write
 from kincompile.runtime.singular.assemblies import assemblies as assemblies
 from kincompile.runtime.singular.events import Event as Event
 from kincompile.runtime.solve import solve as solve
+from kincompile.runtime.statics.equilibrium import Equilibrium as Equilibrium
+from kincompile.runtime.statics.equilibrium import equilibria as equilibria
+from kincompile.runtime.statics.equilibrium import equilibrium as equilibrium
 from kincompile.runtime.status import Status as Status
 from kincompile.runtime.times import times_at as times_at
 from kincompile.sweep.result import Sweep as Sweep

@@ -21,7 +21,7 @@ import warnings
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -264,13 +264,13 @@ def _loadable(target: str, system: ConstraintSystem, form: str | None) -> str:
 
 def emit_loadable(
     model: Mechanism | ConstraintSystem, target: str
-) -> tuple[Emitted, Mapping[str, str]]:
-    """Return the files from which another process makes the module that `compile` gives.
+) -> tuple[str, str, Mapping[str, NDArray[Any]], Mapping[str, str]]:
+    """Return what another process makes the module from that `compile` gives.
 
     Returns
     -------
-    Emitted
-        The NumPy module.
+    str, str, mapping
+        Name, text and arrays of the NumPy module.
     mapping
         The files of C that replace its functions, text by name; none for ``target="numpy"``.
     """
@@ -279,7 +279,8 @@ def emit_loadable(
         target = _loadable(target, system, None)
         code = _lowered(system, None)
         native = emit_program(target, code).files if target == "c" else {}
-        return emit_program("numpy", code), native
+        emitted = emit_program("numpy", code)
+        return system.name, emitted.source, emitted.arrays, native
 
 
 def _joint_points(system: ConstraintSystem) -> ModuleType:

@@ -51,7 +51,7 @@ def require(package: Any, name: str) -> None:
 
 def derived(linkage: Linkage) -> textbook.Derived:
     """Return Phi, Phi_q, nu and gamma of a mechanism as SymPy derives them from Phi."""
-    n = 3 * len(linkage.bodies)
+    n = len(linkage.guess)
     q, q_dot = ([sympy.Symbol(f"{name}{k}") for k in range(n)] for name in ("q", "w"))
     p = [sympy.Symbol(name) for name in linkage.parameters]
     rows = linkage.residual(sympy, q, textbook.t, p)

@@ -522,9 +522,11 @@ INLINE void solve_at(const double (*restrict F)[LANES],
 static void solve_of_strip(const strip *at, double (*right)[LANES], double (*to)[LANES],
     size_t count)
 {
+    double b[M][LANES], x[N][LANES];  // no other pointer leads there: the loop takes several lanes
+    memcpy(b, right, sizeof b);
     for (size_t lane = 0; lane < count; lane++)
-        solve_at((const double (*)[LANES])at->F, (const double (*)[LANES])right, to,
-            lane);
+        solve_at((const double (*)[LANES])at->F, (const double (*)[LANES])b, x, lane);
+    memcpy(to, x, sizeof x);
 }
 
 // Copy numbers of `count` points, from point `start` on, into rows; what is not finite shows in

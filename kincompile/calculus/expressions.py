@@ -207,6 +207,8 @@ class Rotation(Protocol):
     names: ClassVar[tuple[str, ...]]
     symbols: ClassVar[tuple[str, ...]]
     """Names and symbols of the entries."""
+    formula: ClassVar[str]
+    """A in them or in the coordinates, for a comment."""
 
     @property
     def coordinates(self) -> tuple[Expression, ...]:

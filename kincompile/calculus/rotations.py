@@ -34,6 +34,7 @@ class PlaneRotation:
     letters: ClassVar[str] = "AB"
     names: ClassVar[tuple[str, ...]] = ("cos", "sin")
     symbols: ClassVar[tuple[str, ...]] = ("c", "s")
+    formula: ClassVar[str] = "[[c, -s], [s, c]]"
     constraints: ClassVar[tuple[Scalar, ...]] = ()
 
     @property

@@ -36,7 +36,7 @@ def command(
     """Compare the formulas in HAND with those derived from MODEL.
 
     HAND is a TOML or JSON file, or lines such as "Phi_q = [[1, 0, cos(phi)], ...]", with any of
-    Phi, Phi_q, nu and gamma. Its formulas are parsed, never run. The exit code is 0 where all
+    Phi, Phi_q, nu, gamma, M and Q. Its formulas are parsed, never run. The exit code is 0 where all
     entries are accepted: equal, equal up to a convention that is named, or, in nu and gamma, equal
     on the constraint manifold; 1 where one is not.
     """

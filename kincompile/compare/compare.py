@@ -4,6 +4,7 @@ generated   the formulas the compiler derives, evaluated at random states   refe
 written     the formulas of the author: texts, arrays, functions            written.py, hand_file.py
 match       rows, columns, signs, scales that conventions leave open        matching.py, layouts.py
 agree       entry by entry: equal, equal on the manifold, different         comparer.py
+            M and Q, which are sums over masses and loads                   load_comparer.py
 diagnose    the fault of the catalogue that gives the numbers that differ   diagnosis.py, *fault*.py
 report      entries with verdicts, for people and for machines              report.py
 
@@ -17,13 +18,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kincompile.compare.comparer import Comparer
+from kincompile.compare.comparer import NUMBERS, Comparer
+from kincompile.compare.comparison import Verdict
 from kincompile.compare.conventions import stated_signs
 from kincompile.compare.hand_file import read_hand_file
 from kincompile.compare.layouts import expected_widths, usual_layout
-from kincompile.compare.reference import QUANTITIES, Reference, Subject
+from kincompile.compare.load_comparer import LoadComparer
+from kincompile.compare.reference import COMPARED, OF_LOADS, QUANTITIES, Reference, Subject
+from kincompile.compare.report import Report
 from kincompile.compare.states import given_states
-from kincompile.compare.written import TOLD, read_written, vocabulary
+from kincompile.compare.written import MATRICES, TOLD, read_written, vocabulary
 from kincompile.errors import InputError
 from kincompile.names import listed
 
@@ -34,7 +38,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from kincompile.compare.reference import ConstraintBlock
-    from kincompile.compare.report import Report
     from kincompile.compare.states import States
     from kincompile.compare.written import Written
     from kincompile.model.mechanism import Mechanism
@@ -47,6 +50,8 @@ def compare(
     Phi_q: object = None,
     nu: object = None,
     gamma: object = None,
+    M: object = None,
+    Q: object = None,
     *,
     constraint: str | None = None,
     aliases: Mapping[str, object] | None = None,
@@ -54,19 +59,21 @@ def compare(
     states: Mapping[str, ArrayLike] | None = None,
     strict: bool = False,
 ) -> Report:
-    r"""Compare hand-derived Phi, Phi_q, nu and gamma with the generated ones.
+    r"""Compare hand-derived Phi, Phi_q, nu, gamma, M and Q with the generated ones.
 
     :math:`\Phi_q \dot q = \nu = -\Phi_t` and :math:`\Phi_q \ddot q = \gamma = -(\Phi_q \dot q)_q
-    \dot q - 2 \Phi_{qt} \dot q - \Phi_{tt}` (Haug, section 3.1).
+    \dot q - 2 \Phi_{qt} \dot q - \Phi_{tt}` (Haug, section 3.1); :math:`M \ddot q + \Phi_q^T
+    \lambda = Q` (section 6.3), where weight and the forces of inertia that are quadratic in the
+    rates belong to Q.
 
     Parameters
     ----------
     model
         The mechanism or system; a `Reference` made of it, where many are compared with one model.
-    Phi, Phi_q, nu, gamma
+    Phi, Phi_q, nu, gamma, M, Q
         At least one, derived by hand: text such as ``[[1, 0, 0.25*cos(phi3)], ...]``, nested lists
         of numbers, texts and SymPy expressions, a SymPy matrix, an array, or a function ``f(q, t)``
-        (of gamma ``f(q, q_dot, t)``), which may take the parameters p as a last argument.
+        (of gamma and Q ``f(q, q_dot, t)``), which may take the parameters p as a last argument.
     constraint
         Name of the one constraint that is checked alone. Phi_q then has the columns of the whole
         system, or of the constraint's bodies, i before j.
@@ -96,7 +103,7 @@ def compare(
     """
     reference = model if isinstance(model, Reference) else Reference(model)
     block = None if constraint is None else reference.block(constraint)
-    given = {"Phi": Phi, "Phi_q": Phi_q, "nu": nu, "gamma": gamma}
+    given = {"Phi": Phi, "Phi_q": Phi_q, "nu": nu, "gamma": gamma, "M": M, "Q": Q}
     written = _read(reference, block, given, aliases or {}, at_states=states is not None)
     subject = Subject(reference, block, _states(reference, written, states))
     return _compared(subject, written, stated_signs(conventions or {}), strict)
@@ -159,12 +166,37 @@ def _compared(
     subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float], strict: bool
 ) -> Report:
     """Compare at the given states, and where something differs at others that may explain it."""
-    best = Comparer(subject, written, signs, strict)
+    of_equations, of_loads = (
+        {name: item for name, item in written.items() if name in names}
+        for names in (QUANTITIES, OF_LOADS)
+    )
+    if not of_equations:
+        return _of_loads(subject, of_loads, strict)
+    best = Comparer(subject, of_equations, signs, strict)
     for states, convention in best.other_states():
-        other = Comparer(replace(subject, states=states), written, signs, strict, convention)
+        other = Comparer(replace(subject, states=states), of_equations, signs, strict, convention)
         if other.wrong_count < best.wrong_count:
             best = other
-    return best.report()
+    report = best.report()
+    if not of_loads:
+        return report
+    added = _of_loads(subject, of_loads, strict)
+    conventions = dict.fromkeys((*report.conventions, *added.conventions))
+    return replace(report, entries=report.entries + added.entries, conventions=tuple(conventions))
+
+
+def _of_loads(subject: Subject, written: Mapping[str, Written], strict: bool) -> Report:
+    """Compare M and Q; where numbers may stand for parameters, at their default values too."""
+    reference, states = subject.reference, subject.states
+    best, conventions = LoadComparer(reference, written, states, strict), []
+    if best.wrong_count and states is reference.random and reference.defaults.size:
+        fixed = states.with_default_parameters(reference.defaults)
+        other = LoadComparer(reference, written, fixed, strict)
+        if other.wrong_count < best.wrong_count:
+            best, conventions = other, [NUMBERS]
+    right = Verdict.CONVENTION if conventions else Verdict.EQUAL
+    entries = tuple(best.entries(right))
+    return Report(reference.system.name, None, entries, tuple(conventions))
 
 
 def _read(
@@ -177,7 +209,9 @@ def _read(
     """Read all quantities, or raise all problems at once."""
     given = {name: value for name, value in given.items() if value is not None}
     if not given:
-        raise InputError(f"there is nothing to compare: give at least one of {listed(QUANTITIES)}.")
+        raise InputError(f"there is nothing to compare: give at least one of {listed(COMPARED)}.")
+    if any(name in OF_LOADS for name in given):
+        _require_loads(reference, block)
     words = vocabulary(reference, aliases)
     written: dict[str, Written] = {}
     problems: list[str] = []
@@ -197,14 +231,31 @@ def _shape_problems(
     reference: Reference, block: ConstraintBlock | None, name: str, rows: int, columns: int
 ) -> list[str]:
     names = reference.equations if block is None else block.constraint.equation_names
+    names = reference.coordinates if name in OF_LOADS else names
     found = []
     if rows != len(names):
         found.append(
             f"{name} has {rows} rows; expected {len(names)}, one for each of: {listed(names, 60)}"
         )
+    if name == "M" and columns != len(names):
+        found.append(f"M has {columns} columns; expected {len(names)}, as many as rows")
     if name == "Phi_q" and usual_layout(reference, block, columns) is None:
         widths = expected_widths(reference, block)
         found.append(f"Phi_q has {columns} columns; expected {widths}")
-    if name != "Phi_q" and columns != 1:
+    if name not in MATRICES and columns != 1:
         found.append(f"{name} has {columns} columns; it is a vector: expected one")
     return found
+
+
+def _require_loads(reference: Reference, block: ConstraintBlock | None) -> None:
+    """Refuse M and Q of a mechanism that has none, and of one constraint."""
+    if block is not None:
+        raise InputError(
+            f"M and Q are those of the whole system, not of {block.constraint.name!r}: leave "
+            "constraint out."
+        )
+    if not reference.system.loads:
+        raise InputError(
+            f"{reference.system.name} has no masses and no forces, so that M and Q are zero: give "
+            "its bodies masses, m.body(..., mass=..., inertia=...), or add loads."
+        )

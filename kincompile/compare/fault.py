@@ -41,6 +41,7 @@ PHI_TT = "Phi_tt missing"
 WITH_RATES = "rates where none belong"
 SAME_SPACE = "row spaces agree"
 OTHER_FORM = "follows from another Phi"
+WITHOUT = "counted as zero"
 COUPLING = "coupling 2 w (r_j_dot - r_i_dot) missing"
 SQUARES = "w_j^2 - w_i^2 for (w_j - w_i)^2"
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.compare.matrix_text import Cell, Rows, split_matrix
 from kincompile.compare.notation import plain
-from kincompile.compare.reference import QUANTITIES
+from kincompile.compare.reference import COMPARED
 from kincompile.errors import InputError, ModelError
 from kincompile.files.content import decoded, file_content
 from kincompile.files.data_text import MAX_PROBLEMS, read_json, read_toml
@@ -48,7 +48,7 @@ class HandFile:
     name
         Name of the file.
     quantities
-        Rows of elements by quantity: Phi, Phi_q, nu, gamma.
+        Rows of elements by quantity: Phi, Phi_q, nu, gamma, M, Q.
     aliases
         The author's own names, each with its expression.
     constraint
@@ -98,7 +98,7 @@ class _Draft:
 
     def unknown(self, name: str, place: TextPlace) -> None:
         """Add the problem of a key that means nothing."""
-        keys = (*QUANTITIES, "constraint", "aliases", "conventions")
+        keys = (*COMPARED, "constraint", "aliases", "conventions")
         hint = suggestion(name, keys)
         self.problem(place, f"there is no quantity {shown(name)}{hint}; expected: {listed(keys)}")
 
@@ -107,7 +107,7 @@ class _Draft:
         if not self._problems and not self._quantities:
             self.problem(
                 TextPlace(),
-                f"the file compares nothing; give at least one of: {listed(QUANTITIES)}",
+                f"the file compares nothing; give at least one of: {listed(COMPARED)}",
             )
         if self._problems:
             raise InputError(self._problems)
@@ -122,10 +122,10 @@ def read_hand_file(path: str | os.PathLike[str]) -> HandFile:
     Parameters
     ----------
     path
-        A ``.json`` or ``.toml`` file with the keys Phi, Phi_q, nu, gamma (each a text as one writes
-        it, or lists of numbers and texts), constraint (a name), aliases (a table of names and
-        expressions) and conventions (``nu = "Phi_t"``, ``gamma = "left side"``); or any other text
-        file with lines ``Name = [[...], ...]``, where further names are aliases.
+        A ``.json`` or ``.toml`` file with the keys Phi, Phi_q, nu, gamma, M, Q (each a text as one
+        writes it, or lists of numbers and texts), constraint (a name), aliases (a table of names
+        and expressions) and conventions (``nu = "Phi_t"``, ``gamma = "left side"``); or any other
+        text file with lines ``Name = [[...], ...]``, where further names are aliases.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def _from_lines(file: Path, content: bytes) -> HandFile:
                 draft.problem(
                     places[offset],
                     f"expected 'name = value', found {line.strip()[:40]!r}; names are "
-                    f"{listed(QUANTITIES)}, and your own for aliases",
+                    f"{listed(COMPARED)}, and your own for aliases",
                 )
             offset += len(line) + 1
     return draft.finished()
@@ -201,7 +201,7 @@ def _add_statement(
 ) -> None:
     if section == "conventions":
         draft.conventions[name] = value.strip()
-    elif name in QUANTITIES:
+    elif name in COMPARED:
         draft.add_matrix(name, value, place)
     elif section is None and name == "constraint":
         draft.constraint = value.strip()
@@ -238,7 +238,7 @@ def _from_data(name: str, document: Document) -> HandFile:
     places = TextPlaces(document.text)
     for key, value in document.data.items():
         locate = _Locator(document, places, (key,))
-        if key in QUANTITIES:
+        if key in COMPARED:
             _add_data(draft, key, value, locate)
         elif key == "constraint" and isinstance(value, str):
             draft.constraint = value

@@ -40,6 +40,12 @@ Kept = TypeVar("Kept")
 
 QUANTITIES = tuple(item.name for item in quantities.OF_EQUATIONS)
 
+OF_LOADS = ("M", "Q")
+"""What is compared of a mechanism with masses and loads, besides."""
+
+COMPARED = (*QUANTITIES, *OF_LOADS)
+"""All that is compared."""
+
 ASIDE = 0.4
 """How far from the guess the states lie that are brought onto the manifold, in sizes."""
 
@@ -131,8 +137,16 @@ class Reference:
         """The rows as SymPy expressions, which people read."""
         return assemble(self.system)
 
+    @cached_property
+    def _of_loads(self) -> dict[str, sympy.ImmutableDenseMatrix]:
+        """M and Q, which people read."""
+        return {"M": self.system.M, "Q": self.system.Q}
+
     def expression(self, quantity: str, row: int, column: int) -> sympy.Expr:
         """Return an entry as a SymPy expression."""
+        if quantity in OF_LOADS:
+            found: sympy.Expr = self._of_loads[quantity][row, column]
+            return found
         if quantity == "Phi_q":
             entry = self._rows[row].Phi_q.get(self.coordinates[column], 0)
         else:
@@ -156,7 +170,8 @@ class Reference:
         if states not in self._values:
             with np.errstate(all="ignore"):
                 found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
-            self._values[states] = Values(dict(zip(QUANTITIES, found, strict=False)))
+            names = [item.name for item in self.program.quantities]
+            self._values[states] = Values(dict(zip(names, found, strict=True)))
         return self._values[states]
 
     @cached_property

@@ -41,6 +41,9 @@ MAX_SIZE = 1_000_000
 
 TOLD = ""
 """A problem that was told before: all that a quantity has are names unknown elsewhere too."""
+MATRICES, MOVING = ("Phi_q", "M"), ("gamma", "Q")
+"""Quantities with a column for each coordinate, and those that depend on rates."""
+
 _NO_ACCELERATIONS = "accelerations are the unknowns of Phi_q q_ddot = gamma; no formula holds them"
 
 
@@ -267,11 +270,11 @@ def read_written(
     Parameters
     ----------
     quantity
-        Phi, Phi_q, nu or gamma.
+        Phi, Phi_q, nu, gamma, M or Q.
     given
         Text, rows of `Cell`, nested lists of numbers, texts and SymPy expressions, a SymPy matrix,
-        a NumPy array, or a function ``f(q, t)`` (of gamma: ``f(q, q_dot, t)``), which may also take
-        the parameters as a last argument.
+        a NumPy array, or a function ``f(q, t)`` (of gamma and Q: ``f(q, q_dot, t)``), which
+        may also take the parameters as a last argument.
     words
         The names that formulas may use.
     reference
@@ -295,7 +298,7 @@ def read_written(
         return _from_function(quantity, given, reference)
     rows = _rows(quantity, given)
     _check_rectangular(quantity, rows)
-    if quantity != "Phi_q" and len(rows) == 1:
+    if quantity not in MATRICES and len(rows) == 1:
         rows = [[cell] for cell in rows[0]]
     if problems := shape_problems(len(rows), len(rows[0])):
         raise InputError(problems)
@@ -400,7 +403,7 @@ def _no_texts(shape: tuple[int, ...]) -> Texts:
 def _from_array(quantity: str, given: Array, at_states: bool) -> Written:
     """Return an array that holds everywhere, or one with the given states along its first axis."""
     array = given.astype(float)
-    if quantity != "Phi_q":
+    if quantity not in MATRICES:
         array = array.reshape(*(array.shape if at_states else (-1,)), 1)
     if at_states and array.ndim == 2:
         array = array[None]
@@ -431,7 +434,7 @@ def _from_array(quantity: str, given: Array, at_states: bool) -> Written:
 
 
 def _from_function(quantity: str, function: Callable[..., object], reference: Reference) -> Written:
-    names = ("q", "q_dot", "t") if quantity == "gamma" else ("q", "t")
+    names = ("q", "q_dot", "t") if quantity in MOVING else ("q", "t")
     count = _positional_count(function)
     if count is not None and count < len(names):
         raise InputError(f"{quantity}: the function takes {count} arguments; expected {names}.")
@@ -443,7 +446,7 @@ def _from_function(quantity: str, function: Callable[..., object], reference: Re
         arguments = [np.copy(getattr(states, name)[k])[()] for name in names]
         arguments += [states.p[k].copy()] if takes_parameters else []
         value = np.asarray(function(*arguments), dtype=float)
-        return value if quantity == "Phi_q" else value.reshape(-1, 1)
+        return value if quantity in MATRICES else value.reshape(-1, 1)
 
     def evaluate(states: States) -> tuple[Array, Array]:
         with np.errstate(all="ignore"):

@@ -10,15 +10,21 @@ factorization, shared by all right sides.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import Constant, Graph, Node
+from kincompile.ir.orientations import name_of, orientations_of, sampled, small_rotations
 from kincompile.structure.blocks import Block, block_triangular
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.orientations import Orientation
 
 Matrix = dict[int, dict[int, int]]
 """Nodes of the entries by row and column."""
@@ -63,9 +69,15 @@ class SolvePlan:
     solution: tuple[int, ...]
 
     @property
+    def has_choices(self) -> bool:
+        """Whether rows change places: there is a block of more than three, not solved by LAPACK."""
+        sizes = (len(block.rows) for block in self.blocks)
+        return any(LARGEST_CLOSED_FORM < size <= LARGEST_PIVOTED for size in sizes)
+
+    @property
     def has_large_blocks(self) -> bool:
         """Whether there is a block that LAPACK solves."""
-        return any(len(block.rows) > LARGEST_CLOSED_FORM for block in self.blocks)
+        return any(len(block.rows) > LARGEST_PIVOTED for block in self.blocks)
 
 
 def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan | None:
@@ -78,7 +90,15 @@ def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan |
     equations, redundant = code.program.equations, code.program.redundant
     size = len(equations), len(code.program.coordinates)
     left_out = frozenset(equations.index(name) for name in redundant)
-    return plan_entries(*size, jacobian_entries(code), left_out=left_out, is_straight=is_straight)
+    orientations = orientations_of(code.program)
+    return plan_entries(
+        *size,
+        jacobian_entries(code),
+        left_out=left_out,
+        is_straight=is_straight,
+        orientations=orientations,
+        states=sampled(code) if orientations else {},
+    )
 
 
 def jacobian_entries(code: InlineProgram) -> list[tuple[int, int, Constant | None]]:
@@ -93,17 +113,20 @@ def plan_entries(
     *,
     left_out: Collection[int] = (),
     is_straight: bool = False,
+    orientations: Sequence[Orientation] = (),
+    states: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> SolvePlan | None:
     """Plan the solve of a matrix given by its entries, each a number or, where it varies, None.
 
-    Rows that are left out are inputs that nothing reads.
+    Rows that are left out are inputs that nothing reads. Where there are `orientations`, `states`
+    are values of the inputs.
     """
     graph = Graph()
     matrix: Matrix = {row: {} for row in range(row_count)}
     varying = []
     for row, column, value in entries:
         if value is None:
-            matrix[row][column] = graph.input(f"Phi_q[{row}, {column}]")
+            matrix[row][column] = graph.input(name_of(row, column))
             varying.append((row, column, matrix[row][column]))
         else:
             matrix[row][column] = graph.const(value)
@@ -112,22 +135,28 @@ def plan_entries(
     for row in left_out:
         del matrix[row]
     pivots, eliminated = _eliminate(graph, matrix, right)
+    rotations = small_rotations(graph, orientations, states or {}, column_count, matrix, right)
     rows = sorted(matrix)
-    columns = sorted(set(range(column_count)) - {pivot.column for pivot in pivots})
+    settled = {pivot.column for pivot in pivots}.union(*(item.columns for item in rotations))
+    columns = sorted(set(range(column_count)) - settled)
+    columns += [column for item in rotations for column in item.turns]
+    solution = {column: node for item in rotations for column, node in item.solution.items()}
     if len(rows) != len(columns):
         return None
-    pattern = [(row, column) for row in rows for column in sorted(matrix[row])]
+    pattern = [(row, k) for row in rows for k in sorted(matrix[row].keys() - solution.keys())]
     blocks = block_triangular(rows, columns, pattern)
     if blocks is None:
         return None
-    solution: dict[int, int] = {}
     determinants: list[int] = []
     for block in blocks:
-        is_small = len(block.rows) <= LARGEST_CLOSED_FORM
-        solve = _eliminate_block if is_straight and not is_small else _solve_block
+        is_large = len(block.rows) > LARGEST_PIVOTED
+        solve = _eliminate_block if is_straight and is_large else _solve_block
         determinants += solve(graph, block, matrix, right, solution)
+        for item in rotations:
+            if not item.is_finished and solution.keys() >= set(item.turns):
+                item.finish(matrix, solution)
     _substitute(graph, pivots, eliminated, right, solution)
-    if len(solution) < column_count:
+    if not solution.keys() >= set(range(column_count)):
         return None
     return SolvePlan(
         tuple(graph.nodes),
@@ -136,7 +165,7 @@ def plan_entries(
         tuple(pivots),
         blocks,
         tuple(determinants),
-        tuple(solution[column] for column in sorted(solution)),
+        tuple(solution[column] for column in range(column_count)),
     )
 
 
@@ -223,7 +252,11 @@ def _solve_block(
     size = len(block.rows)
     a = [[matrix[row].get(column, zero) for column in block.columns] for row in block.rows]
     b = [_remainder(graph, matrix[row], block.columns, right[row], solution) for row in block.rows]
-    if size > LARGEST_CLOSED_FORM:
+    if LARGEST_CLOSED_FORM < size <= LARGEST_PIVOTED:
+        x, pivots = _pivoted(graph, a, b)
+        solution |= zip(block.columns, x, strict=True)
+        return [pivots]
+    if size > LARGEST_PIVOTED:
         entries = [node for row in a for node in row]
         for k, column in enumerate(block.columns):
             solution[column] = graph.linear("solve", size, k, (*entries, *b))
@@ -236,6 +269,36 @@ def _solve_block(
             total = graph.add(total, graph.mul(cofactor, value))
         solution[column] = graph.mul(total, inverse)
     return [determinant]
+
+
+def _pivoted(graph: Graph, a: list[list[int]], b: list[int]) -> tuple[list[int], int]:
+    """Return x of a x = b by elimination with partial pivoting, and the determinant of a.
+
+    Rows change places by choices, not by branches, so that many points are solved at once.
+    """
+    size, determinant = len(a), graph.const(1)
+    inverses = []
+    for k in range(size):
+        for i in range(k + 1, size):
+            is_larger = graph.compare("<", graph.square(a[k][k]), graph.square(a[i][k]))
+            choose = partial(graph.select, is_larger)
+            pairs = [(choose(y, x), choose(x, y)) for x, y in zip(a[k][k:], a[i][k:], strict=True)]
+            a[k][k:], a[i][k:] = (list(row) for row in zip(*pairs, strict=True))
+            b[k], b[i] = choose(b[i], b[k]), choose(b[k], b[i])
+            determinant = choose(graph.neg(determinant), determinant)
+        determinant = graph.mul(determinant, a[k][k])
+        inverses.append(graph.div(graph.const(1), a[k][k]))
+        for i in range(k + 1, size):
+            factor = graph.mul(a[i][k], inverses[k])
+            for j in range(k + 1, size):
+                a[i][j] = graph.sub(a[i][j], graph.mul(factor, a[k][j]))
+            b[i] = graph.sub(b[i], graph.mul(factor, b[k]))
+    x = list(b)
+    for k in reversed(range(size)):
+        for j in range(k + 1, size):
+            x[k] = graph.sub(x[k], graph.mul(a[k][j], x[j]))
+        x[k] = graph.mul(x[k], inverses[k])
+    return x, determinant
 
 
 def _eliminate_block(
@@ -253,6 +316,8 @@ def _eliminate_block(
 
 LARGEST_CLOSED_FORM = 3
 """Blocks up to this size are solved by their adjugate, as Cramer's rule does."""
+LARGEST_PIVOTED = 6
+"""Blocks up to this size are eliminated in straight-line code, larger ones by LAPACK."""
 
 
 def _adjugate(graph: Graph, a: list[list[int]]) -> tuple[list[list[int]], int]:

@@ -70,7 +70,8 @@ def observing_forces(code: InlineProgram, *, is_planned: bool = True) -> Program
         springs pull with. There are no rates. None where there is no planned elimination.
     """
     program, graph = code.program, Graph(code.nodes)
-    plan = plan_solve(code, is_straight=True) if is_planned and not program.redundant else None
+    is_square = not program.redundant and not program.unsolvable
+    plan = plan_solve(code, is_straight=True) if is_planned and is_square else None
     if is_planned and plan is None:
         return None
     first: list[_Row] = []

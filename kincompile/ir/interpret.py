@@ -21,13 +21,22 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
+
+def angle(y: Any, x: Any) -> Any:
+    """Return arctan2 of y and x, continued to complex numbers."""
+    if not (np.iscomplexobj(y) or np.iscomplexobj(x)):
+        return np.arctan2(y, x)
+    b, a = np.real(y), np.real(x)
+    return np.arctan2(b, a) + np.arctan((y * a - x * b) / (x * a + y * b))
+
+
 BINARY: Mapping[str, Callable[[Any, Any], Any]] = {
     "add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv,
     "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
     "==": operator.eq, "!=": operator.ne, "&": np.logical_and, "|": np.logical_or,
 }  # fmt: skip
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2,
+    "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": angle,
     "asinh": np.arcsinh, "acosh": np.arccosh, "atanh": np.arctanh, "pow": np.power,
 }  # fmt: skip
 
@@ -61,7 +70,7 @@ def interpret(
     """
     q, q_dot = np.asarray(q), np.asarray(q_dot)
     q_ddot = 0 * q if q_ddot is None else np.asarray(q_ddot)
-    values = run(program.values, _inputs(program, (q, q_dot, q_ddot), t, p), program.tables)
+    values = run(program.values, inputs_of(program, (q, q_dot, q_ddot), t, p), program.tables)
 
     shape = q.shape[:-1]
     dtype = np.result_type(q, q_dot, q_ddot, t, float)
@@ -87,7 +96,7 @@ def interpret(
     return tuple(found)
 
 
-def _inputs(program: Program, states: Sequence[Array], t: Any, p: Any) -> dict[str, Any]:
+def inputs_of(program: Program, states: Sequence[Array], t: Any, p: Any) -> dict[str, Any]:
     """Return the values of the inputs by name; `states` are q, q_dot and q_ddot."""
     values = [item.default for item in program.parameters] if p is None else p
     names = (item.name for item in program.parameters)
@@ -152,17 +161,18 @@ def run(
     """Evaluate straight-line code and return the value of every node."""
     values: list[Any] = []
     for operation, *operands in nodes:
-        values.append(_apply(operation, operands, values, inputs, tables))
+        values.append(apply(operation, operands, values, inputs, tables))
     return values
 
 
-def _apply(
+def apply(
     operation: str,
     operands: list[Any],
     values: list[Any],
     inputs: Mapping[Any, Any],
     tables: Mapping[str, SplineTable],
 ) -> Any:
+    """Evaluate one operation on the values of nodes before it."""
     match operation, operands:
         case "const", [number]:
             return float(number)

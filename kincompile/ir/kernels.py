@@ -187,7 +187,9 @@ def frame_kernel(own: Frame) -> FrameKernel:
     }
     new = graph.instantiate(environment.graph.nodes, numbers)
     entries = tuple(new[item.node] for item in found)
-    return FrameKernel(tuple(graph.nodes), entries, own.letters, own.rotation.symbols)
+    return FrameKernel(
+        tuple(graph.nodes), entries, own.letters, own.rotation.symbols, own.rotation.formula
+    )
 
 
 @cache

@@ -100,12 +100,15 @@ class FrameKernel:
         Nodes of what it gives.
     letters, symbols
         Letters of the coordinates, and symbols of the entries: ``c`` and ``s``.
+    formula
+        The matrix A, for a comment.
     """
 
     nodes: tuple[Node, ...]
     entries: tuple[int, ...]
     letters: tuple[str, ...]
     symbols: tuple[str, ...]
+    formula: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import depending_on
+from kincompile.ir.orientations import name_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -34,7 +36,7 @@ class StraightSolve:
 
     def __init__(self, graph: Graph, code: InlineProgram, plan: SolvePlan) -> None:
         self._graph, self._plan = graph, plan
-        self._given = {f"Phi_q[{x.row}, {x.column}]": x.node for x in code.entries("Phi_q")}
+        self._given = {name_of(x.row, x.column): x.node for x in code.entries("Phi_q")}
         self._solved = self._planned([graph.input(("b", row)) for row in range(len(plan.right))])
         self._moving = depending_on(plan.nodes, plan.right)
         self.determinants = [self._solved[node] for node in plan.determinants]
@@ -76,6 +78,9 @@ class StraightSolve:
                 shares = ((a, graph.neg(amount)),)
             case "mul", a, b:
                 shares = ((a, graph.mul(amount, new[b])), (b, graph.mul(new[a], amount)))
+            case "select", condition, a, b:
+                nothing, choose = graph.const(0), partial(graph.select, new[condition])
+                shares = ((a, choose(amount, nothing)), (b, choose(nothing, amount)))
             case "div", a, b:
                 shares = ((a, graph.div(amount, new[b])),)
         yield from ((node, share) for node, share in shares if node in self._moving)

@@ -173,11 +173,18 @@ def _joint_rows(joint: Joint) -> list[EquationRow]:
 
 def _entries(system: CheckedSystem, quantity: str) -> Iterator[tuple[int, int, sympy.Expr]]:
     """Yield row, column and value of what each load adds to M or to Q."""
-    places = {item.name: k for k, item in enumerate(system.coordinates)}
     for load in system.loads:
-        expansion = Expansion(SymbolicEnvironment(load))
-        columns = [None if name is None else places[name] for name in load.columns]
-        for row, column, value in load.entries(quantity):
-            at, by = columns[row], columns[column] if quantity == "M" else 0
-            if at is not None and by is not None:
-                yield at, by, expansion.scalar(value)
+        yield from load_entries(system, load, quantity)
+
+
+def load_entries(
+    system: CheckedSystem, load: AppliedLoad, quantity: str
+) -> Iterator[tuple[int, int, sympy.Expr]]:
+    """Yield row, column and value of what a load adds to M or to Q."""
+    places = {item.name: k for k, item in enumerate(system.coordinates)}
+    expansion = Expansion(SymbolicEnvironment(load))
+    columns = [None if name is None else places[name] for name in load.columns]
+    for row, column, value in load.entries(quantity):
+        at, by = columns[row], columns[column] if quantity == "M" else 0
+        if at is not None and by is not None:
+            yield at, by, expansion.scalar(value)

@@ -180,10 +180,13 @@ def read_inputs(
     method: str | None = None,
     through: str | None = None,
     product: bool | None = None,
+    *,
+    may_move: bool = False,
 ) -> Inputs:
     """Check all inputs of the solver and bring them into the form in which it uses them.
 
-    There may be several parameter sets unless `product` is None.
+    There may be several parameter sets unless `product` is None, and degrees of freedom that no
+    equation determines with `may_move`.
 
     Raises
     ------
@@ -209,7 +212,8 @@ def read_inputs(
     sweep = dict(given.sweep)
     sets = None if problems else given.parameters(module.PARAMETERS, values[1])
     code = code_of(module)
-    require_square(code)
+    if not may_move:
+        require_square(code)
     if method == "grid" and code.lanes is None:
         problems.append(
             f"{code.name} goes from point to point, as all mechanisms in the grouped form do: use "

@@ -265,7 +265,7 @@ def problem(
     place, probe = np.abs(q), probe_of(m)
     floor = float(ROUNDING * (place[~angular] / size).max(initial=0.0))
     equations = Problem(code, engine, p, angular, size, reference, place, floor, probe, np.zeros(m))
-    generic = equations.at(q + reference * equations.probe[: q.size], t)
+    generic = equations.at(q + reference * probe_of(q.size), t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
         equations.magnitude = rounded(equations.terms(generic, reference))
         here = equations.terms(generic, reference + equations.place)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import FIRST_COMPLETED, wait
+from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from kincompile.errors import KincompileError
 from kincompile.sweep.worker import run
 
 if TYPE_CHECKING:
@@ -19,6 +21,11 @@ if TYPE_CHECKING:
     from kincompile.sweep.worker import Job
 
     Values = dict[str, NDArray[Any]] | None
+
+
+class StoppedError(Exception):
+    """The executor, or a worker, could not go on; says which exception that was."""
+
 
 PER_WORKER = 2
 """Chunks under way for each worker: one that is solved, and one that waits."""
@@ -50,15 +57,37 @@ def solved(
     try:
         while True:
             for number in islice(left, most - len(waiting)):
-                waiting[executor.submit(run, job, number, plan.sets(number))] = number
+                with _of_executor():
+                    future = executor.submit(run, job, number, plan.sets(number))
+                waiting[future] = number
             if not waiting:
                 return
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 number = waiting.pop(future)
-                yield number, future.result()
+                with _of_executor():
+                    values = future.result()
+                yield number, values
     finally:
         for future in waiting:
             future.cancel()
+
+
+@contextmanager
+def _of_executor() -> Iterator[None]:
+    """Turn what an executor raises, which may be anything, into one exception.
+
+    Raises
+    ------
+    StoppedError
+        Where it is not an error that says itself what to do.
+    """
+    try:
+        yield
+    except KincompileError:
+        raise
+    except Exception as error:
+        name = type(error).__name__
+        raise StoppedError(f"{name}: {error}" if str(error) else name) from error
 
 
 def _workers(executor: Executor) -> int:

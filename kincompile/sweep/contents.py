@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from kincompile.errors import InputError, package_of_extra
 from kincompile.names import escaped, listed
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.sweep.layout import PENDING, STATUS, TIME, Layout
+from kincompile.sweep.worker import Writer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,6 +25,22 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
     from kincompile.sweep.plan import Plan
     from kincompile.sweep.worker import Job
+
+
+class Store(Writer, Protocol):
+    """Results as they come."""
+
+    IS_SHARED: bool
+    """Whether a worker writes its chunks itself."""
+
+    def done(self) -> NDArray[np.bool_]:
+        """Return which chunks are complete."""
+
+    def read(self, number: int, name: str) -> NDArray[Any]:
+        """Return the values of a chunk that is complete, of one array."""
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the results; those of a Zarr folder are read when they are used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +130,18 @@ class Contents:
         shape, names = self.plan.shape(number), [item.name for item in self.variables]
         return {name: values[name].reshape(*shape, *values[name].shape[1:]) for name in names}
 
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays that chunks fill, empty."""
+        return {item.name: np.full(item.shape, item.fill, item.dtype) for item in self.variables}
+
+    def filled(self, store: Store) -> xarray.Dataset:
+        """Return the results of a store, read into memory."""
+        arrays = self.arrays()
+        for number in np.flatnonzero(store.done()).tolist():
+            for name, array in arrays.items():
+                array[self.region(number, name)] = store.read(number, name)
+        return self.dataset(arrays)
+
     def dataset(self, arrays: Mapping[str, Any]) -> xarray.Dataset:
         """Return arrays as a dataset with dimensions, coordinates and units."""
         with package_of_extra("xarray", "tables"):
@@ -134,18 +162,21 @@ def units(unit: str) -> dict[str, str]:
     return {"units": unit} if unit else {}
 
 
-def marks_of(job: Job, plan: Plan) -> dict[str, str]:
-    """Return what decides the numbers of a sweep, each by its digest."""
+def marks_of(job: Job, plan: Plan, given: Array, assembly: int | None) -> dict[str, str]:
+    """Return what decides the numbers of a sweep, each by its digest.
+
+    Of the start that is the guess as it was given, or the number of the assembly: the position that
+    is found from it may differ by rounding on another machine, where a sweep may go on.
+    """
     sweep = [plan.common.tobytes(), str(plan.is_product).encode()]
     for name, values in plan.sweep.items():
         sweep += [name.encode(), values.tobytes()]
-    options = json.dumps(dict(job.options), sort_keys=True)
     parts = {
         "model": (job.sources.digest.encode(),),
         "parameters": tuple(sweep),
         "times": (job.t.tobytes(),),
         "columns and measures": tuple(repr(item).encode() for item in job.layout.kept),
-        "start and options": (job.guess.tobytes(), options.encode()),
+        "start": (given.tobytes(), str(assembly).encode()),
         "chunk": (str(plan.most).encode(),),
     }
     return {name: _digest(*part) for name, part in parts.items()}

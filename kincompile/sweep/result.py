@@ -15,8 +15,7 @@ from kincompile.sweep.layout import PENDING, STATUS
 if TYPE_CHECKING:
     import xarray
 
-    from kincompile.sweep.contents import Contents
-    from kincompile.sweep.store import Store
+    from kincompile.sweep.contents import Contents, Store
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import escaped, listed
-from kincompile.sweep.worker import Writer
+from kincompile.sweep.parquet_store import ParquetStore
 from kincompile.sweep.zarr_store import ZarrStore
 
 if TYPE_CHECKING:
@@ -19,23 +19,7 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
-    from kincompile.sweep.contents import Contents
-
-
-class Store(Writer, Protocol):
-    """Results as they come."""
-
-    IS_SHARED: bool
-    """Whether a worker writes its chunks itself."""
-
-    def done(self) -> NDArray[np.bool_]:
-        """Return which chunks are complete."""
-
-    def read(self, number: int, name: str) -> NDArray[Any]:
-        """Return the values of a chunk that is complete, of one array."""
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the results; those of a folder are read when they are used."""
+    from kincompile.sweep.contents import Contents, Store
 
 
 class Memory:
@@ -46,9 +30,7 @@ class Memory:
     def __init__(self, contents: Contents) -> None:
         self._contents = contents
         self._done = np.zeros(len(contents.plan), dtype=bool)
-        self._arrays: dict[str, NDArray[Any]] = {
-            item.name: np.full(item.shape, item.fill, item.dtype) for item in contents.variables
-        }
+        self._arrays = contents.arrays()
 
     def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
         """Keep the values of a chunk, by name."""
@@ -70,7 +52,7 @@ class Memory:
         return self._contents.dataset(self._arrays)
 
 
-STORES = {".zarr": ZarrStore}
+STORES: dict[str, type[ZarrStore | ParquetStore]] = {".zarr": ZarrStore, ".parquet": ParquetStore}
 """Kinds of folders, by ending."""
 
 

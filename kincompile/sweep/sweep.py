@@ -10,18 +10,18 @@ chunks     -> executor    those that are missing, a few at a time             ch
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.compiler import emit_loadable
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.errors import InputError, KincompileError, SweepError
+from kincompile.errors import InputError, SweepError
+from kincompile.model.mechanism import system_of
 from kincompile.names import escaped
 from kincompile.runtime.inputs import read_inputs, read_sweep
 from kincompile.runtime.solve import solve
-from kincompile.sweep.chunks import solved
+from kincompile.sweep.chunks import StoppedError, solved
 from kincompile.sweep.contents import Contents, marks_of
 from kincompile.sweep.layout import read_layout
 from kincompile.sweep.plan import Plan, chunk_size
@@ -33,12 +33,15 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Mapping, Sequence
     from concurrent.futures import Executor
+    from types import ModuleType
 
     from numpy.typing import ArrayLike
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
-    from kincompile.sweep.store import Store
+    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.inputs import Inputs
+    from kincompile.sweep.contents import Store
 
 
 def sweep(
@@ -84,8 +87,9 @@ def sweep(
     target : {"c", "numpy"}
         What workers run: C, which each compiles once, or NumPy where there is no compiler.
     store : path-like, optional
-        A folder whose name ends in .zarr: chunks are written when they are done. If it is there,
-        the sweep that was begun goes on. Every worker must see it. None keeps results in memory.
+        A folder whose name ends in .zarr, or in .parquet for a table: workers write chunks when
+        they are done, so that all of them must see it. If it is there, the sweep that was begun
+        goes on. None keeps results in memory.
     executor : concurrent.futures.Executor, optional
         Where chunks are solved: anything with this interface. None solves them here, in turn.
     chunk : int, optional
@@ -110,69 +114,56 @@ def sweep(
     UnsupportedError
         If a package or the C compiler is not installed.
     """
-    job, contents = _prepared(
-        model, p, t, columns, measures, product, guess, assembly, target, chunk
-    )
+    for name, count in (("chunk", chunk), ("pending", pending)):
+        if count is not None and count < 1:
+            raise InputError(f"{name} is {count!r}: give a number of at least 1.")
+    sources = Sources(*emit_loadable(model, target))
+    module = sources.module()
+    plan, inputs = _planned(module, p, _times(model) if t is None else t, guess, product, chunk)
+    first = dict(zip(module.PARAMETERS, plan.sets(0)[0].tolist(), strict=True))
+    begin = solve(module, inputs.t[:1], first, guess, assembly=assembly)
+    # All chunks start from one position, so that one assembly is meant in all.
+    position = begin.q[0] if begin.success else inputs.guess
+    job = Job(sources, inputs.t, position, read_layout(begin, columns, measures), None)
+    units = {name: module.UNITS[name] for name in module.PARAMETERS}
+    marks = marks_of(job, plan, inputs.guess, assembly)
+    contents = Contents(module.NAME, plan, job.layout, job.t, units, marks)
     kept = open_store(store, contents)
-    job = job.written_by(kept) if kept.IS_SHARED else job
     result = Sweep(contents, kept, "" if store is None else str(store))
     try:
-        _solve_missing(job, contents.plan, kept, executor, pending, progress)
-    except KincompileError:
-        raise
-    except Exception as error:  # an executor may raise anything
-        if executor is None:
-            raise
+        _solve_missing(job, plan, kept, executor, pending, progress)
+    except StoppedError as error:
         raise SweepError(_stopped(error, result), result) from error
-    if not kept.done().all():
-        missing = np.count_nonzero(~kept.done())
-        raise SweepError(
-            f"{missing} of {len(contents.plan)} chunks are not in {result.where}, and no worker "
-            "failed: they were written elsewhere. Give a folder that all workers see under this "
-            "name, or no store, and workers hand their results back.",
-            result,
-        )
+    _require_all(result)
     return result
 
 
-def _prepared(
-    model: Mechanism | ConstraintSystem,
+def _times(model: Mechanism | ConstraintSystem) -> Array:
+    """Return the times of a model."""
+    system = system_of(model)
+    return np.linspace(0.0, system.end, system.points)
+
+
+def _planned(
+    module: ModuleType,
     p: Mapping[str, ArrayLike],
-    t: ArrayLike | None,
-    columns: Sequence[str] | None,
-    measures: Sequence[str],
-    product: bool,
+    t: ArrayLike,
     guess: Mapping[str, float] | None,
-    assembly: int | None,
-    target: str,
+    product: bool,
     chunk: int | None,
-) -> tuple[Job, Contents]:
-    """Check what is given, and return what every chunk has in common, and what is kept."""
-    emitted, native = emit_loadable(model, target)
-    sources = Sources(emitted.name, emitted.source, emitted.arrays, native)
-    module = sources.module()
+) -> tuple[Plan, Inputs]:
+    """Read parameters and times: the variants in chunks, and what all of them have in common."""
     given = read_sweep(p, product)
     if given.problems:
         raise InputError(given.problems)
+    inputs = read_inputs(module, t, given.common, guess, TOLERANCE, MAX_ITERATIONS)
     if not given.sweep:
         raise InputError(
             "nothing is swept: give an array of values of a parameter, such as "
             "{'a': np.linspace(0.2, 0.6, 100)}."
         )
-    times = np.linspace(0.0, model.end, model.points) if t is None else t
-    inputs = read_inputs(module, times, given.common, guess, TOLERANCE, MAX_ITERATIONS)
     size = chunk_size(len(module.COORDINATES), inputs.t.size) if chunk is None else chunk
-    if size < 1:
-        raise InputError(f"chunk is {chunk!r}: give the number of variants, at least 1.")
-    plan = Plan(module.PARAMETERS, inputs.p, given.sweep, product, size)
-    first = dict(zip(module.PARAMETERS, plan.sets(0)[0].tolist(), strict=True))
-    begin = solve(module, inputs.t[:1], first, guess, assembly=assembly)
-    layout = read_layout(begin, columns, measures)
-    # All chunks start from one position, so that one assembly is meant in all.
-    at = begin.q[0] if begin.success else inputs.guess
-    job = Job(sources, inputs.t, at, layout, {}, None)
-    units = {name: module.UNITS[name] for name in module.PARAMETERS}
-    return job, Contents(module.NAME, plan, layout, inputs.t, units, marks_of(job, plan))
+    return Plan(module.PARAMETERS, inputs.p, given.sweep, product, size), inputs
 
 
 def _solve_missing(
@@ -189,7 +180,8 @@ def _solve_missing(
     if progress and done:
         progress(done, plan.variants)
     missing = np.flatnonzero(~is_done).tolist()
-    for number, values in solved(job, plan, missing, executor, pending):
+    shared = job.written_by(kept) if kept.IS_SHARED else job
+    for number, values in solved(shared, plan, missing, executor, pending):
         if values is not None:
             kept.write(number, values)
         done += int(np.prod(plan.shape(number)))
@@ -197,16 +189,33 @@ def _solve_missing(
             progress(done, plan.variants)
 
 
-def _stopped(error: Exception, result: Sweep) -> str:
+def _require_all(result: Sweep) -> None:
+    """Refuse results that are not where they should be.
+
+    Raises
+    ------
+    SweepError
+        If chunks are missing though no worker failed.
+    """
+    missing = np.count_nonzero(~result.store.done())
+    if missing:
+        raise SweepError(
+            f"{missing} of {len(result.contents.plan)} chunks are not in {result.where}, and no "
+            "worker failed: they were written elsewhere. Give a folder that all workers see under "
+            "this name, or no store, and workers hand their results back.",
+            result,
+        )
+
+
+def _stopped(error: StoppedError, result: Sweep) -> str:
     """Say that the executor stopped the sweep, what is kept and what to do."""
     done, total = int(result.store.done().sum()), len(result.contents.plan)
-    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     if result.where:
-        kept = f"{escaped(Path(result.where))} has them; the same call goes on from there"
+        kept = f"{escaped(result.where)} has them; the same call goes on from there"
     else:
         kept = ".sweep has them; with store='NAME.zarr' the same call would go on from there"
     return (
-        f"{result.contents.name}: the executor stopped after {done} of {total} chunks ({said}). "
+        f"{result.contents.name}: the executor stopped after {done} of {total} chunks ({error}). "
         f"{kept}. A worker that was killed may have had too little memory: fewer workers, or a "
         "smaller chunk, need less."
     )

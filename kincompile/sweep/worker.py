@@ -93,8 +93,6 @@ class Job:
         Where every chunk starts.
     layout
         What is kept.
-    options
-        Of `solve`.
     writer
         What a worker writes a chunk with; None where it hands the values back.
     """
@@ -103,7 +101,6 @@ class Job:
     t: Array
     guess: Array
     layout: Layout
-    options: Mapping[str, Any]
     writer: Writer | None
 
     def written_by(self, writer: Writer) -> Job:
@@ -115,7 +112,7 @@ def run(job: Job, number: int, sets: Array) -> dict[str, NDArray[Any]] | None:
     """Solve a chunk and write it, or return its values by name, (B, N) over time, else (B,)."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", KincompileWarning)  # statuses say the same
-        solution = solve(job.sources.module(), job.t, sets[:, np.newaxis], job.guess, **job.options)
+        solution = solve(job.sources.module(), job.t, sets[:, np.newaxis], job.guess)
         values = job.layout.values(solution)
     if job.writer is None:
         return values

@@ -20,10 +20,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class UsedFrame:
-    """What is used of a body's frame, and the angle where that is its cosine and sine."""
+    """What is used of a body's frame, the angle where that is its cosine and sine, and A."""
 
     angle: int | None
     values: tuple[Assignment, ...]
+    formula: str
+
+
+def frames_title(frames: Sequence[UsedFrame]) -> list[str]:
+    """Return the comment on what frames are; nothing where there are none."""
+    return [f"body frames: A = {frame.formula}" for frame in frames[:1]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,14 +147,14 @@ def inputs_read(program: Program, listing: Listing) -> Iterator[tuple[str, int, 
 
 def _frames(inline: InlineProgram, scheduler: Scheduler) -> tuple[UsedFrame, ...]:
     """Return the frames of which something is used, and name that."""
-    found = []
+    found, formula = [], inline.program.bodies[0].kernel.formula if inline.frames else ""
     for entries in inline.frames:
         used = [node for node in entries if node in scheduler.uses]
         parts = [node for node in scheduler.operands_first(used) if node not in used]
         shared = scheduler.assign("frame", parts)
         values = tuple(scheduler.name(node) for node in used)
         if values:
-            found.append(UsedFrame(_angle(inline, values), (*shared, *values)))
+            found.append(UsedFrame(_angle(inline, values), (*shared, *values), formula))
     return tuple(found)
 
 

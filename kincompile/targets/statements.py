@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.quantities import quantity_named
-from kincompile.targets.evaluators import inputs_read
+from kincompile.targets.evaluators import frames_title, inputs_read
 from kincompile.targets.headings import entry_titles, header, title
 from kincompile.targets.lines import broken, pieces
 
@@ -29,8 +29,8 @@ class Statements:
         Left side of the statement that computes a value, with ``{}`` for its name.
     element, entry
         A vector's element and a matrix's entry: name, and an index each.
-    rotation
-        The matrix A of a body frame, for a comment.
+    plane
+        How it writes the matrix A of a frame in the plane.
     first
         Number of the first row.
     continued, ending
@@ -41,7 +41,7 @@ class Statements:
     value: str
     element: str
     entry: str
-    rotation: str = "[[c, -s], [s, c]]"
+    plane: str = "[[c, -s], [s, c]]"
     first: int = 0
     continued: str = ""
     ending: str = ";"
@@ -80,7 +80,8 @@ class Statements:
 
     def frames(self, listing: Listing, printer: Printer) -> list[str]:
         """Return the statements that compute cosine and sine of each body's angle."""
-        lines = [f"{self.comment} body frames: A = {self.rotation}"] if listing.frames else []
+        titles = frames_title(listing.frames)
+        lines = [f"{self.comment} {x.replace('[[c, -s], [s, c]]', self.plane)}" for x in titles]
         for frame in listing.frames:
             for item in frame.values:
                 lines += self._value(item.name, printer.definition(item.node))

@@ -88,13 +88,22 @@ class PlannedSolve:
             return np.full(q.size, np.nan)
 
     def _of_complex_numbers(self) -> tuple[Array, Array, Array]:
-        """Return Phi_q, x and b of complex numbers, a batch between each state and another one."""
+        """Return Phi_q, x and b of complex numbers: of complex coordinates, in a batch.
+
+        Where a function takes real ones only, Phi_q is between that of each state and of another.
+        """
         engine = Planned(self._code, self._at.p.T)
-        point = engine.evaluate(self._at.q.T, self._at.t)
-        point.Phi_q = _between(stacked(point.Phi_q, self.states).T).T
+        try:
+            q = self._at.q + 1j * self._other
+            nonzeros = self._module.Phi_q_nonzeros(q, self._at.t, self._at.p)
+            point = engine.evaluate(q.T, self._at.t)
+        except TypeError:
+            nonzeros = _between(self._nonzeros)
+            point = engine.evaluate(self._at.q.T, self._at.t)
+            point.Phi_q = _between(stacked(point.Phi_q, self.states).T).T
         b = self._b + 1j * self._other
         x = engine.solve(point, b.T)
-        return _between(self._Phi_q), np.array(np.broadcast_arrays(*x)).T, b
+        return dense(self._module, nonzeros), np.array(np.broadcast_arrays(*x)).T, b
 
     @property
     def has_blocks(self) -> bool:

@@ -41,10 +41,13 @@ COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-std=c99", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast")
 """None of these changes what a program may assume of floating-point numbers, NaN included."""
 
-LARGEST_VECTORIZED = 100_000
-"""Characters of source up to which it is optimized in full, which takes 2 s for 9 coordinates, 6 s
-for 27 and 13 s for 45: gcc combines instructions in time that grows with the square of a function's
-length. Without it 45 coordinates take 1 s and 99 coordinates 3 s, and run at half the speed."""
+LARGEST_VECTORIZED = 250_000
+"""Characters of source up to which it is optimized in full, an angle's cosine and sine, which are
+written in line, counted as ANGLE. In full takes 2 s for 9 coordinates in the plane, 6 s for 27, and
+7 s for three bodies in space: gcc combines instructions in time that grows with the square of a
+function's length. Beyond, code runs at half to a quarter of the speed, and 99 coordinates take 3 s
+instead of minutes."""
+ANGLE = 3_000
 
 TRIAL = "import ctypes, sys; ctypes.CDLL(sys.argv[1])"
 
@@ -72,7 +75,8 @@ def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDL
     UnsupportedError
         If there is no C compiler, or it does not do its work.
     """
-    is_large = len(next(iter(files.values()))) > LARGEST_VECTORIZED
+    source = next(iter(files.values()))
+    is_large = len(source) + ANGLE * source.count("cos_sin(") > LARGEST_VECTORIZED
     level = "-O1" if is_large else "-O3"
     command = (*_compiler(), level, *FLAGS, *_machine_flags())
     digest = hashlib.sha256()

@@ -98,7 +98,7 @@ def assembled_positions(inputs: Inputs) -> Vector:
         equations = _equations(inputs)
         found: list[Vector] = []
         last = 0
-        for k, start in enumerate(_starts(equations, inputs.guess), 1):
+        for k, start in enumerate(spread_starts(equations, inputs.guess), 1):
             point = _assembled(equations, time, start)
             if point is not None:
                 q = unwound(equations, time, point, inputs.guess, TOLERANCE).q
@@ -221,7 +221,7 @@ def _periodic(equations: Problem, t: float, guess: Vector) -> NDArray[np.bool_]:
     return periodic
 
 
-def _starts(equations: Problem, guess: Vector) -> Vector:
+def spread_starts(equations: Problem, guess: Vector) -> Vector:
     """Return the guess, and positions spread over all angles and twice the mechanism's size."""
     random = np.random.default_rng(SEED)
     offsets = random.uniform(-1, 1, (MOST_STARTS - 1, guess.size))

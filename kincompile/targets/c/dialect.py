@@ -6,6 +6,7 @@ C = Dialect(
     "C",
     {name: f"{name}({{}})" for name in ELEMENTARY}
     # These two say by `far` that an angle is out of their reach.
+    | {"atan2": "angle_of({})"}
     | {"cos": "cosine({}, exact, &far)", "sin": "sine({}, exact, &far)"},
     pi="PI",
     nan="NAN",

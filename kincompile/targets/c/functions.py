@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.quantities import quantity_named
 from kincompile.targets.c.dialect import C
+from kincompile.targets.evaluators import frames_title
 from kincompile.targets.planned_solve import explained
 from kincompile.targets.printer import Printer
 from kincompile.targets.solve_statements import factorization, operands, solution
@@ -85,9 +86,7 @@ def _strip_function(name: str) -> list[str]:
 
 def _frames(listing: Listing, printer: Printer) -> list[str]:
     """Return the cosine and sine of each body's angle, a line a body."""
-    if not listing.frames:
-        return []
-    lines = ["// body frames: A = [[c, -s], [s, c]]"]
+    lines = [f"// {title}" for title in frames_title(listing.frames)]
     for frame in listing.frames:
         if frame.angle is not None:
             c, s = (item.name for item in frame.values)

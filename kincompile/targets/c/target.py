@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from kincompile import criteria, quantities
-from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
+from kincompile.ir.elimination import LARGEST_PIVOTED, plan_solve
 from kincompile.quantities import nonzeros_of
 from kincompile.targets.c.dialect import C
 from kincompile.targets.c.functions import WRITE, evaluator, solve_functions
@@ -48,7 +48,7 @@ KEYWORDS = (
 
 RESERVED: tuple[str, ...] = (
     *KEYWORDS, "at", "lane", "t", "far", "exact", "F", "right", "to", "PI", "LANES",
-    "square", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
+    "square", "angle_of", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
     "fabs", "fmax", *ELEMENTARY,
 )  # fmt: skip
 """Names that the functions of a mechanism use."""
@@ -247,10 +247,11 @@ def _elementary(program: Program, called: Collection[str], largest: int) -> str:
     data = {
         "alone": [long for short, long in (("cos", "cosine"), ("sin", "sine")) if short in called],
         "tables": "\n\n".join(_splines(program)),
+        "has_angles": "atan2" in called,
         "order": max(
             (len(row) for item in program.tables.values() for row in item.coefficients), default=0
         ),
-        "largest_block": largest if largest > LARGEST_CLOSED_FORM else 0,
+        "largest_block": largest if largest > LARGEST_PIVOTED else 0,
     }
     return fill("c/elementary.c.jinja", data)
 

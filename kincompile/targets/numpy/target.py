@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from kincompile.ir.elimination import plan_solve
 from kincompile.quantities import FORMAT, kernels, quantity_named, states_of
-from kincompile.targets.evaluators import varying, vectors
+from kincompile.targets.evaluators import frames_title, varying, vectors
 from kincompile.targets.headings import entry_titles, header, short_title, title
 from kincompile.targets.lines import WIDTH, commented, indented, table, wrapped
 from kincompile.targets.naming import NameTable
@@ -31,7 +31,7 @@ DIALECT = NUMPY
 Style = Literal["titled", "plain", "packed"]
 
 FUNCTIONS = {
-    "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2",
+    "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "staticmethod(_atan2)",
     "asinh": "np.arcsinh", "acosh": "np.arccosh", "atanh": "np.arctanh",
     "pow": "np.power", "where": "np.where", "cos_sin": "staticmethod(_cos_sin)",
 }  # fmt: skip
@@ -88,7 +88,7 @@ def files(
         "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
         "is_planned": plan is not None,
         **support(
-            called,
+            {*called, "where"} if plan is not None and plan.has_choices else called,
             has_large_blocks=plan is not None and plan.has_large_blocks,
         ),
     }
@@ -229,6 +229,7 @@ def support(called: Collection[str], *, has_large_blocks: bool) -> dict[str, str
         "scalar_functions": indented(_scalar_functions(sorted(called))),
         "array_functions": indented(_array_functions(sorted(called))),
         "has_frames": "cos_sin" in called,
+        "has_angles": "atan2" in called,
         "has_large_blocks": has_large_blocks,
     }
     files = {"arguments": {}, "spline": {}, "elementary": functions}
@@ -360,7 +361,7 @@ def _targets(members: Sequence[str], vector: str) -> list[str]:
 
 def _frames(listing: Listing, printer: Printer, is_first: bool) -> list[str]:
     """Return the cosine and sine of each body's angle, a line a body."""
-    lines = ["# body frames: A = [[c, -s], [s, c]]"] if listing.frames and is_first else []
+    lines = [f"# {title}" for title in frames_title(listing.frames) if is_first]
     for frame in listing.frames:
         left = ", ".join(item.name for item in frame.values)
         if frame.angle is not None:

@@ -3,6 +3,7 @@
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import kincompile as kc
@@ -100,17 +101,36 @@ def test_c_gives_the_numbers_too(quick_compiler):
     np.testing.assert_allclose(found["tip.x"], expected, atol=1e-13)
 
 
-def test_a_zarr_folder_has_the_results_and_their_units(tmp_path):
-    found = sweep(columns=["x_tip"], measures=["tip.x.rms"], chunk=2, store=tmp_path / "a.zarr")
-    memory = sweep(columns=["x_tip"], measures=["tip.x.rms"], chunk=2)
-    data = found.to_xarray()
-    assert data.load().equals(memory.to_xarray())
+@pytest.mark.parametrize("ending", ["zarr", "parquet"])
+@pytest.mark.parametrize("product", [True, False])
+def test_a_folder_has_the_results_and_their_units(ending, product, tmp_path):
+    store = tmp_path / f"a.{ending}"
+    p = {"a": LENGTHS, "omega": SPEEDS if product else LENGTHS}
+    kept = {"p": p, "columns": ["x_tip"], "measures": ["tip.x.rms"], "chunk": 2}
+    found = sweep(**kept, product=product, store=store)
+    memory = sweep(**kept, product=product).to_xarray()
+    data = found.to_xarray().load()
+    assert data.equals(memory)
+    assert set(data.coords) == set(memory.coords)
     assert data["x_tip_rms"].attrs["units"] == "m"
-    assert found.statuses() == {"CONVERGED": 135}
+    assert found.statuses() == {"CONVERGED": memory["x_tip"].size}
 
 
-def test_what_is_done_is_not_done_again(tmp_path):
-    store, calls = tmp_path / "a.zarr", []
+def test_a_parquet_folder_is_a_table_for_others(tmp_path):
+    store = tmp_path / "a.parquet"
+    found = sweep(columns=["x_tip"], measures=["tip.x.rms"], chunk=2, store=store).to_xarray()
+    table = pd.read_parquet(store)
+    assert list(table) == ["a", "omega", "t", "x_tip", "x_tip_rms", "status"]
+    again = table.set_index(["a", "omega", "t"]).to_xarray()
+    np.testing.assert_array_equal(again["x_tip"], found["x_tip"])
+    only = sweep(measures=["tip.x.rms"], store=tmp_path / "b.parquet").to_xarray()
+    assert list(pd.read_parquet(tmp_path / "b.parquet")) == ["a", "omega", "x_tip_rms", "status"]
+    np.testing.assert_array_equal(only["x_tip_rms"], found["x_tip_rms"])
+
+
+@pytest.mark.parametrize("ending", ["zarr", "parquet"])
+def test_what_is_done_is_not_done_again(ending, tmp_path):
+    store, calls = tmp_path / f"a.{ending}", []
     options = {"columns": ["x_tip"], "chunk": 2, "store": store}
 
     class StopError(Exception):
@@ -123,13 +143,14 @@ def test_what_is_done_is_not_done_again(tmp_path):
     with pytest.raises(StopError):
         sweep(**options, progress=stop)
     before = files_of(store)
-    (store / "x_tip" / "c" / "0" / "0.123.partial").write_bytes(b"half")
+    place = store / "x_tip" / "c" / "0" / "0" if ending == "zarr" else store
+    (place / (".part" * (ending == "parquet") + "0.123.partial")).write_bytes(b"half")
     sweep(**options, progress=lambda done, total: calls.append((done, total)))
     assert calls == [(done, 15) for done in (6, 8, 9, 11, 12, 14, 15)]
     after = files_of(store)
     assert after.items() >= before.items()
-    sweep(columns=["x_tip"], chunk=2, store=tmp_path / "b.zarr")
-    assert files_of(tmp_path / "b.zarr") == after
+    sweep(columns=["x_tip"], chunk=2, store=tmp_path / f"b.{ending}")
+    assert files_of(tmp_path / f"b.{ending}") == after
 
 
 @pytest.mark.parametrize(

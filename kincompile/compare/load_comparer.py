@@ -1,0 +1,186 @@
+"""M and Q by hand against the derived ones: judged entry by entry, and explained load by load.
+
+Both are sums over masses and loads. So a slip is one of what a load adds: missing, of the wrong
+sign, with a factor, or as if one of the load's own numbers were zero or reversed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.compare.agreement import ABSOLUTE, OF_TERMS, agrees
+from kincompile.compare.comparison import ComparedEntry, Diagnosis, Difference, Verdict
+from kincompile.compare.fault import MISSING_RATE, SIGN, WITHOUT, Fault, term_faults, whole_faults
+from kincompile.model.matrices import load_entries
+from kincompile.model.resolve import title_of
+from kincompile.quantities import quantity_named
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from fractions import Fraction
+
+    from kincompile.compare.reference import Reference
+    from kincompile.compare.states import Array, States
+    from kincompile.compare.written import Written
+    from kincompile.model.resolve_loads import AppliedLoad
+
+UNEXPLAINED = "no slip with one of the loads gives these numbers."
+
+
+@dataclass(frozen=True)
+class LoadComparer:
+    """One comparison of M and Q.
+
+    Attributes
+    ----------
+    reference
+        The generated side.
+    written
+        M, Q or both.
+    states
+        Where they are compared.
+    strict
+        Whether what is right by a convention alone is not accepted.
+    """
+
+    reference: Reference
+    written: Mapping[str, Written]
+    states: States
+    strict: bool
+
+    @property
+    def wrong_count(self) -> int:
+        """The number of entries that differ."""
+        return sum(int((~equal).sum()) for equal in self._equal.values())
+
+    @cached_property
+    def _values(self) -> dict[str, tuple[Array, Array]]:
+        """Values and sizes of what was written, (N, rows, columns) each."""
+        found = {}
+        for name, item in self.written.items():
+            values, sizes = item.evaluate(self.states)
+            lost = 0.0 if item.lost is None else item.lost(self.states, values) / OF_TERMS
+            found[name] = values, sizes + lost
+        return found
+
+    @cached_property
+    def _equal(self) -> dict[str, Array]:
+        """Which entries agree at all states, (rows, columns)."""
+        expected = self.reference.values(self.states)
+        return {
+            name: np.all(agrees(*self._values[name], expected.of(name)), axis=0)
+            for name in self.written
+        }
+
+    def entries(self, right: Verdict = Verdict.EQUAL) -> Iterator[ComparedEntry]:
+        """Yield all entries; those that agree have the verdict that is given."""
+        for name, item in self.written.items():
+            equal = self._equal[name]
+            explained = {} if equal.all() else self._explained(name)
+            for place in np.ndindex(*equal.shape):
+                row, column = place
+                verdict = right if equal[place] else Verdict.DIFFERENT
+                is_accepted = verdict is Verdict.EQUAL or (verdict.is_right and not self.strict)
+                yield ComparedEntry(
+                    name,
+                    self.reference.coordinates[row],
+                    self.reference.coordinates[column] if name == "M" else None,
+                    self.reference.text(name, row, column),
+                    item.texts[row][column],
+                    verdict,
+                    is_accepted,
+                    explained.get(place, ()),
+                    None if is_accepted else self._difference(name, place),
+                )
+
+    def _difference(self, name: str, place: tuple[int, ...]) -> Difference:
+        """Return the state at which an entry differs the most."""
+        values, right_values = self._values[name][0], self.reference.values(self.states).of(name)
+        row, column = place
+        written, right = (item[:, row, column] for item in (values, right_values))
+        k = int(np.argmax(np.nan_to_num(np.abs(written - right), nan=np.inf, posinf=np.inf)))
+        state = self.reference.named(self.states, k)
+        return Difference(state, float(right[k]), float(written[k]))
+
+    def _explained(self, name: str) -> dict[tuple[int, ...], tuple[Diagnosis, ...]]:
+        """Return the explanations of the entries that differ: the slips that fit the best."""
+        values, sizes = self._values[name]
+        wrong = [tuple(place) for place in np.argwhere(~self._equal[name]).tolist()]
+        found: dict[tuple[int, ...], list[tuple[int, Fault[Array]]]] = {item: [] for item in wrong}
+        for fault in self._faults(name):
+            agreeing = np.asarray(np.all(agrees(values, sizes, fault.result), axis=0))
+            for place in wrong:
+                if agreeing[place]:
+                    found[place].append((int(agreeing.sum()), fault))
+        return {place: _best(faults) for place, faults in found.items()}
+
+    def _faults(self, name: str) -> Iterator[Fault[Array]]:
+        """Yield the slips with one load, and with all of them."""
+        total = self.reference.values(self.states).of(name)
+        yield from whole_faults(name, name, lambda factor: float(factor) * total)
+        for load in self.reference.system.loads:
+            yield from self._faults_of(name, load, total)
+
+    def _faults_of(self, name: str, load: AppliedLoad, total: Array) -> Iterator[Fault[Array]]:
+        """Yield the slips with one load."""
+        own = self._added(name, load, self.states)
+        if not np.any(np.abs(own) > ABSOLUTE):
+            return
+
+        def with_factor(factor: Fraction) -> Array:
+            return np.asarray(total + (float(factor) - 1) * own)
+
+        title = title_of(load.written)
+        yield from term_faults(f"what {title} adds to {name}", with_factor)
+        still = replace(self.states, q_dot=0 * self.states.q_dot)
+        text = f"terms with rates of {title} are missing in {name}"
+        yield Fault(MISSING_RATE, text, total - own + self._added(name, load, still))
+        for argument, zero, reverse in _changes(load):
+            without, opposite = (self._added(name, item, self.states) for item in (zero, reverse))
+            text = f"{title}: {argument} is counted as zero in {name}"
+            yield Fault(WITHOUT, text, total - own + without)
+            text = f"{title}: {argument} has the wrong sign in {name}"
+            yield Fault(SIGN, text, total - own + opposite)
+
+    def _added(self, name: str, load: AppliedLoad, states: States) -> Array:
+        """Return what a load adds at states, (N, rows, columns)."""
+        n = len(self.reference.coordinates)
+        size = n if quantity_named(name).is_matrix else 1
+        found = np.zeros((len(states), n, size))
+        entries = list(load_entries(self.reference.system, load, name))
+        values, _ = self.reference.evaluate([value for _, _, value in entries], states)
+        for k, (row, column, _) in enumerate(entries):
+            found[:, row, column] += values[:, k]
+        return found
+
+
+def _changes(load: AppliedLoad) -> Iterator[tuple[str, AppliedLoad, AppliedLoad]]:
+    """Yield the arguments of a load, with the load as if they were zero, and reversed."""
+    for name, item in load.written.arguments().items():
+        if item.symbol in load.scalars and load.scalars[item.symbol] != 0:
+            value = load.scalars[item.symbol]
+            zero, opposite = (
+                replace(load, scalars={**load.scalars, item.symbol: new}) for new in (0, -value)
+            )
+            yield name, zero, opposite
+        elif any(x != 0 for x in load.points.get(item.symbol, ())):
+            point = load.points[item.symbol]
+            zero, opposite = (
+                replace(load, points={**load.points, item.symbol: tuple(factor * x for x in point)})
+                for factor in (0, -1)
+            )
+            yield name, zero, opposite
+
+
+def _best(faults: list[tuple[int, Fault[Array]]]) -> tuple[Diagnosis, ...]:
+    """Return the slips with which the most entries agree: they are equivalent to each other."""
+    if not faults:
+        return (Diagnosis("not in the catalogue", UNEXPLAINED),)
+    most = max(count for count, _ in faults)
+    return tuple(
+        dict.fromkeys(Diagnosis(f.kind, f"{f.text}.") for count, f in faults if count == most)
+    )

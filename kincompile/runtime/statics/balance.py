@@ -1,0 +1,183 @@
+r"""The equations of equilibrium at one position.
+
+A position is one of equilibrium where the loads do no work for any movement that the joints allow,
+:math:`Z^T Q = 0` with :math:`\Phi_q Z = 0`. Its stiffness is how this force falls along these
+movements, :math:`K = Z^T (\partial(\Phi_q^T \lambda)/\partial q - Q_q) Z`: loads turn, and so do
+the forces of joints. Derivatives of the emitted functions are taken by complex steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.criteria import RESIDUAL_FACTOR, TOLERANCE
+from kincompile.errors import InputError
+from kincompile.names import column_name, listed, suggestion
+from kincompile.runtime.problem import problem
+from kincompile.runtime.results.forces import RANK
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.inputs import Inputs
+    from kincompile.runtime.problem import Problem
+
+STEP = 1e-30
+"""Of a complex step; its square is lost in every number."""
+
+CORRECTIONS = 60
+"""Corrections of a position until the joints hold."""
+
+NOTHING = 1e-9
+"""Part of the forces that act up to which a force, or a stiffness, is nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Place:
+    """A position at which the joints hold, and what acts there.
+
+    Attributes
+    ----------
+    point
+        Position, time and equations.
+    free : ndarray, shape (n, f)
+        Movements that the joints allow, orthonormal in scales of the coordinates.
+    multipliers : ndarray, shape (m,)
+        lambda; of redundant equations the shortest.
+    force : ndarray, shape (f,)
+        Work of the loads for each of the movements.
+    nothing : float
+        Force, or stiffness, that is nothing beside what loads and joints do.
+    """
+
+    point: Point
+    free: Array
+    multipliers: Array
+    force: Array
+    nothing: float
+
+    @property
+    def q(self) -> Array:
+        """The position."""
+        return self.point.q
+
+    @property
+    def is_balanced(self) -> bool:
+        """Whether nothing pushes the mechanism anywhere."""
+        return bool((np.abs(self.force) <= self.nothing).all())
+
+
+class Balance:
+    """A mechanism with loads, its parameters set.
+
+    Parameters
+    ----------
+    inputs
+        Module, parameters and guess.
+
+    Attributes
+    ----------
+    equations
+        The joints, with the scales of coordinates and equations.
+    """
+
+    def __init__(self, inputs: Inputs) -> None:
+        self.code, self._p = inputs.code, inputs.p
+        self.module = inputs.code.module
+        self.equations: Problem = problem(self.module, inputs.p, inputs.guess, float(inputs.t[0]))
+
+    @property
+    def scale(self) -> Array:
+        """Scale of each coordinate."""
+        return self.equations.reference
+
+    def hold(self, q: Array, t: float) -> Place | None:
+        """Return the position near one at which the joints hold; None where none is found."""
+        scale, weights = self.scale, self.equations.weights()
+        is_small = False
+        for _ in range(CORRECTIONS):
+            point = self.equations.at(q, t)
+            if point is None or not np.isfinite(point.Phi_q).all():
+                return None
+            left, values, right = np.linalg.svd(weights[:, np.newaxis] * point.Phi_q * scale)
+            rank = int((values > RANK * values[:1]).sum())
+            part = left[:, :rank].T @ (weights * point.Phi) / values[:rank]
+            change = -scale * (part @ right[:rank])
+            size = float(np.abs(change / scale).max(initial=0.0))
+            if is_small:
+                break
+            is_small = self.equations.is_small(change, q, TOLERANCE)
+            q = q + change * min(1.0, 1.0 / (size or 1.0))
+        else:
+            return None
+        if not self.equations.holds(point, RESIDUAL_FACTOR * TOLERANCE):
+            return None
+        Q = self.loads(q, t)
+        free = (right[rank:] * scale).T
+        factors = weights * (left[:, :rank] @ ((right[:rank] @ (scale * Q)) / values[:rank]))
+        acting = np.abs(Q) + np.abs(point.Phi_q.T) @ np.abs(factors)
+        held = np.abs(self.slopes(q, t)) @ scale
+        level = float((np.maximum(acting, held) * scale).max(initial=0.0))
+        return Place(point, free, factors, free.T @ Q, NOTHING * level)
+
+    def loads(self, q: Array, t: complex) -> Array:
+        """Return Q of the mechanism at rest."""
+        return np.asarray(self.module.Q(q, np.zeros_like(q), t, self._p))
+
+    def slopes(self, q: Array, t: float) -> Array:
+        """Return Q_q of the mechanism at rest."""
+        return np.asarray(self.module.Q_q(q, np.zeros_like(q), t, self._p))
+
+    def acting(self, place: Place) -> Array:
+        """Return the size of all that acts on each coordinate, shape (n,)."""
+        q, t = place.q, place.point.t
+        joints = np.abs(place.point.Phi_q.T) @ np.abs(place.multipliers)
+        return np.asarray(np.abs(self.loads(q, t)) + np.abs(self.slopes(q, t)).sum(axis=1) + joints)
+
+    def turning(self, q: Array, factors: Array, t: float, directions: Array) -> Array:
+        r"""Return the changes of :math:`\Phi_q^T \lambda - Q` along directions (n, k)."""
+        loads = self.slopes(q, t) @ directions
+        moved = np.asarray(self.code.module.Phi_q(q + 1j * STEP * directions.T, t, self._p))
+        joints = np.einsum("kmn,m->nk", moved.imag, factors) / STEP
+        return np.asarray(joints - loads)
+
+    def stiffness(self, place: Place) -> Array:
+        """Return the reduced stiffness K, shape (f, f)."""
+        turning = self.turning(place.q, place.multipliers, place.point.t, place.free)
+        return np.asarray(place.free.T @ turning)
+
+    def in_time(self, q: Array, factors: Array, t: float) -> tuple[Array, Array]:
+        r"""Return how :math:`\Phi_q^T \lambda - Q` and Phi change in time where nothing moves."""
+        later = t + 1j * STEP
+        moved = np.asarray(self.code.module.Phi_q(q, later, self._p))
+        load = np.asarray(self.loads(q, later))
+        forces = (moved.imag.T @ factors - load.imag) / STEP
+        return forces, -np.asarray(self.code.nu(q, t, self._p))
+
+    def gradients(self, names: Sequence[str], q: Array, t: float) -> Array:
+        """Return the derivatives of coordinates or outputs, shape (k, n).
+
+        Raises
+        ------
+        InputError
+            When there is no coordinate or output of a name.
+        """
+        outputs = getattr(self.module, "OUTPUTS", ())
+        known = (*self.code.coordinates, *outputs)
+        rows = np.eye(q.size)
+        if outputs:
+            still = np.zeros_like(q)
+            rows = np.vstack((rows, self.module.outputs_q(q, still, still, t, self._p)))
+        wanted = [column_name(name) for name in names]
+        if missing := [name for name in wanted if name not in known]:
+            near = suggestion(missing[0], known) or "."
+            raise InputError(
+                f"{self.code.name} has no coordinate and no output {missing[0]!r}{near} There are "
+                f"{listed(known)}; m.point(...) makes a point of a body an output."
+            )
+        return np.asarray(rows[[known.index(name) for name in wanted]])
