@@ -1,9 +1,9 @@
 """A mechanism in space, turned as a whole: the same motion, seen from elsewhere."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from kincompile import spatial
@@ -12,7 +12,9 @@ from kincompile.model.arguments import Kind
 SLIDES = {spatial.AbsoluteX: 0, spatial.AbsoluteY: 1, spatial.AbsoluteZ: 2}
 
 
-def turned_copy(m: spatial.Mechanism, turn: Rotation, shift: Sequence[float]) -> spatial.Mechanism:
+def turned_copy(
+    m: spatial.Mechanism, turn: Rotation, shift: NDArray[np.float64]
+) -> spatial.Mechanism:
     """Return a copy whose ground, with all that stands on it, is turned and then moved.
 
     A point on the ground goes to A s + shift, a direction to A v; bodies keep their own frames, and
@@ -27,11 +29,11 @@ def turned_copy(m: spatial.Mechanism, turn: Rotation, shift: Sequence[float]) ->
         p = turn * Rotation.from_quat(guess[[4, 5, 6, 3]])
         copy.body(body.name, matrix @ guess[:3] + shift, p)
     for item in m.constraints:
-        copy.add(_turned(copy, item, matrix, np.asarray(shift)))
+        copy.add(_turned(copy, item, matrix, shift))
     return copy
 
 
-def _number(item: Any, values: dict[str, float]) -> Any:
+def _number(item: Any, values: dict[str, float | None]) -> Any:
     return item.subs(values) if hasattr(item, "subs") else item
 
 
