@@ -103,7 +103,7 @@ def test_orientations(given: str) -> None:
     np.testing.assert_allclose(found, ORIENTATIONS[given], rtol=0, atol=1e-15)
 
 
-CRANK = "orientation = [1.0, 0.0, 0.0, 0.0] }"
+CRANK = "orientation = [1, 0, 0, 0] }"
 WRONG = {
     "space": ("space = 3", "space = 4", 3, "space: it is 2 or 3, not 4"),
     "plane": ("space = 3", "space = 2", 7, "body 'crank', position: there is no such field"),

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from kincompile import spatial
 from kincompile.model.arguments import Kind
 
+Place = NDArray[np.float64]
 SLIDES = {spatial.AbsoluteX: 0, spatial.AbsoluteY: 1, spatial.AbsoluteZ: 2}
 
 
