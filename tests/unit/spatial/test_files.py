@@ -48,7 +48,7 @@ def everything() -> spatial.Mechanism:
             m.add(kind(f"c{k}_{name}", **{key: given[key] for key in kind.arguments()}))
     m.add(kc.Equation("free", one.z - two.p[3] * a, point.z - kc.t))
     spin = two.direction((0, 1, 0))
-    m.output("camber", outputs.inclination(spin, (0, 0, 1)), "rad")
+    m.output("lean", spin[2] ** 2, "")
     m.output("rise", outputs.rate(point.z) - one.omega[2])
     return m
 
