@@ -31,6 +31,11 @@ STILL, MOVING = (".svg", ".dxf"), (".svg", ".gif", ".mp4")
     help="Draw the path of a point, body or joint.  [default: the model's points]",
 )
 @click.option("--true-size", is_flag=True, help="Give an .svg of one time the mechanism's size.")
+@click.option(
+    "--view",
+    metavar="NAME",
+    help="Show a mechanism in space as an .svg from the front, side or top.  [default: isometric]",
+)
 @motion_options
 @click.pass_context
 def command(
@@ -40,6 +45,7 @@ def command(
     at: float | None,
     trace: tuple[str, ...],
     true_size: bool,
+    view: str | None,
     start: str,
     end: str | None,
     points: int | None,
@@ -55,6 +61,8 @@ def command(
     paths. Where the motion does not converge, what was found is drawn, and the exit code is 3.
     """
     is_still = _is_still(output, at, true_size)
+    if view and not (is_still and output.lower().endswith(".svg")):
+        raise InputError("--view is for an .svg of one time: give --time T, too")
     require_output(output, model, "the model itself")
     mechanism = read_model(model)
     numbers = set_values(mechanism, values)
@@ -67,7 +75,7 @@ def command(
     if shown.any():
         named = trace or None
         if is_still:
-            kc.draw(solution, output, at, trace=named, true_size=true_size)
+            kc.draw(solution, output, at, trace=named, true_size=true_size, view=view)
         else:
             kc.animate(solution, output, trace=named)
         click.echo(f"Wrote {output}", err=True)

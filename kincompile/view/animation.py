@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError, UnsupportedError, package_of_extra
+from kincompile.names import listed
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.view.drawing import drawing
-from kincompile.view.mechanism_plot import NAME, draw, move
+from kincompile.view.mechanism_plot import axes_of, draw, write_name
 from kincompile.view.svg import Timing, as_svg
 from kincompile.view.traces import described, moving_system, traced_places
 from kincompile.writing import require_writable, write_atomically
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
 """Matplotlib's writer for each kind of file."""
+
+IN_SPACE = (*WRITERS, ".glb")
+"""Endings of files that show a motion in space."""
 
 SVG = ".svg"
 """Ending of what is written without matplotlib."""
@@ -99,7 +103,8 @@ def animate(
     rows, interval = frame_rows(solution, seconds)
     drawn = drawing(system, solution.parameters, solution.q[solution.good])
     traced = traced_places(drawn, trace)
-    figure, ax = plt.subplots(layout="constrained")
+    figure = plt.figure(layout="constrained")
+    ax = axes_of(figure, drawn)
     show = _first_frame(ax, system, drawn, solution, rows, traced)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # one layout serves all frames
@@ -123,19 +128,19 @@ def _first_frame(
 ) -> Callable[[int], None]:
     """Draw the first frame, and return what shows another one."""
     positions = solution.q[solution.good]
-    artists = draw(ax, system, drawn, positions)
+    move = draw(ax, system, drawn, positions)
     for point in traced:
         ax.plot(*point.at(positions).T, color="0.5", linewidth=1, zorder=1)
-    labels = [(ax.annotate(dot.name, (0, 0), **NAME), dot.place) for dot in drawn.dots]
+    labels = [
+        (write_name(ax, dot.name, dot.place.at(positions[0]).tolist()), dot.place)
+        for dot in drawn.dots
+    ]
     captions = _captions(solution, rows)
 
-    for text, _ in labels:
-        text.set_in_layout(False)
-
     def show(frame: int) -> None:
-        move(artists, solution.q[rows[frame]])
-        for text, place in labels:
-            text.xy = tuple(place.at(solution.q[rows[frame]]).tolist())
+        move(solution.q[rows[frame]])
+        for put, place in labels:
+            put(place.at(solution.q[rows[frame]]).tolist())
         ax.set_title(captions[frame], loc="left")
 
     show(0)
@@ -185,6 +190,11 @@ def _written_svg(
     step = max(1, round(t.size / (length * FRAME_RATE)))
     rows = np.append(np.arange(0, t.size - 1, step), t.size - 1)
     shapes = drawing(system, solution.parameters, q)
+    if shapes.is_spatial:
+        raise InputError(
+            f"cannot write {path}: a motion in space is written as {listed(IN_SPACE)}, and as SVG "
+            "at one time: by kc.draw, on the command line with --time"
+        )
     timing = Timing(length, (t[rows] - t[0]) / ((t[-1] - t[0]) or 1.0))
     description = described(shapes, f"in motion from t = {t[0]:g} to {t[-1]:g} {TIME_UNIT}")
     paths = [place.at(solution.q) for place in traced_places(shapes, trace)]

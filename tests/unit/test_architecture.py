@@ -39,7 +39,7 @@ GROUND = {name for name, floor in FLOORS.items() if floor == 0}
 RUNTIME = "runtime"
 BOTH_SIDES = {
     *("__init__", "__main__", "compiler", "cli", "spatial"),
-    *("compare", "derivation", "exercises", "sweep", "verify", "view"),
+    *("compare", "derivation", "design", "exercises", "sweep", "verify", "view"),
 }
 
 # Modules that may import kincompile inside a function. The lazy table of public names is what the

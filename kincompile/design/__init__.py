@@ -1,0 +1,1 @@
+"""From analysis to design: what tolerances do to a motion, and dimensions that reach targets."""
