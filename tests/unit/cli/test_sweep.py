@@ -7,7 +7,7 @@ import pytest
 import xarray
 
 import kincompile as kc
-from kincompile.files.sweep_table import read_sweep_table
+from kincompile.files.sweep_table import SweepTable, read_sweep_table
 from kincompile.sweep.samples import values_of
 from tests.unit.sweep.models import TIMES, crank, folding
 
@@ -110,7 +110,9 @@ def test_what_cannot_be_assembled_is_counted_and_alone_is_exit_code_3(
 def test_samples_fill_a_box_evenly(model):
     spans = "a = { from = 1, to = 3 }, omega = { from = -1, to = 0 }"
     table = f"[sweep]\nsamples = 1000\nparameters = {{ {spans} }}"
-    values = values_of(read_sweep_table(model(table)))
+    found = read_sweep_table(model(table))
+    assert found is not None
+    values = values_of(found)
     counts, *_ = np.histogram2d(values["a"], values["omega"], 5, ((1, 3), (-1, 0)))
     assert counts.sum() == 1000
     assert np.abs(counts - 40).max() <= 5
@@ -120,7 +122,7 @@ def test_the_table_may_be_json(tmp_path):
     file = tmp_path / "crank.json"
     data = json.loads(crank().to_json()) | {"sweep": {"parameters": {"a": [1, "4/2"]}}}
     file.write_text(json.dumps(data), encoding="utf-8")
-    assert read_sweep_table(file).parameters == {"a": (1.0, 2.0)}
+    assert read_sweep_table(file) == SweepTable({"a": (1.0, 2.0)})
     assert kc.read(file).name == "crank"
 
 
