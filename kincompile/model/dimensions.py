@@ -19,7 +19,10 @@ from kincompile.model.expressions import as_sympy
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from kincompile.model.resolve_loads import AppliedLoad
+    from kincompile.model.expressions import Scalar
+    from kincompile.model.load import Load
+
+    Values = Mapping[str, tuple[Scalar, ...]]
 
 Dimension = tuple[int, int, int]
 """Powers of mass, length and time."""
@@ -67,20 +70,20 @@ class _Given:
 
 
 def unit_problems(
-    loads: Iterable[AppliedLoad], units: Mapping[str, str], length_unit: str
+    loads: Iterable[tuple[Load, Values]], units: Mapping[str, str], length_unit: str
 ) -> Iterator[str]:
     """Yield what is wrong with the units of parameters that stand alone for attributes of loads.
 
     Parameters
     ----------
     loads
-        Masses and loads.
+        Masses and loads, with the values of their attributes by symbol.
     units
         Units of the parameters, by name.
     length_unit
         That of the mechanism.
     """
-    found = [item for load in loads for item in _given(load, units)]
+    found = [item for load, values in loads for item in _given(load, values, units)]
     length, _ = UNITS.get(length_unit, (math.nan, MASS))
     masses: dict[str, float] = {}
     for item in found:
@@ -109,13 +112,12 @@ def unit_problems(
             return
 
 
-def _given(load: AppliedLoad, units: Mapping[str, str]) -> Iterator[_Given]:
+def _given(load: Load, values: Values, units: Mapping[str, str]) -> Iterator[_Given]:
     """Yield the parameters that stand alone, or with a number, for attributes of a load."""
-    kind = load.template.type_name
-    for name, argument in load.written.arguments().items():
+    kind = type(load).__name__
+    for name, argument in load.arguments().items():
         expected = EXPECTED.get((kind, argument.symbol))
-        scalars = [load.scalars[argument.symbol]] if argument.symbol in load.scalars else []
-        for value in (*scalars, *load.points.get(argument.symbol, ())):
+        for value in values.get(argument.symbol, ()):
             _, rest = as_sympy(value).as_coeff_Mul()
             if expected is None or not isinstance(rest, sympy.Symbol):
                 continue

@@ -96,6 +96,10 @@ class AppliedLoad:
         """Return the forces and attributes."""
         return *self.scalars.values(), *chain(*self.points.values())
 
+    def by_symbol(self) -> dict[str, tuple[Scalar, ...]]:
+        """Return the forces and attributes by their symbol, points as their components."""
+        return {name: (value,) for name, value in self.scalars.items()} | dict(self.points)
+
     def entries(self, quantity: str) -> Iterator[tuple[int, int, Expression]]:
         """Yield row, column and formula of the entries of M or of Q that it adds to."""
         derived = derive_load(self.template, self.others, varies=self.varies)
@@ -120,7 +124,8 @@ def resolved_loads(
     found = (_resolved(item, scope) for item in given)
     known = tuple(item for item in found if item is not None)
     units = {name: parameter.unit for name, parameter in scope.parameters.items()}
-    scope.problems += unit_problems(known, units, length_unit)
+    values = ((item.written, item.by_symbol()) for item in known)
+    scope.problems += unit_problems(values, units, length_unit)
     return known
 
 
