@@ -6,16 +6,18 @@ for ``--help``.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 from kincompile.cli.shared import set_option
+from kincompile.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from kincompile.cli.shared import Command
@@ -42,29 +44,25 @@ def time_options(command: Command) -> Command:
     )
 
 
-def motion_options(command: Command) -> Command:
+def motion_options(command: Command, *, has_through: bool = True) -> Command:
     """Add the options of a motion: its times, and the values of parameters."""
-    return time_options(
-        _with(
-            command,
-            click.option(
-                "--grid",
-                metavar="NAME=FIRST:LAST:STEP",
-                help="Times at which a coordinate has these values, as crank.phi=0:360deg:1deg.",
-            ),
-            click.option(
-                "--through",
-                type=click.Choice(["smooth"]),
-                help="Go on past a bifurcation, along the smooth branch.",
-            ),
-            click.option(
-                "--assembly",
-                type=int,
-                metavar="N",
-                help="Start in the N-th of the ways that `kincompile assemblies` lists.",
-            ),
-        )
+    grid = click.option(
+        "--grid",
+        metavar="NAME=FIRST:LAST:STEP",
+        help="Times at which a coordinate has these values, such as crank.phi=0:360deg:1deg.",
     )
+    through = click.option(
+        "--through",
+        type=click.Choice(["smooth"]),
+        help="Go on past a bifurcation, along the smooth branch.",
+    )
+    assembly = click.option(
+        "--assembly",
+        type=int,
+        metavar="N",
+        help="Start in the N-th of the ways that `kincompile assemblies` lists.",
+    )
+    return time_options(_with(command, grid, *((through,) if has_through else ()), assembly))
 
 
 def _with(command: Command, *options: Callable[[Command], Command]) -> Command:
@@ -72,6 +70,43 @@ def _with(command: Command, *options: Callable[[Command], Command]) -> Command:
     for option in reversed(options):
         command = option(command)
     return command
+
+
+def sweep_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of parameters that are swept."""
+    product = click.option("--product", is_flag=True, help="Solve every combination of the sweeps.")
+    sweep = click.option(
+        "--sweep",
+        "sweeps",
+        multiple=True,
+        metavar="NAME=FIRST:LAST:COUNT",
+        callback=_sweeps,
+        help="Solve for so many values of a parameter; several sweeps go in pairs.",
+    )
+    return sweep(product(command))
+
+
+def _sweeps(
+    context: click.Context, option: click.Parameter, given: tuple[str, ...]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the values of parameters that are swept."""
+    del context, option
+    values, problems = {}, []
+    for sweep in given:
+        name, _, span = sweep.partition("=")
+        try:
+            first, last, count = span.split(":")
+            ends, size = (float(first), float(last)), int(count)
+        except ValueError:
+            ends, size = (math.nan, math.nan), 0
+        if size < 1 or not all(map(math.isfinite, ends)):
+            problems.append(
+                f"--sweep {sweep}: give NAME=FIRST:LAST:COUNT with numbers, such as a=0.2:0.6:5"
+            )
+        values[name.strip()] = np.linspace(*ends, max(size, 1))
+    if problems:
+        raise InputError(problems)
+    return values
 
 
 def set_values(
