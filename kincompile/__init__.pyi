@@ -69,6 +69,8 @@ from kincompile.runtime.solve import solve as solve
 from kincompile.runtime.statics.equilibrium import Equilibrium as Equilibrium
 from kincompile.runtime.statics.equilibrium import equilibria as equilibria
 from kincompile.runtime.statics.equilibrium import equilibrium as equilibrium
+from kincompile.runtime.statics.flywheel import Flywheel as Flywheel
+from kincompile.runtime.statics.flywheel import flywheel as flywheel
 from kincompile.runtime.status import Status as Status
 from kincompile.runtime.times import times_at as times_at
 from kincompile.sweep.result import Sweep as Sweep

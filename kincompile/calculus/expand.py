@@ -15,6 +15,7 @@ from kincompile.calculus.expressions import (
     Angle,
     Basis,
     Circular,
+    Cross,
     Dot,
     Expression,
     Norm,
@@ -31,6 +32,7 @@ from kincompile.calculus.expressions import (
     Sum,
     Symbol,
     TimeFunction,
+    TimesG,
     Vector,
     VectorSum,
     VectorSymbol,
@@ -163,6 +165,10 @@ class Expansion:
             case Perpendicular(vector):
                 x, y = self.vector(vector)
                 return -y, x
+            case Cross(left, right):
+                return cross_product(self.vector(left), self.vector(right))
+            case TimesG(p, vector, is_transposed):
+                return times_g(self.vector(p), self.vector(vector), is_transposed)
             case VectorSum(()):
                 return (environment.number(Fraction(0)),) * self._size
             case VectorSum(terms):
@@ -177,3 +183,26 @@ class Expansion:
 
     def _total(self, values: Sequence[Value]) -> Value:
         return reduce(add, values) if values else self.environment.number(Fraction(0))
+
+
+def cross_product(left: Components, right: Components) -> Components:
+    """Return the vector product of two vectors of three components."""
+    (a1, a2, a3), (b1, b2, b3) = left, right
+    return a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1
+
+
+def times_g(p: Components, vector: Components, is_transposed: bool) -> Components:
+    """Return G v or G^T v of Euler parameters p, G = [-e, -e~ + e0 I]."""
+    e0, e1, e2, e3 = p
+    if is_transposed:
+        a, b, c = vector
+        first = -(e1 * a + e2 * b + e3 * c)
+        return (
+            first, e0 * a + e2 * c - e3 * b, e0 * b + e3 * a - e1 * c, e0 * c + e1 * b - e2 * a
+        )  # fmt: skip
+    w, a, b, c = vector
+    return (
+        e0 * a - e1 * w + e3 * b - e2 * c,
+        e0 * b - e2 * w + e1 * c - e3 * a,
+        e0 * c - e3 * w + e2 * a - e1 * b,
+    )

@@ -271,10 +271,14 @@ class Rotated(Vector):
 
 @dataclass(frozen=True, slots=True)
 class RotationSlope(Vector):
-    """B(p, v), the derivative of A v by Euler parameters p: a matrix, where it is shown."""
+    """B(p, v), the derivative of A v by Euler parameters p: a matrix, where it is shown.
+
+    With `is_small` it is A v~, minus the derivative by a small rotation about the body's axes.
+    """
 
     rotation: Rotation
     vector: Vector
+    is_small: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,6 +294,23 @@ class Perpendicular(Vector):
     """R vector: a vector of the plane turned by a right angle, counterclockwise."""
 
     vector: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Cross(Vector):
+    """The vector product left~ right."""
+
+    left: Vector
+    right: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class TimesG(Vector):
+    """G(p) v of a v with four components, or G(p)^T v of one with three; G = [-e, -e~ + e0 I]."""
+
+    p: VectorSymbol
+    vector: Vector
+    is_transposed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -430,6 +451,15 @@ def perpendicular(vector: Vector) -> Vector:
         # In the plane R A is the derivative of A by its angle.
         return scaled(factor, rotated(vector.rotation, vector.vector, (*vector.along, ONE)))
     return scaled(factor, Perpendicular(vector))
+
+
+def cross(left: Vector, right: Vector) -> Vector:
+    """Return left~ right, scalar factors in front."""
+    first, left = split_factor(left)
+    second, right = split_factor(right)
+    if left == right or ZERO_VECTOR in (left, right):
+        return ZERO_VECTOR
+    return scaled(first * second, Cross(left, right))
 
 
 def dot(left: Vector, right: Vector) -> Scalar:

@@ -3,9 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
-from kincompile.calculus.expressions import Rotated, VectorSymbol, dot
+from kincompile.calculus.expand import cross_product
+from kincompile.calculus.expressions import (
+    Number,
+    Rotated,
+    Scalar,
+    TimesG,
+    VectorSymbol,
+    cross,
+    dot,
+    rotated,
+    scaled,
+    split_factor,
+)
 from kincompile.calculus.symbols import Frame
 from kincompile.names import rate
 
@@ -16,11 +29,10 @@ if TYPE_CHECKING:
         Components,
         Expression,
         Rotation,
-        Scalar,
         Value,
         Vector,
     )
-    from kincompile.calculus.symbols import CoordinateSymbol
+    from kincompile.calculus.symbols import Change, CoordinateSymbol
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +64,14 @@ class EulerRotation:
         return (dot(self.p, self.p) - 1,)
 
     def tidy(self, vector: Vector, along: tuple[Expression, ...]) -> Vector:
-        """Return the derivative of A v with its directions, which may change places, in order."""
+        """Return the derivative of A v with its directions, which may change places, in order.
+
+        Along p_dot = G^T omega'/2 it is A omega'~ v.
+        """
+        if len(along) == 1 and not isinstance(along[0], Scalar):
+            factor, change = split_factor(along[0])
+            if isinstance(change, TimesG) and change.p == self.p and change.is_transposed:
+                return scaled(2 * factor, rotated(self, cross(change.vector, vector)))
         return Rotated(self, vector, tuple(sorted(along, key=repr)))
 
     def entries(
@@ -91,7 +110,7 @@ class EulerRotation:
         p0, w0 = p[0], w[0] + w[0]
         e, f = p[1:], tuple(item + item for item in w[1:])
         same, by_e, by_f = p0 * w0 - _dot(e, f), _dot(f, vector), _dot(e, vector)
-        turns = zip(_cross(e, vector), _cross(f, vector), strict=True)
+        turns = zip(cross_product(e, vector), cross_product(f, vector), strict=True)
         return tuple(
             same * v + a * by_e + b * by_f + (w0 * c + p0 * d)
             for v, a, b, (c, d) in zip(vector, e, f, turns, strict=True)
@@ -103,11 +122,6 @@ def _dot(left: Components, right: Components) -> Value:
     for item in others:
         first = first + item
     return first
-
-
-def _cross(left: Components, right: Components) -> Components:
-    (a1, a2, a3), (b1, b2, b3) = left, right
-    return a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,3 +146,32 @@ class SpatialFrame(Frame):
     def rotation(self) -> Rotation:
         """The rotation by p."""
         return EulerRotation(self.p)
+
+
+@dataclass(frozen=True, slots=True)
+class TurnedFrame(SpatialFrame):
+    """The frame of a body in space whose changes are small rotations: Haug's r-omega form.
+
+    Its columns are those of r and of a small rotation pi' about the body's own axes, its rates
+    r_dot and the angular velocity omega'. Formulas have p in them, which changes by
+    p_dot = G^T omega'/2.
+    """
+
+    letters: ClassVar[tuple[str, ...]] = ("x", "y", "z", "pi_xi", "pi_eta", "pi_zeta")
+    ground: ClassVar[tuple[int, ...]] = (0,) * 6
+
+    def motion(self, order: int) -> tuple[CoordinateSymbol, ...]:
+        """Return r and pi', or r_dot and omega', or their derivatives."""
+        letter = f"omega_{self.index}" if order else f"pi_{self.index}"
+        turn = rate(letter, order - 1) if order > 1 else letter
+        return VectorSymbol(rate(f"r_{self.index}", order), self.size), VectorSymbol(turn, 3)
+
+    def changed(self, coordinate: CoordinateSymbol, change: Expression) -> Change:
+        """Return p with its change along a small rotation, r with its own."""
+        if coordinate != self.coordinates[1]:
+            return coordinate, change
+        assert not isinstance(change, Scalar)
+        return self.p, scaled(HALF, TimesG(self.p, change, is_transposed=True))
+
+
+HALF = Number(Fraction(1, 2))

@@ -19,13 +19,26 @@ from kincompile.calculus.rotations import PlaneRotation, turned
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from kincompile.calculus.expressions import Rotation
+    from kincompile.calculus.expressions import Expression, Rotation
 
 CoordinateSymbol = VectorSymbol | Symbol
 
+Change = tuple["Expression", "Expression"]
+"""A leaf of formulas, and how it changes."""
+
+
+class Owner:
+    """What has coordinates: the frame of a body, or a contact."""
+
+    __slots__ = ()
+
+    def changed(self, coordinate: CoordinateSymbol, change: Expression) -> Change:
+        """Return what a change of a coordinate changes in formulas: the coordinate itself."""
+        return coordinate, change
+
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class Frame(Owner):
     """The frame of a body: its position r, its orientation, and the rotation that belongs to it."""
 
     index: str
@@ -99,7 +112,7 @@ class PlaneFrame(Frame):
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class Contact(Owner):
     """The contact parameter of a cam profile in polar form, a(alpha) = rho(alpha) u(alpha)."""
 
     index: str

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from kincompile.calculus.expressions import Expression
     from kincompile.calculus.symbols import Contact, CoordinateSymbol, Frame
 
@@ -49,6 +51,22 @@ class Template:
     def coordinates(self) -> tuple[CoordinateSymbol, ...]:
         """The generalised coordinates: r and phi of each body, then the contact parameters."""
         return tuple(item for owner in self.owners for item in owner.coordinates)
+
+    def direction(
+        self, changes: Mapping[CoordinateSymbol, Expression]
+    ) -> dict[Expression, Expression]:
+        """Return how the leaves of Phi change where some coordinates do."""
+        return dict(
+            owner.changed(item, changes[item])
+            for owner in self.owners
+            for item in owner.coordinates
+            if item in changes
+        )
+
+    @property
+    def motion(self) -> dict[Expression, Expression]:
+        """How the leaves of Phi change with the rates of all coordinates."""
+        return self.direction(dict(zip(self.coordinates, self.rates, strict=True)))
 
     @property
     def rates(self) -> tuple[CoordinateSymbol, ...]:

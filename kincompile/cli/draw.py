@@ -16,13 +16,13 @@ from kincompile.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-STILL, MOVING = (".svg", ".dxf"), (".svg", ".gif", ".mp4")
+STILL, MOVING = (".svg", ".dxf"), (".svg", ".gif", ".mp4", ".glb")
 """Endings of files that show one time, and of those that show the motion."""
 
 
 @click.command("draw")
 @click.argument("model")
-@output_option("File to write: .svg or .dxf; .gif and .mp4 of a motion.")
+@output_option("File to write: .svg or .dxf; .gif, .mp4 and .glb of a motion.")
 @click.option("--time", "at", type=float, metavar="T", help="Draw this time of the motion alone.")
 @click.option(
     "--trace",
@@ -31,6 +31,11 @@ STILL, MOVING = (".svg", ".dxf"), (".svg", ".gif", ".mp4")
     help="Draw the path of a point, body or joint.  [default: the model's points]",
 )
 @click.option("--true-size", is_flag=True, help="Give an .svg of one time the mechanism's size.")
+@click.option(
+    "--view",
+    metavar="NAME",
+    help="Show a mechanism in space as an .svg from the front, side or top.  [default: isometric]",
+)
 @motion_options
 @click.pass_context
 def command(
@@ -40,6 +45,7 @@ def command(
     at: float | None,
     trace: tuple[str, ...],
     true_size: bool,
+    view: str | None,
     start: str,
     end: str | None,
     points: int | None,
@@ -52,9 +58,12 @@ def command(
 
     An .svg moves, without a script, or with --time stands still. A .dxf has one position, the first
     without --time, in the model's unit, with a layer for each body, the ground, the joints and the
-    paths. Where the motion does not converge, what was found is drawn, and the exit code is 3.
+    paths. A .glb is a motion in space for programs that show 3-D. Where the motion does not
+    converge, what was found is drawn, and the exit code is 3.
     """
     is_still = _is_still(output, at, true_size)
+    if view and not (is_still and output.lower().endswith(".svg")):
+        raise InputError("--view is for an .svg of one time: give --time T, too")
     require_output(output, model, "the model itself")
     mechanism = read_model(model)
     numbers = set_values(mechanism, values)
@@ -67,7 +76,7 @@ def command(
     if shown.any():
         named = trace or None
         if is_still:
-            kc.draw(solution, output, at, trace=named, true_size=true_size)
+            kc.draw(solution, output, at, trace=named, true_size=true_size, view=view)
         else:
             kc.animate(solution, output, trace=named)
         click.echo(f"Wrote {output}", err=True)

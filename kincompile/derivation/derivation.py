@@ -20,6 +20,7 @@ from kincompile.derivation.evaluation import Evaluation, evaluation
 from kincompile.derivation.figures import Figures
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
+from kincompile.derivation.load_section import load_abbreviations, loads_section
 from kincompile.derivation.to_html import as_html, as_slides
 from kincompile.derivation.to_latex import as_tex
 from kincompile.derivation.to_markdown import as_markdown
@@ -164,6 +165,8 @@ def derivation(
     chapters = [unknowns_section(figures), constraints]
     if constraint is None:
         chapters.append(assembled_section(chosen))
+        if system.loads:
+            chapters.append(loads_section(chosen))
     return Derivation(
         system.name,
         _summary(chosen),
@@ -191,6 +194,8 @@ def constraint_chapters(
     for item in constraints:
         if isinstance(item, Joint):
             names |= abbreviations(item.template)
+    for load in chosen.system.loads:
+        names |= load_abbreviations(load.template)
     return names, sections
 
 

@@ -141,6 +141,7 @@ Formula: TypeAlias = (
 PHI, PHI_Q, PHI_T = Glyph("Phi"), Glyph("Phi", "q"), Glyph("Phi", "t")
 PHI_QT, PHI_TT = Glyph("Phi", "qt"), Glyph("Phi", "tt")
 NU, GAMMA = Glyph("nu"), Glyph("gamma")
+MASS, LAMBDA = Glyph("M"), Glyph("lambda")
 Q, Q_DOT, Q_DDOT = Glyph("q"), Glyph("q", dots=1), Glyph("q", dots=2)
 DELTA_Q = Joined((Glyph("Delta", bold=False), Q))
 IDENTITY, ZERO_BLOCK = Glyph("I"), Glyph("0")

@@ -11,7 +11,15 @@ import sympy
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
-from kincompile.derivation.document import Chapter, Display, Figure, Math, Verbatim, table, text
+from kincompile.derivation.document import (
+    Chapter,
+    Display,
+    Figure,
+    Math,
+    Verbatim,
+    table,
+    text,
+)
 from kincompile.derivation.formulas import (
     GAMMA_TERMS,
     PHI_Q,
@@ -50,13 +58,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
-    from kincompile.derivation.document import Block, Run, Runs
+    from kincompile.derivation.document import Block, Run, Runs, Table
     from kincompile.derivation.figures import Figures
     from kincompile.derivation.formulas import Formula
     from kincompile.derive.rules import Step
     from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
+    from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.view.picture import Picture
 
 
@@ -103,29 +112,10 @@ class _JointSteps(Steps[RowBlock]):
     def attributes(self, picture: Picture | None) -> Chapter:
         written = type(self.joint.written)
         meaning = (written.__doc__ or "").strip().splitlines()[0]
-        rows: list[tuple[Run | Runs, ...]] = []
-        for name, argument in written.arguments().items():
-            symbol = _attribute_symbol(argument.symbol, argument.kind)
-            shown: tuple[Run, Run]
-            if argument.kind is Kind.BODY:
-                shown = Verbatim(self.joint.bodies["ij".index(argument.symbol)].name), ""
-            else:
-                shown = Math(_attribute(self.joint, argument.symbol)), self._number(argument.symbol)
-            rows.append((Verbatim(name), Math(symbol), *shown))
         source = text(f"{meaning} Source: {self.joint.source}.")
-        header = ("attribute", "symbol", "as written", "number")
-        attributes = table(header, rows)
+        attributes = attributes_table(self.joint, self.evaluation.values)
         figure = [] if picture is None else [Figure(picture)]
         return self.step(1, "The joint and its attributes", source, *figure, attributes, level="")
-
-    def _number(self, symbol: str) -> Run:
-        """Return an attribute in numbers; a profile has none."""
-        joint, values = self.joint, self.evaluation.values
-        if symbol in joint.points:
-            return Math(_column(joint.points[symbol], values))
-        if symbol in joint.scalars:
-            return Math(_decimal(joint.scalars[symbol], values))
-        return ""
 
     def constraint(self) -> Chapter:
         blocks: list[Block] = []
@@ -235,15 +225,39 @@ class _JointSteps(Steps[RowBlock]):
             yield Display(Equated((symbol, _column(expansion.vector(vector), values))))
 
 
+def attributes_table(element: Joint | AppliedLoad, values: Mapping[str, float]) -> Table:
+    """Return the attributes of a joint or a load: as written, and in numbers."""
+    rows: list[tuple[Run | Runs, ...]] = []
+    for name, argument in type(element.written).arguments().items():
+        symbol = _attribute_symbol(argument.symbol, argument.kind)
+        shown: tuple[Run, Run]
+        if argument.kind is Kind.BODY:
+            shown = Verbatim(element.bodies["ij".index(argument.symbol)].name), ""
+        else:
+            number = _number(element, argument.symbol, values)
+            shown = Math(_attribute(element, argument.symbol)), number
+        rows.append((Verbatim(name), Math(symbol), *shown))
+    return table(("attribute", "symbol", "as written", "number"), rows)
+
+
+def _number(element: Joint | AppliedLoad, symbol: str, values: Mapping[str, float]) -> Run:
+    """Return an attribute in numbers; a profile has none."""
+    if symbol in element.points:
+        return Math(_column(element.points[symbol], values))
+    if symbol in element.scalars:
+        return Math(_decimal(element.scalars[symbol], values))
+    return ""
+
+
 def _attribute_symbol(symbol: str, kind: Kind) -> Formula:
     if kind is Kind.BODY:
         return Glyph(symbol, bold=False)
-    if kind in (Kind.POINT, Kind.AXIS):
+    if kind in (Kind.POINT, Kind.AXIS, Kind.LOADS):
         return VectorSymbol(symbol)
     return TimeFunction(symbol) if symbol == "C" else Letter(symbol)
 
 
-def _attribute(joint: Joint, symbol: str) -> Formula:
+def _attribute(joint: Joint | AppliedLoad, symbol: str) -> Formula:
     """Return an attribute as the user wrote it."""
     if symbol in joint.points:
         return column(tuple(_as_written(value) for value in joint.points[symbol]))

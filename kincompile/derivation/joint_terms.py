@@ -89,9 +89,7 @@ def abbreviations(template: Template) -> dict[Expression, Glyph]:
     """Name what occurs again and again: the distance vector d, the angle of a gear, their rates."""
     found = [item for Phi in template.Phi for item in parts(Phi)]
     separations = list(dict.fromkeys(v for item in found for v in _separations(item)))
-    q_dot: dict[Expression, Expression] = dict(
-        zip(template.coordinates, template.rates, strict=True)
-    )
+    q_dot = template.motion
     names: dict[Expression, Glyph] = {}
     for k, vector in enumerate(separations, 1):
         index = str(k) if len(separations) > 1 else ""

@@ -63,7 +63,7 @@ def derive(template: Template) -> tuple[RowBlock, ...]:
 
 
 def _row_block(template: Template, Phi: Expression) -> RowBlock:
-    along_q_dot: Direction = dict(zip(template.coordinates, template.rates, strict=True))
+    along_q_dot: Direction = template.motion
     along_t: Direction = {TIME: ONE}
     Phi_t, Phi_t_steps = recorded(Phi, along_t)
     velocity = along(Phi, along_q_dot)
@@ -77,7 +77,9 @@ def _row_block(template: Template, Phi: Expression) -> RowBlock:
     return RowBlock(
         Phi=Phi,
         Phi_q=tuple(
-            along(Phi, {item: unit}) for item in template.coordinates for unit in units(item)
+            along(Phi, template.direction({item: unit}))
+            for item in template.coordinates
+            for unit in units(item)
         ),
         velocity=velocity,
         nu=-Phi_t,

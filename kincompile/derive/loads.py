@@ -13,7 +13,9 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from kincompile.calculus.expressions import (
+    ONE,
     ZERO,
+    Basis,
     Dot,
     Power,
     Product,
@@ -153,7 +155,7 @@ def simplified(expression: Scalar) -> Scalar:
     """Return an expression whose products of vectors of one frame are formed in that frame.
 
     :math:`(A u)^T A v = u^T v`, and in the plane :math:`(A u)^T B v = u^T R v`, which is zero where
-    both are the same.
+    both are the same. The axes are unit vectors across each other.
     """
     match expression:
         case Sum(terms):
@@ -162,6 +164,8 @@ def simplified(expression: Scalar) -> Scalar:
             return product_of(tuple(map(simplified, factors)))
         case Power(base, exponent):
             return power_of(simplified(base), exponent)
+        case Dot(Basis(axis), Basis(other_axis)):
+            return ONE if axis == other_axis else ZERO
         case Dot(Rotated(PlaneRotation() as rotation, u, first), Rotated(other, v, second)):
             if rotation == other:
                 return _in_frame(u, v, len(second) - len(first))

@@ -3,6 +3,7 @@
 By a position r the derivative along a change of r is linear in that change: ``k r_dot`` of a vector
 constraint, whose block is k I, and ``u^T r_dot`` of a scalar one, whose row is u^T. By Euler
 parameters p it is ``B(p, s) p_dot``, whose block is the matrix B(p, s), and ``u^T B(p, s) p_dot``.
+By a small rotation pi' it is ``A omega'~ s = -A s~ omega'``, whose block is -A s~.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from kincompile.calculus.expressions import (
     ONE,
     ZERO,
     ZERO_VECTOR,
+    Cross,
     Dot,
     Expression,
     Product,
@@ -24,9 +26,11 @@ from kincompile.calculus.expressions import (
     Scalar,
     Scaled,
     Sum,
+    TimesG,
     Vector,
     VectorSum,
     VectorSymbol,
+    cross,
     dot,
     product_of,
     rotated,
@@ -53,8 +57,8 @@ class PartialDerivative:
         A coordinate of the template.
     entry
         By a vector r: k of the block k I where Phi is a vector, u of the row u^T where Phi is a
-        scalar. By Euler parameters: the matrix, or the row, of slopes. By a scalar: a vector or a
-        scalar, as Phi is.
+        scalar. By Euler parameters, and by a small rotation: the matrix, or the row, of slopes. By
+        a scalar: a vector or a scalar, as Phi is.
     steps
         The rules that fired, innermost first, with what they give in the same form.
     """
@@ -73,17 +77,17 @@ def partials(template: Template) -> tuple[tuple[PartialDerivative, ...], ...]:
     """Return the derivatives of a constraint type: by row block, then by coordinate."""
     changes = tuple(zip(template.coordinates, template.rates, strict=True))
     return tuple(
-        tuple(_partial(Phi, coordinate, rate) for coordinate, rate in changes)
+        tuple(_partial(template, Phi, coordinate, rate) for coordinate, rate in changes)
         for Phi in template.Phi
     )
 
 
 def _partial(
-    Phi: Expression, coordinate: CoordinateSymbol, rate: CoordinateSymbol
+    template: Template, Phi: Expression, coordinate: CoordinateSymbol, rate: CoordinateSymbol
 ) -> PartialDerivative:
     if not isinstance(rate, VectorSymbol):
         return PartialDerivative(coordinate, *recorded(Phi, {coordinate: ONE}))
-    entry, steps = recorded(Phi, {coordinate: rate})
+    entry, steps = recorded(Phi, template.direction({coordinate: rate}))
     read_off = tuple(
         Step(step.rule, step.expression, coefficient(step.derivative, rate)) for step in steps
     )
@@ -102,10 +106,14 @@ def _applied(entry: Expression, change: Expression) -> Expression:
             return sum(parts[1:], start=parts[0])
         case Scaled(factor, vector) if _has_slopes(vector):
             return factor * _applied(vector, change)
-        case RotationSlope(rotation, vector):
+        case RotationSlope(rotation, vector, is_small):
+            if is_small:
+                return rotated(rotation, cross(vector, change))
             return rotated(rotation, vector, (change,))
-        case RowOfSlope(left, RotationSlope(rotation, vector)):
-            return dot(left, rotated(rotation, vector, (change,)))
+        case RowOfSlope(left, slope):
+            moved = _applied(slope, change)
+            assert isinstance(moved, Vector)
+            return dot(left, moved)
     return dot(entry, change)
 
 
@@ -120,8 +128,10 @@ def _has_slopes(vector: Vector) -> bool:
 
 
 def _slope(vector: Vector, rate: VectorSymbol) -> Vector | None:
-    """Return B(p, v) of B(p, v) p_dot; None for anything else."""
+    """Return B(p, v) of B(p, v) p_dot, -A v~ of A omega'~ v; None for anything else."""
     match vector:
+        case Rotated(rotation, Cross(turn, inner), ()) if turn == rate:
+            return -RotationSlope(rotation, inner, is_small=True)
         case Rotated(rotation, inner, (along_rate,)) if along_rate == rate:
             return RotationSlope(rotation, inner)
     return None
@@ -157,11 +167,15 @@ def _row(expression: Scalar, rate: VectorSymbol) -> Vector:
             return vector_sum(tuple(rows))
         case Dot(left, right) if rate in (left, right):
             return right if left == rate else left
+        case Dot(left, TimesG(p, turn, True)) if turn == rate:
+            return TimesG(p, left)
         case Dot(left, right):
             for one, other in ((left, right), (right, left)):
                 slope = _slope(one, rate)
-                if isinstance(slope, RotationSlope):
-                    return RowOfSlope(other, slope)
+                if slope is not None:
+                    factor, matrix = split_factor(slope)
+                    assert isinstance(matrix, RotationSlope)
+                    return scaled(factor, RowOfSlope(other, matrix))
     if along(expression, {rate: rate}) != ZERO:
         raise InternalError(f"{expression} is not a multiple of {rate}")
     return ZERO_VECTOR

@@ -32,14 +32,17 @@ from kincompile.calculus.expressions import (
     Sum,
     Symbol,
     TimeFunction,
+    TimesG,
     Vector,
     VectorSum,
+    cross,
     dot,
     perpendicular,
     power_of,
     product_of,
     rotated,
     scaled,
+    split_factor,
     sum_of,
     vector_sum,
 )
@@ -61,6 +64,7 @@ class Rule(Enum):
     B_TO_A = "dB/dphi = -A"
     A_TO_SLOPE = "d(A s) = B(p, s) dp"
     SLOPE = "d(B(p, s) w) = B(w, s) dp"
+    TURN = "p_dot = G^T omega'/2: A_dot = A omega'~"
     ANGLE = "d atan2(s, c) = (c ds - s dc)/(s^2 + c^2)"
     CONSTANT = "constant"
     COORDINATE = "coordinate"
@@ -160,7 +164,12 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
         case Rotated(rotation, vector, directions):
             changes = [along(item, direction, record) for item in rotation.coordinates]
             moved = along(vector, direction, record)
-            return _ROTATION[rotation.letters][len(directions)], vector_sum(
+            name = _ROTATION[rotation.letters][len(directions)]
+            if any(
+                isinstance(item, Scaled) and isinstance(item.vector, TimesG) for item in changes
+            ):
+                name = Rule.TURN
+            return name, vector_sum(
                 (
                     *(rotated(rotation, vector, (*directions, change)) for change in changes),
                     *(
@@ -171,6 +180,13 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
                     rotated(rotation, moved, directions),
                 )
             )
+        case TimesG(p, vector, True) if p in direction:
+            factor, change = split_factor(along(p, direction))
+            assert isinstance(change, TimesG), "p changes by a small rotation"
+            number, turn = split_factor(cross(change.vector, vector))
+            back = dot(change.vector, vector) * p
+            onward = ZERO_VECTOR if turn == ZERO_VECTOR else TimesG(p, turn, is_transposed=True)
+            return Rule.TURN, factor * (number * onward - back)
         case Perpendicular(vector):
             return Rule.CONSTANT, perpendicular(along(vector, direction, record))
     change = direction.get(expression)

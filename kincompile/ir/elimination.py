@@ -10,6 +10,7 @@ factorization, shared by all right sides.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import Constant, Graph, Node
@@ -68,9 +69,15 @@ class SolvePlan:
     solution: tuple[int, ...]
 
     @property
+    def has_choices(self) -> bool:
+        """Whether rows change places: there is a block of more than three, not solved by LAPACK."""
+        sizes = (len(block.rows) for block in self.blocks)
+        return any(LARGEST_CLOSED_FORM < size <= LARGEST_PIVOTED for size in sizes)
+
+    @property
     def has_large_blocks(self) -> bool:
         """Whether there is a block that LAPACK solves."""
-        return any(len(block.rows) > LARGEST_CLOSED_FORM for block in self.blocks)
+        return any(len(block.rows) > LARGEST_PIVOTED for block in self.blocks)
 
 
 def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan | None:
@@ -142,8 +149,8 @@ def plan_entries(
         return None
     determinants: list[int] = []
     for block in blocks:
-        is_small = len(block.rows) <= LARGEST_CLOSED_FORM
-        solve = _eliminate_block if is_straight and not is_small else _solve_block
+        is_large = len(block.rows) > LARGEST_PIVOTED
+        solve = _eliminate_block if is_straight and is_large else _solve_block
         determinants += solve(graph, block, matrix, right, solution)
         for item in rotations:
             if not item.is_finished and solution.keys() >= set(item.turns):
@@ -245,7 +252,11 @@ def _solve_block(
     size = len(block.rows)
     a = [[matrix[row].get(column, zero) for column in block.columns] for row in block.rows]
     b = [_remainder(graph, matrix[row], block.columns, right[row], solution) for row in block.rows]
-    if size > LARGEST_CLOSED_FORM:
+    if LARGEST_CLOSED_FORM < size <= LARGEST_PIVOTED:
+        x, pivots = _pivoted(graph, a, b)
+        solution |= zip(block.columns, x, strict=True)
+        return [pivots]
+    if size > LARGEST_PIVOTED:
         entries = [node for row in a for node in row]
         for k, column in enumerate(block.columns):
             solution[column] = graph.linear("solve", size, k, (*entries, *b))
@@ -258,6 +269,36 @@ def _solve_block(
             total = graph.add(total, graph.mul(cofactor, value))
         solution[column] = graph.mul(total, inverse)
     return [determinant]
+
+
+def _pivoted(graph: Graph, a: list[list[int]], b: list[int]) -> tuple[list[int], int]:
+    """Return x of a x = b by elimination with partial pivoting, and the determinant of a.
+
+    Rows change places by choices, not by branches, so that many points are solved at once.
+    """
+    size, determinant = len(a), graph.const(1)
+    inverses = []
+    for k in range(size):
+        for i in range(k + 1, size):
+            is_larger = graph.compare("<", graph.square(a[k][k]), graph.square(a[i][k]))
+            choose = partial(graph.select, is_larger)
+            pairs = [(choose(y, x), choose(x, y)) for x, y in zip(a[k][k:], a[i][k:], strict=True)]
+            a[k][k:], a[i][k:] = (list(row) for row in zip(*pairs, strict=True))
+            b[k], b[i] = choose(b[i], b[k]), choose(b[k], b[i])
+            determinant = choose(graph.neg(determinant), determinant)
+        determinant = graph.mul(determinant, a[k][k])
+        inverses.append(graph.div(graph.const(1), a[k][k]))
+        for i in range(k + 1, size):
+            factor = graph.mul(a[i][k], inverses[k])
+            for j in range(k + 1, size):
+                a[i][j] = graph.sub(a[i][j], graph.mul(factor, a[k][j]))
+            b[i] = graph.sub(b[i], graph.mul(factor, b[k]))
+    x = list(b)
+    for k in reversed(range(size)):
+        for j in range(k + 1, size):
+            x[k] = graph.sub(x[k], graph.mul(a[k][j], x[j]))
+        x[k] = graph.mul(x[k], inverses[k])
+    return x, determinant
 
 
 def _eliminate_block(
@@ -275,6 +316,8 @@ def _eliminate_block(
 
 LARGEST_CLOSED_FORM = 3
 """Blocks up to this size are solved by their adjugate, as Cramer's rule does."""
+LARGEST_PIVOTED = 6
+"""Blocks up to this size are eliminated in straight-line code, larger ones by LAPACK."""
 
 
 def _adjugate(graph: Graph, a: list[list[int]]) -> tuple[list[list[int]], int]:

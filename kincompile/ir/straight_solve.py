@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import depending_on
@@ -77,6 +78,9 @@ class StraightSolve:
                 shares = ((a, graph.neg(amount)),)
             case "mul", a, b:
                 shares = ((a, graph.mul(amount, new[b])), (b, graph.mul(new[a], amount)))
+            case "select", condition, a, b:
+                nothing, choose = graph.const(0), partial(graph.select, new[condition])
+                shares = ((a, choose(amount, nothing)), (b, choose(nothing, amount)))
             case "div", a, b:
                 shares = ((a, graph.div(amount, new[b])),)
         yield from ((node, share) for node, share in shares if node in self._moving)

@@ -144,7 +144,7 @@ def assemble(system: CheckedSystem) -> list[EquationRow]:
         rows += (
             _free_rows(constraint)
             if isinstance(constraint, FreeEquation)
-            else _joint_rows(constraint)
+            else joint_rows(constraint)
         )
     return rows
 
@@ -158,7 +158,8 @@ def _free_rows(equation: FreeEquation) -> list[EquationRow]:
     return rows
 
 
-def _joint_rows(joint: Joint) -> list[EquationRow]:
+def joint_rows(joint: Joint) -> list[EquationRow]:
+    """Return the rows of a joint, by the columns of its template."""
     expansion = Expansion(SymbolicEnvironment(joint), joint.template.dimension)
     rows = []
     for block in derive(joint.template):

@@ -79,8 +79,11 @@ class SymbolicEnvironment:
         return as_sympy(self._bound.scalars[symbol.name])
 
     def vector(self, symbol: VectorSymbol) -> Components:
-        """Return a position, a velocity or a body-fixed point."""
-        if symbol in self._motion:
+        """Return a position, a velocity or a body-fixed point.
+
+        A vector that is given by name among the points is that, also where it is a rate: omega'.
+        """
+        if symbol in self._motion and symbol.name not in self._bound.points:
             return self._motion[symbol]
         return tuple(as_sympy(value) for value in self._bound.points[symbol.name])
 

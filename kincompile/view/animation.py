@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError, UnsupportedError, package_of_extra
+from kincompile.names import listed
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.view.drawing import drawing
-from kincompile.view.mechanism_plot import NAME, draw, move
+from kincompile.view.mechanism_plot import axes_of, draw, write_name
 from kincompile.view.svg import Timing, as_svg
 from kincompile.view.traces import described, moving_system, traced_places
+from kincompile.view.worlds import motion_file
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -33,6 +35,12 @@ if TYPE_CHECKING:
 
 WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
 """Matplotlib's writer for each kind of file."""
+
+GLB = ".glb"
+"""Ending of glTF in one binary file."""
+
+IN_SPACE = (*WRITERS, GLB)
+"""Endings of files that show a motion in space."""
 
 SVG = ".svg"
 """Ending of what is written without matplotlib."""
@@ -66,11 +74,13 @@ def animate(
         The motion of one set of parameters. Points without a solution are left out.
     path : path-like, optional
         File to write, whole or not at all: ``.svg``, which moves in a browser and needs no
-        matplotlib, ``.gif``, or ``.mp4``, which needs ffmpeg.
+        matplotlib, ``.gif``, or ``.mp4``, which needs ffmpeg; of a motion in space ``.glb``, which
+        programs for 3-D open (glTF 2.0 with a keyframe at each point), and no ``.svg``.
     model
         The mechanism; needed only for a solution of a module that was loaded from a file.
     seconds
-        Playing time; without, that of the motion, but at least 2 s and at most 20 s.
+        Playing time; without, that of the motion, but at least 2 s and at most 20 s. A ``.glb`` has
+        the times of the motion.
     trace
         Names of points, bodies and constraints: points, origins and places that leave a line.
         Without, the points of the model do.
@@ -88,8 +98,11 @@ def animate(
     UnsupportedError
         If matplotlib, or for MP4 ffmpeg, is not installed.
     """
-    if path is not None and Path(path).suffix.lower() == SVG:
+    ending = "" if path is None else Path(path).suffix.lower()
+    if path is not None and ending == SVG:
         return _written_svg(solution, Path(path), model, seconds, trace)
+    if path is not None and ending == GLB:
+        return _written_glb(solution, Path(path), model, seconds, trace)
     with package_of_extra("matplotlib", "plot"):
         from matplotlib import animation
         from matplotlib import pyplot as plt
@@ -99,7 +112,8 @@ def animate(
     rows, interval = frame_rows(solution, seconds)
     drawn = drawing(system, solution.parameters, solution.q[solution.good])
     traced = traced_places(drawn, trace)
-    figure, ax = plt.subplots(layout="constrained")
+    figure = plt.figure(layout="constrained")
+    ax = axes_of(figure, drawn)
     show = _first_frame(ax, system, drawn, solution, rows, traced)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # one layout serves all frames
@@ -123,19 +137,19 @@ def _first_frame(
 ) -> Callable[[int], None]:
     """Draw the first frame, and return what shows another one."""
     positions = solution.q[solution.good]
-    artists = draw(ax, system, drawn, positions)
+    move = draw(ax, system, drawn, positions)
     for point in traced:
         ax.plot(*point.at(positions).T, color="0.5", linewidth=1, zorder=1)
-    labels = [(ax.annotate(dot.name, (0, 0), **NAME), dot.place) for dot in drawn.dots]
+    labels = [
+        (write_name(ax, dot.name, dot.place.at(positions[0]).tolist()), dot.place)
+        for dot in drawn.dots
+    ]
     captions = _captions(solution, rows)
 
-    for text, _ in labels:
-        text.set_in_layout(False)
-
     def show(frame: int) -> None:
-        move(artists, solution.q[rows[frame]])
-        for text, place in labels:
-            text.xy = tuple(place.at(solution.q[rows[frame]]).tolist())
+        move(solution.q[rows[frame]])
+        for put, place in labels:
+            put(place.at(solution.q[rows[frame]]).tolist())
         ax.set_title(captions[frame], loc="left")
 
     show(0)
@@ -185,17 +199,48 @@ def _written_svg(
     step = max(1, round(t.size / (length * FRAME_RATE)))
     rows = np.append(np.arange(0, t.size - 1, step), t.size - 1)
     shapes = drawing(system, solution.parameters, q)
+    if shapes.is_spatial:
+        raise InputError(
+            f"cannot write {path}: a motion in space is written as {listed(IN_SPACE)}, and as SVG "
+            "at one time: by kc.draw, on the command line with --time"
+        )
     timing = Timing(length, (t[rows] - t[0]) / ((t[-1] - t[0]) or 1.0))
     description = described(shapes, f"in motion from t = {t[0]:g} to {t[-1]:g} {TIME_UNIT}")
     paths = [place.at(solution.q) for place in traced_places(shapes, trace)]
     return write_atomically(path, as_svg(shapes, q[rows], description, paths=paths, timing=timing))
 
 
+def _written_glb(
+    solution: Solution,
+    path: Path,
+    model: Mechanism | ConstraintSystem | None,
+    seconds: float | None,
+    trace: Iterable[str] | None,
+) -> Path:
+    """Write a motion in space as glTF, with a keyframe at each point that was found."""
+    require_writable(path)
+    system = moving_system(solution, model, WHAT)
+    q, t = solution.q[solution.good], solution.t[solution.good]
+    shapes = drawing(system, solution.parameters, q)
+    if not shapes.is_spatial:
+        raise InputError(
+            f"cannot write {path}: {solution.name} moves in a plane, and {GLB} is for motions in "
+            f"space; end its name in {listed((SVG, *WRITERS))}"
+        )
+    elapsed = np.abs(t - t[0])
+    if seconds is not None and t.size > 1:
+        elapsed *= _playing_time(t, seconds) / elapsed[-1]
+    paths = [place.at(q) for place in traced_places(shapes, trace)]
+    file = motion_file().as_glb(shapes, elapsed, q, system.length_unit, paths)
+    return write_atomically(path, file)
+
+
 def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
     """Check that the file can be written, before the frames are drawn."""
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise InputError(f"cannot write {path}: end its name in {', '.join(WRITERS)} or {SVG}.")
+        known = ", ".join((*WRITERS, GLB))
+        raise InputError(f"cannot write {path}: end its name in {known} or {SVG}.")
     if not is_available(writer):
         raise UnsupportedError(
             f"cannot write {path}: {writer} is not installed. Install it (apt-get install ffmpeg, "

@@ -59,7 +59,7 @@ def links(
         own += [(0.0,) * dimension] if len(_distinct(own)) < 2 else []
         points = _distinct(own)
         if len(points) > 1 or frame not in shown:
-            corners = _hull(points) if dimension == PLANE else tuple(points)
+            corners = convex_chain(points) if dimension == PLANE else tuple(points)
             found.append(Hull(frame, corners, tuple(own)))
     return found
 
@@ -78,7 +78,7 @@ def _distinct(points: Iterable[Point]) -> list[Point]:
     return found
 
 
-def _hull(points: Iterable[Point]) -> tuple[Point, ...]:
+def convex_chain(points: Iterable[Point]) -> tuple[Point, ...]:
     """Return the convex hull, counterclockwise; of points on a line the two ends.
 
     Andrew's monotone chain.

@@ -13,6 +13,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.dxf import LENGTHS, as_dxf
 from kincompile.view.svg import as_svg
 from kincompile.view.traces import described, moving_system, traced_places
+from kincompile.view.worlds import solid_pictures
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -22,9 +23,13 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.results.solution import Solution
+    from kincompile.view.drawing import Drawing
 
 ENDINGS = (".svg", ".dxf")
 """Endings of the files that are written."""
+
+STANDARD = ("isometric", "front", "side", "top")
+"""Views of a mechanism in space."""
 
 SAME_TIME = 1e-9
 """Difference, in durations of the motion, up to which two times are one."""
@@ -38,6 +43,7 @@ def draw(
     model: Mechanism | ConstraintSystem | None = None,
     trace: Iterable[str] | None = None,
     true_size: bool = False,
+    view: str | None = None,
 ) -> Path:
     """Write a drawing of a mechanism at one time of its motion.
 
@@ -57,6 +63,9 @@ def draw(
         Without, those of the points of the model are.
     true_size
         Whether an SVG has the size of the mechanism, where it otherwise fits a screen.
+    view : {"isometric", "front", "side", "top"}, optional
+        From where an SVG shows a mechanism in space: isometric by default, along y, against x, or
+        against z.
 
     Returns
     -------
@@ -77,6 +86,8 @@ def draw(
     system = moving_system(solution, model, "a drawing shows")
     row = row_at(solution, t)
     shapes = drawing(system, solution.parameters, solution.q[solution.good])
+    if view is not None:
+        _require_view(shapes, view)
     paths = [place.at(solution.q) for place in traced_places(shapes, trace)]
     if file.suffix.lower() == ".dxf":
         text = as_dxf(shapes, solution.q[row], system.length_unit, paths)
@@ -84,8 +95,21 @@ def draw(
         size = millimetres(system) if true_size else None
         when = f"at t = {solution.t[row]:g} s"
         description = described(shapes, when)
-        text = as_svg(shapes, solution.q[row : row + 1], description, paths=paths, millimetres=size)
+        q = solution.q[row]
+        if shapes.is_spatial:
+            seen = {"view": view or STANDARD[0], "paths": paths, "millimetres": size}
+            text = solid_pictures().svg_in_space(shapes, q, description, **seen)
+        else:
+            text = as_svg(shapes, q[None], description, paths=paths, millimetres=size)
     return write_atomically(file, text)
+
+
+def _require_view(shapes: Drawing, view: str) -> None:
+    """Check that a mechanism can be seen from somewhere."""
+    if not shapes.is_spatial:
+        raise InputError(f"{shapes.name} moves in a plane, which has one view: leave out view")
+    if view not in STANDARD:
+        raise InputError(f"there is no view {view!r}; views are {listed(STANDARD)}")
 
 
 def row_at(solution: Solution, t: float | None) -> int:

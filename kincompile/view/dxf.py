@@ -11,12 +11,14 @@ from kincompile.errors import package_of_extra
 from kincompile.view.marks import GROUND_FRAME, Contour, Polygon
 from kincompile.view.polylines import Polyline, polylines
 from kincompile.view.shapes import HUES
+from kincompile.view.worlds import solid_pictures
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from kincompile.view.drawing import Drawing
     from kincompile.view.marks import Array
+    from kincompile.view.solids import Solid
 
 VERSION = "R2010"
 """Version of the files: one that every CAD program of today reads."""
@@ -65,7 +67,17 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
         VERSION, setup=["linetypes"], units=LENGTHS.get(length_unit, (0, 0))[0]
     )
     layers = _layers(document, drawn)
-    space = document.modelspace()
+    add = _add_solids if drawn.is_spatial else _add_strokes
+    add(document.modelspace(), drawn, q, layers, paths)
+    text = io.StringIO()
+    document.write(text)
+    return text.getvalue()
+
+
+def _add_strokes(
+    space: Any, drawn: Drawing, q: Array, layers: Sequence[str], paths: Iterable[Array]
+) -> None:
+    """Add the marks of the plane, and the paths, to the last layer."""
     for item in polylines(drawn):
         points = item.at(q)
         if item.stroke.look == "gap" and np.ptp(points, axis=0).max() <= 1e-3 * drawn.size:
@@ -78,9 +90,23 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
     for path in paths:
         for piece, _ in _pieces(path, False):
             _add(space, piece, False, 0.0, {"layer": layers[-1]})
-    text = io.StringIO()
-    document.write(text)
-    return text.getvalue()
+
+
+def _add_solids(
+    space: Any, drawn: Drawing, q: Array, layers: Sequence[str], paths: Iterable[Array]
+) -> None:
+    """Add the marks of space as faces and lines, and the paths, to the last layer."""
+    for item, part in solid_pictures().all_parts(drawn, q):
+        attributes = {"layer": _layer(item, layers)}
+        if part.normal is None:
+            space.add_polyline3d(part.points.tolist(), dxfattribs=attributes)
+            continue
+        first, *others = part.points.tolist()
+        for k in range(0, len(others) - 1, 2):
+            space.add_3dface([first, *others[k : k + 3]], dxfattribs=attributes)
+    for path in paths:
+        for piece, _ in _pieces(path, False):
+            space.add_polyline3d(piece.tolist(), dxfattribs={"layer": layers[-1]})
 
 
 def _layers(document: Any, drawn: Drawing) -> list[str]:
@@ -101,7 +127,7 @@ def _layers(document: Any, drawn: Drawing) -> list[str]:
     return names
 
 
-def _layer(item: Polyline, layers: Sequence[str]) -> str:
+def _layer(item: Polyline | Solid, layers: Sequence[str]) -> str:
     """Return the layer of a stroke: of its body, of the ground, or of what joins them."""
     if item.look.line not in ("", "quiet"):
         return layers[-2]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -14,11 +14,13 @@ from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME
 from kincompile.view.polylines import polylines
 from kincompile.view.shapes import FILL, GROUND_COLOUR
+from kincompile.view.worlds import PLANE, solid_plots
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
     from kincompile.model.mechanism import Mechanism
@@ -56,7 +58,7 @@ def plot_mechanism(
     q : array_like, shape (n,), optional
         The position, such as a row of ``solution.q``; without it the guess.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; without it a new figure.
+        Where to draw, in space axes with ``projection="3d"``; without it a new figure.
     p : mapping, optional
         Values of parameters by name, such as ``solution.parameters``; others have their defaults.
     names
@@ -81,7 +83,7 @@ def plot_mechanism(
     position = position_of(model, q)
     drawn = drawing(model, checked_parameters(model, p), position)
     if ax is None:
-        _, ax = plt.subplots(layout="constrained")
+        ax = axes_of(plt.figure(layout="constrained"), drawn)
         ax.set_title(drawn.name)
     draw(ax, model, drawn, position[None])
     labels = {dot.name: dot.place for dot in drawn.dots}
@@ -154,16 +156,26 @@ def checked_parameters(
     return dict(p or {})
 
 
+def axes_of(figure: Figure, drawn: Drawing) -> Axes:
+    """Return the axes of a new figure, those of space where the mechanism moves there."""
+    return figure.add_subplot(projection="3d" if drawn.is_spatial else None)
+
+
 def draw(
     ax: Axes,
     model: Mechanism | ConstraintSystem,
     drawn: Drawing,
     q: NDArray[np.float64],
-) -> list[tuple[Polyline, Any]]:
-    """Draw all polylines at the first of the positions q, and return each with its artist.
+) -> Callable[[NDArray[np.float64]], None]:
+    """Draw a mechanism at the first of the positions q, and return what moves it to another.
 
     The limits of the plot hold all positions, shape (N, n).
     """
+    if drawn.is_spatial:
+        mover: Callable[[NDArray[np.float64]], None] = solid_plots().draw_in_space(
+            ax, model.system().length_unit, drawn, q
+        )
+        return mover
     x_low, x_high, y_low, y_high = drawn.extent(q)
     artists = [
         (polyline, _artist(ax, polyline, q[0], order))
@@ -177,17 +189,32 @@ def draw(
     ax.set_ylim(y_low - room, y_high + room)
     ax.set_xlabel(titled("x", unit))
     ax.set_ylabel(titled("y", unit))
-    return artists
+
+    def move(position: NDArray[np.float64]) -> None:
+        for polyline, artist in artists:
+            points = polyline.at(position)
+            if polyline.is_area:
+                artist.set_xy(points)
+            else:
+                artist.set_data(*points.T)
+
+    return move
 
 
-def move(artists: list[tuple[Polyline, Any]], q: NDArray[np.float64]) -> None:
-    """Move the artists that `draw` returned to a position, shape (n,)."""
-    for polyline, artist in artists:
-        points = polyline.at(q)
-        if polyline.is_area:
-            artist.set_xy(points)
-        else:
-            artist.set_data(*points.T)
+def write_name(ax: Axes, name: str, place: Sequence[float]) -> Callable[[Sequence[float]], None]:
+    """Write a name beside a place, and return what moves it to another."""
+    if len(place) > PLANE:
+        written = cast("Any", ax).text(*place, f"  {name}", fontsize="small", zorder=10)
+        written.set_in_layout(False)
+        move: Callable[[Sequence[float]], None] = written.set_position_3d
+        return move
+    text = ax.annotate(name, (place[0], place[1]), **NAME)
+    text.set_in_layout(False)  # a long name may leave the plot, but must not shrink it
+
+    def moved(to: Sequence[float]) -> None:
+        text.xy = (to[0], to[1])
+
+    return moved
 
 
 def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
@@ -209,11 +236,10 @@ def _write_names(
     ax: Axes, size: float, labels: Mapping[str, FramePoint], q: NDArray[np.float64]
 ) -> None:
     """Write names at their places; those of one place together."""
-    at: dict[tuple[float, float], list[str]] = {}
+    at: dict[tuple[float, ...], list[str]] = {}
     for name, place in labels.items():
-        x, y = place.at(q)
         step = size * 1e-3
-        at.setdefault((round(x / step) * step, round(y / step) * step), []).append(name)
+        corner = tuple(round(x / step) * step for x in place.at(q).tolist())
+        at.setdefault(corner, []).append(name)
     for corner, names in at.items():
-        text = ax.annotate(", ".join(names), corner, **NAME)
-        text.set_in_layout(False)  # a long name may leave the plot, but must not shrink it
+        write_name(ax, ", ".join(names), corner)

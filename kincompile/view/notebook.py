@@ -13,7 +13,7 @@ from kincompile.model.system import ConstraintSystem
 from kincompile.runtime.results.html import figure_html
 from kincompile.runtime.results.solution import Solution
 from kincompile.view.drawing import drawing
-from kincompile.view.mechanism_plot import draw, position_of
+from kincompile.view.mechanism_plot import axes_of, draw, position_of
 from kincompile.view.page import page
 
 if TYPE_CHECKING:
@@ -33,9 +33,10 @@ def system_picture(system: ConstraintSystem) -> str:
         return ""
 
     def draw_guess(figure: Figure) -> None:
-        ax = figure.subplots()
+        drawn = drawing(system)
+        ax = axes_of(figure, drawn)
         ax.set_title("start guess", fontsize="medium")
-        draw(ax, system, drawing(system), position_of(system, None)[None])
+        draw(ax, system, drawn, position_of(system, None)[None])
 
     return figure_html(f"{system.name} at its start guess", (5.0, 3.6), draw_guess)
 

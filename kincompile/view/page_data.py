@@ -99,9 +99,7 @@ def page_data(
 def _still(name: str, shapes: Drawing, q: Array) -> str:
     """Return the first position that was found as SVG; nothing where there are no bodies."""
     found = q[np.isfinite(q).all(axis=1)][0]
-    if not shapes.bodies or shapes.is_spatial:
-        return ""
-    return svg_element(picture(shapes, found, f"{name} at the start"))
+    return svg_element(picture(shapes, found, f"{name} at the start")) if shapes.bodies else ""
 
 
 def _parameter(item: Parameter, value: float) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, of_mark
 from kincompile.view.shapes import DASHES, FILL, GROUND_COLOUR, HUES
+from kincompile.view.worlds import solid_pictures
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -142,45 +143,68 @@ def picture(
     focus
         Frames that the picture is about; what moves with others is faint. All by default.
     """
-    scale = _Scale(drawn, q, arrows)
+    if drawn.is_spatial:
+        seen: Picture = solid_pictures().picture_in_space(drawn, q, title, arrows, focus)
+        return seen
+    left, right, low, high = drawn.extent(q)
+    ends = [np.stack((arrow.start, arrow.end)) for arrow in arrows]
+    scale = Scale([np.array(((left, low), (right, high))), *ends])
     shown = None if focus is None else {*focus, GROUND_FRAME}
     paths = [
         path
         for mark in drawn.marks
         if shown is None or len(drawn.bodies) <= MOST_FAINT or moves_with(mark) <= shown
         for polyline in of_mark(mark, drawn.size)
-        for path in _paths(polyline, q, scale, _opacity(mark, shown))
+        for path in _paths(polyline, q, scale, opacity_of(mark, shown))
     ]
-    labels: list[PictureLabel] = []
-    for arrow in arrows:
-        start, end = scale.at(arrow.start), scale.at(arrow.end)
-        paths += _arrow(arrow, start, end)
+    return composed(title, scale, paths, zip(arrows, ends, strict=True))
+
+
+def composed(
+    title: str,
+    scale: Scale,
+    paths: Iterable[PicturePath],
+    arrows: Iterable[tuple[Arrow, Array]] = (),
+) -> Picture:
+    """Return a picture of paths, and over them vectors with their ends before they are scaled."""
+    shown, labels = list(paths), list[PictureLabel]()
+    for arrow, ends in arrows:
+        start, end = scale.at(ends)
+        shown += _arrow(arrow, start, end)
         x, y = _free(_places(arrow, start, end), labels)
         colour = colour_of(arrow.frame)
         labels.append(PictureLabel(x, y, arrow.name, colour, arrow.is_vector))
-    return Picture(title, scale.width, scale.height, tuple(paths), tuple(labels))
+    return Picture(title, scale.width, scale.height, tuple(shown), tuple(labels))
 
 
-class _Scale:
-    """From the lengths of a model to points of a picture that shows marks and arrows."""
+class Scale:
+    """From the lengths of a model to points of a picture that shows some points.
 
-    def __init__(self, drawn: Drawing, q: Array, arrows: Sequence[Arrow]) -> None:
-        left, right, low, high = drawn.extent(q)
-        corners = [np.array(((left, low), (right, high)))]
-        corners += [np.stack((arrow.start, arrow.end)) for arrow in arrows]
-        points = np.concatenate(corners)
-        self._low = points.min(axis=0)
-        wide, tall = points.max(axis=0) - self._low
-        self._factor = min((WIDTH - 2 * MARGIN) / wide, (TALLEST - 2 * MARGIN) / tall)
-        self.width = self._factor * float(wide) + 2 * MARGIN
-        self.height = self._factor * float(tall) + 2 * MARGIN
+    Attributes
+    ----------
+    factor
+        Points for a unit of length.
+    width, height
+        Of the picture.
+    """
+
+    def __init__(
+        self, shown: Sequence[Array], most: tuple[float, float] = (WIDTH, TALLEST)
+    ) -> None:
+        points = np.concatenate(shown)
+        self._low = np.nanmin(points, axis=0)
+        wide, tall = np.nanmax(points, axis=0) - self._low
+        self.factor = min((most[0] - 2 * MARGIN) / wide, (most[1] - 2 * MARGIN) / tall)
+        self.width = self.factor * float(wide) + 2 * MARGIN
+        self.height = self.factor * float(tall) + 2 * MARGIN
 
     def at(self, points: Array) -> Array:
-        """Return where points of the ground are on the picture."""
-        return np.asarray(MARGIN + self._factor * (points - self._low), dtype=np.float64)
+        """Return where points are on the picture."""
+        return np.asarray(MARGIN + self.factor * (points - self._low), dtype=np.float64)
 
 
-def _opacity(mark: Mark, shown: set[BodyFrame] | None) -> float:
+def opacity_of(mark: Mark, shown: set[BodyFrame] | None) -> float:
+    """Return the opacity of a mark where a picture is about some frames; None for all."""
     return 1.0 if shown is None or moves_with(mark) <= shown else FAINT
 
 
@@ -191,7 +215,7 @@ def colour_of(frame: BodyFrame) -> str:
     )
 
 
-def _paths(polyline: Polyline, q: Array, scale: _Scale, opacity: float) -> Iterable[PicturePath]:
+def _paths(polyline: Polyline, q: Array, scale: Scale, opacity: float) -> Iterable[PicturePath]:
     """Yield a polyline in pieces, which NaN separates."""
     look, points = polyline.look, scale.at(polyline.at(q))
     colour = look.colour or colour_of(polyline.frame)
@@ -241,7 +265,7 @@ def _free(places: list[Array], labels: list[PictureLabel]) -> tuple[float, float
 def svg_element(picture: Picture, labels: str = "") -> str:
     """Return a picture as an `svg` element of a page, with labels over it."""
     width, height = round(picture.width), round(picture.height)
-    paths = "".join(_svg_path(item, picture.height) for item in picture.paths)
+    paths = "".join(svg_path(item, picture.height) for item in picture.paths)
     return (
         f'<svg class="figure" viewBox="0 0 {width} {height}" '
         f'width="{width}" height="{height}" role="img" aria-label="{escape(picture.title)}" '
@@ -250,7 +274,8 @@ def svg_element(picture: Picture, labels: str = "") -> str:
     )
 
 
-def _svg_path(path: PicturePath, height: float) -> str:
+def svg_path(path: PicturePath, height: float) -> str:
+    """Return the element of a path in a picture of a height."""
     points = "L".join(f"{x:.1f} {height - y:.1f}" for x, y in np.asarray(path.points).tolist())
     style = f'fill="{path.fill or "none"}"'
     if path.is_pale:

@@ -42,6 +42,11 @@ class Piece(Stroke):
 
     sides: int = 0
 
+    @property
+    def is_ball(self) -> bool:
+        """Whether it is a ball about its place."""
+        return not self.corners and self.on == "place"
+
 
 ROUND = 12
 """Sides of what is round."""

@@ -10,6 +10,7 @@ from kincompile.view.shapes import tables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from types import ModuleType
 
     from kincompile.model.constraint import Constraint
     from kincompile.model.system import ConstraintSystem
@@ -32,6 +33,21 @@ def drawings_in(dimension: int) -> Mapping[type[Constraint], DrawJoint]:
         "kincompile.view.solid_joints"
     ).DRAWINGS
     return found
+
+
+def solid_pictures() -> ModuleType:
+    """Return the module that draws still pictures in space."""
+    return import_module("kincompile.view.solid_picture")
+
+
+def solid_plots() -> ModuleType:
+    """Return the module that draws in space by matplotlib."""
+    return import_module("kincompile.view.solid_plot")
+
+
+def motion_file() -> ModuleType:
+    """Return the module that writes a motion in space as glTF."""
+    return import_module("kincompile.view.gltf")
 
 
 def tables_in(dimension: int) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from kincompile import criteria, quantities
-from kincompile.ir.elimination import LARGEST_CLOSED_FORM, plan_solve
+from kincompile.ir.elimination import LARGEST_PIVOTED, plan_solve
 from kincompile.quantities import nonzeros_of
 from kincompile.targets.c.dialect import C
 from kincompile.targets.c.functions import WRITE, evaluator, solve_functions
@@ -251,7 +251,7 @@ def _elementary(program: Program, called: Collection[str], largest: int) -> str:
         "order": max(
             (len(row) for item in program.tables.values() for row in item.coefficients), default=0
         ),
-        "largest_block": largest if largest > LARGEST_CLOSED_FORM else 0,
+        "largest_block": largest if largest > LARGEST_PIVOTED else 0,
     }
     return fill("c/elementary.c.jinja", data)
 

@@ -280,7 +280,7 @@ def _data(
         "frames": indented(frames),
         "groups": indented(groups),
         "stages": indented(stages),
-        **support(module.called, has_large_blocks=True),
+        **support({*module.called, "where"}, has_large_blocks=True),
     }
 
 

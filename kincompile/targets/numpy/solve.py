@@ -23,6 +23,7 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
     printer, names = Printer(NUMPY, listing.plan.nodes, listing.names), listing.names
     factor = _unpack([names[node] for _, _, node in listing.plan.entries], "J")
     factor += _steps(listing.factor_steps, printer)
+    choices = ["where = f.where"] if listing.plan.has_choices else []
     kept = tuple_text(names[node] for node in listing.factors)
     determinants = tuple_text(printer.text(node) for node in listing.plan.determinants)
     factor += f"return {kept}, {determinants}".split("\n")
@@ -36,13 +37,17 @@ def solve_functions(code: InlineProgram, listing: SolveListing, prefix: str = ""
         '    """Return what a solve needs of Phi_q, and the determinants of its blocks."""',
         *(
             f"    {line}"
-            for line in (*(f"# {line}" for line in explained(code, listing.plan)), *factor)
+            for line in (
+                *(f"# {line}" for line in explained(code, listing.plan)),
+                *choices,
+                *factor,
+            )
         ),
         "",
         "",
         f"def {prefix}_solve(f, F, b):",
         '    """Return x of Phi_q x = b."""',
-        *(f"    {line}" for line in solve),
+        *(f"    {line}" for line in (*choices, *solve)),
     ]
 
 

@@ -88,7 +88,7 @@ def files(
         "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
         "is_planned": plan is not None,
         **support(
-            called,
+            {*called, "where"} if plan is not None and plan.has_choices else called,
             has_large_blocks=plan is not None and plan.has_large_blocks,
         ),
     }

@@ -15,6 +15,7 @@ RANDOM = np.random.default_rng(11)
 def six_struts() -> spatial.Mechanism:
     """Return a platform on six struts of given lengths."""
     m = spatial.Mechanism("six_struts")
+    length = m.parameter("length", 1.2, "m")
     plate = m.body("plate", (0.1, 0.05, 1.0), axis=(1, 2, 3), angle=0.2)
     for k in range(6):
         base, top = np.deg2rad(60 * k + (8 if k % 2 else -8)), np.deg2rad(60 * k)
@@ -25,7 +26,7 @@ def six_struts() -> spatial.Mechanism:
                 (np.cos(base), np.sin(base), 0.02 * k),
                 plate,
                 (0.5 * np.cos(top + 0.3), 0.5 * np.sin(top + 0.3), 0.01 * k**2),
-                1.2 + 0.05 * sympy.sin(kc.t + k),
+                length + 0.05 * sympy.sin(kc.t + k),
             )
         )
     return m
@@ -86,3 +87,21 @@ def test_that_a_mechanism_in_the_plane_has_no_small_rotations() -> None:
     m.add(kc.Revolute("A", m.ground, (0, 0), bar, (0, 0)))
     m.add(kc.AbsoluteAngle("motor", bar, kc.t))
     assert "pi_" not in emit(m).source.split("def _factor")[1].split("def _solve")[0]
+
+
+def test_that_sensitivities_and_gradients_of_a_pivoted_block_agree() -> None:
+    m = six_struts()
+    m.output("height", m.bodies[0].z, "m")
+    module = kc.compile(m)
+    solution = kc.solve(module, np.linspace(0, 1, 5))
+    names = list(solution.parameters)
+    forward = kc.sensitivities(solution, names)
+    gradient = kc.sensitivities(solution, names, of=["height"])
+    np.testing.assert_allclose(
+        gradient["height", "length"], forward["height", "length"], rtol=1e-12
+    )
+    h = 1e-5
+    ends = [kc.solve(module, solution.t, {"length": 1.2 + end})["height"] for end in (h, -h)]
+    np.testing.assert_allclose(
+        (ends[0] - ends[1]) / (2 * h), forward["height", "length"], rtol=1e-7
+    )

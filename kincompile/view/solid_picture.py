@@ -1,0 +1,246 @@
+"""A mechanism in space as a still picture: its solids, seen from one of the standard views."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.view.marks import GROUND_FRAME, moves_with
+from kincompile.view.picture import (
+    MOST_FAINT,
+    PicturePath,
+    Scale,
+    colour_of,
+    composed,
+    opacity_of,
+    svg_path,
+)
+from kincompile.view.shapes import FILL, HUES, INKS
+from kincompile.view.solids import Position, facets_of, solids
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from kincompile.view.drawing import Drawing
+    from kincompile.view.marks import Array, BodyFrame
+    from kincompile.view.picture import Arrow, Picture
+    from kincompile.view.solids import Part, Solid
+
+VIEWS: dict[str, tuple[float, float]] = {
+    "isometric": (-math.pi / 4, math.atan(math.sqrt(0.5))),
+    "front": (-math.pi / 2, 0.0),
+    "side": (0.0, 0.0),
+    "top": (-math.pi / 2, math.pi / 2),
+}
+"""The standard views: azimuth of the viewer, and how high it stands [rad]."""
+
+LIGHT = np.array((-0.42, 0.55, 0.72))
+"""Where light comes from: to the right, up, and towards the viewer."""
+
+PLATE = 0.55
+"""Opacity of the faces of a body, behind which joints are seen."""
+
+RIM = 0.6
+"""Part of a line's width that the edges of solids have."""
+
+SEAM = 0.4
+"""Width of the line in its own colour around a facet of a round solid, which closes seams."""
+
+SHEET = (960.0, 720.0)
+"""Largest sides of a picture in a file of its own [px]."""
+
+NAME = 15
+"""Height of names on it [px]."""
+
+CIRCLE = np.stack([f(np.radians(np.arange(0, 360, 10))) for f in (np.cos, np.sin)], axis=-1)
+"""A ball of radius one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A direction of view, without perspective.
+
+    Attributes
+    ----------
+    axes : ndarray, shape (3, 3)
+        Unit vectors to the right, up, and towards the viewer.
+    """
+
+    axes: Array
+
+    @classmethod
+    def named(cls, view: str) -> Camera:
+        """Return one of the standard views."""
+        azimuth, height = VIEWS[view]
+        c, s, a, b = math.cos(azimuth), math.sin(azimuth), math.cos(height), math.sin(height)
+        return cls(np.array(((-s, c, 0), (-b * c, -b * s, a), (a * c, a * s, b))))
+
+    def seen(self, points: Array) -> Array:
+        """Return points of space to the right, up, and towards the viewer."""
+        return np.asarray(points @ self.axes.T)
+
+
+ISOMETRIC = Camera.named("isometric")
+
+
+def picture_in_space(
+    drawn: Drawing,
+    q: Array,
+    title: str,
+    arrows: Sequence[Arrow] = (),
+    focus: Iterable[BodyFrame] | None = None,
+    *,
+    camera: Camera = ISOMETRIC,
+) -> Picture:
+    """Draw a mechanism in space; `picture` says what is given."""
+    ends = [camera.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]
+    seen = _seen(drawn, q, camera, focus)
+    scale = Scale([*(path.points for path in seen), *ends])
+    shown = (dataclasses.replace(path, points=scale.at(path.points)) for path in seen)
+    return composed(title, scale, shown, zip(arrows, ends, strict=True))
+
+
+def _seen(
+    drawn: Drawing, q: Array, camera: Camera, focus: Iterable[BodyFrame] | None = None
+) -> list[PicturePath]:
+    """Return what is seen of a mechanism from back to front, in lengths of the model."""
+    shown = None if focus is None else {*focus, GROUND_FRAME}
+    position, found = Position(q), []
+    for solid in solids(drawn):
+        if shown and len(drawn.bodies) > MOST_FAINT and not moves_with(solid.mark) <= shown:
+            continue
+        opacity = opacity_of(solid.mark, shown)
+        for part in solid.parts(position):
+            if is_visible(solid, part, camera):
+                points = camera.seen(part.points)
+                depth = float(points[:, 2].mean()) + part.radius
+                found.append((depth, _path(solid, part, camera, points[:, :2], opacity)))
+    return [path for _, path in sorted(found, key=lambda item: item[0])]
+
+
+def all_parts(drawn: Drawing, q: Array) -> Iterator[tuple[Solid, Part]]:
+    """Yield facets and lines of a mechanism, balls as facets, without gaps that are closed."""
+    position = Position(q)
+    for solid in solids(drawn):
+        for part in solid.parts(position):
+            if part.normal is not None or part.radius:
+                yield from ((solid, facet) for facet in facets_of(part))
+            elif not is_gap(solid, part):
+                yield solid, part
+
+
+def is_visible(solid: Solid, part: Part, camera: Camera) -> bool:
+    """Return whether a part is towards the viewer, and no gap of a joint that is closed."""
+    if part.normal is not None and not part.is_flat:
+        return bool(part.normal @ camera.axes[2] > 0)
+    return not is_gap(solid, part)
+
+
+def is_gap(solid: Solid, part: Part) -> bool:
+    """Return whether a part is the line between two points that coincide."""
+    way = np.ptp(part.points, axis=0)
+    return solid.piece.look == "gap" and bool(np.max(way) <= 1e-3 * solid.size)
+
+
+def _path(solid: Solid, part: Part, camera: Camera, points: Array, opacity: float) -> PicturePath:
+    """Return a part as it is seen."""
+    look, line = solid.look, solid.look.colour or colour_of(solid.frame)
+    if part.radius:
+        face = look.area or mixed(line, FILL)
+        return PicturePath(points + part.radius * CIRCLE, line, face, look.width, opacity)
+    if part.normal is None:
+        return PicturePath(points, line, "", look.width, opacity, dash=look.dash)
+    face = (look.area or line) if part.is_flat else shade(line, part.normal, camera)
+    width = RIM * look.width if part.is_rim else SEAM
+    if solid.piece.look == "plate":
+        opacity *= PLATE
+    return PicturePath(points, line if part.is_rim else face, face, width, opacity)
+
+
+def shade(colour: str, normal: Array, camera: Camera) -> str:
+    """Return the colour of a facet in the light, which on white paper makes it paler."""
+    lit = max(0.0, float(camera.seen(normal) @ LIGHT))
+    return mixed(colour, 0.85 - 0.6 * lit)
+
+
+def mixed(colour: str, part: float) -> str:
+    """Return a part of a colour on white paper."""
+    channels = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return "#" + "".join(f"{round(part * x + (1 - part) * 255):02x}" for x in channels)
+
+
+def _trace(index: int, points: Array) -> Iterator[PicturePath]:
+    """Yield a path in a colour of its own, on a rim of paper, in pieces that NaN separates."""
+    hues = HUES["light"]
+    gaps = np.flatnonzero(np.isnan(points).any(axis=1))
+    for piece in np.split(points, gaps):
+        kept = piece[~np.isnan(piece).any(axis=1)]
+        if len(kept) > 1:
+            yield PicturePath(kept, INKS["paper"], "", 3.0)
+            yield PicturePath(kept, hues[(index + 4) % len(hues)], "", 1.5)
+
+
+def svg_in_space(
+    drawn: Drawing,
+    q: Array,
+    description: str,
+    *,
+    paths: Sequence[Array] = (),
+    view: str = "isometric",
+    millimetres: float | None = None,
+) -> str:
+    """Return a mechanism in space as the text of an SVG file, on white paper.
+
+    Parameters
+    ----------
+    drawn
+        Its shapes.
+    q : ndarray, shape (n,)
+        The position.
+    description
+        What is shown, for those who cannot see it.
+    paths
+        Lines over the mechanism, each of shape (k, 3).
+    view
+        A name in `VIEWS`.
+    millimetres
+        Length of the model's unit where the picture has its true size, across the view.
+    """
+    camera = Camera.named(view)
+    seen, traces = _seen(drawn, q, camera), [camera.seen(path)[:, :2] for path in paths]
+    scale = Scale([*(path.points for path in seen), *traces], SHEET)
+    shown = [dataclasses.replace(path, points=scale.at(path.points)) for path in seen]
+    shown += [path for k, trace in enumerate(traces) for path in _trace(k, scale.at(trace))]
+    picture = composed(drawn.name, scale, shown)
+    names = "".join(
+        _name(dot.name, scale.at(camera.seen(dot.place.at(q))[:2]), picture.height)
+        for dot in drawn.dots
+    )
+    sides = (picture.width, picture.height)
+    wide, tall = (f"{side:.7g}" for side in sides)
+    if millimetres is not None:
+        wide, tall = (f"{side / scale.factor * millimetres:.7g}mm" for side in sides)
+    elements = "\n".join(svg_path(path, picture.height) for path in picture.paths)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" '
+        f'viewBox="0 0 {picture.width:.7g} {picture.height:.7g}" width="{wide}" height="{tall}" '
+        f'role="img" aria-labelledby="title description" stroke-linecap="round" '
+        f'stroke-linejoin="round" font-family="system-ui,sans-serif" font-size="{NAME}">\n'
+        f'<title id="title">{escape(drawn.name)}</title>\n'
+        f'<desc id="description">{escape(description)}</desc>\n'
+        f'<rect width="100%" height="100%" fill="{INKS["paper"]}"/>\n{elements}\n{names}</svg>\n'
+    )
+
+
+def _name(name: str, place: Array, height: float) -> str:
+    """Return the element of a name, beside its point, on a rim of paper."""
+    x, y = place[0] + NAME / 2, height - place[1] - NAME / 2
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" fill="{INKS["ink"]}" stroke="{INKS["paper"]}" '
+        f'stroke-width="3" paint-order="stroke">{escape(name)}</text>\n'
+    )

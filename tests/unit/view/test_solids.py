@@ -1,0 +1,226 @@
+"""Solids of marks in space: closed, where the page puts them, and the same in every file."""
+
+import itertools
+import json
+import shutil
+import subprocess
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+from kincompile.errors import InputError
+from kincompile.targets.templates import read
+from kincompile.view.drawing import drawing
+from kincompile.view.marks import GROUND_FRAME, FramePoint, Span, Symbol
+from kincompile.view.solid_picture import Camera
+from kincompile.view.solid_shapes import SOLIDS
+from kincompile.view.solids import InFrame, Position, Solid, facets_of, solids, wires
+from tests.spatial_models import slider_crank
+
+SVG = "{http://www.w3.org/2000/svg}"
+CUBE = [(x, y, z) for x in (0.0, 2.0) for y in (0.0, 1.0) for z in (0.0, 3.0)]
+
+PROGRAM = """
+const { drawing, positions } = JSON.parse(require('fs').readFileSync(0, 'utf8'));
+const partsAt = q => drawing.marks.flatMap(mark => drawing.shapes[mark.shape].map(
+  piece => partsOf(q, mark, piece, drawing.size)));
+console.log(JSON.stringify(positions.map(partsAt)));
+"""
+
+
+@pytest.fixture(scope="module")
+def motion():
+    model = slider_crank()
+    return kc.solve(kc.compile(model), np.linspace(0, 1, 41))
+
+
+@pytest.fixture(scope="module")
+def drawn(motion):
+    return drawing(slider_crank(), q=motion.q)
+
+
+def volume(parts):
+    """Return the volume that facets enclose, by the divergence theorem."""
+    found = 0.0
+    for part in parts:
+        first, *others = part.points
+        for b, c in itertools.pairwise(others):
+            found += first @ np.cross(b, c) / 6
+    return found
+
+
+def solid(shape, piece, **given):
+    symbol = Symbol(
+        "j",
+        shape,
+        FramePoint(GROUND_FRAME, (1.0, 2.0, 3.0)),
+        (0.6, 0.0, 0.8),
+        (0.0, 1.0, 0.0),
+        **given,
+    )
+    return Solid(SOLIDS[shape][piece], symbol, 0.1).parts(InFrame())
+
+
+def test_that_solids_are_closed_and_have_their_volume():
+    def prism(sides, radius, length):
+        return sides / 2 * np.sin(2 * np.pi / sides) * radius**2 * length
+
+    assert volume(solid("knuckles", 0)) == pytest.approx(prism(12, 0.1, 0.14))
+    assert volume(solid("block", 0)) == pytest.approx(2 * 0.2**2 * 0.36)
+    assert volume(solid("nut", 0)) == pytest.approx(prism(6, 0.17, 0.2))
+    assert volume(solid("rail", 0, reach=(-1.0, 2.0))) == pytest.approx(prism(8, 0.05, 3))
+    for shape in SOLIDS:
+        for piece in SOLIDS[shape]:
+            if piece.is_area and piece.on in ("axis", "reach", "line") and not piece.every:
+                outs = np.array(piece.corners, dtype=float)[:, 2]
+                assert outs[0] == outs[-1] == 0  # so that it is closed
+
+
+def test_that_normals_point_outwards():
+    for shape in ("hinge", "block", "push", "nut"):
+        for part in solid(shape, 0):
+            a, b, c = part.points[:3]
+            across = np.cross(b - a, c - a)
+            if np.linalg.norm(across) > 1e-12:
+                assert across @ part.normal > 0
+    (ball,) = solid("ball", 0)
+    facets = facets_of(ball)
+    assert all((facet.points.mean(axis=0) - ball.points[0]) @ facet.normal > 0 for facet in facets)
+    assert 0.9 < volume(facets) / (4 / 3 * np.pi * 0.1**3) < 1
+
+
+def test_the_hull_of_a_box_of_a_plate_and_of_a_line():
+    faces, edges = wires((*CUBE, (1.0, 0.5, 1.0), (1.0, 1.0, 1.5)))
+    assert (len(faces), len(edges)) == (6, 12)
+    assert all(len(points) == 4 for points, _ in faces)
+    for points, normal in faces:
+        a, b, c, _ = np.array(points)
+        assert np.cross(b - a, c - a) @ normal > 0
+        assert (np.array(CUBE) @ normal <= a @ normal + 1e-12).all()
+    plate = ((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0), (0.2, 0.2, 1.0))
+    faces, edges = wires(plate)
+    assert sorted(normal for _, normal in faces) == [(0, 0, -1), (0, 0, 1)]
+    assert (len(edges), {len(points) for points, _ in faces}) == (3, {3})
+    assert wires(((0.0, 0.0, 0.0), (2.0, 2.0, 2.0), (1.0, 1.0, 1.0))) == (
+        [], [((0.0, 0.0, 0.0), (2.0, 2.0, 2.0))],
+    )  # fmt: skip
+    assert wires(((1.0, 0.0, 0.0),)) == ([], [])
+
+
+def test_that_the_page_has_the_parts_that_python_has(drawn, motion):
+    if shutil.which("node") is None:
+        pytest.skip("node is not installed")
+    positions = motion.q[::13]
+    given = json.dumps({"drawing": drawn.to_json(), "positions": positions.tolist()})
+    program = read("view/draw.js") + read("view/space.js") + PROGRAM
+    done = subprocess.run(
+        ["node", "-e", program], input=given, capture_output=True, text=True, check=True
+    )
+    for q, on_page in zip(positions, json.loads(done.stdout), strict=True):
+        for item, known in zip(solids(drawn), on_page, strict=True):
+            parts = item.parts(Position(q))
+            assert len(parts) == len(known)
+            for part, other in zip(parts, known, strict=True):
+                points = other.get("points") or other.get("line") or [other["centre"]]
+                np.testing.assert_allclose(part.points, points, atol=1e-13)
+                assert other.get("radius", 0) == pytest.approx(part.radius)
+                if part.normal is None:
+                    assert "normal" not in other
+                else:
+                    np.testing.assert_allclose(part.normal, other["normal"], atol=1e-13)
+
+
+def test_that_a_rod_ends_at_its_points(motion):
+    span = Span(
+        "rod",
+        FramePoint(GROUND_FRAME, (0.0, 0.0, 0.0)),
+        FramePoint(GROUND_FRAME, (1.0, 2.0, 2.0)),
+        "rod",
+    )
+    parts = Solid(SOLIDS["rod"][0], span, 0.1).parts(InFrame())
+    ends = [part for part in parts if part.is_rim]
+    np.testing.assert_allclose(
+        [part.points.mean(axis=0) for part in ends], [(0, 0, 0), (1, 2, 2)], atol=1e-14
+    )
+    normals = np.array([part.normal for part in ends], dtype=float)
+    np.testing.assert_allclose(normals, np.array([(-1, -2, -2), (1, 2, 2)]) / 3)
+
+
+@pytest.mark.parametrize(("view", "axes"), [("front", [0, 2]), ("side", [1, 2]), ("top", [0, 1])])
+def test_that_a_drawing_has_its_true_size_in_a_standard_view(motion, drawn, tmp_path, view, axes):
+    path = kc.draw(motion, tmp_path / "drawing.svg", view=view, true_size=True, trace=["tip"])
+    root: Any = ET.parse(path).getroot()
+    left, top, wide, tall = map(float, root.get("viewBox").split())
+    pixel = float(root.get("width").removesuffix("mm")) / wide / 1000
+    (name,) = root.findall(f"{SVG}text")
+    x, y = float(name.get("x")) - 7.5, float(name.get("y")) + 7.5
+    tip = np.array([motion[f"{axis}_tip"][0] for axis in "xyz"])[axes]
+    block = motion.q[0, 14:17][axes]
+    corners = [
+        np.array([pair.split() for pair in path.get("d").strip("MZ").split("L")], dtype=float)
+        for path in root.findall(f"{SVG}path")
+        if path.get("stroke", "").startswith("#") and "Z" in path.get("d")
+    ]
+    assert (left, top) == (0, 0)
+    assert tall > 0
+    # The block: a square or a rectangle about the slider, with sides of 2 sqrt(2) and 3.6 sizes.
+    wanted = (np.subtract(block, tip)) * (1, -1) / pixel + (x, y)
+    middles = [(corner.min(axis=0) + corner.max(axis=0)) / 2 for corner in corners]
+    assert min(np.linalg.norm(middle - wanted) for middle in middles) < 0.3
+
+
+def test_what_cannot_be_seen_or_written_is_said(motion, tmp_path):
+    with pytest.raises(InputError, match="no view 'back'; views are isometric, front, side, top"):
+        kc.draw(motion, tmp_path / "a.svg", view="back")
+    with pytest.raises(InputError, match=r"a motion in space is written as .gif, .mp4, .glb"):
+        kc.animate(motion, tmp_path / "a.svg")
+    plane = kc.Mechanism("plane")
+    plane.add(kc.AbsoluteAngle("motor", plane.body("link"), kc.t))
+    plane.add(kc.Revolute("pin", plane.ground, (0, 0), plane.bodies[0], (0, 0)))
+    flat = kc.solve(kc.compile(plane), [0, 1])
+    with pytest.raises(InputError, match="moves in a plane, which has one view"):
+        kc.draw(flat, tmp_path / "a.svg", view="top")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_standard_views_are_right_handed():
+    for view in ("isometric", "front", "side", "top"):
+        axes = Camera.named(view).axes
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+        assert np.linalg.det(axes) == pytest.approx(1)
+
+
+def test_a_dxf_of_faces_on_layers(motion, tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    document = ezdxf.readfile(kc.draw(motion, tmp_path / "a.dxf"))
+    assert document.audit().errors == []
+    faces = [item for item in document.modelspace() if item.dxftype() == "3DFACE"]
+    assert {item.dxf.layer for item in faces} == {"crank", "rod", "slider", "ground", "joints"}
+    crank = np.array(
+        [vertex for item in faces if item.dxf.layer == "crank" for vertex in item.wcs_vertices()]
+    )
+    assert np.abs(crank - (0, 0.1, 0.12)).max() < 0.1
+    (path,) = document.modelspace().query("POLYLINE[layer=='paths']")
+    tip = np.stack([motion[f"{axis}_tip"] for axis in "xyz"], axis=-1)
+    np.testing.assert_allclose([tuple(point) for point in path.points()], tip, atol=1e-12)
+
+
+def test_matplotlib_in_three_dimensions(motion, tmp_path):
+    pytest.importorskip("matplotlib")
+    from matplotlib import pyplot as plt
+
+    model = slider_crank()
+    ax = kc.plot_mechanism(model, motion.q[5], names=True)
+    assert ax.name == "3d"
+    texts = {text.get_text().strip(): text.get_position_3d() for text in ax.texts}
+    np.testing.assert_allclose(
+        texts["tip"], [motion[f"{axis}_tip"][5] for axis in "xyz"], atol=1e-5
+    )
+    ax.figure.canvas.draw()
+    assert kc.animate(motion, tmp_path / "a.gif", seconds=0.2).stat().st_size > 5000
+    _, flat = plt.subplots()
+    with pytest.raises(InputError, match='give axes made with projection="3d"'):
+        kc.plot_mechanism(model, ax=flat)
