@@ -59,6 +59,7 @@ DEFERRED = {
     "kincompile.model.system",
     "kincompile.targets.registry",
     "kincompile.view.worlds",
+    "kincompile.ir.elimination",
 }
 
 Sources = Mapping[str, str]  # module name -> source
