@@ -21,7 +21,6 @@ from kincompile.ir.differentiate import tangents
 from kincompile.ir.graph import Graph
 from kincompile.ir.inline import Entry
 from kincompile.ir.observing import observing_program
-from kincompile.ir.orientations import orientations_of
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
 from kincompile.names import correction, force_units, listed, rate, solved
@@ -146,7 +145,7 @@ class _Motion:
         """
         graph, program = self.graph, self._code.program
         mass = {x.row: x.node for x in self._code.entries("M") if x.row == x.column}
-        norms = {item.row for item in orientations_of(program)}
+        norms = {item.first_row for item in program.instances if item.is_own}
         weights = {}
         for row, entries in self._rows.items():
             if mass.keys() >= entries.keys() and row not in norms:
