@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def motion_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of a motion: its times, and the values of parameters."""
     options = (
-        click.option("--start", default="0", metavar="T", help="First time.  [default: 0]"),
+        click.option("--start", default="0", metavar="T", help="First time."),
         click.option(
             "--end",
             metavar="T",
