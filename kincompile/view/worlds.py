@@ -45,6 +45,11 @@ def solid_plots() -> ModuleType:
     return import_module("kincompile.view.solid_plot")
 
 
+def motion_file() -> ModuleType:
+    """Return the module that writes a motion in space as glTF."""
+    return import_module("kincompile.view.gltf")
+
+
 def tables_in(dimension: int) -> dict[str, Any]:
     """Return what marks look like as plain data, for a page."""
     if dimension == PLANE:
