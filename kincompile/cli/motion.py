@@ -29,7 +29,7 @@ def time_options(command: Command) -> Command:
     """Add the options of times, and of values of parameters."""
     return _with(
         command,
-        click.option("--start", default="0", metavar="T", help="First time.  [default: 0]"),
+        click.option("--start", default="0", metavar="T", help="First time."),
         click.option(
             "--end",
             metavar="T",
