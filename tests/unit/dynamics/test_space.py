@@ -200,3 +200,54 @@ def test_that_a_load_of_the_plane_names_its_twin():
     m.add(kc.Force("push", body, (0, 0), (1, 0)))
     with pytest.raises(kc.ModelError, match=r"take spatial\.Force"):
         m.system()
+
+
+def test_that_torques_that_depend_on_the_motion_have_their_slopes():
+    m = spatial.Mechanism("dragged")
+    body = m.body("body", mass=1, inertia=(1, 1, 1))
+    drag = tuple(-(k + 1) * rate * rate for k, rate in enumerate(body.omega_fixed))
+    m.add(spatial.FollowerTorque("drag", body, drag))
+    m.add(spatial.Force("field", body, (0.1, 0.2, 0.3), (body.y, -body.x, body.z**2)))
+    module, (q, q_dot) = kc.compile(m), state(4)
+    spin = 2 * g_of(q[3:]) @ q_dot[3:]
+    torque = -np.array([1, 2, 3]) * spin**2
+    expected = 2 * g_of(q[3:]).T @ torque + 8 * g_of(q_dot[3:]).T @ g_of(q_dot[3:]) @ q[3:]
+    turned = Rotation.from_quat(q[3:], scalar_first=True)
+    force = np.array([q[1], -q[0], q[2] ** 2])
+    lever = np.cross((0.1, 0.2, 0.3), turned.inv().apply(force))
+    expected += 2 * g_of(q[3:]).T @ lever
+    # Along p itself a force has a component that the norm of p takes up.
+    found, p = module.Q(q, q_dot, 0.0)[3:], q[3:]
+    np.testing.assert_allclose(found - p * (p @ found), expected - p * (p @ expected), atol=1e-12)
+    for name, reads in (("Q_q", 0), ("Q_q_dot", 1)):
+        jacobian = getattr(module, name)(q, q_dot, 0.0)
+        for k in range(7):
+            both = [q.astype(complex), q_dot.astype(complex)]
+            both[reads][k] += 1e-30j
+            slope = module.Q(*both, 0.0).imag / 1e-30
+            np.testing.assert_allclose(jacobian[:, k], slope, atol=1e-11)
+
+
+def test_that_a_rod_on_a_spring_rests_in_space_as_in_the_plane():
+    """S1 of the reference cases, swung out of the plane: length and angle are the same."""
+    m = spatial.Mechanism("hang")
+    m.gravity = (0, 0, -G)
+    rod = m.body("rod", (0.3, 0.2, 0.35), x=(0.6, 0.4, 0.7), y=(-0.4, 0.6, 0), mass=2,
+                 inertia=(0.01, 0.2, 0.2))  # fmt: skip
+    m.add(spatial.Spherical("O", m.ground, (0, 0, 0), rod, (-0.5, 0, 0)))
+    m.add(
+        spatial.Spring("s", m.ground, (0, 0, 1.2), rod, (0.5, 0, 0), stiffness=60, free_length=0.4)
+    )
+    rest = kc.equilibrium(kc.compile(m))
+    assert rest.stability == ("neutral",)  # it may be swung about the vertical, and roll
+    x, y, z = 2 * rest.q[0, :3]
+    assert math.atan2(z, math.hypot(x, y)) == pytest.approx(1.18715766125861, abs=1e-8)
+    assert math.dist((x, y, z), (0, 0, 1.2)) == pytest.approx(0.463096960926194, abs=1e-9)
+
+
+def test_that_forces_in_space_say_what_is_there():
+    m = spatial.Mechanism("top")
+    m.body("top", mass=1, inertia=(1, 2, 3))
+    found = kc.simulate(kc.compile(m), [0, 0.1])
+    with pytest.raises(kc.UnsupportedError, match="in space, whose reactions are not compiled"):
+        kc.forces(found)
