@@ -75,7 +75,7 @@ def test_all_chunks_start_in_the_assembly_of_the_first_set():
     b = np.linspace(0.8, 1.2, 9)
     short = -np.arcsin(np.sin(0.3 + np.linspace(0, 0.1, 5)) / b[:, None])
     options = {"model": folding(), "p": {"b": b}, "columns": ["angle"]}
-    ways = {1: [], 2: []}
+    ways: dict[int, list[float]] = {1: [], 2: []}
     for assembly, signs in ways.items():
         for chunk in (1, 2, 9):
             angle = sweep(**options, assembly=assembly, chunk=chunk)["angle"].values
