@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -21,6 +22,8 @@ EXTRA = "rich platformdirs matplotlib scipy kincompile.runtime.native"
 LANGUAGES = "kincompile.targets.c kincompile.targets.octave kincompile.targets.javascript"
 EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2"
 RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
+
+HEAVY = Path(__file__).resolve().parents[3] / "examples" / "balanced_four_bar.toml"
 
 NOT_LOADED = {
     "assemblies MODEL": (
@@ -43,6 +46,7 @@ NOT_LOADED = {
     ),
     "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
+    "equilibrium HEAVY": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} scipy.interpolate",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
     "mark KIT": "rich platformdirs matplotlib kincompile.view.page kincompile.verify",
     "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
@@ -68,7 +72,7 @@ def test_that_a_command_loads_what_it_uses(line, pendulum, tmp_path):
     hand = tmp_path / "hand.txt"
     hand.write_text("nu = [0, 0, 2]\n", encoding="utf-8")
     places = {"MODEL": pendulum, "HAND": hand, "PAGE.html": tmp_path / "page.html"}
-    places |= {"DRAWING.svg": tmp_path / "drawing.svg"}
+    places |= {"DRAWING.svg": tmp_path / "drawing.svg", "HEAVY": HEAVY}
     places |= {"FOLDER": tmp_path / "new", "KIT": tmp_path / "kit"}
     if "KIT" in line:
         kc.exercise(kc.read_model(pendulum)).write(places["KIT"])
