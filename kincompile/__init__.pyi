@@ -10,7 +10,10 @@ from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
 from kincompile.derivation.derivation import derivation as derivation
+from kincompile.design import targets as targets
 from kincompile.design.deviation import Deviation as Deviation
+from kincompile.design.fit import fit as fit
+from kincompile.design.fitted import Fit as Fit
 from kincompile.design.tolerance import tolerance as tolerance
 from kincompile.design.tolerance_analysis import ToleranceAnalysis as ToleranceAnalysis
 from kincompile.errors import AssemblyWarning as AssemblyWarning

@@ -58,7 +58,7 @@ def command(
 
     An .svg moves, without a script, or with --time stands still. A .dxf has one position, the first
     without --time, in the model's unit, with a layer for each body, the ground, the joints and the
-    paths. A .glb is a motion in space for programs that show 3-D. Where the motion does not
+    paths. A .glb (glTF) is a motion in space for programs that show 3-D. Where the motion does not
     converge, what was found is drawn, and the exit code is 3.
     """
     is_still = _is_still(output, at, true_size)

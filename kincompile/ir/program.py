@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from kincompile.model.points import Observed
+from kincompile.model.resolve import Joint
 from kincompile.quantities import quantities_of
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from kincompile.model.bodies import Body, Coordinate, Parameter
     from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.points import OutputColumn, PlacedPoint
-    from kincompile.model.resolve import FreeEquation, Joint
+    from kincompile.model.resolve import FreeEquation
     from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.model.spline import SplineTable
     from kincompile.quantities import Columns, Quantity, Rows
@@ -215,6 +216,11 @@ class Instance:
     def bodies(self) -> tuple[str, ...]:
         """Names of body i and body j, as far as the type has them."""
         return tuple(body.name for body in self.constraint.bodies)
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is a body's own equation, as the length of its Euler parameters."""
+        return isinstance(self.constraint, Joint) and self.constraint.written.is_own
 
     @property
     def is_load(self) -> bool:

@@ -16,7 +16,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.mechanism_plot import axes_of, draw, write_name
 from kincompile.view.svg import Timing, as_svg
 from kincompile.view.traces import described, moving_system, traced_places
-from kincompile.view.worlds import motion_file
+from kincompile.view.worlds import PLANE, dimension_of, motion_file, solid_svgs
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -39,8 +39,8 @@ WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
 GLB = ".glb"
 """Ending of glTF in one binary file."""
 
-IN_SPACE = (*WRITERS, GLB)
-"""Endings of files that show a motion in space."""
+FRAMES_IN_SPACE = 60
+"""Frames of an SVG in space, about: it has all paths of each, a megabyte together."""
 
 SVG = ".svg"
 """Ending of what is written without matplotlib."""
@@ -75,7 +75,7 @@ def animate(
     path : path-like, optional
         File to write, whole or not at all: ``.svg``, which moves in a browser and needs no
         matplotlib, ``.gif``, or ``.mp4``, which needs ffmpeg; of a motion in space ``.glb``, which
-        programs for 3-D open (glTF 2.0 with a keyframe at each point), and no ``.svg``.
+        programs for 3-D open (glTF 2.0 with a keyframe at each point).
     model
         The mechanism; needed only for a solution of a module that was loaded from a file.
     seconds
@@ -196,18 +196,17 @@ def _written_svg(
     system = moving_system(solution, model, WHAT)
     q, t = solution.q[solution.good], solution.t[solution.good]
     length = _playing_time(t, seconds)
-    step = max(1, round(t.size / (length * FRAME_RATE)))
+    most = length * FRAME_RATE
+    if dimension_of(system) > PLANE:
+        most = min(most, FRAMES_IN_SPACE)
+    step = max(1, round(t.size / most))
     rows = np.append(np.arange(0, t.size - 1, step), t.size - 1)
     shapes = drawing(system, solution.parameters, q)
-    if shapes.is_spatial:
-        raise InputError(
-            f"cannot write {path}: a motion in space is written as {listed(IN_SPACE)}, and as SVG "
-            "at one time: by kc.draw, on the command line with --time"
-        )
     timing = Timing(length, (t[rows] - t[0]) / ((t[-1] - t[0]) or 1.0))
     description = described(shapes, f"in motion from t = {t[0]:g} to {t[-1]:g} {TIME_UNIT}")
     paths = [place.at(solution.q) for place in traced_places(shapes, trace)]
-    return write_atomically(path, as_svg(shapes, q[rows], description, paths=paths, timing=timing))
+    in_svg = solid_svgs().svg_in_space if shapes.is_spatial else as_svg
+    return write_atomically(path, in_svg(shapes, q[rows], description, paths=paths, timing=timing))
 
 
 def _written_glb(

@@ -40,6 +40,11 @@ def solid_pictures() -> ModuleType:
     return import_module("kincompile.view.solid_picture")
 
 
+def solid_svgs() -> ModuleType:
+    """Return the module that draws SVG in space."""
+    return import_module("kincompile.view.solid_svg")
+
+
 def solid_plots() -> ModuleType:
     """Return the module that draws in space by matplotlib."""
     return import_module("kincompile.view.solid_plot")

@@ -210,6 +210,71 @@ def test_screw_jack(count: int) -> None:
     np.testing.assert_allclose(found, list(JACK.values()), rtol=0, atol=5e-11)
 
 
+POINTS = {
+    "A": (0.15, 0.35, 0.16), "B": (-0.2, 0.35, 0.17), "C": (0, 0.7, 0.15), "D": (0.1, 0.42, 0.46),
+    "E": (-0.15, 0.42, 0.45), "F": (-0.02, 0.66, 0.44), "G": (-0.12, 0.38, 0.2),
+    "H": (-0.13, 0.68, 0.2), "W": (0, 0.75, 0.3), "P": (0, 0.77, 0),
+}  # fmt: skip
+
+
+def suspension(height: float, rack: float) -> tuple[Any, Any]:
+    """Return C, F, P and the wheel's axis for a height of W, by spheres and circles alone.
+
+    Unknown are the angles of the two arms and the place of H.
+    """
+    p = {name: np.array(place, dtype=float) for name, place in POINTS.items()}
+
+    def swung(hinge: str, end: str, angle: float) -> Any:
+        start, axis = p[hinge[0]], p[hinge[1]] - p[hinge[0]]
+        turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
+        return start + turn.apply(p[end] - start)
+
+    def wheel(given: Any) -> Any:
+        return swung("AB", "C", given[0]), swung("DE", "F", given[1]), given[2:]
+
+    def frame(c: Any, f: Any, h: Any) -> Any:
+        return np.column_stack([f - c, h - c, np.cross(f - c, h - c)])
+
+    rest = np.linalg.inv(frame(p["C"], p["F"], p["H"]))
+
+    def carried(given: Any, vector: Any) -> Any:
+        return frame(*wheel(given)) @ rest @ vector
+
+    push = p["G"] + [0, rack, 0]
+
+    def missing(given: Any) -> Any:
+        c, f, h = wheel(given)
+        lengths = ((c, f, "CF"), (c, h, "CH"), (f, h, "FH"), (push, h, "GH"))
+        rows = [np.linalg.norm(a - b) - np.linalg.norm(p[e[0]] - p[e[1]]) for a, b, e in lengths]
+        return [*rows, (c + carried(given, p["W"] - p["C"]))[2] - height]
+
+    found = fsolve(missing, [0, 0, *p["H"]], xtol=1e-13)
+    c, f, _ = wheel(found)
+    return (c, f, c + carried(found, p["P"] - p["C"])), carried(found, np.array([0, 1.0, 0]))
+
+
+@pytest.mark.parametrize("rack", [0.0, 0.015])
+def test_double_wishbone_with_steering(rack: float) -> None:
+    t = np.array([0.0, 0.5, 1.0, 1.75])
+    found = solved("double_wishbone_with_steering", t, {"rack": rack})
+    for k, time in enumerate(t):
+        height = 0.3 + 0.06 * (time - 1)
+        (c, f, foot), spin = suspension(height, rack)
+        expected = {
+            "camber": -np.arcsin(spin[2]),
+            "toe": np.arctan2(spin[0], spin[1]),
+            "caster": np.arctan2(c[0] - f[0], f[2] - c[2]),
+            "track": 2 * foot[1],
+        }
+        step = 1e-5
+        (_, _, high), _ = suspension(height + step, rack)
+        (_, _, low), _ = suspension(height - step, rack)
+        for name, value in expected.items():
+            assert found[name][k] == pytest.approx(value, abs=1e-10), name
+        slope = (high[1] - low[1]) / (high[2] - low[2])
+        assert found["roll_centre"][k] == pytest.approx(foot[2] + foot[1] * slope, abs=1e-7)
+
+
 def position(found: Any, body: str) -> Any:
     return np.column_stack([found[f"{axis}_{body}"] for axis in "xyz"])
 
