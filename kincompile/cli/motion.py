@@ -30,7 +30,7 @@ def motion_options(
 ) -> Callable[..., None]:
     """Add the options of a motion: its times, and the values of parameters."""
     options: list[Callable[[Command], Command]] = [
-        click.option("--start", default="0", metavar="T", help="First time.  [default: 0]"),
+        click.option("--start", default="0", metavar="T", help="First time."),
         click.option(
             "--end",
             metavar="T",

@@ -14,7 +14,7 @@ import click
 import kincompile as kc
 from kincompile.cli.motion import motion_options, motion_times, set_values, sweep_options
 from kincompile.cli.progress import progress_bar
-from kincompile.cli.shared import NOT_CONVERGED, output_option, print_data, read_model
+from kincompile.cli.shared import NOT_CONVERGED, deg_option, output_option, print_data, read_model
 from kincompile.errors import InputError
 from kincompile.files.sweep_table import SweepTable, read_sweep_table
 from kincompile.names import listed
@@ -49,9 +49,7 @@ from kincompile.writing import require_writable, write_atomically
     "--chunk", type=click.IntRange(min=1), help="Variants that are solved and written together."
 )
 @click.option("--target", type=click.Choice(["c", "numpy"]), default="c", help="What is run.")
-@click.option(
-    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show angles in degrees."
-)
+@deg_option("Show angles in degrees.")
 @click.pass_context
 def command(
     ctx: click.Context,
