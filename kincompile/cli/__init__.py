@@ -26,7 +26,7 @@ from kincompile.names import escaped_lines
 
 COMMANDS = (
     "assemblies", "compare", "compile", "derive", "draw", "equilibrium", "exercise", "inspect",
-    "mark", "run", "schema", "sweep", "view",
+    "mark", "run", "schema", "simulate", "sweep", "view",
 )  # fmt: skip
 """The commands: each is the `command` of the file of its name."""
 
