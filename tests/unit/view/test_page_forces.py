@@ -11,7 +11,6 @@ import kincompile as kc
 from kincompile.view.page_scripts import forces_script
 from tests.unit.dynamics.test_inverse import four_bar, slider_crank, two_guides
 
-
 NODE = shutil.which("node") or shutil.which("nodejs") or "node"
 
 
