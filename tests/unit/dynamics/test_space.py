@@ -251,3 +251,26 @@ def test_that_forces_in_space_say_what_is_there():
     found = kc.simulate(kc.compile(m), [0, 0.1])
     with pytest.raises(kc.UnsupportedError, match="in space, whose reactions are not compiled"):
         kc.forces(found)
+
+
+def test_that_files_keep_masses_and_loads(tmp_path):
+    m = spatial.Mechanism("hang")
+    m.gravity = (0, 0, -G)
+    k = m.parameter("k", 60.0)
+    inertia = ((0.1, 0, 0), (0, 0.2, k / 6000), (0, k / 6000, 0.2))
+    rod = m.body("rod", (0.4, 0, -0.3), mass=2, inertia=inertia, centre=(0, 0, 0.1))
+    m.body("ball", (1, 0, 0), mass=k / 30, inertia=(1, 1, 1))
+    m.add(spatial.Spherical("O", m.ground, (0, 0, 0), rod, (-0.5, 0, 0)))
+    m.add(spatial.Spring("s", m.ground, (0, 0, 1.2), rod, (0.5, 0, 0), stiffness=k))
+    m.add(spatial.FollowerTorque("roll", rod, (-rod.omega_fixed[0] / 10, 0, 0)))
+    path = tmp_path / "hang.toml"
+    path.write_text(m.to_toml(), encoding="utf-8")
+    read = kc.read_model(path)
+    assert read.to_toml() == m.to_toml()
+    before, after = kc.compile(m), kc.compile(read)
+    q, q_dot = state(2, 14)
+    np.testing.assert_array_equal(before.M(q, 0.0), after.M(q, 0.0))
+    np.testing.assert_array_equal(before.Q(q, q_dot, 0.0), after.Q(q, q_dot, 0.0))
+    path.write_text(m.to_toml().replace("mass = 2", "mass = -2"), encoding="utf-8")
+    with pytest.raises(kc.ModelError, match="the mass is -2, and must be positive"):
+        kc.read_model(path).system()
