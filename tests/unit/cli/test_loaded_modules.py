@@ -22,6 +22,11 @@ LANGUAGES = "kincompile.targets.c kincompile.targets.octave kincompile.targets.j
 EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2"
 RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
 
+SPACE = (
+    "kincompile.space kincompile.spatial kincompile.view.solids kincompile.view.solid_joints "
+    "kincompile.view.solid_shapes kincompile.view.solid_picture kincompile.view.gltf"
+)
+
 NOT_LOADED = {
     "assemblies MODEL": (
         f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify"
@@ -43,9 +48,11 @@ NOT_LOADED = {
     ),
     "draw MODEL -o DRAWING.svg": (
         f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify "
-        "kincompile.view.page ezdxf watchfiles"
+        f"kincompile.view.page ezdxf watchfiles {SPACE}"
     ),
-    "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
+    "view MODEL -o PAGE.html": (
+        f"{EXTRA} {LARGE} {SPACE} kincompile.derivation kincompile.compare"
+    ),
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
     "mark KIT": "rich platformdirs matplotlib kincompile.view.page kincompile.verify",
