@@ -39,7 +39,8 @@ def drawn() -> dict[str, str]:
 def moving(name: str) -> str:
     """Return the motion of an example as an SVG that moves; of free equations, as curves."""
     model = kc.read_model(EXAMPLES / f"{name}.toml")
-    times = np.linspace(0, float(model.end), FRAMES + 1)
+    frames = FRAMES if len(model.system().ground.kind.axes) == 2 else FRAMES // 2
+    times = np.linspace(0, float(model.end), frames + 1)
     solution = kc.solve(kc.compile(model), times)
     if isinstance(model, kc.ConstraintSystem):
         return svg_text(solution.plot().figure)
