@@ -196,7 +196,9 @@ def _write_motions() -> None:
         live = live_folder / f"{_last(name)}.html"
         if live.exists() and live.stat().st_mtime > max(newest, model.stat().st_mtime):
             continue
-        write(GENERATED / "motions", {f"{_last(name)}.svg": pictures.moving(name)})
+        last = _last(name)
+        shown = pictures.still(last) if name.startswith("space/") else pictures.moving(name)
+        write(GENERATED / "motions", {f"{last}.svg": shown})
         kc.page(kc.read_model(model)).write(live)
     for lesson in course.LESSONS:
         kc.page(course.model_of(lesson)).write(live_folder / f"lesson_{lesson}.html")
