@@ -46,7 +46,7 @@ $(DEMO_READY): $(VENV_READY) pyproject.toml .ci/constraints.txt
 
 $(TEST_READY): $(DEMO_READY)
 	@echo "Installing the test tools into $(VENV)"
-	@$(PIP) --editable '.[test,plot,sweep,dxf,watch]'
+	@$(PIP) --editable '.[test,plot,sweep,dxf,watch,stiff]'
 	@touch $@
 
 $(PAGES_READY): $(TEST_READY)
@@ -126,7 +126,7 @@ $(BENCH_READY): $(DEMO_READY)
 
 bench: $(BENCH_READY)
 	@$(BIN)/python -m benchmarks
-	@for part in points analysis space outputs sensitivities scale variants page; do $(BIN)/python -m benchmarks.$$part || exit 1; done
+	@for part in points analysis space outputs sensitivities scale variants sweep page; do $(BIN)/python -m benchmarks.$$part || exit 1; done
 
 clean:
 	@rm -rf $(VENV) demo site course docs/made build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache

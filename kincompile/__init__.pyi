@@ -10,7 +10,10 @@ from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
 from kincompile.derivation.derivation import derivation as derivation
+from kincompile.design import targets as targets
 from kincompile.design.deviation import Deviation as Deviation
+from kincompile.design.fit import fit as fit
+from kincompile.design.fitted import Fit as Fit
 from kincompile.design.tolerance import tolerance as tolerance
 from kincompile.design.tolerance_analysis import ToleranceAnalysis as ToleranceAnalysis
 from kincompile.errors import AssemblyWarning as AssemblyWarning
@@ -52,6 +55,7 @@ from kincompile.model.loads import TorsionSpring as TorsionSpring
 from kincompile.model.mechanism import Mechanism as Mechanism
 from kincompile.model.sketch import Sketch as Sketch
 from kincompile.model.system import ConstraintSystem as ConstraintSystem
+from kincompile.runtime.dynamics.simulate import simulate as simulate
 from kincompile.runtime.load import load as load
 from kincompile.runtime.newton import newton as newton
 from kincompile.runtime.results.forces import Forces as Forces

@@ -14,13 +14,14 @@ import click
 import kincompile as kc
 from kincompile.cli.motion import motion_options, motion_times, set_values, sweep_options
 from kincompile.cli.progress import progress_bar
-from kincompile.cli.shared import NOT_CONVERGED, output_option, print_data, read_model
+from kincompile.cli.shared import NOT_CONVERGED, deg_option, output_option, print_data, read_model
 from kincompile.errors import InputError
 from kincompile.files.sweep_table import SweepTable, read_sweep_table
 from kincompile.names import listed
 from kincompile.sweep.overview import overview
 from kincompile.sweep.page import sweep_page
 from kincompile.sweep.samples import values_of
+from kincompile.sweep.worker import end_with_parent
 from kincompile.writing import require_writable, write_atomically
 
 
@@ -49,9 +50,7 @@ from kincompile.writing import require_writable, write_atomically
     "--chunk", type=click.IntRange(min=1), help="Variants that are solved and written together."
 )
 @click.option("--target", type=click.Choice(["c", "numpy"]), default="c", help="What is run.")
-@click.option(
-    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show angles in degrees."
-)
+@deg_option("Show angles in degrees.")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -93,8 +92,11 @@ def command(
         kept = {"columns": table.columns, "measures": table.measures}
     options = {"product": product or (table.product and not sweeps), "assembly": assembly}
     # Fresh processes: a copy of this one would have its memory, and its threads as they stand.
-    context = get_context("spawn")
-    pool = ProcessPoolExecutor(processes, context) if processes > 1 else nullcontext()
+    pool = (
+        ProcessPoolExecutor(processes, get_context("spawn"), end_with_parent)
+        if processes > 1
+        else nullcontext()
+    )
     with pool as executor, progress_bar() as progress:
         found = kc.sweep(
             mechanism, numbers | swept, times, **kept, **options,

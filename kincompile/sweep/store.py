@@ -25,17 +25,18 @@ if TYPE_CHECKING:
 class Memory:
     """Results that are kept in this process."""
 
-    IS_SHARED = False
-
     def __init__(self, contents: Contents) -> None:
-        self._contents = contents
-        self._done = np.zeros(len(contents.plan), dtype=bool)
-        self._arrays = contents.arrays()
+        self._contents, self._form = contents, contents.form
+        self._done = np.zeros(len(self._form.grid), dtype=bool)
+        self._arrays = self._form.empty()
 
-    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
+    def writer(self) -> None:
+        """Return nothing: workers hand their values back."""
+
+    def take(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
         """Keep the values of a chunk, by name."""
-        for name, block in self._contents.blocks(number, values).items():
-            self._arrays[name][self._contents.region(number, name)] = block
+        for name, block in self._form.blocks(number, values).items():
+            self._arrays[name][self._form.region(number, name)] = block
         self._done[number] = True
 
     def done(self) -> NDArray[np.bool_]:
@@ -44,13 +45,19 @@ class Memory:
 
     def read(self, number: int, name: str) -> NDArray[Any]:
         """Return the values of a chunk, of one array."""
-        found: NDArray[Any] = self._arrays[name][self._contents.region(number, name)]
+        found: NDArray[Any] = self._arrays[name][self._form.region(number, name)]
         return found
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the results."""
         return self._contents.dataset(self._arrays)
 
+
+MOST_BYTES = 8_000_000_000
+"""Largest results that are kept in memory."""
+
+MOST_CHUNKS = 10_000_000
+"""Largest number of chunks, of which each is a file or more."""
 
 STORES: dict[str, type[ZarrStore | ParquetStore]] = {".zarr": ZarrStore, ".parquet": ParquetStore}
 """Kinds of folders, by ending."""
@@ -66,7 +73,18 @@ def open_store(path: str | os.PathLike[str] | None, contents: Contents) -> Store
     UnsupportedError
         If the package that writes it is not installed.
     """
+    form = contents.form
+    if len(form.grid) > MOST_CHUNKS:
+        raise InputError(
+            f"{form.grid.variants:,} variants are {len(form.grid):,} chunks, more than "
+            f"{MOST_CHUNKS:,}: give fewer values, or a larger chunk."
+        )
     if path is None:
+        if form.size > MOST_BYTES:
+            raise InputError(
+                f"the results of {form.grid.variants:,} variants have {form.size / 1e9:,.0f} GB, "
+                "too much for memory: give a store, such as store='NAME.zarr', or keep less."
+            )
         return Memory(contents)
     kind = STORES.get(Path(path).suffix)
     if kind is None:

@@ -6,6 +6,9 @@ This module loads neither SymPy nor the compiler, so that a worker starts quickl
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
+import os
+import threading
 import warnings
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -30,10 +33,10 @@ _MODULES: dict[str, ModuleType] = {}
 
 
 class Writer(Protocol):
-    """What writes a chunk; a worker may have a copy of it."""
+    """What writes a chunk; it is sent to workers, with each chunk, so that it is small."""
 
-    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the values of a chunk, by name."""
+    def write(self, number: int, sets: Array, values: Mapping[str, NDArray[Any]]) -> None:
+        """Keep the values of a chunk, by name, whose parameters are (B, k)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +106,7 @@ class Job:
     layout: Layout
     writer: Writer | None
 
-    def written_by(self, writer: Writer) -> Job:
+    def written_by(self, writer: Writer | None) -> Job:
         """Return the job of workers that write what they have solved."""
         return replace(self, writer=writer)
 
@@ -116,5 +119,20 @@ def run(job: Job, number: int, sets: Array) -> dict[str, NDArray[Any]] | None:
         values = job.layout.values(solution)
     if job.writer is None:
         return values
-    job.writer.write(number, values)
+    job.writer.write(number, sets, values)
     return None
+
+
+def end_with_parent() -> None:
+    """End this process when the one that started it has ended: the initializer of a pool.
+
+    Without it the workers of a program that was killed wait for work for ever.
+    """
+    parent = multiprocessing.parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
