@@ -26,14 +26,14 @@ SAMPLES = 40
 
 def unit(random: np.random.Generator) -> Array:
     """Return a direction that points anywhere."""
-    v = random.normal(size=3)
-    return v / np.linalg.norm(v)
+    v: Array = random.normal(size=3)
+    return v / float(np.linalg.norm(v))
 
 
 def beside(random: np.random.Generator, axis: Array) -> Array:
     """Return a direction at a right angle to another."""
-    v = np.cross(axis, unit(random))
-    return v / np.linalg.norm(v)
+    v: Array = np.cross(axis, unit(random))
+    return v / float(np.linalg.norm(v))
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,8 @@ class Rocker:
         along = (point @ self.axis) * self.axis
         across = point - along
         c, s = np.cos(angle)[:, np.newaxis], np.sin(angle)[:, np.newaxis]
-        return self.origin + along + c * across + s * np.cross(self.axis, across)
+        places: Array = self.origin + along + c * across + s * np.cross(self.axis, across)
+        return places
 
     def closed(self, pin: Array, sign: int) -> tuple[Array, Array]:
         """Return its angle for places of the pin at the rod's other end, and how far it is off."""
@@ -74,7 +75,8 @@ class Slider:
 
     def place(self, way: Array, point: Array) -> Array:
         """Return where a point of it is, given by its way from the origin at way 0."""
-        return self.origin + point + way[:, np.newaxis] * self.axis
+        places: Array = self.origin + point + way[:, np.newaxis] * self.axis
+        return places
 
     def closed(self, pin: Array, sign: int) -> tuple[Array, Array]:
         """Return its way for places of the pin at the rod's other end, and how far it is off."""

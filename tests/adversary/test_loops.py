@@ -18,6 +18,7 @@ from tests.adversary.loops import Loop, Rocker, mechanism, motion, random_loop
 
 TIMES = (np.linspace(0, 3, 60), np.linspace(0, 4, 9), np.linspace(0, -3, 25))
 PARTS, EACH = 4, 500
+DERIVED = ("Phi", "Phi_q", "nu", "gamma")
 
 
 def places_of(loop: Loop, followers: list[Any]) -> list[Any]:
@@ -56,8 +57,10 @@ def check(seed: int) -> tuple[int, int]:
     loop, t = random_loop(random), TIMES[random.integers(0, len(TIMES))]
     scale, noise = float(10 ** random.uniform(-6, 6)), float(random.choice((0.0, 0.02, 0.1)))
     module = kc.compile(mechanism(loop, scale, noise, random))
-    verified = kc.verify(module)
-    assert verified.passed, f"seed {seed}: {verified}"
+    # The planned solve is judged by the motion. Of complex numbers it may divide by zero.
+    checks = [item for item in kc.verify(module).checks if item.quantity in DERIVED]
+    assert {item.quantity for item in checks} == set(DERIVED)
+    assert not [item for item in checks if not item.passed], f"seed {seed}"
     found = kc.solve(module, t)
     good = found.status == kc.Status.CONVERGED
     for values in (found.q, found.q_dot, found.q_ddot):
@@ -88,7 +91,7 @@ def check_seeds(seeds: range, record: Any) -> None:
         slowest = max(slowest, time.process_time() - started)
     record(tried=len(seeds), wrong=0, gave_up=gave_up, slowest=slowest)
     assert points > 5 * len(seeds)
-    assert gave_up <= 0.05 * len(seeds)
+    assert gave_up <= 0.005 * len(seeds)
 
 
 def test_a_few_random_loops_in_space(record: Any) -> None:
