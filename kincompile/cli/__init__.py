@@ -26,7 +26,7 @@ from kincompile.names import escaped_lines
 
 COMMANDS = (
     "assemblies", "compare", "compile", "derive", "draw", "exercise", "fit", "inspect", "mark",
-    "run", "schema", "sweep", "tolerance", "view",
+    "run", "schema", "simulate", "sweep", "tolerance", "view",
 )  # fmt: skip
 """The commands: each is the `command` of the file of its name."""
 

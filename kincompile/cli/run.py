@@ -11,6 +11,7 @@ from kincompile.cli.motion import motion_options, motion_times, set_values, swee
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     NOT_CONVERGED,
+    deg_option,
     output_option,
     print_data,
     read_model,
@@ -31,9 +32,7 @@ if TYPE_CHECKING:
 @motion_options
 @sweep_options
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
-@click.option(
-    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show and write angles in degrees."
-)
+@deg_option("Show and write angles in degrees.")
 @click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
 @output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context

@@ -16,6 +16,7 @@ from kincompile.cli.motion import motion_options, motion_times, set_values, swee
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     NOT_CONVERGED,
+    deg_option,
     output_option,
     page_option,
     print_data,
@@ -55,9 +56,7 @@ from kincompile.sweep.samples import values_of
     "--chunk", type=click.IntRange(min=1), help="Variants that are solved and written together."
 )
 @click.option("--target", type=click.Choice(["c", "numpy"]), default="c", help="What is run.")
-@click.option(
-    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show angles in degrees."
-)
+@deg_option("Show angles in degrees.")
 @click.pass_context
 def command(
     ctx: click.Context,

@@ -134,7 +134,7 @@ class _OutputConverter(Converter):
     def _point(self, value: PointCoordinate) -> int:
         """Return the node of a point's coordinate; its derivatives are those of the kernel."""
         graph, kernel = self._graph, _point_row(value.frame, value.row)
-        names = {column: str(item) for column, item in value.moving.items()}
+        names = {column: item.name for column, item in value.moving.items()}
         if not self.by_column.keys() >= set(names.values()):
             return self.convert(value.written_out())
         inputs: dict[Input | str, int] = {}

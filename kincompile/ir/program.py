@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from kincompile.model.points import Observed
@@ -137,7 +138,7 @@ class BodyFrame:
         return tuple(f"{symbol}_{self.name}" for symbol in self.kernel.symbols)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, repr=False)
 class Kernel:
     """Straight-line code for the quantities of one constraint type.
 
@@ -160,6 +161,15 @@ class Kernel:
     nodes: tuple[Node, ...]
     outputs: Mapping[str, tuple[tuple[int, int, int], ...]]
     hints: tuple[Hint, ...]
+
+    def __repr__(self) -> str:
+        return self._text
+
+    @cached_property
+    def _text(self) -> str:
+        """All of it, for fingerprints: every mechanism with the type asks for that."""
+        values = (f"{item.name}={getattr(self, item.name)!r}" for item in fields(self))
+        return f"Kernel({', '.join(values)})"
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,10 +89,11 @@ class PointCoordinate(WrittenOut):
         return None if is_free else _entry(cls.frame, cls.row, args)
 
     @property
-    def moving(self) -> dict[int, sympy.Basic]:
+    def moving(self) -> dict[int, sympy.Symbol]:
         """What moves in it, by the number of the coordinate of its body."""
         size = self.frame.size
-        return dict(zip((self.row, *range(size, len(self.frame.letters))), self.args, strict=False))
+        symbols = cast("tuple[sympy.Symbol, ...]", self.args)
+        return dict(zip((self.row, *range(size, len(self.frame.letters))), symbols, strict=False))
 
     @property
     def local(self) -> tuple[sympy.Basic, ...]:

@@ -43,6 +43,10 @@ NOT_LOADED = {
         "kincompile.targets.c kincompile.targets.octave"
     ),
     "run MODEL": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} scipy.sparse.csgraph",
+    "simulate HEAVY": (
+        "kincompile.derivation kincompile.compare kincompile.verify kincompile.view rich "
+        f"platformdirs matplotlib sksundae {LANGUAGES}"
+    ),
     "inspect MODEL": f"{PAGES} {EXTRA} {LANGUAGES} kincompile.targets.numpy kincompile.runtime",
     "derive MODEL -o PAGE.html": (
         f"{EXTRA} {LARGE} kincompile.view.page kincompile.view.mechanism_plot kincompile.compare "
@@ -60,8 +64,8 @@ NOT_LOADED = {
         f"{LARGE} {LANGUAGES} {RANK} rich platformdirs matplotlib zarr pyarrow xarray scipy.stats "
         "kincompile.view.page kincompile.compare kincompile.verify"
     ),
-    "tolerance TASK": f"{LARGE} {LANGUAGES} {RANK} rich platformdirs matplotlib kincompile.compare",
-    "fit TASK": f"{LARGE} {LANGUAGES} {RANK} rich platformdirs matplotlib kincompile.compare",
+    "tolerance TASK": f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify kincompile.compare",
+    "fit TASK": f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify kincompile.compare",
     "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
 }
 
@@ -85,6 +89,9 @@ def test_that_a_command_loads_what_it_uses(line, pendulum, tmp_path):
     hand = tmp_path / "hand.txt"
     hand.write_text("nu = [0, 0, 2]\n", encoding="utf-8")
     places = {"MODEL": pendulum, "HAND": hand, "PAGE.html": tmp_path / "page.html"}
+    places["HEAVY"] = tmp_path / "heavy.py"
+    text = pendulum.read_text(encoding="utf-8").replace("0.5)", "0.5), mass=1, inertia=1")
+    places["HEAVY"].write_text(text, encoding="utf-8")
     places |= {"DRAWING.svg": tmp_path / "drawing.svg"}
     places |= {"FOLDER": tmp_path / "new", "KIT": tmp_path / "kit"}
     task = tmp_path / "task.toml"
