@@ -98,6 +98,7 @@ class _TableReader(FieldReader):
             given = {}
         parameters = {name: self._values(name, value) for name, value in given.items()}
         self._require_samples(parameters, samples)
+        self._require_few(parameters, samples or 1)
         columns, measures = (
             self.texts(row.get(key), ("sweep", key)) for key in ("columns", "measures")
         )
@@ -125,6 +126,18 @@ class _TableReader(FieldReader):
             if isinstance(value, Span) and value.count is None and samples is None:
                 text = "give it a count of equally spaced values, or the sweep a number of samples"
                 self.problem(("sweep", "parameters", name), text)
+
+    def _require_few(
+        self, parameters: Mapping[str, tuple[float, ...] | Span], samples: int
+    ) -> None:
+        """Report more values than a file may ask for, before they are made."""
+        spans = [item for item in parameters.values() if isinstance(item, Span)]
+        total = sum(samples if item.count is None else item.count for item in spans)
+        if total > MOST_VARIANTS:
+            text = (
+                f"{total:,} values are more than the {MOST_VARIANTS:,} of a file; sweep in Python"
+            )
+            self.problem(("sweep", "parameters"), text)
 
     def _product(self, row: Mapping[str, Any]) -> bool:
         """Return whether every value goes with every other one."""

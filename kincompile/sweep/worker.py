@@ -6,6 +6,9 @@ This module loads neither SymPy nor the compiler, so that a worker starts quickl
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
+import os
+import threading
 import warnings
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -118,3 +121,18 @@ def run(job: Job, number: int, sets: Array) -> dict[str, NDArray[Any]] | None:
         return values
     job.writer.write(number, sets, values)
     return None
+
+
+def end_with_parent() -> None:
+    """End this process when the one that started it has ended: the initializer of a pool.
+
+    Without it the workers of a program that was killed wait for work for ever.
+    """
+    parent = multiprocessing.parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()

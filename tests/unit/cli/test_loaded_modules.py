@@ -64,8 +64,14 @@ NOT_LOADED = {
         f"{LARGE} {LANGUAGES} {RANK} rich platformdirs matplotlib zarr pyarrow xarray scipy.stats "
         "kincompile.view.page kincompile.compare kincompile.verify"
     ),
-    "tolerance TASK": f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify kincompile.compare",
-    "fit TASK": f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify kincompile.compare",
+    "tolerance TASK": (
+        f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify "
+        "kincompile.compare"
+    ),
+    "fit TASK": (
+        f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify "
+        "kincompile.compare"
+    ),
     "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
 }
 
