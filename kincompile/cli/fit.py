@@ -18,9 +18,6 @@ from kincompile.cli.shared import (
     set_option,
     write_page,
 )
-from kincompile.design.page import fit_page
-from kincompile.design.task_tables import read_fit
-from kincompile.design.variation import require_mechanism
 from kincompile.errors import InputError
 from kincompile.writing import write_atomically
 
@@ -50,6 +47,10 @@ def command(
     shows it move. Where a target is not reached, or a limit is not kept, what comes nearest is
     written nevertheless, and the exit code is 3.
     """
+    from kincompile.design.page import fit_page
+    from kincompile.design.task_tables import read_fit
+    from kincompile.design.variation import require_mechanism
+
     if output is not None:
         if Path(output).suffix not in ENDINGS:
             raise InputError(f"cannot write {output}: end its name in .toml or .json")

@@ -9,8 +9,6 @@ import click
 import kincompile as kc
 from kincompile.cli.motion import motion_options, motion_times, set_values
 from kincompile.cli.shared import page_option, print_data, read_model, write_page
-from kincompile.design.page import tolerance_page
-from kincompile.design.task_tables import read_tolerance
 
 
 @click.command("tolerance")
@@ -35,6 +33,9 @@ def command(
     the time at which it deviates most, with what each dimension contributes. --page writes the
     bands over time too.
     """
+    from kincompile.design.page import tolerance_page
+    from kincompile.design.task_tables import read_tolerance
+
     mechanism = read_model(model)
     given = read_tolerance(model)
     if samples is not None:
