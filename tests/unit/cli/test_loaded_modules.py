@@ -32,6 +32,10 @@ samples = 4
 starts = 1
 targets = [{ value = "phi_arm", values = [0.1], times = [0.1], within = 9 }]
 """
+SPACE = (
+    "kincompile.space kincompile.spatial kincompile.view.solids kincompile.view.solid_joints "
+    "kincompile.view.solid_shapes kincompile.view.solid_picture kincompile.view.gltf"
+)
 
 NOT_LOADED = {
     "assemblies MODEL": (
@@ -54,9 +58,11 @@ NOT_LOADED = {
     ),
     "draw MODEL -o DRAWING.svg": (
         f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify "
-        "kincompile.view.page ezdxf watchfiles"
+        f"kincompile.view.page ezdxf watchfiles {SPACE}"
     ),
-    "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
+    "view MODEL -o PAGE.html": (
+        f"{EXTRA} {LARGE} {SPACE} kincompile.derivation kincompile.compare"
+    ),
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
     "equilibrium HEAVY": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} scipy.interpolate",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
