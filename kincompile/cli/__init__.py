@@ -92,7 +92,7 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 )
 @click.version_option(kc.__version__, message="%(prog)s %(version)s")
 def cli() -> None:
-    """Compile planar mechanisms to numerical code, and run it.
+    """Compile mechanisms, in the plane and in space, to numerical code, and run it.
 
     MODEL is a data file (.toml, .json, or .adm of simEngine2D), or a Python file with one Mechanism
     or ConstraintSystem at module level; of several, the one called mechanism, system or m. A data
