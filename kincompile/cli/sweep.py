@@ -16,11 +16,8 @@ from kincompile.cli.motion import motion_options, motion_times, set_values, swee
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import NOT_CONVERGED, deg_option, output_option, print_data, read_model
 from kincompile.errors import InputError
-from kincompile.files.sweep_table import SweepTable, read_sweep_table
 from kincompile.names import listed
 from kincompile.sweep.overview import overview
-from kincompile.sweep.page import sweep_page
-from kincompile.sweep.samples import values_of
 from kincompile.sweep.worker import end_with_parent
 from kincompile.writing import require_writable, write_atomically
 
@@ -78,6 +75,11 @@ def command(
     found is summarised on stdout; -o writes all of it while it comes, and a run that was stopped
     goes on where it was. What cannot be solved has a status; where nothing can, the exit code is 3.
     """
+    # These load SymPy, which --help does without.
+    from kincompile.files.sweep_table import SweepTable, read_sweep_table
+    from kincompile.sweep.page import sweep_page
+    from kincompile.sweep.samples import values_of
+
     if page is not None:
         require_writable(page)
     mechanism = read_model(model)
