@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy
@@ -79,7 +79,7 @@ def entry_faults(
             yield replace(fault, result={(row, column): wrong[:, k, 0]})
 
 
-def _count(expression: sympy.Expr) -> int:
+def _count(expression: Any) -> int:
     """Return of how many terms an expression is when its products are multiplied out, at most."""
     if expression.is_Add:
         return sum(map(_count, expression.args))

@@ -68,7 +68,8 @@ def test_that_the_checker_accepts_the_golden_rows(name: str) -> None:
 AXES = ("xi", "eta", "zeta")
 E0, E1, E2, E3 = P = sympy.symbols("e0_rod e1_rod e2_rod e3_rod")
 OMEGA = sympy.Matrix(sympy.symbols([f"omega_{axis}_rod" for axis in AXES]))
-S, H = sympy.Matrix([-0.1, 0.2, 0.3]), sympy.Matrix([0.6, 0, 0.8])
+POINT, DIRECTION = (-0.1, 0.2, 0.3), (0.6, 0, 0.8)
+S, H = sympy.Matrix(POINT), sympy.Matrix(DIRECTION)
 Y_AXIS = np.eye(3)[1]
 
 
@@ -88,8 +89,8 @@ def pendulum() -> spatial.Mechanism:
     """A rod on a ball joint whose direction h keeps an angle with y: two constraints."""
     m = spatial.Mechanism("pendulum")
     rod = m.body("rod", (0.1, 0.2, -0.3))
-    m.add(spatial.Spherical("A", m.ground, (0, 0, 0), rod, tuple(S)))
-    m.add(spatial.Dot1("dial", m.ground, Y_AXIS, rod, tuple(H), kc.t**2 / 9))
+    m.add(spatial.Spherical("A", m.ground, (0, 0, 0), rod, POINT))
+    m.add(spatial.Dot1("dial", m.ground, Y_AXIS, rod, DIRECTION, kc.t**2 / 9))
     return m
 
 
