@@ -10,7 +10,10 @@ from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
 from kincompile.derivation.derivation import derivation as derivation
+from kincompile.design import targets as targets
 from kincompile.design.deviation import Deviation as Deviation
+from kincompile.design.fit import fit as fit
+from kincompile.design.fitted import Fit as Fit
 from kincompile.design.tolerance import tolerance as tolerance
 from kincompile.design.tolerance_analysis import ToleranceAnalysis as ToleranceAnalysis
 from kincompile.errors import AssemblyWarning as AssemblyWarning
@@ -66,6 +69,8 @@ from kincompile.runtime.solve import solve as solve
 from kincompile.runtime.statics.equilibrium import Equilibrium as Equilibrium
 from kincompile.runtime.statics.equilibrium import equilibria as equilibria
 from kincompile.runtime.statics.equilibrium import equilibrium as equilibrium
+from kincompile.runtime.statics.flywheel import Flywheel as Flywheel
+from kincompile.runtime.statics.flywheel import flywheel as flywheel
 from kincompile.runtime.status import Status as Status
 from kincompile.runtime.times import times_at as times_at
 from kincompile.sweep.result import Sweep as Sweep

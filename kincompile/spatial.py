@@ -13,3 +13,4 @@ from kincompile.runtime.results.orientation import orientation as orientation
 from kincompile.space import outputs as outputs
 from kincompile.space.catalogue import *  # noqa: F403
 from kincompile.space.mechanism import Mechanism as Mechanism
+from kincompile.space.sketch import Sketch as Sketch

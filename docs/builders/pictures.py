@@ -12,6 +12,7 @@ import numpy as np
 
 import kincompile as kc
 from docs.builders.places import EXAMPLES
+from docs.builders.space import joints_in_space
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,8 +31,9 @@ THUMBNAILS = (
 
 
 def drawn() -> dict[str, str]:
-    """Return the pictures of the README by the name of their file."""
-    return {f"{name}.svg": moving(name) for name in THUMBNAILS}
+    """Return the pictures of the README, and of joints in space, by the name of their file."""
+    moved = {f"{name}.svg": moving(name) for name in THUMBNAILS}
+    return {**moved, "joints_in_space.svg": joints_in_space()}
 
 
 def moving(name: str) -> str:

@@ -10,8 +10,16 @@ import numpy as np
 
 import kincompile as kc
 from kincompile.cli.motion import set_values
-from kincompile.cli.shared import NOT_CONVERGED, output_option, print_data, read_model, set_option
+from kincompile.cli.shared import (
+    NOT_CONVERGED,
+    deg_option,
+    output_option,
+    print_data,
+    read_model,
+    set_option,
+)
 from kincompile.errors import InputError
+from kincompile.runtime.results.columns import shown_unit
 from kincompile.tables import table
 from kincompile.writing import require_writable
 
@@ -30,10 +38,16 @@ ROUNDING = 1e-9
 @click.argument("model")
 @click.option("--time", "at", type=float, default=0.0, metavar="T", help="Time of the assemblies.")
 @set_option("parameter")
+@deg_option("List angles in degrees.")
 @output_option("Page to write, .html: each assembly and the motion from it.", required=False)
 @click.pass_context
 def command(
-    context: click.Context, model: str, at: float, values: tuple[str, ...], output: str | None
+    context: click.Context,
+    model: str,
+    at: float,
+    values: tuple[str, ...],
+    angle_unit: str,
+    output: str | None,
 ) -> None:
     """List the ways to assemble MODEL at a time, and draw them.
 
@@ -56,12 +70,12 @@ def command(
     if not len(found):
         click.echo(f"Error: {module.NAME} cannot be assembled at t = {at:g}", err=True)
         context.exit(NOT_CONVERGED)
-    print_data("\n".join(_listed(module, found, at)) + "\n")
+    print_data("\n".join(_listed(module, found, at, angle_unit)) + "\n")
     if output is not None:
         click.echo(f"Wrote {drawn.write(output)}", err=True)
 
 
-def _listed(module: ModuleType, found: Array, t: float) -> list[str]:
+def _listed(module: ModuleType, found: Array, t: float, angle_unit: str) -> list[str]:
     """Return a table: a row a coordinate that differs, a column an assembly."""
     least = ROUNDING * float(np.max(np.abs(found), initial=1.0))
     apart = np.ptp(found, axis=0) if len(found) > 1 else np.full(found.shape[1], np.inf)
@@ -69,8 +83,9 @@ def _listed(module: ModuleType, found: Array, t: float) -> list[str]:
     rows = []
     for name in names:
         values = found[:, module.COORDINATES.index(name)]
-        shown = np.where(np.abs(values) > least, values, 0.0)
-        rows.append([name, module.UNITS[name], *(f"{value:.6g}" for value in shown)])
+        unit, factor = shown_unit(module.UNITS[name], angle_unit)
+        shown = np.where(np.abs(values) > least, values * factor, 0.0)
+        rows.append([name, unit, *(f"{value:.6g}" for value in shown)])
     numbers = [str(k) for k in range(1, len(found) + 1)]
     only = f"{module.NAME}: 1 assembly at t = {t:g}"
     several = f"{module.NAME}: {len(found)} assemblies at t = {t:g}; the coordinates that differ"

@@ -16,13 +16,13 @@ from kincompile.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-STILL, MOVING = (".svg", ".dxf"), (".svg", ".gif", ".mp4")
+STILL, MOVING = (".svg", ".dxf"), (".svg", ".gif", ".mp4", ".glb")
 """Endings of files that show one time, and of those that show the motion."""
 
 
 @click.command("draw")
 @click.argument("model")
-@output_option("File to write: .svg or .dxf; .gif and .mp4 of a motion.")
+@output_option("File to write: .svg or .dxf; .gif, .mp4 and .glb of a motion.")
 @click.option("--time", "at", type=float, metavar="T", help="Draw this time of the motion alone.")
 @click.option(
     "--trace",
@@ -58,7 +58,8 @@ def command(
 
     An .svg moves, without a script, or with --time stands still. A .dxf has one position, the first
     without --time, in the model's unit, with a layer for each body, the ground, the joints and the
-    paths. Where the motion does not converge, what was found is drawn, and the exit code is 3.
+    paths. A .glb (glTF) is a motion in space for programs that show 3-D. Where the motion does not
+    converge, what was found is drawn, and the exit code is 3.
     """
     is_still = _is_still(output, at, true_size)
     if view and not (is_still and output.lower().endswith(".svg")):

@@ -6,26 +6,31 @@ for ``--help``.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 from kincompile.cli.shared import set_option
+from kincompile.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
+    from kincompile.cli.shared import Command
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
 
-def motion_options(command: Callable[..., None]) -> Callable[..., None]:
+def motion_options(
+    command: Callable[..., None], *, has_through: bool = True
+) -> Callable[..., None]:
     """Add the options of a motion: its times, and the values of parameters."""
-    options = (
-        click.option("--start", default="0", metavar="T", help="First time.  [default: 0]"),
+    options: list[Callable[[Command], Command]] = [
+        click.option("--start", default="0", metavar="T", help="First time."),
         click.option(
             "--end",
             metavar="T",
@@ -53,10 +58,47 @@ def motion_options(command: Callable[..., None]) -> Callable[..., None]:
             metavar="N",
             help="Start in the N-th of the ways that `kincompile assemblies` lists.",
         ),
-    )
-    for option in reversed(options):
+    ]
+    for option in reversed(options if has_through else [*options[:-2], options[-1]]):
         command = option(command)
     return command
+
+
+def sweep_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of parameters that are swept."""
+    product = click.option("--product", is_flag=True, help="Solve every combination of the sweeps.")
+    sweep = click.option(
+        "--sweep",
+        "sweeps",
+        multiple=True,
+        metavar="NAME=FIRST:LAST:COUNT",
+        callback=_sweeps,
+        help="Solve for so many values of a parameter; several sweeps go in pairs.",
+    )
+    return sweep(product(command))
+
+
+def _sweeps(
+    context: click.Context, option: click.Parameter, given: tuple[str, ...]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the values of parameters that are swept."""
+    del context, option
+    values, problems = {}, []
+    for sweep in given:
+        name, _, span = sweep.partition("=")
+        try:
+            first, last, count = span.split(":")
+            ends, size = (float(first), float(last)), int(count)
+        except ValueError:
+            ends, size = (math.nan, math.nan), 0
+        if size < 1 or not all(map(math.isfinite, ends)):
+            problems.append(
+                f"--sweep {sweep}: give NAME=FIRST:LAST:COUNT with numbers, such as a=0.2:0.6:5"
+            )
+        values[name.strip()] = np.linspace(*ends, max(size, 1))
+    if problems:
+        raise InputError(problems)
+    return values
 
 
 def set_values(model: Mechanism | ConstraintSystem, given: Sequence[str]) -> dict[str, float]:

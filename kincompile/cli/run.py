@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, motion_times, set_values
+from kincompile.cli.motion import motion_options, motion_times, set_values, sweep_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     NOT_CONVERGED,
+    deg_option,
     output_option,
     print_data,
     read_model,
@@ -24,48 +23,16 @@ from kincompile.runtime.results.summary import summary
 from kincompile.runtime.results.write import require_known_suffix
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
-
-
-def _sweeps(
-    context: click.Context, option: click.Parameter, given: tuple[str, ...]
-) -> dict[str, NDArray[np.float64]]:
-    """Return the values of parameters that are swept."""
-    del context, option
-    values, problems = {}, []
-    for sweep in given:
-        name, _, span = sweep.partition("=")
-        try:
-            first, last, count = span.split(":")
-            ends, size = (float(first), float(last)), int(count)
-        except ValueError:
-            ends, size = (math.nan, math.nan), 0
-        if size < 1 or not all(map(math.isfinite, ends)):
-            problems.append(
-                f"--sweep {sweep}: give NAME=FIRST:LAST:COUNT with numbers, such as a=0.2:0.6:5"
-            )
-        values[name.strip()] = np.linspace(*ends, max(size, 1))
-    if problems:
-        raise InputError(problems)
-    return values
 
 
 @click.command("run")
 @click.argument("model")
 @motion_options
-@click.option(
-    "--sweep",
-    "sweeps",
-    multiple=True,
-    metavar="NAME=FIRST:LAST:COUNT",
-    callback=_sweeps,
-    help="Solve for so many values of a parameter; several sweeps go in pairs.",
-)
-@click.option("--product", is_flag=True, help="Solve every combination of the sweeps.")
+@sweep_options
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
-@click.option(
-    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show and write angles in degrees."
-)
+@deg_option("Show and write angles in degrees.")
 @click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
 @output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context

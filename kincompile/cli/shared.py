@@ -44,6 +44,11 @@ def output_option(text: str, *, required: bool = True) -> Callable[[Command], Co
     return click.option("-o", "--output", required=required, metavar="FILE", help=text)
 
 
+def deg_option(text: str) -> Callable[[Command], Command]:
+    """Return the option ``--deg``, which shows angles in degrees."""
+    return click.option("--deg", "angle_unit", flag_value="deg", default="rad", help=text)
+
+
 def set_option(what: str) -> Callable[[Command], Command]:
     """Return the option ``--set NAME=VALUE``, which gives values by name."""
     text = f"Value of a {what}, such as a=0.25 or phi=30deg; may be given several times."

@@ -9,7 +9,7 @@ import click
 
 import kincompile as kc
 from kincompile.cli.motion import motion_options, motion_times, set_values
-from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model
+from kincompile.cli.shared import NOT_CONVERGED, deg_option, output_option, read_model
 from kincompile.cli.watch import follow
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
@@ -22,6 +22,7 @@ from kincompile.writing import require_writable
 )
 @click.option("--watch", is_flag=True, help="Show the page, anew when the model is saved.")
 @motion_options
+@deg_option("Show angles in degrees until the page is told otherwise.")
 @click.pass_context
 def command(
     context: click.Context,
@@ -35,6 +36,7 @@ def command(
     values: tuple[str, ...],
     through: str | None,
     assembly: int | None,
+    angle_unit: str,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
 
@@ -57,7 +59,9 @@ def command(
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
     read = [read_model(model) for model in models]
-    options: dict[str, Any] = {"through": through, "assembly": assembly}
+    options: dict[str, Any] = {
+        "through": through, "assembly": assembly, "angle_unit": angle_unit,
+    }  # fmt: skip
     pages = []
     for model in read:
         numbers = set_values(model, values)
@@ -82,7 +86,10 @@ def _watch(context: click.Context, models: tuple[str, ...], output: str | None) 
         given = context.params[item.name or ""]
         if item.param_type_name == "option" and item.name not in ("output", "watch"):
             every = given if isinstance(given, tuple) else (given,)
-            options += [f"{item.opts[-1]}={value}" for value in every if value is not None]
+            if isinstance(item, click.Option) and item.is_flag:
+                options += [item.opts[-1]] if given == item.flag_value else []
+            else:
+                options += [f"{item.opts[-1]}={value}" for value in every if value is not None]
     follow(models[0], options)
 
 

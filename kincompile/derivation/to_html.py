@@ -41,10 +41,13 @@ def as_slides(document: Manuscript) -> str:
     return as_html(slides_of(document), kind="slides")
 
 
-def as_html(document: Manuscript, title: str = "Derivation of", kind: str = "") -> str:
+def as_html(
+    document: Manuscript, title: str = "Derivation of", kind: str = "", after: str = ""
+) -> str:
     """Return a document as an HTML page; the title stands before its name.
 
-    The kind is the class of the page's body: ``"slides"``, or none.
+    The kind is the class of the page's body: ``"slides"``, or none. What comes `after` the sections
+    is HTML: plots.
     """
     renderer = _HtmlRenderer(document)
     data = {
@@ -54,7 +57,9 @@ def as_html(document: Manuscript, title: str = "Derivation of", kind: str = "") 
         "heading": f"{escape(title)} <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
         "contents": "\n".join(renderer.contents(document.sections)),
-        "main": "\n".join(line for item in document.sections for line in renderer.section(item, 0)),
+        "main": "\n".join(
+            [*(line for item in document.sections for line in renderer.section(item, 0)), after]
+        ),
     }
     return fill("derivation/page.html.jinja", data)
 

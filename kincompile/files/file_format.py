@@ -20,6 +20,8 @@ VERSION = 1
 """Version of the format, the value of the key `kincompile`."""
 MOST_POINTS = 10_000_000
 """Largest time grid that a file may ask for."""
+MOST_VARIANTS = 100_000_000
+"""Largest number of values of a parameter that a file may ask for."""
 MOST_DRAWN, MOST_JOINTS = 300, 30
 """Largest number of joints, parts and parameters of a drawing, and of joints of one link."""
 SMOOTHNESS = 4
@@ -59,6 +61,8 @@ _POINT = _components(2)
 _TRIPLE = _components(3)
 _NUMBERS: dict[str, Any] = {"type": "array", "items": _NUMBER, "minItems": 6}
 _VALUES: dict[str, Any] = {"type": "array", "items": _EXPRESSION, "minItems": 3}
+_NAMES: dict[str, Any] = {"type": "array", "items": _TEXT}
+_VARIANTS: dict[str, Any] = {"type": "integer", "minimum": 1, "maximum": MOST_VARIANTS}
 _LAW: dict[str, Any] = {"enum": list(RISES)}
 _CORNERS: dict[str, Any] = {"type": "boolean"}
 
@@ -84,6 +88,29 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "loads": Field(_list("load"), is_required=False),
         "points": Field(_list("point"), is_required=False),
         "outputs": Field(_list("output"), is_required=False),
+        "sweep": Field({"$ref": "#/$defs/sweep"}, is_required=False),
+    },
+    "sweep": {
+        "parameters": Field(
+            {
+                "type": "object",
+                "additionalProperties": {
+                    "anyOf": [
+                        {"type": "array", "items": _EXPRESSION, "minItems": 1},
+                        {"$ref": "#/$defs/span"},
+                    ]
+                },
+            }
+        ),
+        "samples": Field(_VARIANTS, is_required=False),
+        "product": Field({"type": "boolean"}, is_required=False),
+        "columns": Field(_NAMES, is_required=False),
+        "measures": Field(_NAMES, is_required=False),
+    },
+    "span": {
+        "from": Field(_EXPRESSION),
+        "to": Field(_EXPRESSION),
+        "count": Field(_VARIANTS, is_required=False),
     },
     "sketch": {
         "lengths": Field({"type": "object", "additionalProperties": _NUMBER}, is_required=False),

@@ -11,20 +11,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import Constant, Graph, Node
-from kincompile.ir.orientations import name_of, orientations_of, sampled, small_rotations
+from kincompile.ir.inline import input_name
 from kincompile.structure.blocks import Block, block_triangular
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-
-    import numpy as np
-    from numpy.typing import NDArray
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from typing import TypeAlias
 
     from kincompile.ir.inline import InlineProgram
-    from kincompile.ir.orientations import Orientation
+    from kincompile.ir.orientations import SmallRotation
+
+    Turn: TypeAlias = Callable[[Graph, "Matrix", Mapping[int, int]], list[SmallRotation]]
 
 Matrix = dict[int, dict[int, int]]
 """Nodes of the entries by row and column."""
@@ -58,6 +59,9 @@ class SolvePlan:
         Node of each block's determinant.
     solution
         Node of each coordinate.
+    turned
+        Column of e0 of each body whose stretch s and small rotation pi' have four columns after
+        those of Phi_q.
     """
 
     nodes: tuple[Node, ...]
@@ -67,6 +71,7 @@ class SolvePlan:
     blocks: tuple[Block, ...]
     determinants: tuple[int, ...]
     solution: tuple[int, ...]
+    turned: tuple[int, ...] = ()
 
     @property
     def has_choices(self) -> bool:
@@ -90,14 +95,12 @@ def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan |
     equations, redundant = code.program.equations, code.program.redundant
     size = len(equations), len(code.program.coordinates)
     left_out = frozenset(equations.index(name) for name in redundant)
-    orientations = orientations_of(code.program)
+    turn: Turn | None = None
+    if any(instance.is_own for instance in code.program.instances):
+        space = import_module("kincompile.ir.orientations")  # a planar model does without
+        turn = partial(space.small_rotations, code)
     return plan_entries(
-        *size,
-        jacobian_entries(code),
-        left_out=left_out,
-        is_straight=is_straight,
-        orientations=orientations,
-        states=sampled(code) if orientations else {},
+        *size, jacobian_entries(code), left_out=left_out, is_straight=is_straight, turn=turn
     )
 
 
@@ -113,20 +116,19 @@ def plan_entries(
     *,
     left_out: Collection[int] = (),
     is_straight: bool = False,
-    orientations: Sequence[Orientation] = (),
-    states: Mapping[str, NDArray[np.float64]] | None = None,
+    turn: Turn | None = None,
 ) -> SolvePlan | None:
     """Plan the solve of a matrix given by its entries, each a number or, where it varies, None.
 
-    Rows that are left out are inputs that nothing reads. Where there are `orientations`, `states`
-    are values of the inputs.
+    Rows that are left out are inputs that nothing reads. `turn` replaces the Euler parameters of
+    bodies by small rotations.
     """
     graph = Graph()
     matrix: Matrix = {row: {} for row in range(row_count)}
     varying = []
     for row, column, value in entries:
         if value is None:
-            matrix[row][column] = graph.input(name_of(row, column))
+            matrix[row][column] = graph.input(input_name(row, column))
             varying.append((row, column, matrix[row][column]))
         else:
             matrix[row][column] = graph.const(value)
@@ -135,7 +137,7 @@ def plan_entries(
     for row in left_out:
         del matrix[row]
     pivots, eliminated = _eliminate(graph, matrix, right)
-    rotations = small_rotations(graph, orientations, states or {}, column_count, matrix, right)
+    rotations = [] if turn is None else turn(graph, matrix, right)
     rows = sorted(matrix)
     settled = {pivot.column for pivot in pivots}.union(*(item.columns for item in rotations))
     columns = sorted(set(range(column_count)) - settled)
@@ -166,6 +168,7 @@ def plan_entries(
         blocks,
         tuple(determinants),
         tuple(solution[column] for column in range(column_count)),
+        tuple(item.columns[0] for item in rotations),
     )
 
 

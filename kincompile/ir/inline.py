@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from kincompile.ir.program import Hint, Instance, Program
 
 
+def input_name(row: int, column: int) -> str:
+    """Return what the code of a solve calls an entry of Phi_q."""
+    return f"Phi_q[{row}, {column}]"
+
+
 @dataclass(frozen=True, slots=True)
 class Entry:
     """One number of a result: its place in the emitted array, and the node that computes it."""
@@ -23,6 +28,11 @@ class Entry:
     row: int
     column: int
     node: int
+
+    @property
+    def name(self) -> str:
+        """What the code of a solve calls an entry of Phi_q."""
+        return input_name(self.row, self.column)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,9 +19,8 @@ from kincompile.ir.kernels import (
     frame_entries,
     frame_kernel,
     motion_of,
-    output_kernel,
-    point_kernel,
 )
+from kincompile.ir.output_kernels import output_kernel, point_kernel
 from kincompile.ir.program import Attribute, BodyFrame, Function, Input, Instance, Kernel, Program
 from kincompile.model.expressions import alpha, t
 from kincompile.model.laws import TableLaw

@@ -18,7 +18,6 @@ are the same in the body at all states.
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 
     from kincompile.ir.graph import Graph
     from kincompile.ir.inline import InlineProgram
-    from kincompile.ir.program import Program
 
     Array = NDArray[np.float64]
     Matrix = dict[int, dict[int, int]]
@@ -46,25 +44,6 @@ NOTHING = 1e-9
 """Part of the size of its terms below which a sum is zero at a random state."""
 PARALLEL = 1e-3
 """Sine of the angle below which two directions give no third one."""
-
-
-@dataclass(frozen=True, slots=True)
-class Orientation:
-    """The four Euler parameters of a body and its own row."""
-
-    row: int
-    columns: tuple[int, int, int, int]
-
-
-def orientations_of(program: Program) -> tuple[Orientation, ...]:
-    """Return the orientations of bodies that have Euler parameters."""
-    found = []
-    for instance in program.instances:
-        if getattr(getattr(instance.constraint, "written", None), "is_own", False):
-            places = (instance.columns[column] for _, column, _ in instance.kernel.outputs["Phi_q"])
-            e0, e1, e2, e3 = sorted(place for place in places if place is not None)
-            found.append(Orientation(instance.first_row, (e0, e1, e2, e3)))
-    return tuple(found)
 
 
 def sampled(code: InlineProgram) -> dict[str, Array]:
@@ -79,31 +58,27 @@ def sampled(code: InlineProgram) -> dict[str, Array]:
     inputs = inputs_of(program, (q, np.zeros_like(q)), random.uniform(0, 1, STATES), p)
     with np.errstate(all="ignore"):
         values = run(nodes, inputs, program.tables)
-    return {name_of(x.row, x.column): values[number[x.node]] for x in entries}
-
-
-def name_of(row: int, column: int) -> str:
-    """Return the name of an entry of Phi_q as an input of the solve's code."""
-    return f"Phi_q[{row}, {column}]"
+    return {entry.name: values[number[entry.node]] for entry in entries}
 
 
 def small_rotations(
-    graph: Graph,
-    orientations: Sequence[Orientation],
-    states: Mapping[str, Array],
-    first: int,
-    matrix: Matrix,
-    right: Mapping[int, int],
+    code: InlineProgram, graph: Graph, matrix: Matrix, right: Mapping[int, int]
 ) -> list[SmallRotation]:
-    """Replace the Euler parameters of all bodies whose own row is in the matrix, as they are.
+    """Replace the Euler parameters of all bodies of which elimination has not taken one.
 
-    `states` are the inputs of the code at random states; columns are added from `first` on.
+    `graph`, `matrix` and `right` are as of `SmallRotation`.
     """
-    samples = Samples(graph, states)
-    whole = [item for item in orientations if matrix.get(item.row, {}).keys() == set(item.columns)]
+    own: dict[int, list[int]] = {
+        instance.first_row: [] for instance in code.program.instances if instance.is_own
+    }
+    for entry in code.entries("Phi_q"):
+        if entry.row in own:
+            own[entry.row].append(entry.column)
+    samples, first = Samples(graph, sampled(code)), len(code.program.coordinates)
+    whole = [row for row, columns in own.items() if matrix.get(row, {}).keys() == set(columns)]
     return [
-        SmallRotation(graph, samples, item, first + 4 * k, matrix, right)
-        for k, item in enumerate(whole)
+        SmallRotation(graph, samples, (row, own[row]), first + 4 * k, matrix, right)
+        for k, row in enumerate(whole)
     ]
 
 
@@ -153,8 +128,8 @@ class SmallRotation:
     ----------
     graph, samples
         The code, and its values at the random states.
-    orientation
-        Whose it is.
+    own
+        The body's own row, and the columns of its Euler parameters.
     first
         The first of the four columns of s and pi', which follow those of Phi_q.
     matrix, right
@@ -177,17 +152,17 @@ class SmallRotation:
         self,
         graph: Graph,
         samples: Samples,
-        orientation: Orientation,
+        own: tuple[int, Sequence[int]],
         first: int,
         matrix: Matrix,
         right: Mapping[int, int],
     ) -> None:
-        self._graph, self.columns = graph, orientation.columns
+        self._graph, (row_of_norm, self.columns) = graph, own
         self.is_finished = False
-        norm = matrix.pop(orientation.row)
+        norm = matrix.pop(row_of_norm)
         p = [norm[column] for column in self.columns]
         inverse = graph.div(graph.const(1), self._dot(p, p))
-        self.solution = {first: graph.mul(right[orientation.row], inverse)}
+        self.solution = {first: graph.mul(right[row_of_norm], inverse)}
         self.turns = range(first + 1, first + 4)
         self._rows = {
             row: {column: entries[column] for column in self.columns if column in entries}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from kincompile.model.points import Observed
+from kincompile.model.resolve import Joint
 from kincompile.quantities import quantities_of
 
 if TYPE_CHECKING:
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     from kincompile.model.bodies import Body, Coordinate, Parameter
     from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.points import OutputColumn, PlacedPoint
-    from kincompile.model.resolve import FreeEquation, Joint
+    from kincompile.model.resolve import FreeEquation
     from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.model.spline import SplineTable
     from kincompile.quantities import Columns, Quantity, Rows
@@ -136,7 +138,7 @@ class BodyFrame:
         return tuple(f"{symbol}_{self.name}" for symbol in self.kernel.symbols)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, repr=False)
 class Kernel:
     """Straight-line code for the quantities of one constraint type.
 
@@ -159,6 +161,15 @@ class Kernel:
     nodes: tuple[Node, ...]
     outputs: Mapping[str, tuple[tuple[int, int, int], ...]]
     hints: tuple[Hint, ...]
+
+    def __repr__(self) -> str:
+        return self._text
+
+    @cached_property
+    def _text(self) -> str:
+        """All of it, for fingerprints: every mechanism with the type asks for that."""
+        values = (f"{item.name}={getattr(self, item.name)!r}" for item in fields(self))
+        return f"Kernel({', '.join(values)})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,6 +226,11 @@ class Instance:
     def bodies(self) -> tuple[str, ...]:
         """Names of body i and body j, as far as the type has them."""
         return tuple(body.name for body in self.constraint.bodies)
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is a body's own equation, as the length of its Euler parameters."""
+        return isinstance(self.constraint, Joint) and self.constraint.written.is_own
 
     @property
     def is_load(self) -> bool:

@@ -6,7 +6,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import depending_on
-from kincompile.ir.orientations import name_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -36,7 +35,7 @@ class StraightSolve:
 
     def __init__(self, graph: Graph, code: InlineProgram, plan: SolvePlan) -> None:
         self._graph, self._plan = graph, plan
-        self._given = {name_of(x.row, x.column): x.node for x in code.entries("Phi_q")}
+        self._given = {x.name: x.node for x in code.entries("Phi_q")}
         self._solved = self._planned([graph.input(("b", row)) for row in range(len(plan.right))])
         self._moving = depending_on(plan.nodes, plan.right)
         self.determinants = [self._solved[node] for node in plan.determinants]

@@ -13,9 +13,17 @@ from typing import TYPE_CHECKING, TypeAlias, cast
 
 import sympy
 
+from kincompile.errors import ModelError
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Body
-from kincompile.model.expressions import as_sympy, symbol_names, t
+from kincompile.model.directions import angle_between, length_of, turning
+from kincompile.model.expressions import (
+    NotAnExpressionError,
+    as_expression,
+    as_sympy,
+    symbol_names,
+    t,
+)
 from kincompile.model.points import (
     BodyPoint,
     Observed,
@@ -107,8 +115,10 @@ def angle(i: Body | tuple[AnyPoint, AnyPoint], j: Body | tuple[AnyPoint, AnyPoin
     """
     if isinstance(i, Body) and isinstance(j, Body):
         return _expression(j.phi - i.phi)
-    (a, b), (c, d) = _direction(i), _direction(j)
-    return _expression(sympy.atan2(a * d - b * c, a * c + b * d))
+    u, v = _direction(i), _direction(j)
+    if len(u) + len(v) != 4:
+        raise ModelError("an angle in space has no sign: kincompile.spatial.outputs.angle")
+    return _expression(turning(*u, *v))
 
 
 def distance(point: AnyPoint, other: AnyPoint) -> sympy.Expr:
@@ -118,12 +128,12 @@ def distance(point: AnyPoint, other: AnyPoint) -> sympy.Expr:
 
 def speed(point: BodyPoint) -> sympy.Expr:
     """Return the magnitude of a point's velocity."""
-    return length(tuple(map(rate, point.coordinates)))
+    return length(tuple(map(rate, _moving(point))))
 
 
 def acceleration(point: BodyPoint) -> sympy.Expr:
     """Return the magnitude of a point's acceleration; it has no rates of its own."""
-    return length(tuple(rate(rate(item)) for item in point.coordinates))
+    return length(tuple(rate(rate(item)) for item in _moving(point)))
 
 
 def transmission_angle(before: AnyPoint, joint: AnyPoint, after: AnyPoint) -> sympy.Expr:
@@ -140,7 +150,7 @@ def velocity_ratio(output: Scalar, by: Scalar) -> sympy.Expr:
     Without friction the ratio of forces is its reciprocal: the mechanical advantage. It is not
     defined where `by` is at rest.
     """
-    return _expression(rate(as_sympy(output)) / rate(as_sympy(by)))
+    return _expression(rate(_scalar(output)) / rate(_scalar(by)))
 
 
 def _expression(found: object) -> sympy.Expr:
@@ -154,11 +164,13 @@ def scalar_product(u: Sequence[sympy.Expr], v: Sequence[sympy.Expr]) -> sympy.Ex
 
 def length(u: Sequence[sympy.Expr]) -> sympy.Expr:
     """Return the length of a vector."""
-    return _expression(sympy.sqrt(scalar_product(u, u)))
+    return _expression(length_of(*u))
 
 
 def between(u: Sequence[sympy.Expr], v: Sequence[sympy.Expr]) -> sympy.Expr:
     """Return the angle between two vectors, 0 to pi."""
+    if len(u) == 2:
+        return _expression(angle_between(*u, *v))
     sizes = sympy.sqrt(scalar_product(u, u) * scalar_product(v, v))
     return _expression(sympy.acos(scalar_product(u, v) / sizes))
 
@@ -167,7 +179,12 @@ def _direction(given: Body | tuple[AnyPoint, AnyPoint]) -> tuple[sympy.Expr, ...
     """Return the components of a body's xi axis, or of the way from a point to another."""
     if isinstance(given, Body):
         return _expression(sympy.cos(given.phi)), _expression(sympy.sin(given.phi))
+    places: object = given
+    if not isinstance(places, tuple | list) or len(places) != 2:
+        raise ModelError(f"{given!r} is no direction: give a body, or two points")
     start, end = (coordinates(place) for place in given)
+    if len(start) != len(end):
+        raise ModelError(f"of {given!r} one is in the plane and the other in space")
     return tuple(b - a for a, b in zip(start, end, strict=True))
 
 
@@ -175,7 +192,27 @@ def coordinates(place: AnyPoint) -> tuple[sympy.Expr, ...]:
     """Return the global coordinates of a point."""
     if isinstance(place, BodyPoint):
         return place.coordinates
-    return tuple(map(as_sympy, place))
+    if isinstance(place, tuple | list):
+        return tuple(map(_scalar, place))
+    raise ModelError(
+        f"{place!r} is no point: give one of a body, as m.point(...) returns it, or a fixed one, "
+        "(x, y)"
+    )
+
+
+def _scalar(value: object) -> sympy.Expr:
+    """Return a number or an expression; text is refused."""
+    try:
+        return as_sympy(as_expression(value))
+    except NotAnExpressionError as error:
+        raise ModelError(f"{error}; give a number, or an expression as foot.x is one") from None
+
+
+def _moving(point: object) -> tuple[sympy.Expr, ...]:
+    """Return the coordinates of a point of a body."""
+    if isinstance(point, BodyPoint):
+        return point.coordinates
+    raise ModelError(f"{point!r} is no point of a body: give one, as m.point(...) returns it")
 
 
 def point_of(joint: Joint) -> BodyPoint | None:

@@ -40,18 +40,46 @@ class rate(sympy.Function):  # noqa: N801 - a function for those who write expre
     nargs = 1
 
 
-class PointCoordinate(sympy.Function):
+class WrittenOut(sympy.Function):
+    """A function whose derivatives the compiler knows; everybody else sees elementary functions."""
+
+    precedence: ClassVar[int] = PRECEDENCE["Atom"]
+    brackets: ClassVar[str] = "({})"
+
+    def written_out(self) -> sympy.Expr:
+        """Return it in elementary functions."""
+        raise NotImplementedError
+
+    def _eval_derivative(self, symbol: sympy.Symbol) -> sympy.Expr:
+        return cast("sympy.Expr", self.written_out().diff(symbol))
+
+    def _eval_evalf(self, prec: int) -> Any:
+        return self.written_out().evalf(max(15, int(prec / 3.33)))
+
+    def doit(self, **hints: bool) -> sympy.Expr:
+        """Return it in elementary functions."""
+        return cast("sympy.Expr", self.written_out().doit(**hints))
+
+    def _printed(self, printer: Any) -> str:
+        return self.brackets.format(printer.doprint(self.written_out()))
+
+    # In texts, and in what `lambdify` makes.
+    _sympystr = _lambdacode = _numpycode = _mpmathcode = _pythoncode = _scipycode = _printed
+
+    def _latex(self, printer: Any) -> str:
+        return rf"\left({printer.doprint(self.written_out())}\right)"
+
+
+class PointCoordinate(WrittenOut):
     """A global coordinate of a point, as a function of the body's, of its angle and of xi, eta.
 
-    The compiler has its derivatives from the vectors, and so need not expand it; everybody else
-    sees cosine and sine. It is one of `point_x` and `point_y`. In space there are the Euler
-    parameters in place of the angle, and zeta.
+    The compiler has its derivatives from the vectors. It is one of `point_x` and `point_y`. In
+    space there are the Euler parameters in place of the angle, and zeta.
     """
 
     nargs = 4
     frame: ClassVar[Frame] = i
     row: ClassVar[int]
-    precedence: ClassVar[int] = PRECEDENCE["Atom"]
 
     @classmethod
     def eval(cls, *args: sympy.Expr) -> sympy.Expr | None:
@@ -61,10 +89,11 @@ class PointCoordinate(sympy.Function):
         return None if is_free else _entry(cls.frame, cls.row, args)
 
     @property
-    def moving(self) -> dict[int, sympy.Basic]:
+    def moving(self) -> dict[int, sympy.Symbol]:
         """What moves in it, by the number of the coordinate of its body."""
         size = self.frame.size
-        return dict(zip((self.row, *range(size, len(self.frame.letters))), self.args, strict=False))
+        symbols = cast("tuple[sympy.Symbol, ...]", self.args)
+        return dict(zip((self.row, *range(size, len(self.frame.letters))), symbols, strict=False))
 
     @property
     def local(self) -> tuple[sympy.Basic, ...]:
@@ -74,25 +103,6 @@ class PointCoordinate(sympy.Function):
     def written_out(self) -> sympy.Expr:
         """Return it in cosine and sine."""
         return _entry(self.frame, self.row, self.args)
-
-    def _eval_derivative(self, symbol: sympy.Symbol) -> sympy.Expr:
-        return cast("sympy.Expr", self.written_out().diff(symbol))
-
-    def _eval_evalf(self, prec: int) -> Any:
-        return self.written_out().evalf(max(15, int(prec / 3.33)))
-
-    def doit(self, **hints: bool) -> sympy.Expr:
-        """Return it in cosine and sine."""
-        return cast("sympy.Expr", self.written_out().doit(**hints))
-
-    def _printed(self, printer: Any) -> str:
-        return f"({printer.doprint(self.written_out())})"
-
-    # In texts, and in what `lambdify` makes.
-    _sympystr = _lambdacode = _numpycode = _mpmathcode = _pythoncode = _scipycode = _printed
-
-    def _latex(self, printer: Any) -> str:
-        return rf"\left({printer.doprint(self.written_out())}\right)"
 
 
 class point_x(PointCoordinate):  # noqa: N801
@@ -125,8 +135,8 @@ def _written(frame: Frame, row: int) -> sympy.Expr:
 
 
 def written_out(value: sympy.Expr) -> sympy.Expr:
-    """Return an expression with the coordinates of points in cosine and sine."""
-    found = value.atoms(PointCoordinate)
+    """Return an expression in elementary functions."""
+    found = value.atoms(WrittenOut)
     plain: sympy.Expr = value.xreplace({item: item.written_out() for item in found})
     return plain
 

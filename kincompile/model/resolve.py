@@ -342,7 +342,7 @@ def text_of(constraint: Element) -> str:
             body = given.name if isinstance(given, Body) else given
             parts.append(f"- {body}" if parts else body)
         elif item.kind in (Kind.POINT, Kind.AXIS):
-            text = f"({', '.join(map(str, given))})"
+            text = f"({', '.join(map(_component, given))})"
             parts.append(text if item.kind is Kind.POINT else f"axis {text}")
         elif item.kind is Kind.PROFILE:
             parts.append("profile table" if isinstance(given, tuple | list) else "profile")
@@ -351,3 +351,8 @@ def text_of(constraint: Element) -> str:
         elif not constraint.is_load or given != 0:  # most springs have no damper
             parts.append(f"{name} {given}")
     return " ".join(parts)
+
+
+def _component(given: Scalar) -> str:
+    """Return a component of a point; SymPy would fill up a float with zeros."""
+    return str(float(given) if isinstance(given, sympy.Float) else given)

@@ -13,6 +13,7 @@ import sympy
 
 from kincompile.derive.loads import derive_load
 from kincompile.model.arguments import Kind
+from kincompile.model.dimensions import unit_problems
 from kincompile.model.expressions import as_sympy, symbol_names
 from kincompile.model.load import Load
 from kincompile.model.masses import mass_of
@@ -95,6 +96,10 @@ class AppliedLoad:
         """Return the forces and attributes."""
         return *self.scalars.values(), *chain(*self.points.values())
 
+    def by_symbol(self) -> dict[str, tuple[Scalar, ...]]:
+        """Return the forces and attributes by their symbol, points as their components."""
+        return {name: (value,) for name, value in self.scalars.items()} | dict(self.points)
+
     def entries(self, quantity: str) -> Iterator[tuple[int, int, Expression]]:
         """Yield row, column and formula of the entries of M or of Q that it adds to."""
         derived = derive_load(self.template, self.others, varies=self.varies)
@@ -111,13 +116,17 @@ class AppliedLoad:
 
 
 def resolved_loads(
-    bodies: Iterable[Body], loads: Sequence[Any], gravity: Any, scope: Scope
+    bodies: Iterable[Body], loads: Sequence[Any], gravity: Any, scope: Scope, length_unit: str
 ) -> tuple[AppliedLoad, ...]:
     """Return the masses of bodies, then the loads, as far as they are good."""
     masses = (mass_of(body, gravity, scope) for body in bodies)
     given = chain((item for item in masses if item is not None), loads)
     found = (_resolved(item, scope) for item in given)
-    return tuple(item for item in found if item is not None)
+    known = tuple(item for item in found if item is not None)
+    units = {name: parameter.unit for name, parameter in scope.parameters.items()}
+    values = ((item.written, item.by_symbol()) for item in known)
+    scope.problems += unit_problems(values, units, length_unit)
+    return known
 
 
 def _resolved(load: Any, scope: Scope) -> AppliedLoad | None:

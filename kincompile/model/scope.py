@@ -29,7 +29,7 @@ from kincompile.model.expressions import (
     unknown_problem,
 )
 from kincompile.model.laws import MotionLaw, TableLaw
-from kincompile.model.points import PointCoordinate, written_out
+from kincompile.model.points import WrittenOut, written_out
 from kincompile.model.points import rate as rate_of
 from kincompile.names import listed, rate, suggestion
 
@@ -124,7 +124,7 @@ def checked_expression(
         return None
     if not isinstance(value, sympy.Expr):
         return value
-    known = (PointCoordinate, rate_of) if is_output else ()
+    known = (WrittenOut, rate_of) if is_output else ()
     value = value if is_output else written_out(value)
     problem = smoothness_problem(value, corners=corners, known=known)
     # Rare, so that large mechanisms pay for one look alone.

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from kincompile.errors import ModelError
-from kincompile.model.absolute import AbsoluteAngle, AbsoluteX, AbsoluteY
+from kincompile.model.absolute import AbsoluteAngle
 from kincompile.model.bodies import GROUND, Body
-from kincompile.model.constraint import Constraint
-from kincompile.model.equation import Equation
+from kincompile.model.drawing import Drawing
 from kincompile.model.gears import Gear
 from kincompile.model.joints import (
     Revolute,
@@ -18,24 +16,18 @@ from kincompile.model.joints import (
     TranslationalDistance,
 )
 from kincompile.model.link_shape import ShapeError, drawn_angle, shape
-from kincompile.model.mechanism import Mechanism
-from kincompile.model.relative import Distance, RelativeAngle
-from kincompile.model.sketch_parts import Drawn, Line, Link, minus
-from kincompile.names import listed
+from kincompile.model.relative import RelativeAngle
+from kincompile.model.sketch_parts import Line, Link, minus
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import sympy
-
     from kincompile.model.arguments import BodyLike, PointLike, ValueLike
-    from kincompile.model.expressions import Scalar, Scalars
+    from kincompile.model.constraint import Constraint
     from kincompile.model.scope import Point
 
-Item = TypeVar("Item", bound=Constraint | Equation)
 
-
-class Sketch:
+class Sketch(Drawing):
     """A mechanism as one draws it: where the joints are, and which of them each link joins.
 
     Frames, local points, revolute joints and guesses follow. What is on the ground is where it is
@@ -50,50 +42,6 @@ class Sketch:
     name, length_unit, end, points
         As for `Mechanism`.
     """
-
-    def __init__(
-        self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
-    ) -> None:
-        self._mechanism = Mechanism(name, length_unit=length_unit, end=end, points=points)
-        self._drawn = Drawn(self._mechanism)
-
-    def parameter(
-        self,
-        name: str,
-        default: Scalar | None = None,
-        unit: str = "",
-        range: Scalars | None = None,  # noqa: A002
-    ) -> sympy.Symbol:
-        """Declare a parameter and return its symbol, as `Mechanism.parameter` does."""
-        return self._mechanism.parameter(name, default, unit, range)
-
-    def length(
-        self,
-        name: str,
-        default: float,
-        range: Scalars | None = None,  # noqa: A002
-    ) -> sympy.Symbol:
-        """Declare a parameter in the unit of length and return its symbol."""
-        return self.parameter(name, default, self._mechanism.length_unit, range)
-
-    def joints(self, /, **places: PointLike) -> None:
-        """Draw joints: a place (x, y) by name [length], numbers or expressions of parameters.
-
-        A joint that several links have is a pin, one of a single link a point to be watched, with
-        columns ``G.x`` and ``G.y`` in a solution. Where lengths are given, a rough place will do.
-        """
-        for name, place in places.items():
-            if name in self._drawn.joints:
-                self._drawn.problems.append(f"joint {name!r} is drawn twice; draw it once")
-            where = self._drawn.pair(place, f"joint {name!r}", "a place (x, y)")
-            self._drawn.joints[name] = where
-
-    def ground(self, /, **places: PointLike) -> None:
-        """Draw joints of the ground, as `joints` does: these are exactly where they are drawn."""
-        self.joints(**places)
-        ground = self._drawn.links[GROUND.name]
-        own = {name: self._drawn.joints[name] for name in places}
-        self._drawn.links[GROUND.name] = Link(GROUND, {**ground.places, **own})
 
     def link(
         self,
@@ -241,57 +189,9 @@ class Sketch:
         if link is not None:
             constraint = self._turning_or_sliding(name, link, value, against)
         else:
-            constraint = self._moving_joints(name, what, value)
+            constraint = self.moving_joints(name, what, value)
         if constraint is not None:
             self.add(constraint)
-
-    def add(self, constraint: Item) -> Item:
-        """Add any constraint, as `Mechanism.add` does; `place` gives its points."""
-        return self._mechanism.add(constraint)
-
-    def place(self, link: BodyLike, joint: str) -> Point:
-        """Return where a joint is in the frame of a link that has it, (xi, eta)."""
-        found = self._drawn.link_of(link, f"joint {joint!r}")
-        if found is not None and joint not in found.places:
-            self._drawn.problems.append(
-                f"the link {found.body.name!r} has no joint {joint!r}; it has "
-                f"{listed(found.places)}"
-            )
-        return (0, 0) if found is None else found.places.get(joint, (0, 0))
-
-    def mechanism(self) -> Mechanism:
-        """Return the mechanism, to which more may be added.
-
-        Raises
-        ------
-        ModelError
-            With everything that is wrong with the drawing.
-        """
-        drawn = self._drawn
-        held = {joint for link in drawn.links.values() for joint in link.places}
-        loose = [joint for joint in drawn.joints if joint not in held]
-        problems = [*drawn.problems]
-        if loose:
-            problems.append(
-                f"no link has the joints {listed(loose)}; name them in a link, or do not draw them"
-            )
-        if problems:
-            raise ModelError(list(dict.fromkeys(problems)))
-        self._name_points()
-        return self._mechanism
-
-    def _name_points(self) -> None:
-        """Name the points of links: the joints that one moving link has alone."""
-        named = {item.name for item in self._mechanism.outputs}
-        for joint in self._drawn.joints:
-            holders = [link for link in self._drawn.links.values() if joint in link.places]
-            if len(holders) == 1 and not holders[0].body.is_ground and joint not in named:
-                self._mechanism.point(joint, holders[0].body, holders[0].places[joint])
-
-    def __repr__(self) -> str:
-        """Return name and sizes."""
-        sizes = f"{len(self._drawn.joints)} joints, {len(self._drawn.links) - 1} links"
-        return f"<Sketch {self._mechanism.name!r}: {sizes}; .mechanism() makes the model>"
 
     def _added(
         self,
@@ -327,24 +227,3 @@ class Sketch:
             return AbsoluteAngle(name, link.body, value)
         base = self._drawn.link_of(against, f"drive of {link.body.name!r}")
         return None if base is None else RelativeAngle(name, base.body, link.body, value)
-
-    def _moving_joints(self, name: str, what: str, value: ValueLike) -> Constraint | None:
-        """Return the driver of a joint's coordinate, or of the distance of two joints."""
-        drawn, title = self._drawn, f"drive of {what!r}"
-        joint, _, letter = what.partition(".")
-        kind = {"x": AbsoluteX, "y": AbsoluteY}.get(letter)
-        ends = (joint,) if kind is not None else tuple(what.split())
-        if kind is None and len(ends) < 2:
-            drawn.problems.append(
-                f"{title}: drive a link, a slider, the distance of two joints 'A B', or a "
-                f"coordinate of a joint 'A.x'; links so far are: {listed(drawn.links)}"
-            )
-            return None
-        named = drawn.named(ends, title, len(ends), most=1 if kind else 2)
-        held = [(drawn.holder(end, title), end) for end in named or ()]
-        points = [(link.body, link.places[end]) for link, end in held if link is not None]
-        if len(points) < len(ends):
-            return None
-        if kind is not None:
-            return kind(name, *points[0], value)
-        return Distance(name, *points[0], *points[1], value)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from kincompile.model.bodies import GROUND, Body, default_values
+from kincompile.model.bodies import Body, default_values
 from kincompile.model.expressions import NotAnExpressionError, Scalar, as_expression
 from kincompile.model.link_shape import Outline, listed_pairs, number, pairs_by_name
 from kincompile.names import listed, suggestion
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from kincompile.model.arguments import BodyLike, PointLike
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.scope import Point
-
-ALONG = "two joints of one link, along='C D', or a direction, along=(1, 0)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +33,15 @@ class Link:
         Angle of the body in the drawing [rad].
     guide
         Of a slider, the line along which it slides.
+    hinge
+        In space the axis of the first hinge in which it hangs, on the other link.
     """
 
     body: Body
     places: Mapping[str, Point]
     angle: float = 0.0
     guide: Line | None = None
+    hinge: Line | None = None
 
     def turned(self, vector: Point) -> Point:
         """Return a vector of the drawing in the frame of the link."""
@@ -62,7 +63,7 @@ class Line:
 
 def minus(point: Point, other: Point) -> Point:
     """Return the vector to a point from another."""
-    return point[0] - other[0], point[1] - other[1]
+    return tuple(there - here for there, here in zip(point, other, strict=True))
 
 
 @dataclass(slots=True)
@@ -74,8 +75,23 @@ class Drawn:
 
     mechanism: Mechanism
     joints: dict[str, Point] = field(default_factory=dict)
-    links: dict[str, Link] = field(default_factory=lambda: {GROUND.name: Link(GROUND, {})})
+    links: dict[str, Link] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        ground = self.mechanism.ground
+        self.links[ground.name] = Link(ground, {})
+
+    @property
+    def size(self) -> int:
+        """How many components a place has."""
+        return len(self.mechanism.ground.kind.axes)
+
+    @property
+    def line_words(self) -> str:
+        """How a line is given."""
+        example = (1, *(0,) * (self.size - 1))
+        return f"two joints of one link, along='C D', or a direction, along={example}"
 
     def first(self, joint: str) -> Link | None:
         """Return the first link that has a joint, or None."""
@@ -149,16 +165,17 @@ class Drawn:
             return 1
         return value
 
-    def pair(self, given: Any, what: str, expected: str) -> Point:
-        """Return two numbers or expressions; note what is wrong with them."""
+    def place(self, given: Any, what: str, expected: str = "") -> Point:
+        """Return two or three numbers or expressions; note what is wrong with them."""
         try:
-            one, other = (None, None) if isinstance(given, str) else given
+            found = () if isinstance(given, str) else tuple(given)
         except (TypeError, ValueError):
-            one = other = None
-        if one is None or other is None:
+            found = ()
+        if len(found) != self.size:
+            expected = expected or f"a place ({', '.join('xyz'[: self.size])})"
             self.problems.append(f"{what}: {given!r} is not {expected}")
-            return 0, 0
-        return self._scalar(one, what), self._scalar(other, what)
+            return (0,) * self.size
+        return tuple(self._scalar(item, what) for item in found)
 
     def lengths(
         self, what: str, joints: Sequence[str], length: Any, given: Mapping[str, Any]
@@ -177,7 +194,7 @@ class Drawn:
         for key, value in given.items():
             where = f"{what}, {key}"
             if key in joints[2:]:
-                places[key] = self.pair(value, where, "a place (xi, eta) in the frame of the link")
+                places[key] = self.place(value, where, "a place (xi, eta) in the frame of the link")
             elif len(meant := pairs.get(key, [])) == 1:
                 lengths[meant[0]] = self._length(value, where)
             else:
@@ -193,17 +210,22 @@ class Drawn:
         self.problems.append(f"{what}: the length is {size:g}; give one that is positive")
         return 1
 
+    def direction(self, given: Any, what: str, expected: str) -> Point:
+        """Return a direction; note what is wrong with it."""
+        found = self.place(given, what, expected)
+        if all(number(part, self.values) == 0 for part in found):
+            self.problems.append(f"{what}: the direction {found} is none; {expected}")
+        return found
+
     def line(self, joint: str, along: str | PointLike, on: BodyLike, what: str) -> Line | None:
         """Return a line through two joints of a link, or through a drawn joint; note problems."""
         if isinstance(along, str):
             ends = self.named(along, what, 2, most=2)
             return None if ends is None else self._through(ends, what)
-        link, axis = self.link_of(on, what), self.pair(along, what, ALONG)
+        link, axis = self.link_of(on, what), self.direction(along, what, self.line_words)
         named = self.named(joint, what, 1, most=1)
         if link is None or named is None:
             return None
-        if all(number(part, self.values) == 0 for part in axis):
-            self.problems.append(f"{what}: the direction (0, 0) is none; {ALONG}")
         start = self.joints[joint]
         if not link.body.is_ground:
             start = link.turned(minus(start, self.joints[next(iter(link.places), joint)]))
@@ -215,7 +237,9 @@ class Drawn:
             if link.places.keys() >= set(ends):
                 start, end = (link.places[joint] for joint in ends)
                 return Line(link, start, minus(end, start))
-        self.problems.append(f"{what}: no link has both {ends[0]} and {ends[1]}; give {ALONG}")
+        self.problems.append(
+            f"{what}: no link has both {ends[0]} and {ends[1]}; give {self.line_words}"
+        )
         return None
 
 

@@ -160,7 +160,9 @@ class ConstraintSystem(MatrixViews, TextViews):
         scope = _scope(bodies, found, declared, problems, ground)
         constraints = _resolved(written, scope)
         observers = resolved_observers(body_points, asked, scope, length_unit)
-        applied = _loads(bodies, members(loads, "loads", problems), gravity, scope, written)
+        applied = _loads(
+            bodies, members(loads, "loads", problems), gravity, scope, written, length_unit
+        )
         if not written:
             problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
         if not found and not bodies:
@@ -254,6 +256,7 @@ def _loads(
     gravity: Scalars,
     scope: Scope,
     constraints: Iterable[Constraint | Equation],
+    length_unit: str,
 ) -> tuple[AppliedLoad, ...]:
     """Return the masses and the loads; a model that has none does not import what they need."""
     if not loads and not any(body.is_heavy for body in bodies):
@@ -261,7 +264,7 @@ def _loads(
     from kincompile.model.resolve_loads import check_named, resolved_loads
 
     check_named(loads, (item.name for item in constraints), scope.problems)
-    return resolved_loads(bodies, loads, gravity, scope)
+    return resolved_loads(bodies, loads, gravity, scope, length_unit)
 
 
 def _fill(system: ConstraintSystem, values: Mapping[str, Any]) -> None:

@@ -116,10 +116,13 @@ class Motion:
                 self.near.append(index)
 
 
-def follow(inputs: Inputs, progress: Progress | None = None) -> tuple[Motion, Outcome]:
+def follow(
+    inputs: Inputs, progress: Progress | None = None, *, explains: bool = True
+) -> tuple[Motion, Outcome]:
     """Go through the grid up to its end, or to the first point that fails.
 
-    What ends a motion is found and noted; with `inputs.smooth` it goes on past a bifurcation.
+    What ends a motion is found and noted; with `inputs.smooth` it goes on past a bifurcation. Who
+    tries many mechanisms, of which some do not get through, need not wait for why.
     """
     motion = Motion.over(inputs)
     way = _Way(inputs, motion, progress)
@@ -127,7 +130,7 @@ def follow(inputs: Inputs, progress: Progress | None = None) -> tuple[Motion, Ou
     if inputs.method is None and way.march_compiled(outcome):
         return motion, outcome
     outcome = way.run(outcome)
-    while outcome.status is not Status.CONVERGED:
+    while explains and outcome.status is not Status.CONVERGED:
         passage = way.explain(outcome)
         outcome = way.judged(outcome)
         if passage is None or not inputs.smooth:

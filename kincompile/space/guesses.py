@@ -71,7 +71,8 @@ def _given(given: Any) -> tuple[Scalars, str]:
         return tuple(given), ""
     numbers = _numbers(given, "orientation")
     if numbers.shape == (4,):
-        return _normalised(numbers)
+        exact = abs(np.linalg.norm(numbers) - 1) < EXACT
+        return (tuple(given), "") if exact else _normalised(numbers)
     if numbers.shape == (3, 3):
         return _of_matrix(numbers)
     raise OrientationError(
@@ -88,8 +89,6 @@ def _normalised(p: NDArray[np.float64]) -> tuple[Scalars, str]:
             "the Euler parameters have length zero, which is no orientation; (1, 0, 0, 0) is that "
             "of the ground"
         )
-    if abs(length - 1) < EXACT:
-        return tuple(p.tolist()), ""
     remark = f"the Euler parameters have length {length:.6g}, and were divided by it"
     return tuple((p / length).tolist()), remark if abs(length - 1) > ROUNDED else ""
 

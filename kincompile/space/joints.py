@@ -307,22 +307,34 @@ class ConstantVelocity(Triads):
 
 
 @constraint_type
-class Screw(Triads):
-    """Body j turns about an axis of body i and advances by the pitch in each turn."""
+class Screw(Triads, CamConstraint):
+    """Body j turns about an axis of body i and advances by the pitch in each turn.
+
+    Its angle is a coordinate ``theta_<name>``, from the cross of body i to that of body j over any
+    number of turns; so a motion keeps its turn. The points coincide where the angle is zero.
+    """
 
     source = "Haug 9.4"
-    row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "advance")
+    row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "turn", "advance")
+    contacts = (contact_i,)
+    contact_letter = "theta"
     pitch: ValueLike = argument.radius("pitch", "Advance in one turn")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
-        """Return the rows of a cylindrical joint and h_i^T d - pitch theta/(2 pi).
+        """Return the rows of a cylindrical joint, theta - alpha and h_i^T d - pitch alpha/(2 pi).
 
-        Of all theta it is the one nearest to 2 pi h_i^T d/pitch, whatever the number of turns.
+        Of all angles theta it is the one nearest to the coordinate alpha.
         """
-        turn = 2 * Pi() / Symbol("pitch")
-        rest = angle_from(turn * dot(i.A(h_i), separation()))
-        return *parallel(), *on_line(), -rest / turn
+        alpha = contact_i.alpha
+        advance = Symbol("pitch") * alpha / (2 * Pi())
+        along = dot(i.A(h_i), separation()) - advance
+        return *parallel(), *on_line(), angle_from(alpha), along
+
+    @property
+    def theta(self) -> sympy.Symbol:
+        """Symbol of the angle."""
+        return self.alpha
 
 
 @constraint_type

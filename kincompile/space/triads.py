@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
 import sympy
 
 from kincompile.model.expressions import as_sympy, evaluate
+
+ROUNDING = 1e-15
+"""Components of unit vectors up to which rounding leaves what is zero."""
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,31 +29,41 @@ def with_triads(
     found = {key: value for key, value in points.items() if key[0] not in "fh"}
     for key, given in points.items():
         if key[0] == "h":
-            h = _unit([as_sympy(value) for value in given])
-            cross = [as_sympy(value) for value in points.get(f"f{key[1:]}", ())]
+            cross = _plain(points.get(f"f{key[1:]}", ()))
+            h = _unit(_plain(given))
             f = _unit(_beside(cross or _farthest(h, defaults), h))
             g = [h[k - 2] * f[k - 1] - h[k - 1] * f[k - 2] for k in range(3)]
-            found |= {f"f{key[1:]}": _numbers(f), f"g{key[1:]}": _numbers(g), key: _numbers(h)}
+            found |= {f"f{key[1:]}": _tidy(f), f"g{key[1:]}": _tidy(g), key: _tidy(h)}
     return found
 
 
-def _unit(vector: Sequence[sympy.Expr]) -> list[sympy.Expr]:
-    size = sympy.sqrt(sympy.Add(*(item**2 for item in vector)))
+def _plain(vector: Sequence[Scalar]) -> list[Any]:
+    """Return floats if all components are numbers, else expressions."""
+    items = [as_sympy(value) for value in vector]
+    # Nested roots of exact numbers take SymPy seconds.
+    return [float(item) for item in items] if all(item.is_number for item in items) else items
+
+
+def _unit(vector: Sequence[Any]) -> list[Any]:
+    square = sum(item * item for item in vector)
+    size = math.sqrt(square) if isinstance(square, float) else sympy.sqrt(square)
     return [item / size for item in vector]
 
 
-def _beside(vector: Sequence[sympy.Expr], h: Sequence[sympy.Expr]) -> list[sympy.Expr]:
+def _beside(vector: Sequence[Any], h: Sequence[Any]) -> list[Any]:
     """Return the part of a vector at a right angle to the unit vector h."""
-    along = sympy.Add(*(a * b for a, b in zip(vector, h, strict=True)))
+    along = sum(a * b for a, b in zip(vector, h, strict=True))
     return [a - along * b for a, b in zip(vector, h, strict=True)]
 
 
-def _farthest(h: Sequence[sympy.Expr], defaults: Mapping[str, float]) -> list[sympy.Expr]:
+def _farthest(h: Sequence[Any], defaults: Mapping[str, float]) -> list[Any]:
     """Return the coordinate axis with the smallest component of h."""
     sizes = [abs(evaluate(item, dict(defaults)) or 0.0) for item in h]
     nearest = sizes.index(min(sizes))
     return [sympy.Integer(k == nearest) for k in range(3)]
 
 
-def _numbers(vector: Sequence[sympy.Expr]) -> tuple[Scalar, ...]:
-    return tuple(float(item) if item.is_number else item for item in vector)
+def _tidy(vector: Sequence[Any]) -> tuple[Scalar, ...]:
+    """Return floats where there are numbers, and zero for what is left by rounding."""
+    items = [float(item) if as_sympy(item).is_number else item for item in vector]
+    return tuple(0.0 if isinstance(x, float) and abs(x) < ROUNDING else x for x in items)

@@ -10,6 +10,7 @@ import numpy as np
 from kincompile.errors import InputError
 from kincompile.names import listed, suggestion
 from kincompile.runtime.results.columns import TIME_UNIT
+from kincompile.runtime.results.measures import output_measures
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,12 +71,15 @@ class Layout:
         measured = [item for item in self.kept if item.measure]
         for item in measured:
             found[item.name] = np.full(len(solution.q), np.nan)
+        names = {item.column for item in measured}
         for number in np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else ():
-            measures = solution.variant(number).measures()
-            for item in measured:
-                value = getattr(measures[item.column], item.measure)
-                if value is not None:
-                    found[item.name][number] = value
+            one = solution.variant(number)
+            p = np.array(list(one.parameters.values()))
+            for own in output_measures(one, one.require_module("its measures"), p, names):
+                for item in measured:
+                    value = getattr(own, item.measure) if item.column == own.name else None
+                    if value is not None:
+                        found[item.name][number] = value
         status = solution.status
         if not self.over_time:  # the first that is not good says what happened
             first = np.argmax(~solution.good, axis=1)

@@ -88,6 +88,11 @@ class Plan:
         parts = zip(self.place(number), self.block, self.sizes.values(), strict=True)
         return tuple(slice(k * n, min((k + 1) * n, size)) for k, n, size in parts)
 
+    def first(self, number: int) -> int:
+        """Return how many variants come before a chunk."""
+        starts = [part.start for part in self.region(number)]
+        return int(np.ravel_multi_index(starts, tuple(self.sizes.values())))
+
     def shape(self, number: int) -> tuple[int, ...]:
         """Return how long a chunk is along each dimension; the last ones are shorter."""
         return tuple(part.stop - part.start for part in self.region(number))

@@ -68,7 +68,7 @@ class Sweep:
                 found.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
             else:
                 found[PENDING] += int(np.prod(contents.plan.shape(number))) * per_variant
-        return {_name(number): found[number] for number in sorted(found)}
+        return {status_name(number): found[number] for number in sorted(found)}
 
     def __str__(self) -> str:
         """Return how many variants there are and how they ended."""
@@ -86,6 +86,6 @@ class Sweep:
         return f"<Sweep of {self.contents.name}: {self.contents.plan.sizes}, {', '.join(names)}>"
 
 
-def _name(number: int) -> str:
+def status_name(number: int) -> str:
     """Return the name of a status, ``PENDING`` of what has not been solved yet."""
     return "PENDING" if number == PENDING else next(x.name for x in Status if x == number)

@@ -34,7 +34,7 @@ class ZarrStore:
 
     def __init__(self, path: Path, contents: Contents) -> None:
         self._path, self._contents = path, contents
-        self._group: zarr.Group | None = None
+        self._arrays: dict[str, Any] = {}
 
     @classmethod
     def opened(cls, path: Path, contents: Contents) -> ZarrStore:
@@ -71,12 +71,12 @@ class ZarrStore:
         return np.asarray(self._array(name)[self._contents.region(number, name)])
 
     def _array(self, name: str) -> Any:
-        """Return an array of the group, which is opened when it is first needed."""
-        if self._group is None:
+        """Return an array of the group; it is opened once, which takes milliseconds."""
+        if name not in self._arrays:
             import zarr
 
-            self._group = zarr.open_group(self._path, mode="r+")
-        return self._group[name]
+            self._arrays[name] = zarr.open_array(self._path / name, mode="r+")
+        return self._arrays[name]
 
     def done(self) -> NDArray[np.bool_]:
         """Return which chunks have statuses."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import depending_on, number_of, operands_of
-from kincompile.ir.orientations import orientations_of
 from kincompile.targets.lines import wrapped
 from kincompile.targets.schedule import Assignment, Scheduler, count_uses
 
@@ -118,8 +117,8 @@ def explained(code: InlineProgram, plan: SolvePlan) -> list[str]:
     """Return lines of a comment that say how the system is taken apart."""
     equations = code.program.equations
     coordinates = [item.name for item in code.program.coordinates]
-    for item in orientations_of(code.program):  # columns of s and pi' follow those of Phi_q
-        body = next(x.name for x in code.program.bodies if item.columns[0] in x.columns)
+    for column in plan.turned:
+        body = next(item.name for item in code.program.bodies if column in item.columns)
         coordinates += [f"{name}_{body}" for name in ("s", "pi_f", "pi_g", "pi_h")]
     pivots = [f"{coordinates[item.column]} by {equations[item.row]}" for item in plan.pivots]
     lines = wrapped(["eliminated:", *pivots]) if pivots else []

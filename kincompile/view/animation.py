@@ -16,6 +16,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.mechanism_plot import axes_of, draw, write_name
 from kincompile.view.svg import Timing, as_svg
 from kincompile.view.traces import described, moving_system, traced_places
+from kincompile.view.worlds import PLANE, dimension_of, motion_file, solid_svgs
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -35,8 +36,11 @@ if TYPE_CHECKING:
 WRITERS: Mapping[str, str] = {".gif": "pillow", ".mp4": "ffmpeg"}
 """Matplotlib's writer for each kind of file."""
 
-IN_SPACE = (*WRITERS, ".glb")
-"""Endings of files that show a motion in space."""
+GLB = ".glb"
+"""Ending of glTF in one binary file."""
+
+FRAMES_IN_SPACE = 60
+"""Frames of an SVG in space, about: it has all paths of each, a megabyte together."""
 
 SVG = ".svg"
 """Ending of what is written without matplotlib."""
@@ -70,11 +74,13 @@ def animate(
         The motion of one set of parameters. Points without a solution are left out.
     path : path-like, optional
         File to write, whole or not at all: ``.svg``, which moves in a browser and needs no
-        matplotlib, ``.gif``, or ``.mp4``, which needs ffmpeg.
+        matplotlib, ``.gif``, or ``.mp4``, which needs ffmpeg; of a motion in space ``.glb``, which
+        programs for 3-D open (glTF 2.0 with a keyframe at each point).
     model
         The mechanism; needed only for a solution of a module that was loaded from a file.
     seconds
-        Playing time; without, that of the motion, but at least 2 s and at most 20 s.
+        Playing time; without, that of the motion, but at least 2 s and at most 20 s. A ``.glb`` has
+        the times of the motion.
     trace
         Names of points, bodies and constraints: points, origins and places that leave a line.
         Without, the points of the model do.
@@ -92,8 +98,11 @@ def animate(
     UnsupportedError
         If matplotlib, or for MP4 ffmpeg, is not installed.
     """
-    if path is not None and Path(path).suffix.lower() == SVG:
+    ending = "" if path is None else Path(path).suffix.lower()
+    if path is not None and ending == SVG:
         return _written_svg(solution, Path(path), model, seconds, trace)
+    if path is not None and ending == GLB:
+        return _written_glb(solution, Path(path), model, seconds, trace)
     with package_of_extra("matplotlib", "plot"):
         from matplotlib import animation
         from matplotlib import pyplot as plt
@@ -187,25 +196,50 @@ def _written_svg(
     system = moving_system(solution, model, WHAT)
     q, t = solution.q[solution.good], solution.t[solution.good]
     length = _playing_time(t, seconds)
-    step = max(1, round(t.size / (length * FRAME_RATE)))
+    most = length * FRAME_RATE
+    if dimension_of(system) > PLANE:
+        most = min(most, FRAMES_IN_SPACE)
+    step = max(1, round(t.size / most))
     rows = np.append(np.arange(0, t.size - 1, step), t.size - 1)
     shapes = drawing(system, solution.parameters, q)
-    if shapes.is_spatial:
-        raise InputError(
-            f"cannot write {path}: a motion in space is written as {listed(IN_SPACE)}, and as SVG "
-            "at one time: by kc.draw, on the command line with --time"
-        )
     timing = Timing(length, (t[rows] - t[0]) / ((t[-1] - t[0]) or 1.0))
     description = described(shapes, f"in motion from t = {t[0]:g} to {t[-1]:g} {TIME_UNIT}")
     paths = [place.at(solution.q) for place in traced_places(shapes, trace)]
-    return write_atomically(path, as_svg(shapes, q[rows], description, paths=paths, timing=timing))
+    in_svg = solid_svgs().svg_in_space if shapes.is_spatial else as_svg
+    return write_atomically(path, in_svg(shapes, q[rows], description, paths=paths, timing=timing))
+
+
+def _written_glb(
+    solution: Solution,
+    path: Path,
+    model: Mechanism | ConstraintSystem | None,
+    seconds: float | None,
+    trace: Iterable[str] | None,
+) -> Path:
+    """Write a motion in space as glTF, with a keyframe at each point that was found."""
+    require_writable(path)
+    system = moving_system(solution, model, WHAT)
+    q, t = solution.q[solution.good], solution.t[solution.good]
+    shapes = drawing(system, solution.parameters, q)
+    if not shapes.is_spatial:
+        raise InputError(
+            f"cannot write {path}: {solution.name} moves in a plane, and {GLB} is for motions in "
+            f"space; end its name in {listed((SVG, *WRITERS))}"
+        )
+    elapsed = np.abs(t - t[0])
+    if seconds is not None and t.size > 1:
+        elapsed *= _playing_time(t, seconds) / elapsed[-1]
+    paths = [place.at(q) for place in traced_places(shapes, trace)]
+    file = motion_file().as_glb(shapes, elapsed, q, system.length_unit, paths)
+    return write_atomically(path, file)
 
 
 def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:
     """Check that the file can be written, before the frames are drawn."""
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise InputError(f"cannot write {path}: end its name in {', '.join(WRITERS)} or {SVG}.")
+        known = ", ".join((*WRITERS, GLB))
+        raise InputError(f"cannot write {path}: end its name in {known} or {SVG}.")
     if not is_available(writer):
         raise UnsupportedError(
             f"cannot write {path}: {writer} is not installed. Install it (apt-get install ffmpeg, "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.dxf import LENGTHS, as_dxf
 from kincompile.view.svg import as_svg
 from kincompile.view.traces import described, moving_system, traced_places
-from kincompile.view.worlds import solid_pictures
+from kincompile.view.worlds import solid_svgs
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -95,12 +96,11 @@ def draw(
         size = millimetres(system) if true_size else None
         when = f"at t = {solution.t[row]:g} s"
         description = described(shapes, when)
-        q = solution.q[row]
+        in_svg = as_svg
         if shapes.is_spatial:
-            seen = {"view": view or STANDARD[0], "paths": paths, "millimetres": size}
-            text = solid_pictures().svg_in_space(shapes, q, description, **seen)
-        else:
-            text = as_svg(shapes, q[None], description, paths=paths, millimetres=size)
+            in_svg = functools.partial(solid_svgs().svg_in_space, view=view or STANDARD[0])
+        q = solution.q[row : row + 1]
+        text = in_svg(shapes, q, description, paths=paths, millimetres=size)
     return write_atomically(file, text)
 
 

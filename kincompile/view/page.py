@@ -13,6 +13,7 @@ from kincompile.compiler import compile as compile_model
 from kincompile.errors import InputError, StructuralError
 from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
+from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
@@ -102,6 +103,7 @@ def page(
     p: Mapping[str, float] | None = None,
     through: str | None = None,
     assembly: int | None = None,
+    angle_unit: str = "rad",
 ) -> Page:
     """Return a page that shows a mechanism, its motion and its numbers.
 
@@ -120,15 +122,18 @@ def page(
         Go on past a bifurcation, as `kc.solve` does.
     assembly : int, optional
         Start in this one of the ways to assemble the mechanism, as `kc.solve` does.
+    angle_unit : {"rad", "deg"}
+        What the page shows angles in, until its reader chooses.
 
     Raises
     ------
     ModelError
         If the model cannot be used as written; every problem is listed.
     InputError
-        If times or parameters cannot be used, or the solution is of another model, or holds
-        several variants.
+        If times, parameters or the unit cannot be used, or the solution is of another model, or
+        holds several variants.
     """
+    shown_unit("rad", angle_unit)
     system = system_of(model)
     module = None
     if solution is None:
@@ -140,6 +145,7 @@ def page(
         message = solution.message
     is_given = assembly is not None or module is None
     shown = page_data(system, solution, message, starts_there=is_given)
+    shown["angleUnit"] = angle_unit
     slots = {
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),

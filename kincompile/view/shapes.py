@@ -1,7 +1,7 @@
 """What marks look like, as data: the strokes of each shape, and how a stroke is drawn.
 
 Python evaluates the tables in `polylines.py`, for matplotlib and for figures; a page is given the
-same tables, and evaluates them in its script `draw.js`.
+same tables, and evaluates them in its script `plane.js`.
 """
 
 from __future__ import annotations

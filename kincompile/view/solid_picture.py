@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,6 @@ from kincompile.view.picture import (
     colour_of,
     composed,
     opacity_of,
-    svg_path,
 )
 from kincompile.view.shapes import FILL, HUES, INKS
 from kincompile.view.solids import Position, facets_of, solids
@@ -50,12 +48,6 @@ RIM = 0.6
 
 SEAM = 0.4
 """Width of the line in its own colour around a facet of a round solid, which closes seams."""
-
-SHEET = (960.0, 720.0)
-"""Largest sides of a picture in a file of its own [px]."""
-
-NAME = 15
-"""Height of names on it [px]."""
 
 CIRCLE = np.stack([f(np.radians(np.arange(0, 360, 10))) for f in (np.cos, np.sin)], axis=-1)
 """A ball of radius one."""
@@ -99,13 +91,13 @@ def picture_in_space(
 ) -> Picture:
     """Draw a mechanism in space; `picture` says what is given."""
     ends = [camera.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]
-    seen = _seen(drawn, q, camera, focus)
+    seen = seen_paths(drawn, q, camera, focus)
     scale = Scale([*(path.points for path in seen), *ends])
     shown = (dataclasses.replace(path, points=scale.at(path.points)) for path in seen)
     return composed(title, scale, shown, zip(arrows, ends, strict=True))
 
 
-def _seen(
+def seen_paths(
     drawn: Drawing, q: Array, camera: Camera, focus: Iterable[BodyFrame] | None = None
 ) -> list[PicturePath]:
     """Return what is seen of a mechanism from back to front, in lengths of the model."""
@@ -174,7 +166,7 @@ def mixed(colour: str, part: float) -> str:
     return "#" + "".join(f"{round(part * x + (1 - part) * 255):02x}" for x in channels)
 
 
-def _trace(index: int, points: Array) -> Iterator[PicturePath]:
+def trace(index: int, points: Array) -> Iterator[PicturePath]:
     """Yield a path in a colour of its own, on a rim of paper, in pieces that NaN separates."""
     hues = HUES["light"]
     gaps = np.flatnonzero(np.isnan(points).any(axis=1))
@@ -183,64 +175,3 @@ def _trace(index: int, points: Array) -> Iterator[PicturePath]:
         if len(kept) > 1:
             yield PicturePath(kept, INKS["paper"], "", 3.0)
             yield PicturePath(kept, hues[(index + 4) % len(hues)], "", 1.5)
-
-
-def svg_in_space(
-    drawn: Drawing,
-    q: Array,
-    description: str,
-    *,
-    paths: Sequence[Array] = (),
-    view: str = "isometric",
-    millimetres: float | None = None,
-) -> str:
-    """Return a mechanism in space as the text of an SVG file, on white paper.
-
-    Parameters
-    ----------
-    drawn
-        Its shapes.
-    q : ndarray, shape (n,)
-        The position.
-    description
-        What is shown, for those who cannot see it.
-    paths
-        Lines over the mechanism, each of shape (k, 3).
-    view
-        A name in `VIEWS`.
-    millimetres
-        Length of the model's unit where the picture has its true size, across the view.
-    """
-    camera = Camera.named(view)
-    seen, traces = _seen(drawn, q, camera), [camera.seen(path)[:, :2] for path in paths]
-    scale = Scale([*(path.points for path in seen), *traces], SHEET)
-    shown = [dataclasses.replace(path, points=scale.at(path.points)) for path in seen]
-    shown += [path for k, trace in enumerate(traces) for path in _trace(k, scale.at(trace))]
-    picture = composed(drawn.name, scale, shown)
-    names = "".join(
-        _name(dot.name, scale.at(camera.seen(dot.place.at(q))[:2]), picture.height)
-        for dot in drawn.dots
-    )
-    sides = (picture.width, picture.height)
-    wide, tall = (f"{side:.7g}" for side in sides)
-    if millimetres is not None:
-        wide, tall = (f"{side / scale.factor * millimetres:.7g}mm" for side in sides)
-    elements = "\n".join(svg_path(path, picture.height) for path in picture.paths)
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" '
-        f'viewBox="0 0 {picture.width:.7g} {picture.height:.7g}" width="{wide}" height="{tall}" '
-        f'role="img" aria-labelledby="title description" stroke-linecap="round" '
-        f'stroke-linejoin="round" font-family="system-ui,sans-serif" font-size="{NAME}">\n'
-        f'<title id="title">{escape(drawn.name)}</title>\n'
-        f'<desc id="description">{escape(description)}</desc>\n'
-        f'<rect width="100%" height="100%" fill="{INKS["paper"]}"/>\n{elements}\n{names}</svg>\n'
-    )
-
-
-def _name(name: str, place: Array, height: float) -> str:
-    """Return the element of a name, beside its point, on a rim of paper."""
-    x, y = place[0] + NAME / 2, height - place[1] - NAME / 2
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" fill="{INKS["ink"]}" stroke="{INKS["paper"]}" '
-        f'stroke-width="3" paint-order="stroke">{escape(name)}</text>\n'
-    )

@@ -40,9 +40,19 @@ def solid_pictures() -> ModuleType:
     return import_module("kincompile.view.solid_picture")
 
 
+def solid_svgs() -> ModuleType:
+    """Return the module that draws SVG in space."""
+    return import_module("kincompile.view.solid_svg")
+
+
 def solid_plots() -> ModuleType:
     """Return the module that draws in space by matplotlib."""
     return import_module("kincompile.view.solid_plot")
+
+
+def motion_file() -> ModuleType:
+    """Return the module that writes a motion in space as glTF."""
+    return import_module("kincompile.view.gltf")
 
 
 def tables_in(dimension: int) -> dict[str, Any]:

@@ -114,13 +114,13 @@ const orbit = {
     };
     Object.keys(STANDARD).forEach((name, k) =>
       button(name, name[0].toUpperCase() + name.slice(1), `Seen from the ${name} (${k + 1})`, () => this.look(name)));
-    document.getElementById('isometric');
     const made = button('perspective', 'Perspective', 'Perspective or parallel (P)', () => {
       this.isPerspective = !this.isPerspective;
       made.ariaPressed = String(this.isPerspective);
       player.refresh();
     });
     made.ariaPressed = 'false';
+    bar.style.marginTop = '.5rem';
     document.getElementById('drawn').append(bar);
     stage.canvas.addEventListener('contextmenu', event => event.preventDefault());
     for (const id of ['poles', 'centrodes']) document.getElementById(id).closest('label').hidden = true;

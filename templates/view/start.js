@@ -238,6 +238,7 @@ function start() {
   showPanel('plots');
   showing.theme();
   live.build(byId('live'));
+  if (player.data.angleUnit !== units.angle) showing.angles();
 }
 
 /* The motion is another one: what was computed from the last one is dropped. */

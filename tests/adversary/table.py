@@ -35,6 +35,8 @@ ROWS = (
         ("test_two_thousand_starts_in_javascript",)),
     Row("the same bad starts in Octave, against the runtime's",
         ("test_two_thousand_starts_in_octave",)),
+    Row("starts up to 30 degrees and a tenth of a length off an assembly that is alone there",
+        ("test_that_near_starts_come_home",)),
     Row("bad starts, the iterates of the page's JavaScript against NumPy's",
         ("test_two_hundred_bad_starts_on_the_page",)),
     Row("words of Python, C, JavaScript and Octave as names, in NumPy", ("test_all_names[numpy]",)),

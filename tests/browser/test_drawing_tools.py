@@ -240,6 +240,16 @@ def test_that_degrees_are_shown_everywhere(open_page: Any, example_named: Any) -
     page.close()
 
 
+def test_that_a_page_may_open_in_degrees(
+    open_file: Any, example_named: Any, tmp_path: Path
+) -> None:
+    drawn = kc.page(example_named("four_bar").model, angle_unit="deg")
+    page = open_file(drawn.write(tmp_path / "degrees.html"))
+    assert page.evaluate("plots.list[0].labels[1]") == "phi_rocker [deg]"
+    assert page.inner_text("#angles") == "rad"
+    page.close()
+
+
 def test_that_angles_among_parameters_are_typed_and_measured_in_degrees(open_page: Any) -> None:
     m = kc.Mechanism("swing", end=1.0, points=21)
     start, arm = m.parameter("start", 0.5, unit="rad"), m.body("arm", guess=(0, 0, 0.5))

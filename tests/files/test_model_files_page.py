@@ -44,7 +44,11 @@ def test_that_the_file_in_space_moves(tmp_path):
 
 def test_that_each_table_has_its_fields():
     tables = ("model", "analysis", "parameter", "body", "coordinate", "point", "output", "sketch")
-    given = (*(FIELDS[table] for table in tables), *IN_SPACE.values(), *PARTS.values())
+    given = (
+        *(FIELDS[table] for table in (*tables, "sweep", "span")),
+        *IN_SPACE.values(),
+        *PARTS.values(),
+    )
     for fields in given:
         for field in fields:
             assert f"`{field}`" in PAGE

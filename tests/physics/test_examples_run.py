@@ -24,6 +24,7 @@ FIGURES = {
     "double_wishbone": "camber from +0.000 to +0.561 degrees",
     "cam_by_table": "highest: 60.000 mm at a cam angle of 270 degrees",
     "swing_and_dwell": "the arm's largest speed is 1.760 times the mean of its swing",
+    "balanced_four_bar": "share 1.0: shaking force swings by 0.000 N",
     "slot_follower": "back at 152.95, where it was: 152.95",
 }
 

@@ -59,6 +59,7 @@ DEFERRED = {
     "kincompile.model.system",
     "kincompile.targets.registry",
     "kincompile.view.worlds",
+    "kincompile.ir.elimination",
 }
 
 Sources = Mapping[str, str]  # module name -> source
@@ -333,3 +334,22 @@ def test_an_import_inside_a_function_is_found(statement: str) -> None:
 def test_sympy_inside_a_function_of_the_runtime_is_found() -> None:
     planted = {**CLEAN, "kincompile.runtime.newton": "def f():\n    from sympy import sin"}
     assert sympy_imports(planted) == ["kincompile.runtime.newton"]
+
+
+def test_that_a_planar_model_imports_nothing_of_space() -> None:
+    program = """
+import sys
+import kincompile as kc
+m = kc.Mechanism("pendulum")
+bar = m.body("bar", (0, 0, 0))
+m.add(kc.Revolute("A", m.ground, (0, 0), bar, (0, 0)))
+m.add(kc.AbsoluteAngle("motor", bar, kc.t))
+kc.solve(kc.compile(m), [0, 1])
+kc.page(m)
+own = [name for name in sys.modules if name.startswith("kincompile.")]
+print([name for name in own if "spac" in name or "spatial" in name or "orientation" in name])
+"""
+    found = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert found.stdout.strip() == "[]"

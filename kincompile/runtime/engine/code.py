@@ -242,8 +242,8 @@ def attach(module: ModuleType) -> Code:
     return code
 
 
-STRIP = 2000
-"""Points at a time, so that intermediate arrays stay in the cache."""
+STRIP = 3000
+"""Points at a time at most, so that intermediate arrays stay in the cache."""
 
 
 def _observing(
@@ -255,8 +255,9 @@ def _observing(
 
     def observe_into(states: Sequence[Array], t: Array, p: Array, found: Array) -> None:
         places = found.reshape(-1, t.size)
-        for start in range(0, t.size, STRIP):
-            own = slice(start, start + STRIP)
+        strips = max(1, -(-t.size // STRIP))  # of one size, since short arrays cost as much
+        for k in range(strips):
+            own = slice(k * t.size // strips, (k + 1) * t.size // strips)
             parts = (state[:, own] for state in states)
             sets = p[:, own] if p.ndim > 1 else p
             values = lanes["observe"](names["ARRAYS"], *parts, t[own], sets)

@@ -7,13 +7,14 @@ singular values: what changes with multipliers that change nothing else is not d
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.criteria import probe_of
-from kincompile.errors import InputError, UnsupportedError
+from kincompile.errors import InputError, SingularConfigurationWarning, UnsupportedError
 from kincompile.html import Shown
 from kincompile.names import listed, multiplier
 from kincompile.runtime.engine.code import FORCES, code_of
@@ -24,6 +25,7 @@ from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
 
     from matplotlib.axes import Axes
@@ -264,18 +266,34 @@ def forces(solution: Solution) -> Forces:
         mechanism has no loads.
     UnsupportedError
         If the mechanism is so large that its module is in grouped form.
+
+    Warns
+    -----
+    SingularConfigurationWarning
+        Where loads have no value, as a spring of length zero has no direction: forces are NaN.
     """
     require_solution(solution)
     module = solution.require_module("its forces")
     modules = _modules(module)
     points = _Points.of(solution, code_of(module), modules)
     names, units, found, shared = points.forces()
+    if np.isnan(found).any() and (text := points.without_loads()):
+        warnings.warn(text, SingularConfigurationWarning, stacklevel=2)
     values = np.moveaxis(found.reshape(len(names), *solution.q.shape[:-1]), 0, -1)
     m = len(solution.equations)
     added = names[m:]
     merged = solution.observed.joined(added, {name: units[name] for name in added}, values[..., m:])
     motion = solution.observing(merged)
     return Forces(motion, added, values[..., :m], shared, dict(modules.joints))
+
+
+def no_value(name: str, bodies: Sequence[str], t: float) -> str:
+    """Say that loads have no value at a time."""
+    return (
+        f"{name}: the loads on {listed(dict.fromkeys(bodies))} have no value at t = {t:.10g}. A "
+        "spring of length zero has no direction: move one of its ends; or look for a root of a "
+        "negative number in the loads."
+    )
 
 
 def _modules(module: ModuleType) -> ForceModules:
@@ -348,6 +366,20 @@ class _Points:
             found[:, own] = part.T
             shared |= loose
         return names, units, found, tuple(np.array(names)[shared].tolist())
+
+    def without_loads(self) -> str:
+        """Say where the loads on which bodies have no value; "" where all have."""
+        code, known = self.code, np.isfinite(self.q_ddot.sum(axis=-1))
+        at = self.at(np.flatnonzero(known))
+        with np.errstate(all="ignore"):
+            Q = code.module.Q(at.q, at.q_dot, at.t, at.p)
+        bad = ~np.isfinite(Q)
+        if not bad.any():
+            return ""
+        owners = code.owners()
+        names = np.array([owners[name] for name in code.coordinates])[bad.any(axis=0)]
+        t = at.t[int(np.argmax(bad.any(axis=1)))]
+        return no_value(code.name, tuple(names.tolist()), float(t))
 
     def outputs_of(self, module: ModuleType, p: Array) -> Array:
         """Return the outputs of a module at the points, shape (K, L)."""

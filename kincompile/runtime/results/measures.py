@@ -30,6 +30,7 @@ from kincompile.runtime.results.plot import runs
 from kincompile.tables import table
 
 if TYPE_CHECKING:
+    from collections.abc import Container
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -159,14 +160,25 @@ class Measures:
 
 def measures(solution: MotionTable, module: ModuleType, p: Array) -> Measures:
     """Measure the motion of a module with parameters p, as `Solution.measures` describes."""
+    found = output_measures(solution, module, p)
+    return Measures(solution.name, found, driver_ranges(solution, module, p))
+
+
+def output_measures(
+    solution: MotionTable, module: ModuleType, p: Array, names: Container[str] | None = None
+) -> tuple[OutputMeasures, ...]:
+    """Measure the outputs of these names, or all, over the motion of a module."""
     solution.require_one_motion("measures are those of", "solve with one of the parameter sets")
     if not np.isfinite(solution.q_dot).any():
         raise InputError(f"{solution.name} has no motion to measure. {solution.message}")
-    found: tuple[OutputMeasures, ...] = ()
-    if any(name not in solution.observed.without_rates for name in solution.observed.names):
-        motion = _ObservedMotion(solution, module, p)
-        found = tuple(_measured(motion, k) for k in range(len(motion.names)))
-    return Measures(solution.name, found, driver_ranges(solution, module, p))
+    if all(name in solution.observed.without_rates for name in solution.observed.names):
+        return ()
+    motion = _ObservedMotion(solution, module, p)
+    return tuple(
+        _measured(motion, k)
+        for k, name in enumerate(motion.names)
+        if names is None or name in names
+    )
 
 
 class _ObservedMotion:

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import probe_of
+from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import Observed
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -27,7 +30,8 @@ def observed(module: ModuleType, motion: tuple[Array, Array, Array], t: Array, p
         sets = sets[:, np.newaxis]
     # Where second rates were found, so were position and velocity; nearly always that is all.
     if names and math.isfinite(float(motion[2].sum())):
-        return Observed(names, units, *module.observe(*motion, t, sets))
+        y, y_dot, y_ddot = _everywhere(module, motion, t, sets)
+        return Observed(names, units, y, y_dot, y_ddot)
     results = np.full((3, *motion[0].shape[:-1], len(names)), np.nan)
     if names:
         if sets.ndim > 1:
@@ -49,3 +53,15 @@ def observed(module: ModuleType, motion: tuple[Array, Array, Array], t: Array, p
             some, other = observe(corner, probe), observe(corner, probe**2)
             results[:, corner] = np.where(some == other, some, np.nan)
     return Observed(names, units, *results)
+
+
+def _everywhere(module: ModuleType, motion: Sequence[Array], t: Array, p: Array) -> Sequence[Array]:
+    """Return the outputs, their rates and second rates of a motion that was found throughout."""
+    observe = code_of(module).observe_into
+    if observe is None or motion[0].ndim != 2 or p.ndim != 1:
+        found: Sequence[Array] = module.observe(*motion, t, p)
+        return found
+    seen = empty((3, len(module.OUTPUTS), t.size))
+    with np.errstate(all="ignore"):
+        observe([part.T for part in motion], t, p, seen)
+    return [part.T for part in seen]

@@ -12,7 +12,7 @@ from kincompile.errors import InputError, SolveError, StructuralError
 from kincompile.html import Shown
 from kincompile.names import listed
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.results.forces import forces
+from kincompile.runtime.results.forces import forces, no_value
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.assemblies import distance_modulo_turns, spread_starts
 from kincompile.runtime.singular.events import involved
@@ -195,7 +195,7 @@ class Equilibrium(Shown):
         heads = ("t", "equilibrium", "least eigenvalue")
         least = self.eigenvalues.min(axis=1, initial=np.inf)
         rows = [
-            (f"{t:.6g}", kind or "none", f"{value:.6g}")
+            (f"{t:.6g}", kind or "none", f"{value:.6g}" if kind else "")
             for t, kind, value in zip(self.t, self.stability, least, strict=True)
         ]
         lines = [self.headline(), *indented(table(heads, rows, (heads[0], heads[2])))]
@@ -412,6 +412,10 @@ def _message(inputs: Inputs, balance: Balance, found: list[Rest], events: list[E
             f"{name} has no equilibrium at t = {times[count]:.10g} near that of the time before."
             f"{met}"
         )
+    if not np.isfinite(Q := balance.loads(place.q, float(place.point.t))).all():
+        owners = inputs.code.owners()
+        names = [owners[inputs.code.coordinates[k]] for k in np.flatnonzero(~np.isfinite(Q))]
+        return no_value(name, names, float(place.point.t))
     bodies = listed(involved(inputs.code, place.free @ place.force / balance.scale))
     return (
         f"{name} has no equilibrium at t = {times[count - 1]:.10g} that is reached from the "

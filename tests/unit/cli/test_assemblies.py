@@ -45,6 +45,10 @@ def test_that_it_lists_what_differs(model):
     found = kc.assemblies(kc.compile(kc.read_model(model)))
     values = np.array([row.split()[2:] for row in rows], dtype=float)
     np.testing.assert_allclose(values, found[:, [5, 8]].T, rtol=1e-5)
+    *_, last = run("assemblies", model, "--deg").stdout.splitlines()
+    name, unit, *degrees = last.split()
+    assert (name, unit) == ("phi_rocker", "deg")
+    np.testing.assert_allclose(np.array(degrees, dtype=float), np.degrees(found[:, 8]), rtol=1e-5)
 
 
 def test_that_it_lists_those_of_a_time_and_of_parameters(model):

@@ -77,8 +77,11 @@ def test_that_what_was_found_is_drawn(kincompile, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("{pendulum}", "-o", "a.png"), "cannot write a.png: end its name in .dxf, .gif, .mp4 or"),
-        (("{pendulum}", "-o", "{folder}"), "end its name in .dxf, .gif, .mp4 or .svg"),
+        (
+            ("{pendulum}", "-o", "a.png"),
+            "cannot write a.png: end its name in .dxf, .gif, .glb, .mp4 or",
+        ),
+        (("{pendulum}", "-o", "{folder}"), "end its name in .dxf, .gif, .glb, .mp4 or .svg"),
         (("{pendulum}", "-o", "{folder}/d.svg"), "it is a folder. Give the name of a file in it."),
         (("{pendulum}", "-o", "no/a.svg"), "the folder no does not exist"),
         (("{pendulum}", "-o", "a.gif", "--time", "1"), "a.gif of one time: end its name in .svg"),

@@ -45,6 +45,10 @@ NOT_LOADED = {
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
     "mark KIT": "rich platformdirs matplotlib kincompile.view.page kincompile.verify",
+    "sweep MODEL --sweep length=1:2:2 --target numpy --processes 1": (
+        f"{LARGE} {LANGUAGES} {RANK} rich platformdirs matplotlib zarr pyarrow xarray scipy.stats "
+        "kincompile.view.page kincompile.compare kincompile.verify"
+    ),
     "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
 }
 

@@ -22,6 +22,15 @@ def test_that_options_choose_times_and_parameters(kincompile, pendulum, tmp_path
     assert '{"name":"length","value":2.0,"unit":"m",' in html
 
 
+def test_that_a_page_opens_in_degrees(kincompile, pendulum, tmp_path):
+    for option, unit in (((), "rad"), (("--deg",), "deg")):
+        page = tmp_path / f"{unit}.html"
+        assert kincompile("view", pendulum, "-o", page, *option).exit_code == 0
+        assert f'"angleUnit":"{unit}"' in page.read_text(encoding="utf-8")
+    with pytest.raises(kc.InputError, match="angle_unit is 'gon': angles are shown in 'rad' or"):
+        kc.page(kc.read_model(pendulum), angle_unit="gon")
+
+
 def test_that_several_models_go_into_a_folder_with_an_index(
     kincompile, pendulum, stopping, tmp_path
 ):

@@ -94,13 +94,13 @@ def watching():
 
 @pytest.mark.slow
 def test_that_the_page_follows_the_model_and_what_it_imports(watching, model, process, tmp_path):
-    watcher, line = watching(model, "--end", "1", "--points", "3")
+    watcher, line = watching(model, "--end", "1", "--points", "3", "--deg")
     assert line.startswith(f"{model} is shown at http://127.0.0.1:")
     browser = Browser(line)
     first = browser.listen_for(lambda state: "status" in browser.page()[1])
     written = tmp_path / "written" / "page.html"
     written.parent.mkdir()
-    assert process("view", model, "-o", written, "--end", 1, "--points", 3).returncode == 0
+    assert process("view", model, "-o", written, "--end", 1, "--points", 3, "--deg").returncode == 0
     version, html = browser.page()
     assert version == first["version"]
     assert html == written.read_text(encoding="utf-8")

@@ -478,6 +478,23 @@ def test_what_forces_are_refused(tmp_path):
         kc.forces(kc.solve(kc.compile(named), [0.0]))
 
 
+def test_that_a_spring_of_length_zero_is_told():
+    """It passes through the point at which its ends meet: nothing says which way it pulls."""
+    m = kc.Mechanism("arm")
+    arm = m.body("arm", mass=1, inertia=1)
+    m.add(kc.Revolute("O", m.ground, (0, 0), arm, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", arm, kc.t))
+    m.add(kc.Spring("s", m.ground, (1, 0), arm, (1, 0), 10, 0.1))
+    module = kc.compile(m)
+    with pytest.warns(kc.SingularConfigurationWarning, match="spring of length zero has no"):
+        found = kc.forces(kc.solve(module, [0.0, 0.1]))
+    assert np.isnan(found["motor.drive"][0])
+    assert np.isfinite(found["motor.drive"][1])
+    m.constraints.pop()
+    found = kc.equilibrium(kc.compile(m))
+    assert "the loads on arm have no value at t = 0" in found.message
+
+
 def test_the_unit_of_a_force_is_that_of_lengths_and_kilograms():
     m = kc.Mechanism("wheel", length_unit="mm")
     wheel = m.body("wheel", mass=3, inertia=0.25, centre=(1, 0))

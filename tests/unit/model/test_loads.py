@@ -83,6 +83,40 @@ def test_that_a_load_that_is_none_is_refused(load, message):
         m.system()
 
 
+@pytest.mark.parametrize(
+    ("units", "lengths", "message"),
+    [
+        ({"k": "N"}, "m", "stiffness: the parameter 'k' has the unit N, and a force per length is"),
+        ({"k": "N/mm^2"}, "m", "has the unit N/mm"),
+        ({"heavy": "m"}, "m", "Mass 'arm', mass: .* has the unit m, and a mass is wanted"),
+        ({"inertia": "kg*m"}, "m", "inertia: .* a moment of inertia is wanted"),
+        ({"F": "N*m"}, "m", "Force 'push', force: .* a force is wanted"),
+        ({"rest": "mm"}, "m", "free_length: .* has the unit mm, and the mechanism is in m and s"),
+        ({"heavy": "kg", "F": "N"}, "mm", r"push.* one has masses in 1 kg, the other in 1000 kg"),
+        ({"heavy": "kg", "k": "N/mm"}, "m", "the other in 1000 kg; give all in units that belong"),
+        ({"heavy": "kg", "k": "N/m", "F": "N", "inertia": "kg*m^2", "rest": "m"}, "m", None),
+        ({"heavy": "t", "k": "N/mm", "F": "N", "inertia": "t*mm^2", "rest": "mm"}, "mm", None),
+        ({"heavy": "lb", "k": "lbf/in", "F": "N/(m/m)"}, "in", None),
+        ({"heavy": "g", "k": "mN/mm"}, "mm", "the other in 1 kg"),
+    ],
+)
+def test_that_units_that_do_not_fit_are_refused(units, lengths, message):
+    m = kc.Mechanism("arm", length_unit=lengths)
+    names = ("heavy", "inertia", "k", "F", "rest")
+    heavy, inertia, k, load, rest = (
+        m.parameter(name, 1.0, unit=units.get(name, "")) for name in names
+    )
+    body = m.body("arm", mass=2 * heavy, inertia=inertia)
+    m.add(kc.Revolute("pin", m.ground, (0, 0), body, (0, 0)))
+    m.add(kc.Spring("s", m.ground, (5, 0), body, (1, 0), k, rest))
+    m.add(kc.Force("push", body, (1, 0), (0, -load)))
+    if message is None:
+        assert m.system().loads
+        return
+    with pytest.raises(kc.ModelError, match=message):
+        m.system()
+
+
 def test_that_all_problems_are_told_together():
     m, body = arm(mass=-1, inertia=1)
     m.add(kc.Torque("a", body, sympy.Symbol("u")))

@@ -8,6 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile import spatial
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.runtime.load import from_source
 
@@ -215,6 +216,22 @@ def test_that_random_linkages_agree_with_complex_steps(seed):
     solution = kc.solve(kc.compile(m), np.linspace(0, 0.6, 9), assembly=1)
     assert solution.success, solution.message
     assert_complex_steps(solution, kc.sensitivities(solution, [*"abcdws"]))
+
+
+def test_that_a_mechanism_in_space_agrees_with_complex_steps():
+    """A four-bar of two hinges at right angles, and a rod between ball joints."""
+    m = spatial.Mechanism("rssr")
+    a, b, w = m.parameter("a", 0.2, "m"), m.parameter("b", 1.0, "m"), m.parameter("w", 2.0)
+    x, z = (1, 0, 0), (0, 0, 1)
+    crank, rocker = m.body("crank"), m.body("rocker", (1.0, 0, 0.3))
+    m.add(spatial.Revolute("A", m.ground, (0, 0, 0), z, crank, (0, 0, 0), z))
+    m.add(spatial.Revolute("B", m.ground, x, (0, 1, 0), rocker, (0, 0, -0.3), (0, 1, 0)))
+    m.add(spatial.Distance("rod", crank, (a, 0, 0), rocker, (0, 0, 0.1), b))
+    m.add(spatial.RelativeRotation("motor", m.ground, z, x, crank, z, x, w * kc.t + 0.3))
+    m.output("reach", spatial.outputs.distance(m.point("tip", rocker, (0, 0, 0.4)), (0, a, 0)), "m")
+    solution = kc.solve(kc.compile(m), np.linspace(0, 3, 9))
+    assert solution.success, solution.message
+    assert_complex_steps(solution, kc.sensitivities(solution, ["a", "b", "w"]))
 
 
 def coupled_equations(seed):

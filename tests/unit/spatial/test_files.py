@@ -48,7 +48,7 @@ def everything() -> spatial.Mechanism:
             m.add(kind(f"c{k}_{name}", **{key: given[key] for key in kind.arguments()}))
     m.add(kc.Equation("free", one.z - two.p[3] * a, point.z - kc.t))
     spin = two.direction((0, 1, 0))
-    m.output("camber", outputs.inclination(spin, (0, 0, 1)), "rad")
+    m.output("lean", spin[2] ** 2, "")
     m.output("rise", outputs.rate(point.z) - one.omega[2])
     return m
 
@@ -103,7 +103,7 @@ def test_orientations(given: str) -> None:
     np.testing.assert_allclose(found, ORIENTATIONS[given], rtol=0, atol=1e-15)
 
 
-CRANK = "orientation = [1.0, 0.0, 0.0, 0.0] }"
+CRANK = "orientation = [1, 0, 0, 0] }"
 WRONG = {
     "space": ("space = 3", "space = 4", 3, "space: it is 2 or 3, not 4"),
     "plane": ("space = 3", "space = 2", 7, "body 'crank', position: there is no such field"),

@@ -185,7 +185,9 @@ def test_that_a_writer_that_fails_leaves_the_old_file(motion, tmp_path, monkeypa
 
 
 def test_that_another_suffix_or_folder_is_refused(motion, tmp_path):
-    with pytest.raises(kc.InputError, match=r"arm\.avi: end its name in \.gif, \.mp4 or \.svg"):
+    with pytest.raises(
+        kc.InputError, match=r"arm\.avi: end its name in \.gif, \.mp4, \.glb or \.svg"
+    ):
         kc.animate(motion, "arm.avi")
     with pytest.raises(kc.InputError, match=r"the folder .* does not exist"):
         kc.animate(motion, tmp_path / "nowhere" / "arm.gif")

@@ -19,7 +19,8 @@ def test_that_the_programs_run_and_draw_the_picture(tmp_path, monkeypatch):
     for program in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
         exec(compile(program, "plots.md", "exec"), names)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "motion.png", "plots.png", "pose.svg", "slider_crank.gif", "slider_crank.svg",
+        "arm.glb", "arm.svg", "motion.png", "plots.png", "pose.svg", "slider_crank.gif",
+        "slider_crank.svg",
     ]  # fmt: skip
     kept = DOCS / "images" / "plots.png"
     assert kept.stat().st_size < 60_000

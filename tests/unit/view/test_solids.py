@@ -175,8 +175,6 @@ def test_that_a_drawing_has_its_true_size_in_a_standard_view(motion, drawn, tmp_
 def test_what_cannot_be_seen_or_written_is_said(motion, tmp_path):
     with pytest.raises(InputError, match="no view 'back'; views are isometric, front, side, top"):
         kc.draw(motion, tmp_path / "a.svg", view="back")
-    with pytest.raises(InputError, match=r"a motion in space is written as .gif, .mp4, .glb"):
-        kc.animate(motion, tmp_path / "a.svg")
     plane = kc.Mechanism("plane")
     plane.add(kc.AbsoluteAngle("motor", plane.body("link"), kc.t))
     plane.add(kc.Revolute("pin", plane.ground, (0, 0), plane.bodies[0], (0, 0)))
@@ -184,6 +182,31 @@ def test_what_cannot_be_seen_or_written_is_said(motion, tmp_path):
     with pytest.raises(InputError, match="moves in a plane, which has one view"):
         kc.draw(flat, tmp_path / "a.svg", view="top")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_that_an_svg_shows_one_frame_at_a_time(motion, tmp_path):
+    root: Any = ET.parse(kc.animate(motion, tmp_path / "a.svg", seconds=4)).getroot()
+    still, moving = root.findall(f"{SVG}g")
+    assert (still.get("class"), moving.get("class")) == ("still", "moving")
+    shown = []
+    for group in moving:
+        animate = group.find(f"{SVG}animate")
+        assert animate.get("values") == "none;inline;none"
+        assert animate.get("dur") == "4s"
+        shown.append([float(part) for part in animate.get("keyTimes").split(";")][1:])
+    assert shown[0][0] == 0
+    assert shown[-1][1] == 1
+    assert [end for _, end in shown[:-1]] == [start for start, _ in shown[1:]]
+    # The name of the point goes where the point goes.
+    scale = [
+        (float(group.find(f"{SVG}text").get("x")), float(group.find(f"{SVG}text").get("y")))
+        for group in moving
+    ]
+    tip = np.stack([motion[f"{axis}_tip"] for axis in "xyz"], axis=-1)
+    seen = Camera.named("isometric").seen(tip)[:, :2] * (1, -1)
+    ways = np.diff(seen, axis=0)
+    factor = np.linalg.norm(np.diff(scale, axis=0)) / np.linalg.norm(ways)
+    np.testing.assert_allclose(np.diff(scale, axis=0), factor * ways, atol=0.11)
 
 
 def test_the_standard_views_are_right_handed():

@@ -1,0 +1,108 @@
+"""`kincompile sweep`: a model at many sets of parameters, on all processors, into a folder."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
+from functools import partial
+from multiprocessing import get_context
+from typing import Any
+
+import click
+
+import kincompile as kc
+from kincompile.cli.motion import motion_options, motion_times, set_values, sweep_options
+from kincompile.cli.progress import progress_bar
+from kincompile.cli.shared import NOT_CONVERGED, deg_option, output_option, print_data, read_model
+from kincompile.errors import InputError
+from kincompile.files.sweep_table import SweepTable, read_sweep_table
+from kincompile.names import listed
+from kincompile.sweep.overview import overview
+from kincompile.sweep.page import sweep_page
+from kincompile.sweep.samples import values_of
+from kincompile.writing import require_writable, write_atomically
+
+
+@click.command("sweep")
+@click.argument("model")
+@output_option(
+    "Folder to write: .zarr or .parquet; one that is there is gone on with.", required=False
+)
+@click.option("--page", metavar="FILE", help="Page of the results to write, .html.")
+@partial(motion_options, has_through=False)
+@sweep_options
+@click.option(
+    "--column", "columns", multiple=True, metavar="NAME", help="Column over time to keep."
+)
+@click.option(
+    "--measure",
+    "measures",
+    multiple=True,
+    metavar="NAME",
+    help="Measure to keep, such as foot.x.stroke.",
+)
+@click.option(
+    "--processes", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="How many solve."
+)
+@click.option(
+    "--chunk", type=click.IntRange(min=1), help="Variants that are solved and written together."
+)
+@click.option("--target", type=click.Choice(["c", "numpy"]), default="c", help="What is run.")
+@deg_option("Show angles in degrees.")
+@click.pass_context
+def command(
+    ctx: click.Context,
+    model: str,
+    output: str | None,
+    page: str | None,
+    start: str,
+    end: str | None,
+    points: int | None,
+    grid: str | None,
+    values: tuple[str, ...],
+    assembly: int | None,
+    sweeps: dict[str, Any],
+    product: bool,
+    columns: tuple[str, ...],
+    measures: tuple[str, ...],
+    processes: int,
+    chunk: int | None,
+    target: str,
+    angle_unit: str,
+) -> None:
+    """Solve MODEL at many sets of parameters, as its table [sweep] says.
+
+    The options --sweep, --column and --measure take the place of what the table says. What was
+    found is summarised on stdout; -o writes all of it while it comes, and a run that was stopped
+    goes on where it was. What cannot be solved has a status; where nothing can, the exit code is 3.
+    """
+    if page is not None:
+        require_writable(page)
+    mechanism = read_model(model)
+    table = read_sweep_table(model) or SweepTable({})
+    swept: dict[str, Any] = sweeps or values_of(table)
+    numbers = set_values(mechanism, values)
+    if twice := numbers.keys() & swept.keys():
+        raise InputError(f"--set names {listed(sorted(twice))}, which is swept: give one of them")
+    times = motion_times(mechanism, start, end, points, grid, numbers)
+    kept = {"columns": columns or None, "measures": measures}
+    if not columns and not measures:
+        kept = {"columns": table.columns, "measures": table.measures}
+    options = {"product": product or (table.product and not sweeps), "assembly": assembly}
+    # Fresh processes: a copy of this one would have its memory, and its threads as they stand.
+    context = get_context("spawn")
+    pool = ProcessPoolExecutor(processes, context) if processes > 1 else nullcontext()
+    with pool as executor, progress_bar() as progress:
+        found = kc.sweep(
+            mechanism, numbers | swept, times, **kept, **options,
+            target=target, store=output, executor=executor, chunk=chunk, progress=progress,
+        )  # fmt: skip
+    print_data(f"{found}\n\n{overview(found).table(angle_unit)}\n")
+    if output is not None:
+        click.echo(f"Wrote {output}", err=True)
+    if page is not None:
+        click.echo(f"Wrote {write_atomically(page, sweep_page(found, angle_unit))}", err=True)
+    if not {"CONVERGED", "CORNER"} & found.statuses().keys():
+        click.echo("Error: no set of parameters was solved", err=True)
+        ctx.exit(NOT_CONVERGED)

@@ -1,0 +1,239 @@
+"""The targets of a fit for one mechanism: which columns at which times, and their deviations.
+
+The variables are the parameters, then for each passing without times its first time and the steps
+to the next ones, so that their order is kept by bounds. What is asked of the motion as a whole is
+asked at the times of a grid.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+from kincompile.design.columns import Column, column_of
+from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
+from kincompile.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from types import ModuleType
+
+    from numpy.typing import NDArray
+
+    from kincompile.design.targets import Target
+    from kincompile.model.system import ConstraintSystem
+
+    Array = NDArray[np.float64]
+    Places = NDArray[np.intp]
+    Values = Callable[[Column], Array]
+
+SMALLEST_STEP = 1e-6
+"""Time between two points whose times are found, as a part of all time."""
+
+GRID = 73
+"""Times at which the motion as a whole is looked at; the model's own where those are fewer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Demands:
+    """Targets with their columns, for a module.
+
+    Attributes
+    ----------
+    passing
+        Each target with its columns.
+    free
+        The passing targets whose times are found, each with the first and last time allowed.
+    limits
+        Each limit with its column, and whether it depends on parameters alone.
+    ratios
+        Each time ratio with its column.
+    grid : ndarray
+        Times for what concerns the whole motion; empty where nothing does.
+    """
+
+    passing: tuple[tuple[Passing, tuple[Column, ...]], ...]
+    free: tuple[tuple[float, float], ...]
+    limits: tuple[tuple[Limit, Column, bool], ...]
+    ratios: tuple[tuple[TimeRatio, Column], ...]
+    grid: Array
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the coordinates and outputs whose derivatives are needed."""
+        of = [column.of for _, columns in self.passing for column in columns]
+        of += [column.of for _, column, _ in self.limits]
+        of += [column.of for _, column in self.ratios]
+        return tuple(dict.fromkeys(of))
+
+    def time_bounds(self) -> list[tuple[float, float]]:
+        """Return the bounds of the variables that are times."""
+        found = []
+        for (first, last), (target, _) in zip(self.free, self.untimed, strict=True):
+            span = last - first
+            found += [(first, last), *[(SMALLEST_STEP * span, span)] * (len(target.values) - 1)]
+        return found
+
+    @property
+    def first_time(self) -> float:
+        """The first time at which anything is asked for."""
+        given = [float(item.times[0]) for item, _ in self.passing if item.times is not None]
+        begins = [first for first, _ in self.free]
+        return min(*given, *begins, *map(float, self.grid[:1]), math.inf)
+
+    @property
+    def untimed(self) -> list[tuple[Passing, tuple[Column, ...]]]:
+        """The passing targets whose times are found."""
+        return [item for item in self.passing if item[0].times is None]
+
+    def instants(self, variables: Array) -> list[Array]:
+        """Return the times of each passing target, given the variables that are times."""
+        found, first = [], 0
+        for target, _ in self.passing:
+            if target.times is not None:
+                found.append(target.times)
+                continue
+            count = len(target.values)
+            found.append(np.cumsum(variables[first : first + count]))
+            first += count
+        return found
+
+
+def read_demands(
+    module: ModuleType, system: ConstraintSystem, targets: Sequence[Target]
+) -> Demands:
+    """Return the targets with their columns.
+
+    Raises
+    ------
+    InputError
+        With every name that is none, and every target that cannot be asked for.
+    """
+    problems: list[str] = []
+
+    def column(name: str) -> Column:
+        try:
+            return column_of(module, name)
+        except InputError as error:
+            problems.extend(error.problems)
+            return Column(name, "", name, 0)
+
+    passing = tuple(
+        (target, tuple(map(column, target.columns)))
+        for target in targets
+        if isinstance(target, Passing)
+    )
+    ratios = tuple((item, column(item.column)) for item in targets if isinstance(item, TimeRatio))
+    limits = []
+    for number, item in enumerate(item for item in targets if isinstance(item, Limit)):
+        is_expression = isinstance(item.what, sympy.Expr)
+        found = column(limit_name(number) if is_expression else str(item.what))
+        limits.append((item, found, is_expression and _is_constant(item.what, system)))
+    problems += [
+        f"{target.title}: times of second rates cannot be found; give times"
+        for target, columns in passing
+        if target.times is None and any(item.order == 2 for item in columns)
+    ]
+    if problems:
+        raise InputError(problems)
+    whole = any(isinstance(item, Moves | TimeRatio) for item in targets)
+    whole = whole or any(not is_constant for _, _, is_constant in limits)
+    end, count = float(system.end), min(GRID, system.points)
+    free = tuple(
+        (0.0, end) if target.between is None else target.between
+        for target, _ in passing
+        if target.times is None
+    )
+    grid = np.linspace(0.0, end, max(count, 2)) if whole else np.empty(0)
+    return Demands(passing, free, tuple(limits), ratios, grid)
+
+
+def limit_name(number: int) -> str:
+    """Return the name of the output that a limit of an expression becomes."""
+    return f"limit_{number + 1}"
+
+
+def _is_constant(expression: Any, system: ConstraintSystem) -> bool:
+    """Say whether an expression depends on parameters alone."""
+    known = {item.name for item in system.parameters}
+    return {str(item) for item in expression.free_symbols} <= {*known, "deg"}
+
+
+def deviation(wanted: Array, column: Column, got: Array) -> Array:
+    """Return how far values are from what is wanted; angles modulo whole turns."""
+    off: Array = got - wanted
+    if column.unit == "rad" and column.order == 0:
+        off = (off + math.pi) % (2 * math.pi) - math.pi
+    return off
+
+
+def limit_gaps(item: Limit, got: Array) -> list[tuple[Array, float]]:
+    """Return what is left to each limit that there is, and the factor of its derivative."""
+    size = max((abs(end) for end in (item.least, item.most) if math.isfinite(end)), default=0.0)
+    size = size or 1.0
+    found = []
+    if math.isfinite(item.least):
+        found.append(((got - item.least) / size, 1 / size))
+    if math.isfinite(item.most):
+        found.append(((item.most - got) / size, -1 / size))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Turning:
+    """A zero of a rate between two points of a grid, and how it depends on the values there.
+
+    Attributes
+    ----------
+    t
+        Its time.
+    weights
+        Derivatives of it by the rate at both points, and by the second rate at both.
+    cell
+        The number of the point before it.
+    """
+
+    t: float
+    weights: Array
+    cell: int
+
+
+def turning(t: Array, rate: Array, second: Array, sign: float) -> list[Turning]:
+    """Return where a rate passes through zero downwards (sign 1), or upwards (sign -1).
+
+    Between two points it is the polynomial of third degree through both and its derivatives.
+    """
+    signed = sign * rate
+    found = []
+    for cell in np.flatnonzero((signed[:-1] > 0) & (signed[1:] <= 0)).tolist():
+        h = t[cell + 1] - t[cell]
+        data = np.array([rate[cell], rate[cell + 1], h * second[cell], h * second[cell + 1]])
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            middle = (low + high) / 2
+            if sign * (_basis(middle) @ data) > 0:
+                low = middle
+            else:
+                high = middle
+        slope = float(_basis_slopes(low) @ data) / h
+        weights = -_basis(low) / slope
+        weights[2:] *= h
+        found.append(Turning(float(t[cell] + low * h), weights, cell))
+    return found
+
+
+def _basis(s: float) -> Array:
+    """Return Hermite's polynomials of third degree: of both values, of both derivatives."""
+    return np.array(
+        [(1 + 2 * s) * (1 - s) ** 2, s * s * (3 - 2 * s), s * (1 - s) ** 2, s * s * (s - 1)]
+    )
+
+
+def _basis_slopes(s: float) -> Array:
+    return np.array(
+        [6 * s * s - 6 * s, 6 * s - 6 * s * s, 3 * s * s - 4 * s + 1, 3 * s * s - 2 * s]
+    )

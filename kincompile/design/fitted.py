@@ -1,0 +1,324 @@
+"""The result of `kc.fit`: the mechanism with its new dimensions, and what it reaches."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.compiler import compile as compile_model
+from kincompile.design.demands import deviation, limit_gaps
+from kincompile.design.variation import with_values
+from kincompile.errors import KincompileWarning
+from kincompile.html import Shown, table_html
+from kincompile.runtime.solve import solve
+from kincompile.tables import counted, indented, table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.design.demands import Demands
+    from kincompile.design.trial import Trial
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.runtime.results.solution import Solution
+
+    Array = NDArray[np.float64]
+
+REACHED = ("target", "t", "wanted", "got", "off")
+KEPT = ("limit", "from", "to", "least", "greatest")
+DIMENSIONS = ("parameter", "value", "unit", "before")
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """What a fit took.
+
+    Attributes
+    ----------
+    sampled
+        Sets of parameters that the search tried.
+    starts
+        Of them, those that were followed.
+    motions, gradients
+        Motions and derivatives that were evaluated one by one.
+    seconds
+        Time.
+    """
+
+    sampled: int
+    starts: int
+    motions: int
+    gradients: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """One wanted value and what became of it.
+
+    Attributes
+    ----------
+    title
+        Of the target.
+    t
+        When.
+    column, unit
+        Of what.
+    wanted, got, off
+        What was wanted, what is, and the difference, of angles modulo whole turns.
+    is_near
+        Whether it is as near as the target asks.
+    """
+
+    title: str
+    t: float
+    column: str
+    unit: str
+    wanted: float
+    got: float
+    off: float
+    is_near: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A limit, and the least and greatest value along the motion."""
+
+    title: str
+    low: float
+    high: float
+    least: float
+    greatest: float
+    holds: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Fit(Shown):
+    """A mechanism with dimensions that were found, and what it reaches.
+
+    Attributes
+    ----------
+    model : Mechanism
+        The mechanism with these dimensions as defaults, and a guess on the branch that was found.
+    parameters : dict
+        The dimensions by name.
+    before : dict
+        What they were.
+    error : float
+        The sum of squares of the weighted deviations.
+    errors : tuple of float
+        That of every start that was followed, the least first.
+    reached : tuple of Reached
+        Every wanted value.
+    limits : tuple of Kept
+        Every limit.
+    motion : Solution
+        The motion through all times of the targets, on one branch.
+    counts : Counts
+        Evaluations and time.
+    success : bool
+        Whether all is as near as was asked, within all limits.
+    message : str
+        One sentence; else how near it comes, and where.
+    """
+
+    model: Mechanism
+    parameters: dict[str, float]
+    before: dict[str, float]
+    units: dict[str, str]
+    error: float
+    errors: tuple[float, ...]
+    reached: tuple[Reached, ...]
+    limits: tuple[Kept, ...]
+    motion: Solution
+    counts: Counts
+
+    @property
+    def success(self) -> bool:
+        """Whether all is as near as was asked, within all limits."""
+        return all(item.is_near for item in self.reached) and all(
+            item.holds for item in self.limits
+        )
+
+    @property
+    def message(self) -> str:
+        """One sentence on what was reached; else how near it comes, and where."""
+        name = self.model.name
+        broken = [item for item in self.limits if not item.holds]
+        if broken:
+            item = broken[0]
+            return (
+                f"{name} cannot keep {item.title} between {item.low:g} and {item.high:g} within "
+                f"the bounds: it goes from {item.least:.6g} to {item.greatest:.6g}."
+            )
+        if self.success:
+            return f"{name} reaches all targets; {self._farthest()}"
+        return (
+            f"no set of parameters that was found within the bounds reaches all targets; "
+            f"{self._farthest()}"
+        )
+
+    def _farthest(self) -> str:
+        item = max(self.reached, key=lambda item: abs(item.off))
+        unit = f" {item.unit}".rstrip()
+        return (
+            f"the farthest is {item.column} at t = {item.t:.6g}: {item.got:.6g}{unit}, which is "
+            f"{abs(item.off):.3g} from {item.wanted:.6g}."
+        )
+
+    def headline(self) -> str:
+        """Return what was reached."""
+        return self.message.rstrip(".")
+
+    def dimensions(self) -> list[tuple[str, ...]]:
+        """Return the rows of a table of the dimensions."""
+        return [
+            (name, f"{value:.9g}", self.units.get(name, ""), f"{self.before[name]:.6g}")
+            for name, value in self.parameters.items()
+        ]
+
+    def targets(self) -> list[tuple[str, ...]]:
+        """Return the rows of a table of what is reached."""
+        return [
+            (
+                item.column, f"{item.t:.6g}", f"{item.wanted:.6g}", f"{item.got:.6g}",
+                f"{item.off:+.2e}{'' if item.is_near else ' (far)'}",
+            )
+            for item in self.reached
+        ]  # fmt: skip
+
+    def kept(self) -> list[tuple[str, ...]]:
+        """Return the rows of a table of limits."""
+        return [
+            (
+                item.title, f"{item.low:.6g}", f"{item.high:.6g}", f"{item.least:.6g}",
+                f"{item.greatest:.6g}{'' if item.holds else ' (exceeded)'}",
+            )
+            for item in self.limits
+        ]  # fmt: skip
+
+    def effort(self) -> str:
+        """Return what it took, in a sentence."""
+        counts = self.counts
+        ends = sum(error <= 1.01 * self.errors[0] + 1e-30 for error in self.errors)
+        return (
+            f"Sum of squares {self.error:.6g}, from {counted(ends, 'start')} of {counts.starts}; "
+            f"{counts.sampled} sets searched, {counted(counts.motions, 'motion')} and "
+            f"{counted(counts.gradients, 'Jacobian')} in {counts.seconds:.2f} s."
+        )
+
+    def to_text(self) -> str:
+        """Return dimensions, targets and limits as tables."""
+        lines = [self.message, self.effort(), ""]
+        lines += indented(table(DIMENSIONS, self.dimensions(), right=("value", "before")))
+        lines += ["", *indented(table(REACHED, self.targets(), right=REACHED[1:]))]
+        if self.limits:
+            lines += ["", *indented(table(KEPT, self.kept(), right=KEPT[1:]))]
+        return "\n".join(lines)
+
+    def to_html(self) -> str:
+        """Return the tables as a part of a page."""
+        name = self.model.name
+        parts = [
+            table_html(name, f"{self.message} {self.effort()}", DIMENSIONS, self.dimensions()),
+            table_html("targets", "what is reached", REACHED, self.targets()),
+        ]
+        if self.limits:
+            parts.append(table_html("limits", "over the motion", KEPT, self.kept()))
+        return "\n".join(parts)
+
+    def _repr_html_(self) -> str:
+        return self.to_html()
+
+
+def fitted(
+    model: Mechanism,
+    demands: Demands,
+    best: Trial,
+    names: Sequence[str],
+    counts: Counts,
+    errors: Sequence[float],
+    allowed: float,
+) -> Fit:
+    """Return the result of a fit from its best trial."""
+    values = dict(zip(names, best.x.tolist(), strict=False))
+    before = {item.name: item.default for item in model.system().parameters}
+    changed = _on_branch(model, values, best.motion)
+    return Fit(
+        changed,
+        values,
+        {name: float(before[name] or 0.0) for name in names},
+        {item.name: item.unit for item in model.parameters},
+        best.error,
+        tuple(errors),
+        tuple(_reached(demands, best, len(names))),
+        tuple(_kept(demands, best, allowed)),
+        best.motion,
+        counts,
+    )
+
+
+def _on_branch(model: Mechanism, values: dict[str, float], motion: Solution) -> Mechanism:
+    """Return the model with these values, guessed so that it starts where the motion belongs.
+
+    A model starts at t = 0, its targets may begin elsewhere: the motion is followed back to there,
+    as far as that goes.
+    """
+    own = values | {
+        name: float(value) for name, value in motion.parameters.items() if name not in values
+    }
+    guess = motion.q[0]
+    if motion.t[0] != 0.0:
+        back = np.linspace(motion.t[0], 0.0, 73)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", KincompileWarning)
+            found = solve(compile_model(model), back, own, guess)
+        guess = found.q[-1] if found.success else guess
+    named = dict(zip(motion.coordinates, guess.tolist(), strict=True))
+    return with_values(model, own, named)
+
+
+def _reached(demands: Demands, best: Trial, count: int) -> list[Reached]:
+    """Return every wanted value and what became of it."""
+    rows, motion = [], best.motion
+    for (target, columns), at in zip(
+        demands.passing, demands.instants(best.x[count:]), strict=True
+    ):
+        places = np.searchsorted(motion.t, at)
+        for j, place in enumerate(places.tolist()):
+            for k, column in enumerate(columns):
+                wanted, got = float(target.values[j, k]), float(motion[column.name][place])
+                off = float(deviation(np.array(wanted), column, np.array(got)))
+                near = abs(off) * float(target.weights[k]) <= target.within
+                rows.append(
+                    Reached(
+                        target.title, float(at[j]), column.name, column.unit, wanted, got, off, near
+                    )
+                )
+    first = best.residuals.size - len(demands.ratios)
+    for (ratio, _), residual in zip(demands.ratios, best.residuals[first:].tolist(), strict=True):
+        off = residual / ratio.weight
+        near = abs(off) <= ratio.within
+        rows.append(
+            Reached(
+                ratio.title, float(motion.t[-1]), ratio.title, "", ratio.ratio, ratio.ratio + off,
+                off, near,
+            )
+        )  # fmt: skip
+    return rows
+
+
+def _kept(demands: Demands, best: Trial, allowed: float) -> list[Kept]:
+    """Return every limit with what is along the motion."""
+    rows = []
+    on_grid = np.searchsorted(best.motion.t, demands.grid)
+    for item, column, is_constant in demands.limits:
+        values = best.motion[column.name][np.zeros(1, np.intp) if is_constant else on_grid]
+        holds = all((gap >= -allowed).all() for gap, _ in limit_gaps(item, values))
+        least, greatest = float(values.min()), float(values.max())
+        rows.append(Kept(item.title, item.least, item.most, least, greatest, holds))
+    return rows

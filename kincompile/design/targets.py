@@ -1,0 +1,331 @@
+"""What a mechanism is to do: `kc.targets`, for `kc.fit`.
+
+kc.targets.path("P", [(1, 2), (1.5, 2.2)])                     a point goes through points, in order
+kc.targets.path("P", points, times=[0.1, 0.2])                 at these times
+kc.targets.value("rocker.phi", angles, times)                  function generation; rates too
+kc.targets.pose("rod", [(1, 2, 0.3), (1.5, 2.2, 0.5)])         a body goes through poses
+kc.targets.time_ratio("ram.x", 1.4)                            forth takes 1.4 times as long as back
+kc.targets.limit("mu", 40 * kc.deg, 140 * kc.deg)           a transmission angle, over the motion
+kc.targets.limit(b / a, most=4)                                of dimensions
+kc.targets.moves()                                             assembled at all times: full rotation
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+from kincompile.errors import InputError
+from kincompile.model.expressions import number_in
+from kincompile.names import column_name, shown
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+    Target: TypeAlias = "Passing | TimeRatio | Limit | Moves"
+
+MOST_POINTS = 1000
+"""Points of one target."""
+
+PART = 1e-3
+"""Part of how far wanted values are apart, or of their size, up to which they count as reached."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passing:
+    """Columns are to have values: at times, or one after the other at times that are found.
+
+    Attributes
+    ----------
+    title
+        What it is called in reports.
+    columns
+        Names of coordinates, outputs or rates.
+    values : ndarray, shape (K, columns)
+        What is wanted.
+    times : ndarray, shape (K,), or None
+        When; None where only the order counts.
+    weights : ndarray, shape (columns,)
+        Factors of the deviations, whose squares are added.
+    within : float
+        Largest deviation, weighted, that counts as reached.
+    between : tuple of float, or None
+        The first and the last time that may be found; None for those of the model.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    values: Array
+    times: Array | None
+    weights: Array
+    within: float
+    between: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TimeRatio:
+    """The way of a column from its least to its greatest value is to take `ratio` times the rest.
+
+    The times of the model must be one cycle.
+    """
+
+    column: str
+    ratio: float
+    weight: float
+    within: float
+
+    @property
+    def title(self) -> str:
+        """What it is called in reports."""
+        return f"time ratio of {self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A column, or an expression, is to stay between two values at all times of the model."""
+
+    what: str | sympy.Expr
+    least: float
+    most: float
+    title: str
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """The mechanism is to move through all times of the model."""
+
+    title: str = "moves"
+
+
+def path(
+    point: str,
+    points: ArrayLike,
+    times: ArrayLike | None = None,
+    *,
+    weight: float = 1.0,
+    within: float | None = None,
+    between: tuple[float, float] | None = None,
+) -> Passing:
+    """Return the demand that a point goes through points, in their order.
+
+    Parameters
+    ----------
+    point
+        Name of a point, ``"P"``, or of a body, whose origin is meant.
+    points : array_like, shape (K, 2), in space (K, 3)
+        Where it is to be [length].
+    times : array_like, shape (K,), optional
+        When; without, the times are found as well.
+    weight
+        Factor of its deviations, among other targets.
+    within
+        Distance along an axis up to which a point counts as reached; without, a thousandth of
+        how far the points are apart.
+    between
+        The first and the last time that may be found; without, those of the model.
+
+    Raises
+    ------
+    InputError
+        If numbers are missing, not finite, or times do not rise.
+    """
+    wanted = _numbers(points, f"the points of {point!r}", 2)
+    letters = "xyz"[: wanted.shape[1]]
+    names = tuple(f"{letter}_{point}" for letter in letters)
+    weights = np.full(len(names), weight)
+    return _passing(f"path of {point}", names, wanted, times, weights, within, between)
+
+
+def value(
+    column: str,
+    values: ArrayLike,
+    times: ArrayLike | None = None,
+    *,
+    weight: float = 1.0,
+    within: float | None = None,
+    between: tuple[float, float] | None = None,
+) -> Passing:
+    """Return the demand that a column has values: function generation, velocities.
+
+    Parameters
+    ----------
+    column
+        A coordinate, an output, or a rate: ``"rocker.phi"``, ``"ram.x_dot"``. Angles count modulo
+        whole turns.
+    values : array_like, shape (K,)
+        What is wanted, in the unit of the column.
+    times, weight, within, between
+        As for `path`.
+
+    Raises
+    ------
+    InputError
+        As `path` does.
+    """
+    wanted = _numbers(values, f"the values of {column!r}", 1)[:, np.newaxis]
+    name = column_name(column)
+    return _passing(name, (name,), wanted, times, np.array([weight]), within, between)
+
+
+def pose(
+    body: str,
+    poses: ArrayLike,
+    times: ArrayLike | None = None,
+    *,
+    weight: float = 1.0,
+    angle_weight: float = 1.0,
+    within: float | None = None,
+    between: tuple[float, float] | None = None,
+) -> Passing:
+    """Return the demand that a body of the plane goes through poses, in their order.
+
+    Parameters
+    ----------
+    body
+        Its name.
+    poses : array_like, shape (K, 3)
+        x, y [length] and phi [rad].
+    angle_weight
+        Factor of deviations of the angle beside those of lengths [length/rad].
+    times, weight, within, between
+        As for `path`.
+
+    Raises
+    ------
+    InputError
+        As `path` does.
+    """
+    wanted = _numbers(poses, f"the poses of {body!r}", 2)
+    if wanted.shape[1] != 3:
+        raise InputError(f"the poses of {body!r} have {wanted.shape[1]} numbers: give x, y, phi")
+    names = tuple(f"{letter}_{body}" for letter in ("x", "y", "phi"))
+    weights = weight * np.array([1.0, 1.0, angle_weight])
+    return _passing(f"poses of {body}", names, wanted, times, weights, within, between)
+
+
+def time_ratio(
+    column: str, ratio: float, *, weight: float = 1.0, within: float = PART
+) -> TimeRatio:
+    """Return the demand that a column rises for `ratio` times the time in which it falls.
+
+    The times of the model must be one cycle.
+
+    Raises
+    ------
+    InputError
+        If the ratio is no positive number.
+    """
+    found = _number(ratio, f"the time ratio of {column!r}")
+    if not found > 0:
+        raise InputError(f"the time ratio of {column!r} is {found:g}: give a positive number")
+    return TimeRatio(column_name(column), found, float(weight), float(within))
+
+
+def limit(what: Any, least: Any = -math.inf, most: Any = math.inf, *, title: str = "") -> Limit:
+    """Return the demand that something stays between two values at all times of the model.
+
+    Parameters
+    ----------
+    what
+        A column, or an expression of parameters, coordinates and points: ``kc.outputs`` has the
+        transmission angle, ``b / a`` is a ratio of lengths.
+    least, most
+        Limits, in its unit; one of them may be left out.
+    title
+        What it is called in reports.
+
+    Raises
+    ------
+    InputError
+        If there is no limit, or they are in the wrong order.
+    """
+    about = title or str(what)
+    low, high = (
+        item if isinstance(item, float) and math.isinf(item) else _number(item, f"limit of {about}")
+        for item in (least, most)
+    )
+    if not low < high or low == math.inf or high == -math.inf:
+        raise InputError(
+            f"{about} is to stay between {low:g} and {high:g}: give the least value first"
+        )
+    if math.isinf(low) and math.isinf(high):
+        raise InputError(f"{about} has no limit: give least, most or both")
+    if not isinstance(what, sympy.Expr):
+        what = column_name(str(what))
+    return Limit(what, low, high, about)
+
+
+def moves() -> Moves:
+    """Return the demand that the mechanism moves through all times of the model: a full turn."""
+    return Moves()
+
+
+def _passing(
+    title: str,
+    columns: tuple[str, ...],
+    values: Array,
+    times: ArrayLike | None,
+    weights: Array,
+    within: float | None,
+    between: tuple[float, float] | None,
+) -> Passing:
+    """Return a demand, checked."""
+    problems = []
+    at = None if times is None else _numbers(times, f"the times of {title}", 1)
+    if at is not None and len(at) != len(values):
+        problems.append(f"{title} has {len(values)} values and {len(at)} times: give one for each")
+    elif at is not None and not (np.diff(at) > 0).all():
+        problems.append(f"the times of {title} do not rise: give them in their order, each once")
+    if not (np.isfinite(weights).all() and (weights > 0).all()):
+        problems.append(f"{title} has the weight {weights.min():g}: give a positive number")
+    if between is not None and not between[0] < between[1]:
+        problems.append(
+            f"{title} is to happen between {between[0]:g} and {between[1]:g}: give the first time "
+            "first"
+        )
+    if problems:
+        raise InputError(problems)
+    if within is None:
+        sizes = np.ptp(values, axis=0)
+        sizes = np.where(sizes > 0, sizes, sizes.max() or np.abs(values).max() or 1.0)
+        within = PART * float((weights * sizes).max())
+    return Passing(title, columns, values, at, weights, float(within), between)
+
+
+def _numbers(given: ArrayLike, what: str, dimensions: int) -> Array:
+    """Return finite numbers, of one or two dimensions."""
+    try:
+        rows: Any = given
+        if dimensions == 1:
+            found = np.array([_number(item, what) for item in rows])
+        else:
+            found = np.array([[_number(item, what) for item in row] for row in rows])
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{what} are {shown(given)}: give a list of numbers for each") from None
+    if found.ndim != dimensions or not 0 < len(found) <= MOST_POINTS:
+        raise InputError(f"{what} are {len(found)}: give 1 to {MOST_POINTS}, all of one length")
+    if dimensions == 2 and found.shape[1] not in (2, 3):
+        raise InputError(f"{what} have {found.shape[1]} coordinates: give 2, in space 3")
+    return found
+
+
+def _number(given: Any, what: str) -> float:
+    """Return a finite number; an expression such as 30*kc.deg is one."""
+    if isinstance(given, sympy.Expr):
+        given = number_in(given, "rad", {})
+    try:
+        found = float(given)
+    except (TypeError, ValueError):
+        found = math.nan
+    if not math.isfinite(found):
+        raise InputError(f"{what}: {shown(given)} is not a finite number")
+    return found

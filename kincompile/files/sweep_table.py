@@ -1,0 +1,163 @@
+"""The table `sweep` of a model file: which parameters are swept, and what is kept.
+
+[sweep]
+parameters = { a = [0.2, 0.3], b = { from = 0.4, to = 0.6, count = 100 } }
+product = true
+columns = ["rocker.phi"]
+measures = ["foot.x.stroke"]
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kincompile.files.content import file_content
+from kincompile.files.data_text import listed_problems, read_json, read_toml
+from kincompile.files.file_fields import FieldReader
+from kincompile.files.file_format import FIELDS, MOST_VARIANTS
+from kincompile.model.expressions import evaluate
+from kincompile.names import shown
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from kincompile.files.data_lines import Address
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Values from one to another: so many equally spaced ones, or as many as there are samples."""
+
+    first: float
+    last: float
+    count: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class SweepTable:
+    """What a file says of a sweep.
+
+    Attributes
+    ----------
+    parameters
+        Lists of values, or spans, by the names of parameters.
+    samples
+        How many points fill the spans that have no count; None where there are none.
+    product
+        Whether every value goes with every other one.
+    columns, measures
+        What is kept; None where the file does not say.
+    """
+
+    parameters: Mapping[str, tuple[float, ...] | Span]
+    samples: int | None = None
+    product: bool = False
+    columns: tuple[str, ...] | None = None
+    measures: tuple[str, ...] = ()
+
+
+def read_sweep_table(path: str | os.PathLike[str]) -> SweepTable | None:
+    """Read the table of a sweep in a model file; None where it has none, or is no TOML or JSON.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it cannot be read.
+    ModelError
+        If the table cannot be used; every problem with line and field.
+    """
+    file = Path(path)
+    read = {".toml": read_toml, ".json": read_json}.get(file.suffix.lower())
+    if read is None:
+        return None
+    reader = _TableReader(read(file, file_content(file)))
+    table = reader.read()
+    if reader.problems:
+        raise listed_problems(reader.problems)
+    return table
+
+
+class _TableReader(FieldReader):
+    """Reads the fields of the table one after the other."""
+
+    def read(self) -> SweepTable | None:
+        """Return the table as far as it could be read."""
+        data = self.document.data
+        row = data.get("sweep") if isinstance(data, dict) else None
+        if row is None:
+            return None
+        if not isinstance(row, dict):
+            self.problem(("sweep",), f"expected a table of fields, not {shown(row)}")
+            return None
+        if not self.has_fields(("sweep",), row, FIELDS["sweep"]):
+            return None
+        samples = self._count(row.get("samples"), ("sweep", "samples"))
+        given = row["parameters"]
+        if not isinstance(given, dict):
+            self.problem(("sweep", "parameters"), f"expected names and values, not {shown(given)}")
+            given = {}
+        parameters = {name: self._values(name, value) for name, value in given.items()}
+        self._require_samples(parameters, samples)
+        columns, measures = (self._names(row.get(key), key) for key in ("columns", "measures"))
+        return SweepTable(parameters, samples, self._product(row), columns, measures or ())
+
+    def _values(self, name: str, given: Any) -> tuple[float, ...] | Span:
+        """Return the values of a parameter, or from where to where they go."""
+        address = ("sweep", "parameters", name)
+        if isinstance(given, list):
+            return tuple(self._number(item, (*address, k)) for k, item in enumerate(given))
+        if not isinstance(given, dict):
+            text = "expected a list of values, or { from = 0.2, to = 0.6, count = 5 }"
+            self.problem(address, f"{text}, not {shown(given)}")
+            return ()
+        if not self.has_fields(address, given, FIELDS["span"]):
+            return ()
+        first, last = (self._number(given[key], (*address, key)) for key in ("from", "to"))
+        return Span(first, last, self._count(given.get("count"), (*address, "count")))
+
+    def _number(self, given: Any, address: Address) -> float:
+        """Return a number, or that of a formula without names."""
+        known = len(self.problems)
+        found = evaluate(self.constant(given, address, {}), {})
+        if found is not None and math.isfinite(found):
+            return found
+        if len(self.problems) == known:
+            self.problem(address, f"{shown(given)} is not a finite number")
+        return 1.0
+
+    def _count(self, given: Any, address: Address) -> int | None:
+        """Return a whole number of at least 1, None where none is given."""
+        if given is None or (type(given) is int and 1 <= given <= MOST_VARIANTS):
+            return given
+        text = f"expected a whole number from 1 to {MOST_VARIANTS:,}, not {shown(given)}"
+        self.problem(address, text)
+        return 1
+
+    def _require_samples(
+        self, parameters: Mapping[str, tuple[float, ...] | Span], samples: int | None
+    ) -> None:
+        """Report spans that nobody says the number of values of."""
+        for name, value in parameters.items():
+            if isinstance(value, Span) and value.count is None and samples is None:
+                text = "give it a count of equally spaced values, or the sweep a number of samples"
+                self.problem(("sweep", "parameters", name), text)
+
+    def _names(self, given: Any, key: str) -> tuple[str, ...] | None:
+        """Return a list of names, None where none is given."""
+        if given is None:
+            return None
+        if isinstance(given, list) and all(isinstance(item, str) for item in given):
+            return tuple(given)
+        self.problem(("sweep", key), f"expected a list of names in quotes, not {shown(given)}")
+        return None
+
+    def _product(self, row: Mapping[str, Any]) -> bool:
+        """Return whether every value goes with every other one."""
+        given = row.get("product", False)
+        if not isinstance(given, bool):
+            self.problem(("sweep", "product"), f"expected true or false, not {shown(given)}")
+        return given is True

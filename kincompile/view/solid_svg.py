@@ -1,0 +1,119 @@
+"""A mechanism in space as SVG, on white paper: at a position, or in motion, frame after frame.
+
+Nothing of it moves rigidly on the picture, so that every frame has its own paths.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.view.picture import Scale, svg_path
+from kincompile.view.shapes import INKS
+from kincompile.view.solid_picture import Camera, seen_paths, trace
+from kincompile.view.svg import HEIGHT, STILL, WIDTH
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.view.drawing import Drawing
+    from kincompile.view.marks import Array
+    from kincompile.view.picture import PicturePath
+    from kincompile.view.svg import Timing
+
+NAME = 15
+"""Height of names [px]."""
+
+
+def svg_in_space(
+    drawn: Drawing,
+    q: Array,
+    description: str,
+    *,
+    paths: Sequence[Array] = (),
+    timing: Timing | None = None,
+    millimetres: float | None = None,
+    view: str = "isometric",
+) -> str:
+    """Return a mechanism in space as the text of an SVG file.
+
+    Parameters
+    ----------
+    drawn
+        Its shapes.
+    q : ndarray, shape (F, n)
+        Positions.
+    description
+        What is shown, for those who cannot see it.
+    paths
+        Lines over the mechanism, each of shape (k, 3).
+    timing
+        When the positions are shown; without, the first one is.
+    millimetres
+        Length of the model's unit where the picture has its true size, across the view.
+    view
+        From where it is seen: a name in `VIEWS`.
+    """
+    camera = Camera.named(view)
+    shown = q if timing is not None else q[:1]
+    frames = [seen_paths(drawn, row, camera) for row in shown]
+    traces = [camera.seen(path)[:, :2] for path in paths]
+    scale = Scale([*(path.points for frame in frames for path in frame), *traces], (WIDTH, HEIGHT))
+    lines = [path for k, points in enumerate(traces) for path in trace(k, scale.at(points))]
+    pictures = [
+        _elements([*(_scaled(path, scale) for path in frame), *lines], scale)
+        + "".join(_name(dot.name, camera.seen(dot.place.at(row)), scale) for dot in drawn.dots)
+        for frame, row in zip(frames, shown, strict=True)
+    ]
+    parts, style = pictures[0], ""
+    if timing is not None and len(pictures) > 1:
+        moving = "".join(_frames(pictures, timing))
+        parts = f'<g class="still" display="none">{parts}</g>\n<g class="moving">{moving}</g>'
+        style = f"<style>{STILL}</style>\n"
+    sides = (scale.width, scale.height)
+    wide, tall = (f"{side:.7g}" for side in sides)
+    if millimetres is not None:
+        wide, tall = (f"{side / scale.factor * millimetres:.7g}mm" for side in sides)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" '
+        f'viewBox="0 0 {scale.width:.7g} {scale.height:.7g}" width="{wide}" height="{tall}" '
+        f'role="img" aria-labelledby="title description" stroke-linecap="round" '
+        f'stroke-linejoin="round" font-family="system-ui,sans-serif" font-size="{NAME}">\n'
+        f'<title id="title">{escape(drawn.name)}</title>\n'
+        f'<desc id="description">{escape(description)}</desc>\n{style}'
+        f'<rect width="100%" height="100%" fill="{INKS["paper"]}"/>\n{parts}\n</svg>\n'
+    )
+
+
+def _frames(pictures: Sequence[str], timing: Timing) -> list[str]:
+    """Return groups of which one is shown at a time."""
+    ends = [*timing.parts[1:].tolist(), 1.0]
+    return [
+        f'<g display="none"><animate attributeName="display" calcMode="discrete" '
+        f'values="none;inline;none" keyTimes="0;{start:.4g};{end:.4g}" dur="{timing.seconds:g}s" '
+        f'repeatCount="indefinite"/>{picture}</g>\n'
+        for picture, start, end in zip(pictures, timing.parts.tolist(), ends, strict=True)
+    ]
+
+
+def _scaled(path: PicturePath, scale: Scale) -> PicturePath:
+    return dataclasses.replace(path, points=scale.at(path.points))
+
+
+def _elements(paths: Sequence[PicturePath], scale: Scale) -> str:
+    return "\n".join(svg_path(path, scale.height) for path in paths)
+
+
+def _name(name: str, seen: Array, scale: Scale) -> str:
+    """Return the element of a name, beside its point where there is room, on a rim of paper."""
+    place = scale.at(np.asarray(seen)[:2])
+    is_right = place[0] + NAME * len(name) < scale.width
+    x, y = place[0] + (NAME / 2 if is_right else -NAME / 2), scale.height - place[1] - NAME / 2
+    anchor = "" if is_right else ' text-anchor="end"'
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}"{anchor} fill="{INKS["ink"]}" stroke="{INKS["paper"]}" '
+        f'stroke-width="3" paint-order="stroke">{escape(name)}</text>\n'
+    )

@@ -1,0 +1,19 @@
+"""C's own atan2, which takes several lanes at once: all quadrants, all sizes, the axes."""
+
+import numpy as np
+import sympy
+
+import kincompile as kc
+
+
+def test_that_atan2_is_right_to_two_units_in_the_last_place() -> None:
+    x, y, angle = sympy.symbols("x y angle")
+    equations = [x - sympy.cos(kc.t), y - sympy.sin(kc.t), angle - sympy.atan2(y, x)]
+    system = kc.ConstraintSystem("angles", [x, y, angle], equations)
+    module = kc.compile(system, target="c")
+    random, n = np.random.default_rng(5), 100_000
+    size, turn = 10 ** random.uniform(-12, 12, n), random.uniform(-np.pi, np.pi, n)
+    q = np.column_stack([size * np.cos(turn), size * np.sin(turn), np.zeros(n)])
+    q[:6, :2] = [(1, 0), (-1, 0), (0, 1), (0, -1), (0, 0), (1, 1)]
+    found, wanted = -module.Phi(q, 0.0)[:, 2], np.arctan2(q[:, 1], q[:, 0])
+    assert np.all(np.abs(found - wanted) <= 2 * np.spacing(np.abs(wanted)))

@@ -1,0 +1,292 @@
+"""Synthesis: derivatives against differences, closed forms, published cases, limits, branches."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.design.demands import read_demands
+from kincompile.design.fit import _with_limits
+from kincompile.design.search import in_order
+from kincompile.design.trial import Workbench
+
+LENGTHS = ("r1", "r2", "r3", "r4")
+
+
+def fourbar(name="four_bar", end=2 * math.pi, points=73, **values):
+    """Return a four-bar whose crank turns by t, with a point P in the frame of its rod."""
+    m = kc.Mechanism(name, end=end, points=points)
+    lengths = {"r1": 3.7, "r2": 2.0, "r3": 4.0, "r4": 2.7, "u": 1.7, "v": 1.7, **values}
+    r1, r2, r3, r4, u, v = (m.parameter(key, value, "m") for key, value in lengths.items())
+    crank, rod = m.body("crank", (0, 0, 0.5)), m.body("rod", (1.7, 1, 0.8))
+    rocker = m.body("rocker", (r1, 0, 1.9))
+    m.add(kc.Revolute("A", crank, (0, 0), m.ground, (0, 0)))
+    m.add(kc.Revolute("B", crank, (r2, 0), rod, (0, 0)))
+    m.add(kc.Revolute("C", rod, (r3, 0), rocker, (r4, 0)))
+    m.add(kc.Revolute("D", rocker, (0, 0), m.ground, (r1, 0)))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    m.point("P", rod, (u, v))
+    ends = m.point("before", rod, (0, 0)), m.point("joint", rod, (r3, 0)), (r1, 0)
+    m.output("mu", kc.outputs.transmission_angle(*ends), unit="rad")
+    return m
+
+
+def bench(model, targets, names):
+    """Return what evaluates trials of a model, and its variables at the defaults."""
+    wider = _with_limits(model, targets)
+    module = kc.compile(wider)
+    demands = read_demands(module, wider.system(), targets)
+    return Workbench(module, demands, names, {}), module
+
+
+@pytest.mark.parametrize(
+    "targets",
+    [
+        [kc.targets.path("P", [(3, 3), (2, 3.5)], [0.5, 1.0])],
+        [kc.targets.path("P", [(3, 3), (2, 3.5), (1, 4)])],
+        [
+            kc.targets.value("rocker.phi_dot", [0.3, 0.1], weight=3.0),
+            kc.targets.pose("rod", [(1, 1, 0.5)], [0.3], angle_weight=2.0),
+            kc.targets.path("P", [(3, 3), (2, 3.5)]),
+        ],
+        [kc.targets.time_ratio("rocker.phi", 1.2, weight=2.0)],
+        [
+            kc.targets.value("rocker.phi", [1.8], [0.5]),
+            kc.targets.limit("mu", 0.7, 2.4),
+            kc.targets.limit(sympy.Symbol("r3") / sympy.Symbol("r2"), most=1.5),
+        ],
+    ],
+    ids=["timed", "untimed", "mixed", "ratio", "limits"],
+)
+def test_derivatives_of_deviations_and_limits_are_exact(targets):
+    names = ("r1", "r2", "r3", "r4", "u", "v")
+    tried, module = bench(fourbar(), targets, names)
+    times = [0.6 + 0.1 * k for k in range(len(tried.demands.time_bounds()))]
+    x = np.array([3.7, 2.0, 4.0, 2.7, 1.7, 1.6, *times])
+    guess = np.array(module.GUESS)
+    trial = tried.solved(x, guess)
+    found = tried.derivatives(trial)
+    h = 1e-5
+    for k in range(x.size):
+        step = h * np.eye(x.size)[k]
+        up, down = tried.solved(x + step, guess), tried.solved(x - step, guess)
+        for own, name in zip(found, ("residuals", "gaps"), strict=True):
+            slope = (getattr(up, name) - getattr(down, name)) / (2 * h)
+            np.testing.assert_allclose(own[:, k], slope, rtol=2e-7, atol=2e-8)
+
+
+def test_freudensteins_three_precision_points_are_reached():
+    # y = x^1.5 on 1..4, Chebyshev's spacing; lengths by Freudenstein's linear equations, d = 1.
+    x = np.array([1.20096189432334, 2.5, 3.79903810567666])
+    theta = np.radians(20 + (x - 1) / 3 * 90)
+    phi = np.radians(40 + (x**1.5 - 1) / 7 * 90)
+    m = fourbar("freudenstein", r1=1.0, r2=0.6, r3=0.8, r4=0.6)
+    target = kc.targets.value("rocker.phi", phi, theta)
+    bounds = dict.fromkeys(("r2", "r3", "r4"), (0.2, 2.0))
+    found = kc.fit(m, target, bounds=bounds, samples=64, starts=8)
+    assert found.success
+    assert found.error < 1e-20
+    matrix = np.column_stack((np.cos(phi), -np.cos(theta), np.ones(3)))
+    k1, k2, k3 = np.linalg.solve(matrix, np.cos(theta - phi))
+    a, c = 1 / k1, 1 / k2
+    b = math.sqrt(a * a + c * c + 1 - 2 * a * c * k3)
+    assert (a, b, c) == pytest.approx((0.545874184319922, 0.872936471028201, 0.496810872280478))
+    closed = [found.parameters[name] for name in ("r2", "r3", "r4")]
+    np.testing.assert_allclose(closed, (a, b, c), rtol=1e-8)
+    # The result is a model: it starts on its branch and passes the points.
+    motion = kc.solve(kc.compile(found.model), theta)
+    np.testing.assert_allclose(motion["rocker.phi"] % (2 * math.pi), phi, atol=1e-9)
+
+
+def test_path_without_times_finds_them_in_order():
+    m = fourbar(r1=4.0, r2=2.0, r3=5.0, r4=5.0, u=2.5, v=1.0)
+    at = np.array([0.7, 1.5, 2.4, 3.4])
+    points = kc.solve(kc.compile(m), at)
+    wanted = np.column_stack((points["P.x"], points["P.y"]))
+    bounds = {"u": (1, 4), "v": (0, 3)}
+    found = kc.fit(m, kc.targets.path("P", wanted), bounds=bounds, samples=128, starts=4)
+    assert found.error < 1e-18
+    times = [item.t for item in found.reached if item.column == "x_P"]
+    assert times == sorted(times)
+    np.testing.assert_allclose(times, at, atol=1e-7)
+    assert found.parameters == pytest.approx({"u": 2.5, "v": 1.0}, abs=1e-7)
+
+
+def test_time_ratio_of_an_offset_slider_crank_is_reached():
+    # Chebyshev: the rise takes pi + beta of the cycle, beta the angle between both dead centres.
+    m = kc.Mechanism("press", end=2 * math.pi, points=181)
+    e = m.parameter("e", 0.1, "m")
+    crank, rod = m.body("crank", (0, 0, 0.3)), m.body("rod", (1, 0.3, 0))
+    ram = m.body("ram", (4, 0, 0))
+    m.add(kc.Revolute("A", m.ground, (0, 0), crank, (0, 0)))
+    m.add(kc.Revolute("B", crank, (1, 0), rod, (0, 0)))
+    m.add(kc.Revolute("C", rod, (3, 0), ram, (0, 0)))
+    m.add(kc.Translational("D", m.ground, (0, e), (1, 0), ram, (0, 0), (1, 0)))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t + 0.3))
+    found = kc.fit(m, kc.targets.time_ratio("ram.x", 1.1), bounds={"e": (-1.5, -0.01)}, samples=32)
+    assert found.success
+    offset = found.parameters["e"]
+    turn = abs(math.asin(offset / 4) - math.asin(offset / 2))
+    assert (math.pi + turn) / (math.pi - turn) == pytest.approx(1.1, abs=1e-7)
+
+
+def test_active_limit_holds_and_costs_as_little_as_possible():
+    m = fourbar()
+    r2 = sympy.Symbol("r2")
+    target = kc.targets.value("rocker.phi", [1.9, 1.7], [0.5, 1.0])
+    free = kc.fit(m, target, bounds={"r2": (0.5, 3), "r4": (2, 4)}, samples=64, starts=4)
+    longest = 0.8 * free.parameters["r2"]
+    targets = [target, kc.targets.limit(r2, most=longest, title="crank")]
+    for minimizer in ("SLSQP", "trust-constr"):
+        found = kc.fit(
+            m, targets, bounds={"r2": (0.5, 3), "r4": (2, 4)}, samples=64, starts=4,
+            minimizer=minimizer,
+        )  # fmt: skip
+        assert found.limits[0].holds
+        assert found.parameters["r2"] == pytest.approx(longest, rel=2e-6)
+        # The least along the limit, by a scan of the other dimension.
+        module = kc.compile(m)
+        scan = found.parameters["r4"] + np.linspace(-0.02, 0.02, 41)
+        motion = kc.solve(module, [0.5, 1.0], {"r2": longest, "r4": scan})
+        errors = ((motion["rocker.phi"] - [1.9, 1.7]) ** 2).sum(axis=1)
+        assert found.error <= errors.min() * (1 + 1e-3)
+
+
+def test_transmission_angle_is_kept_over_the_whole_turn():
+    m = fourbar(r1=4.0, r2=1.5, r3=4.0, r4=3.0)
+    at = [0.5, 1.2]
+    own = kc.solve(kc.compile(m), at, {"r2": 1.2, "r4": 3.5})
+    target = kc.targets.path("P", np.column_stack((own["P.x"], own["P.y"])), at)
+    keep = kc.targets.limit("mu", 45 * kc.deg, 135 * kc.deg, title="transmission angle")
+    bounds = {"r2": (0.3, 3), "r3": (2, 6), "r4": (2, 6), "u": (-3, 3), "v": (-3, 3)}
+    found = kc.fit(m, [target, keep], bounds=bounds, samples=128, starts=4)
+    assert found.success
+    whole = kc.solve(kc.compile(found.model), np.linspace(0, 2 * math.pi, 73))
+    assert whole.success
+    assert whole["mu"].min() >= math.radians(45) - 1e-6
+    assert whole["mu"].max() <= math.radians(135) + 1e-6
+
+
+def test_result_never_jumps_its_branch():
+    # Wanted are points of both branches of one four-bar: a fit that jumped would reach them all.
+    m = fourbar()
+    module = kc.compile(m)
+    positions = kc.assemblies(module, 0.5)
+    one, other = (kc.solve(module, [0.5, 0.9], guess=q) for q in positions)
+    wanted = [(one["P.x"][0], one["P.y"][0]), (other["P.x"][1], other["P.y"][1])]
+    target = kc.targets.path("P", wanted, [0.5, 0.9])
+    found = kc.fit(m, target, bounds={"u": (1.6, 1.8), "v": (1.6, 1.8)}, samples=32, starts=4)
+    assert not found.success
+    assert found.error > 0.1
+    assert "the farthest is" in found.message
+    fine = np.linspace(0.5, 0.9, 50)
+    motion = kc.solve(kc.compile(found.model), fine)
+    np.testing.assert_allclose(motion["P.x"][[0, -1]], found.motion["P.x"], atol=1e-9)
+    assert (motion.branch == motion.branch[0]).all()
+
+
+def test_target_out_of_reach_says_how_near_and_where():
+    found = kc.fit(
+        fourbar(), kc.targets.path("P", [(30, 0)], [0.5]), bounds={"u": (0, 2), "v": (0, 2)},
+        samples=32,
+    )  # fmt: skip
+    assert not found.success
+    assert "x_P at t = 0.5" in found.message
+    assert "from 30" in found.message
+    assert "(far)" in str(found)
+
+
+def test_search_by_differential_evolution_reaches_the_same():
+    m = fourbar()
+    motion = kc.solve(kc.compile(m), [0.5, 1.0, 1.5])
+    wanted = np.column_stack((motion["P.x"], motion["P.y"]))
+    target = kc.targets.path("P", wanted, [0.5, 1.0, 1.5])
+    bounds = {"r2": (1.5, 2.5), "u": (1, 2), "v": (1, 2)}
+    found = kc.fit(m, target, bounds=bounds, samples=8, starts=2, search="differential evolution")
+    assert found.error < 1e-18
+    assert found.counts.sampled > 8
+
+
+def test_same_seed_gives_the_same_result():
+    target = kc.targets.path("P", [(3, 3), (2, 3.6)], [0.5, 1.1])
+    one, other = (
+        kc.fit(fourbar(), target, bounds={"u": (1, 2), "v": (1, 2)}, samples=32, starts=2)
+        for _ in range(2)
+    )
+    assert one.parameters == other.parameters
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"bounds": {"q": (0, 1)}}, "no parameter 'q'"),
+        ({"bounds": {"u": (2, 1)}}, "the bounds of 'u' go from 2 to 1"),
+        ({"bounds": {"u": (0, math.inf)}}, "give finite numbers"),
+        ({"bounds": {"u": 3}}, "the bounds of 'u' are 3"),
+        ({"parameters": ["u"]}, "'u' has no bounds"),
+        ({}, "no parameter of four_bar may change"),
+        ({"parameters": ["u"], "bounds": {"u": (0, 1), "v": (0, 1)}}, "there are bounds of v"),
+        ({"bounds": {"u": (0, 1)}, "p": {"u": 1}}, "is to change and has a value in p"),
+        ({"bounds": {"u": (0, 1)}, "starts": 0}, "starts is 0"),
+        ({"bounds": {"u": (0, 1)}, "search": "genetic"}, "there is no search 'genetic'"),
+        ({"bounds": {"u": (0, 1)}, "minimizer": "BFGS"}, "there is no minimizer 'BFGS'"),
+        ({"bounds": {"r2": (30, 40)}, "samples": 8}, "does not move through the times"),
+        ({"targets": [], "bounds": {"u": (0, 1)}}, "there is nothing to reach"),
+        ({"targets": ["P"], "bounds": {"u": (0, 1)}}, "'P' is not a target"),
+        ({"targets": kc.targets.path("Q", [(1, 2)]), "bounds": {"u": (0, 1)}}, "'x_Q'"),
+    ],
+)
+def test_bad_input_says_what_and_where(arguments, words):
+    given = {"targets": kc.targets.path("P", [(3, 3)], [0.5]), **arguments}
+    with pytest.raises(kc.InputError, match=words):
+        kc.fit(fourbar(), **given)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: kc.targets.path("P", [(1, 2)], [0.1, 0.2]), "1 values and 2 times"),
+        (lambda: kc.targets.path("P", [(1, 2), (2, 3)], [0.2, 0.1]), "do not rise"),
+        (lambda: kc.targets.path("P", [(1, math.nan)]), "is not a finite number"),
+        (lambda: kc.targets.path("P", 3), "give a list of numbers"),
+        (lambda: kc.targets.path("P", [(1,)]), "have 1 coordinates"),
+        (lambda: kc.targets.pose("rod", [(1, 2)]), "give x, y, phi"),
+        (lambda: kc.targets.value("mu", [1.0], weight=-1), "has the weight -1"),
+        (lambda: kc.targets.value("mu", [1.0], between=(2, 1)), "give the first time first"),
+        (lambda: kc.targets.time_ratio("mu", -1), "give a positive number"),
+        (lambda: kc.targets.limit("mu"), "has no limit"),
+        (lambda: kc.targets.limit("mu", 2, 1), "give the least value first"),
+    ],
+)
+def test_targets_check_what_they_are_given(make, words):
+    with pytest.raises(kc.InputError, match=words):
+        make()
+
+
+def test_points_are_matched_in_their_order_at_least_cost():
+    rng = np.random.default_rng(3)
+    off = rng.random((5, 7, 3))
+    error, chosen = in_order(off)
+    for k in range(5):
+        every = {
+            (a, b, c): off[k, a, 0] + off[k, b, 1] + off[k, c, 2]
+            for a in range(7)
+            for b in range(a + 1, 7)
+            for c in range(b + 1, 7)
+        }
+        assert error[k] == pytest.approx(min(every.values()))
+        assert tuple(chosen[k].tolist()) == min(every, key=lambda key: every[key])
+
+
+@pytest.mark.slow
+def test_five_points_with_times_are_reached_as_well_as_published():
+    points = [(3, 3), (2.759, 3.363), (2.372, 3.663), (1.890, 3.862), (1.355, 3.943)]
+    target = kc.targets.path("P", points, np.radians([30, 45, 60, 75, 90]))
+    r1, r2, r3, r4 = sympy.symbols(LENGTHS)
+    rest = (r1 + r3 + r4 - r2, r1 + r4 - r3 - r2, r1 + r3 - r4 - r2, r3 + r4 - r1 - r2)
+    limits = [kc.targets.limit(item, least=0) for item in (*rest[1:], r1 - r2, r3 - r2, r4 - r2)]
+    bounds = dict.fromkeys(LENGTHS, (0.1, 50)) | {"u": (-50, 50), "v": (-50, 50)}
+    found = kc.fit(fourbar(), [target, *limits], bounds=bounds)
+    assert found.error <= 7.4157513068e-7 * (1 + 1e-10)
