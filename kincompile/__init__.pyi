@@ -55,6 +55,7 @@ from kincompile.model.loads import TorsionSpring as TorsionSpring
 from kincompile.model.mechanism import Mechanism as Mechanism
 from kincompile.model.sketch import Sketch as Sketch
 from kincompile.model.system import ConstraintSystem as ConstraintSystem
+from kincompile.runtime.dynamics.simulate import simulate as simulate
 from kincompile.runtime.load import load as load
 from kincompile.runtime.newton import newton as newton
 from kincompile.runtime.results.forces import Forces as Forces

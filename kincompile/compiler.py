@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from kincompile.ir.grouping import GroupedProgram
     from kincompile.ir.program import Program
     from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.engine.code import DynamicModules
     from kincompile.structure.report import Inspection
     from kincompile.targets.target import Emitted
 
@@ -213,6 +214,7 @@ def compile(  # noqa: A001 - the public name kc.compile
     """
     from kincompile.runtime.engine.code import (
         DRIVERS,
+        DYNAMICS,
         FORCES,
         JOINT_POINTS,
         SENSITIVITIES,
@@ -244,6 +246,7 @@ def compile(  # noqa: A001 - the public name kc.compile
             vars(module)[FORCES] = ForceModules(
                 cache(partial(_forces_module, code, target)), joints
             )
+            vars(module)[DYNAMICS] = cache(partial(_dynamic_modules, code, system, target))
     return remember_model(module, system)
 
 
@@ -326,6 +329,24 @@ def _forces_module(code: InlineProgram, target: str, is_planned: bool) -> Module
 
     program = observing_forces(code, is_planned=is_planned)
     return None if program is None else _observing(program, target)
+
+
+def _dynamic_modules(code: InlineProgram, system: ConstraintSystem, target: str) -> DynamicModules:
+    """Return the compiled equations of motion, for `kc.simulate`."""
+    from kincompile.ir.accelerations import (
+        observing_accelerations,
+        observing_corrections,
+        require_masses,
+    )
+    from kincompile.ir.redundancy import independence
+    from kincompile.runtime.engine.code import DynamicModules
+
+    require_masses(code)
+    redundant, free = independence(system, code.program)
+    left_out = {system.equations.index(name) for name in redundant}
+    accelerations = _observing(observing_accelerations(code, left_out), target)
+    corrections = _observing(observing_corrections(code, left_out), target)
+    return DynamicModules(accelerations, corrections, redundant, free)
 
 
 def _observing(program: Program, target: str) -> ModuleType:

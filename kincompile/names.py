@@ -169,6 +169,16 @@ def multiplier(equation: str) -> str:
     return f"lambda_{equation.replace('.', '_')}"
 
 
+def solved(name: str) -> str:
+    """Return the name of what the equations of motion give of a coordinate."""
+    return f"solved_{name}"
+
+
+def correction(name: str, order: int) -> str:
+    """Return the name of the change of a coordinate, or of its rate, that leads to constraints."""
+    return f"{('correction', 'rate_correction')[order]}_{name}"
+
+
 def force_units(length: str) -> tuple[str, str, str]:
     """Return the units of forces, torques and power where lengths have a unit, and masses kg."""
     if length == "m":

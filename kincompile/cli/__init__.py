@@ -26,7 +26,7 @@ from kincompile.names import escaped_lines
 
 COMMANDS = (
     "assemblies", "compare", "compile", "derive", "draw", "exercise", "inspect", "mark", "run",
-    "schema", "sweep", "view",
+    "schema", "simulate", "sweep", "view",
 )  # fmt: skip
 """The commands: each is the `command` of the file of its name."""
 

@@ -25,11 +25,10 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
 
-def motion_options(
-    command: Callable[..., None], *, has_through: bool = True
-) -> Callable[..., None]:
-    """Add the options of a motion: its times, and the values of parameters."""
-    options: list[Callable[[Command], Command]] = [
+def time_options(command: Command) -> Command:
+    """Add the options of times, and of values of parameters."""
+    return _with(
+        command,
         click.option("--start", default="0", metavar="T", help="First time."),
         click.option(
             "--end",
@@ -41,25 +40,34 @@ def motion_options(
             type=click.IntRange(min=1),
             help="Number of equally spaced times from start to end.  [default: the model's own]",
         ),
-        click.option(
-            "--grid",
-            metavar="NAME=FIRST:LAST:STEP",
-            help="Times at which a coordinate has these values, such as crank.phi=0:360deg:1deg.",
-        ),
         set_option("parameter"),
-        click.option(
-            "--through",
-            type=click.Choice(["smooth"]),
-            help="Go on past a bifurcation, along the smooth branch.",
-        ),
-        click.option(
-            "--assembly",
-            type=int,
-            metavar="N",
-            help="Start in the N-th of the ways that `kincompile assemblies` lists.",
-        ),
-    ]
-    for option in reversed(options if has_through else [*options[:-2], options[-1]]):
+    )
+
+
+def motion_options(command: Command, *, has_through: bool = True) -> Command:
+    """Add the options of a motion: its times, and the values of parameters."""
+    grid = click.option(
+        "--grid",
+        metavar="NAME=FIRST:LAST:STEP",
+        help="Times at which a coordinate has these values, such as crank.phi=0:360deg:1deg.",
+    )
+    through = click.option(
+        "--through",
+        type=click.Choice(["smooth"]),
+        help="Go on past a bifurcation, along the smooth branch.",
+    )
+    assembly = click.option(
+        "--assembly",
+        type=int,
+        metavar="N",
+        help="Start in the N-th of the ways that `kincompile assemblies` lists.",
+    )
+    return time_options(_with(command, grid, *((through,) if has_through else ()), assembly))
+
+
+def _with(command: Command, *options: Callable[[Command], Command]) -> Command:
+    """Add options in order."""
+    for option in reversed(options):
         command = option(command)
     return command
 
@@ -101,11 +109,13 @@ def _sweeps(
     return values
 
 
-def set_values(model: Mechanism | ConstraintSystem, given: Sequence[str]) -> dict[str, float]:
-    """Return the numbers of the options ``--set``, by name."""
+def set_values(
+    model: Mechanism | ConstraintSystem, given: Sequence[str], option: str = "--set"
+) -> dict[str, float]:
+    """Return the numbers of options such as ``--set``, by name."""
     from kincompile.cli import values
 
-    return values.set_values(model, given)
+    return values.set_values(model, given, option)
 
 
 def motion_times(

@@ -23,7 +23,7 @@ from kincompile.model.expressions import (
     evaluate,
     number_in,
 )
-from kincompile.names import column_name
+from kincompile.names import column_name, rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -34,8 +34,12 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
 
-def set_values(model: Mechanism | ConstraintSystem, given: Sequence[str]) -> dict[str, float]:
+def set_values(
+    model: Mechanism | ConstraintSystem, given: Sequence[str], option: str = "--set"
+) -> dict[str, float]:
     """Return the numbers that are set, angles in radians; the last counts of a name set twice.
+
+    Names are those of parameters or of columns, ``crank.phi`` or ``crank.phi_dot``.
 
     Raises
     ------
@@ -50,9 +54,10 @@ def set_values(model: Mechanism | ConstraintSystem, given: Sequence[str]) -> dic
     values: dict[str, float] = {}
     problems: list[str] = []
     for item, (name, text) in zip(given, assignments, strict=True):
-        what = f"--set {item}: give NAME=VALUE with a number"
+        what = f"{option} {item}: give NAME=VALUE with a number"
         try:
-            values[name] = number(text, what, {}, units.get(name, ""))
+            column = column_name(name).removesuffix(rate(""))
+            values[name] = number(text, what, {}, units.get(name, units.get(column, "")))
         except InputError as error:
             problems += error.problems
     if problems:

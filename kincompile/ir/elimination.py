@@ -124,14 +124,7 @@ def plan_entries(
     bodies by small rotations.
     """
     graph = Graph()
-    matrix: Matrix = {row: {} for row in range(row_count)}
-    varying = []
-    for row, column, value in entries:
-        if value is None:
-            matrix[row][column] = graph.input(input_name(row, column))
-            varying.append((row, column, matrix[row][column]))
-        else:
-            matrix[row][column] = graph.const(value)
+    matrix, varying = matrix_of(graph, row_count, entries)
     right = {row: graph.input(f"b[{row}]") for row in matrix}
     given = tuple(right.values())
     for row in left_out:
@@ -157,7 +150,7 @@ def plan_entries(
         for item in rotations:
             if not item.is_finished and solution.keys() >= set(item.turns):
                 item.finish(matrix, solution)
-    _substitute(graph, pivots, eliminated, right, solution)
+    substitute(graph, pivots, eliminated, right, solution)
     if not solution.keys() >= set(range(column_count)):
         return None
     return SolvePlan(
@@ -170,6 +163,21 @@ def plan_entries(
         tuple(solution[column] for column in range(column_count)),
         tuple(item.columns[0] for item in rotations),
     )
+
+
+def matrix_of(
+    graph: Graph, row_count: int, entries: Iterable[tuple[int, int, Constant | None]]
+) -> tuple[Matrix, list[tuple[int, int, int]]]:
+    """Return nodes of a matrix by row and column, and of the entries that are inputs."""
+    matrix: Matrix = {row: {} for row in range(row_count)}
+    varying = []
+    for row, column, value in entries:
+        if value is None:
+            matrix[row][column] = graph.input(input_name(row, column))
+            varying.append((row, column, matrix[row][column]))
+        else:
+            matrix[row][column] = graph.const(value)
+    return matrix, varying
 
 
 def _remainder(
@@ -185,7 +193,7 @@ def _remainder(
     return right
 
 
-def _substitute(
+def substitute(
     graph: Graph,
     pivots: Sequence[Pivot],
     eliminated: Matrix,
@@ -209,25 +217,33 @@ def _eliminate(
     pivots: list[Pivot] = []
     eliminated: Matrix = {}
     while (pivot := _cheapest(graph, matrix, any_pivot)) is not None:
-        row = matrix.pop(pivot.row)
-        for other, entries in matrix.items():
-            if pivot.column not in entries:
-                continue
-            factor = graph.div(entries.pop(pivot.column), row[pivot.column])
-            for column, node in row.items():
-                if column == pivot.column:
-                    continue
-                change = graph.mul(factor, node)
-                updated = (
-                    graph.sub(entries[column], change) if column in entries else graph.neg(change)
-                )
-                entries[column] = updated
-                if graph.value_of(updated) == 0:
-                    del entries[column]
-            right[other] = graph.sub(right[other], graph.mul(factor, right[pivot.row]))
         pivots.append(pivot)
-        eliminated[pivot.row] = row
+        eliminated[pivot.row] = eliminate(graph, matrix, right, pivot)
     return pivots, eliminated
+
+
+def eliminate_constants(graph: Graph, matrix: Matrix, right: dict[int, int]) -> list[Pivot]:
+    """Eliminate with plain numbers as long as there are such, and return the pivots."""
+    return _eliminate(graph, matrix, right)[0]
+
+
+def eliminate(graph: Graph, matrix: Matrix, right: dict[int, int], pivot: Pivot) -> dict[int, int]:
+    """Eliminate a coordinate from all other rows; return the row of the pivot, taken out."""
+    row = matrix.pop(pivot.row)
+    for other, entries in matrix.items():
+        if pivot.column not in entries:
+            continue
+        factor = graph.div(entries.pop(pivot.column), row[pivot.column])
+        for column, node in row.items():
+            if column == pivot.column:
+                continue
+            change = graph.mul(factor, node)
+            updated = graph.sub(entries[column], change) if column in entries else graph.neg(change)
+            entries[column] = updated
+            if graph.value_of(updated) == 0:
+                del entries[column]
+        right[other] = graph.sub(right[other], graph.mul(factor, right[pivot.row]))
+    return row
 
 
 def _cheapest(graph: Graph, matrix: Matrix, any_pivot: bool) -> Pivot | None:
@@ -313,7 +329,7 @@ def _eliminate_block(
     sides = {row: _remainder(graph, matrix[row], own, right[row], solution) for row in block.rows}
     pivots, eliminated = _eliminate(graph, part, sides, any_pivot=True)
     if not part:
-        _substitute(graph, pivots, eliminated, sides, solution)
+        substitute(graph, pivots, eliminated, sides, solution)
     return [eliminated[pivot.row][pivot.column] for pivot in pivots]
 
 

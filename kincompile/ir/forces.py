@@ -8,8 +8,7 @@ equations forbid the planned elimination, the multipliers are parameters of the 
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -21,8 +20,9 @@ from kincompile.errors import ModelError
 from kincompile.ir.elimination import plan_solve
 from kincompile.ir.graph import Graph
 from kincompile.ir.implicit import DETERMINANT
-from kincompile.ir.kernels import KernelEnvironment, attributes, pruned_kernel
-from kincompile.ir.program import Attribute, Instance, OutputDerivatives
+from kincompile.ir.kernels import KernelEnvironment, attributes
+from kincompile.ir.observing import observing_program
+from kincompile.ir.program import Attribute
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Parameter
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from kincompile.derive.loads import LoadTemplate
     from kincompile.derive.rules import Direction
     from kincompile.ir.inline import ConstraintRows, InlineProgram
-    from kincompile.ir.program import Input, Kernel, Program
+    from kincompile.ir.program import Input, Instance, Kernel, Program
 
 AXES = "xyz"
 
@@ -81,30 +81,15 @@ def observing_forces(code: InlineProgram, *, is_planned: bool = True) -> Program
         factors = [graph.input(name) for name in names]
         added = tuple(Parameter(name, 0.0) for name in names)
     else:
-        solve = StraightSolve(graph, code, plan)
+        solve = StraightSolve(graph, code.entries("Phi_q"), plan)
         factors = solve.transposed(_sides(code, graph))
         first = [_Row(DETERMINANT.format(k), "", x) for k, x in enumerate(solve.determinants)]
         first += [_Row(name, "", node) for name, node in zip(names, factors, strict=True)]
     rows = [*first, *_Forces(code, graph, factors).rows()]
     _check_names(program, [row.name for row in rows])
-    nodes = [(k, 0, row.node) for k, row in enumerate(rows)]
-    kernel = pruned_kernel("Forces", graph, {"outputs": nodes})
-    values = Graph(program.values)
-    bindings = tuple(values.input(name) for name in kernel.inputs)
-    about = OutputDerivatives("forces", (), tuple(OutputColumn(x.name, x.unit) for x in rows))
-    content = repr((program.fingerprint, "forces"))
-    return replace(
-        program,
-        equations=(),
-        instances=(),
-        loads=(),
-        redundant=(),
-        parameters=(*program.parameters, *added),
-        values=tuple(values.nodes),
-        fingerprint=hashlib.sha256(content.encode()).hexdigest()[:32],
-        unsolvable="it has no equations",
-        observers=(Instance(kernel, about, 0, (), bindings),),
-    )
+    titles = [OutputColumn(row.name, row.unit) for row in rows]
+    outputs = {"outputs": [row.node for row in rows]}
+    return observing_program(program, "forces", graph, outputs, titles, added=added)
 
 
 def _check_names(program: Program, made: Iterable[str]) -> None:

@@ -20,8 +20,7 @@ whose number does not depend on that of the parameters.
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, TypeVar
@@ -29,8 +28,7 @@ from typing import TYPE_CHECKING, TypeVar
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve
 from kincompile.ir.graph import Graph
-from kincompile.ir.kernels import pruned_kernel
-from kincompile.ir.program import Instance, OutputDerivatives
+from kincompile.ir.observing import observing_program
 from kincompile.ir.sensitive import check_names
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
@@ -92,26 +90,13 @@ def observing_sensitivities(
     nan = system.graph.nan()
     rows = [(node, nan, nan) for node in system.determinants] + found
     outputs = {
-        quantity: [(row, 0, nodes[order]) for row, nodes in enumerate(rows)]
+        quantity: [nodes[order] for nodes in rows]
         for order, quantity in enumerate(TOGETHER["observe"])
     }
-    kernel = pruned_kernel("Sensitivities", system.graph, outputs)
     by: list[str | tuple[str, str]] = [*names, *(pairs_of(names) if second else ())]
-    about = OutputDerivatives("sensitivities", (), _titles(program, len(plan.determinants), by, of))
-    graph = Graph(program.values)
-    bindings = tuple(graph.input(name) for name in kernel.inputs)
-    content = repr((program.fingerprint, "observed", by, tuple(of)))
-    return replace(
-        program,
-        equations=(),
-        instances=(),
-        loads=(),
-        redundant=(),
-        values=tuple(graph.nodes),
-        fingerprint=hashlib.sha256(content.encode()).hexdigest()[:32],
-        unsolvable="it has no equations",
-        observers=(Instance(kernel, about, 0, (), bindings),),
-    )
+    titles = _titles(program, len(plan.determinants), by, of)
+    key = tuple(by), tuple(of)
+    return observing_program(program, "sensitivities", system.graph, outputs, titles, key=key)
 
 
 def pairs_of(names: Sequence[_T]) -> tuple[tuple[_T, _T], ...]:
@@ -169,7 +154,7 @@ class _Linearized:
         self._q = [[graph.input(rate(x.name, order)) for x in coordinates] for order in range(3)]
         self._parameters = [graph.input(name) for name in names]
         self._rows = [row for section in code.constraints for row in self._residuals(section)]
-        self._solve = StraightSolve(graph, code, plan)
+        self._solve = StraightSolve(graph, code.entries("Phi_q"), plan)
         self.determinants = self._solve.determinants
         self._directions: list[dict[int, int]] = []
 

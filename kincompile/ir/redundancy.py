@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import turning
+from kincompile.errors import StructuralError
 from kincompile.ir.interpret import interpret
 from kincompile.model.resolve import Joint
 from kincompile.names import listed
@@ -89,6 +90,25 @@ def redundant_equations(
         free = [system.coordinates[column].name for column in report.free]
         sentences.append(f"at assembled positions {listed(free)} may still move")
     return found, ". ".join(sentences)
+
+
+def independence(
+    system: ConstraintSystem, program: Program
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return equations that repeat others, and free coordinates, of a mechanism that may move.
+
+    Raises
+    ------
+    StructuralError
+        If equations contradict each other.
+    """
+    report = rank_report(system, program)
+    if report.conflicting:
+        found = [item for item in surpluses(system, report) if item.conflicting]
+        sentences = ". ".join(f"{item.text}; {item.remedy}" for item in found)
+        raise StructuralError(f"{system.name}: {sentences}.")
+    equations = tuple(system.equations[row] for row in report.redundant)
+    return equations, tuple(system.coordinates[column].name for column in report.drive)
 
 
 def redundancy_warning(system: ConstraintSystem, found: Sequence[Surplus]) -> str:

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING
 from kincompile.ir.graph import depending_on
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from kincompile.ir.elimination import SolvePlan
     from kincompile.ir.graph import Graph, Node
-    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.inline import Entry
 
 
 class StraightSolve:
-    """Code that solves linear systems whose matrix is Phi_q.
+    """Code that solves linear systems of one matrix, Phi_q or that of the equations of motion.
 
     Parameters
     ----------
     graph
         The mechanism's code, to which that of the solves is added.
-    code
-        The mechanism.
+    entries
+        Those of the matrix, with nodes of the graph.
     plan
-        Its planned solve, without calls of LAPACK.
+        The planned solve, without calls of LAPACK.
 
     Attributes
     ----------
@@ -33,9 +33,9 @@ class StraightSolve:
         Nodes of the determinants of the blocks.
     """
 
-    def __init__(self, graph: Graph, code: InlineProgram, plan: SolvePlan) -> None:
+    def __init__(self, graph: Graph, entries: Iterable[Entry], plan: SolvePlan) -> None:
         self._graph, self._plan = graph, plan
-        self._given = {x.name: x.node for x in code.entries("Phi_q")}
+        self._given = {x.name: x.node for x in entries}
         self._solved = self._planned([graph.input(("b", row)) for row in range(len(plan.right))])
         self._moving = depending_on(plan.nodes, plan.right)
         self.determinants = [self._solved[node] for node in plan.determinants]
@@ -46,12 +46,12 @@ class StraightSolve:
         return self._graph.instantiate(self._plan.nodes, given)
 
     def solve(self, right: Sequence[int]) -> list[int]:
-        """Return x of Phi_q x = b."""
+        """Return x of A x = b."""
         new = self._planned(right)
         return [new[node] for node in self._plan.solution]
 
     def transposed(self, sides: Sequence[int]) -> list[int]:
-        """Return x of Phi_q^T x = b: the plan, linear in its right side, from its end to its start.
+        """Return x of A^T x = b: the plan, linear in its right side, from its end to its start.
 
         Every number of the plan hands on to its operands what the solution owes to it.
         """

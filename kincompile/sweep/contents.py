@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -13,7 +14,6 @@ from kincompile.errors import InputError, package_of_extra
 from kincompile.names import escaped, listed
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.sweep.layout import PENDING, STATUS, TIME, Layout
-from kincompile.sweep.worker import Writer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,15 +23,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.sweep.plan import Plan
-    from kincompile.sweep.worker import Job
+    from kincompile.sweep.plan import Grid, Plan
+    from kincompile.sweep.worker import Job, Writer
 
 
-class Store(Writer, Protocol):
+class Store(Protocol):
     """Results as they come."""
 
-    IS_SHARED: bool
-    """Whether a worker writes its chunks itself."""
+    def writer(self) -> Writer | None:
+        """Return what a worker writes its chunks with; None where it hands its values back."""
+
+    def take(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
+        """Keep the values that a worker has handed back."""
 
     def done(self) -> NDArray[np.bool_]:
         """Return which chunks are complete."""
@@ -56,7 +59,63 @@ class Variable:
     unit: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True)
+class Form:
+    """The arrays of the results, without values: so much a worker has to know.
+
+    Attributes
+    ----------
+    grid
+        Their dimensions without time, in chunks.
+    layout
+        What is kept.
+    times
+        Number of times.
+    """
+
+    grid: Grid
+    layout: Layout
+    times: int
+
+    @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """The arrays by name, statuses last: where those are, a chunk is complete."""
+        sizes = self.grid.sizes
+        still = tuple(sizes), tuple(sizes.values()), self.grid.block
+        moving = (*still[0], TIME), (*still[1], self.times), (*still[2], self.times)
+        found = [
+            Variable(x.name, *(still if x.measure else moving), np.float64, math.nan, x.unit)
+            for x in self.layout.kept
+        ]
+        over = moving if self.layout.over_time else still
+        found.append(Variable(STATUS, *over, np.int8, PENDING, ""))
+        return {item.name: item for item in found}
+
+    def region(self, number: int, name: str) -> tuple[slice, ...]:
+        """Return where a chunk stands in an array."""
+        region = self.grid.region(number)
+        return (*region, slice(None)) if self.is_over_time(name) else region
+
+    def is_over_time(self, name: str) -> bool:
+        """Say whether an array has the dimension t."""
+        return self.variables[name].dimensions[-1] == TIME
+
+    def blocks(self, number: int, values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        """Return the values of a chunk in the shape of its part of each array, statuses last."""
+        shape = self.grid.shape(number)
+        return {
+            name: values[name].reshape(*shape, *values[name].shape[1:]) for name in self.variables
+        }
+
+    def empty(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays, empty."""
+        return {
+            item.name: np.full(item.shape, item.fill, item.dtype)
+            for item in self.variables.values()
+        }
+
+
+@dataclass(frozen=True, eq=False)
 class Contents:
     """What the results of a sweep consist of.
 
@@ -81,27 +140,17 @@ class Contents:
     units: Mapping[str, str]
     marks: Mapping[str, str]
 
-    @property
-    def variables(self) -> tuple[Variable, ...]:
-        """The arrays that chunks fill, statuses last: where they are, a chunk is complete."""
-        sizes, block = self.plan.sizes, self.plan.block
-        still = tuple(sizes), tuple(sizes.values()), block
-        moving = (*still[0], TIME), (*still[1], self.t.size), (*still[2], self.t.size)
-        found = [
-            Variable(
-                item.name, *(still if item.measure else moving), np.float64, math.nan, item.unit
-            )
-            for item in self.layout.kept
-        ]
-        over = moving if self.layout.over_time else still
-        return (*found, Variable(STATUS, *over, np.int8, PENDING, ""))
+    @cached_property
+    def form(self) -> Form:
+        """The arrays that chunks fill."""
+        return Form(self.plan.grid, self.layout, self.t.size)
 
     @property
     def coordinates(self) -> dict[str, tuple[str, Array, str]]:
         """Of each coordinate of the results its dimension, values and unit."""
         axes = self.plan.axes()
         found = {
-            name: (dimension, values, self.units.get(name, ""))
+            name: (dimension, values, self.units[name])
             for name, (dimension, values) in axes.items()
         }
         return {**found, TIME: (TIME, self.t, TIME_UNIT)} if self.layout.over_time else found
@@ -116,30 +165,12 @@ class Contents:
             "sweep": dict(self.marks),
         }
 
-    def region(self, number: int, name: str) -> tuple[slice, ...]:
-        """Return where a chunk stands in an array."""
-        region, item = self.plan.region(number), self.variable(name)
-        return (*region, slice(None)) if item.dimensions[-1] == TIME else region
-
-    def variable(self, name: str) -> Variable:
-        """Return the array of a name."""
-        return next(item for item in self.variables if item.name == name)
-
-    def blocks(self, number: int, values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-        """Return the values of a chunk in the shape of its part of each array, statuses last."""
-        shape, names = self.plan.shape(number), [item.name for item in self.variables]
-        return {name: values[name].reshape(*shape, *values[name].shape[1:]) for name in names}
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the arrays that chunks fill, empty."""
-        return {item.name: np.full(item.shape, item.fill, item.dtype) for item in self.variables}
-
     def filled(self, store: Store) -> xarray.Dataset:
         """Return the results of a store, read into memory."""
-        arrays = self.arrays()
+        arrays = self.form.empty()
         for number in np.flatnonzero(store.done()).tolist():
             for name, array in arrays.items():
-                array[self.region(number, name)] = store.read(number, name)
+                array[self.form.region(number, name)] = store.read(number, name)
         return self.dataset(arrays)
 
     def dataset(self, arrays: Mapping[str, Any]) -> xarray.Dataset:
@@ -147,8 +178,8 @@ class Contents:
         with package_of_extra("xarray", "tables"):
             import xarray
         variables = {
-            item.name: (item.dimensions, arrays[item.name], units(item.unit))
-            for item in self.variables
+            name: (item.dimensions, arrays[name], units(item.unit))
+            for name, item in self.form.variables.items()
         }
         coordinates = {
             name: (dimension, values, units(unit))

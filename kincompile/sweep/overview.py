@@ -138,7 +138,7 @@ def overview(sweep: Sweep) -> Overview:
     measured = {x.name: [np.empty(0)] for x in contents.layout.kept if x.measure}
     for number in np.flatnonzero(sweep.store.done()).tolist():
         swept = np.column_stack(plan.swept(number))
-        some = _scattered(plan.first(number), len(swept), MOST_SHOWN / plan.variants)
+        some = _scattered(plan.grid.first(number), len(swept), MOST_SHOWN / plan.grid.variants)
         samples.append(swept[some])
         status = sweep.store.read(number, STATUS).reshape(len(swept), -1)
         is_good.append((status[some] == 0).all(axis=1))

@@ -86,7 +86,7 @@ def _said_of_plots(seen: Overview, plots: str) -> str:
     """Return what stands above the plots."""
     if not plots.strip():
         return "pip install 'kincompile[plot]' brings matplotlib, and the plots with it."
-    some = f"{len(seen.samples):,} of {seen.sweep.contents.plan.variants:,} variants"
+    some = f"{len(seen.samples):,} of {seen.sweep.contents.plan.grid.variants:,} variants"
     return f"Measures of {some}; of columns least, mean and greatest value over time, of all."
 
 

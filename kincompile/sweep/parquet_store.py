@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,19 +26,81 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
-    from kincompile.sweep.contents import Contents
+    from kincompile.runtime.engine.code import Array
+    from kincompile.sweep.contents import Contents, Form
 
 ABOUT = "_about.json"
 """The mechanism, its fixed parameters and what decides the numbers; readers of Parquet skip it."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ParquetWriter:
+    """Writes chunks as files of a folder, in the process of a worker too.
+
+    Attributes
+    ----------
+    path, form
+        The folder, and the arrays of the results.
+    swept
+        The places of the swept parameters in a set, by name.
+    t : ndarray, shape (N,)
+        The times.
+    unit_of
+        Units by the names of columns.
+    """
+
+    path: Path
+    form: Form
+    swept: Mapping[str, int]
+    t: Array
+    unit_of: Mapping[str, str]
+
+    def file(self, number: int) -> Path:
+        """Return the file of a chunk."""
+        digits = len(str(len(self.form.grid) - 1))
+        return self.path / f"part-{number:0{digits}}.parquet"
+
+    def write(self, number: int, sets: Array, values: Mapping[str, NDArray[Any]]) -> None:
+        """Write a chunk: its file."""
+        import pyarrow.parquet as pq
+
+        file = self.file(number)
+        partial = file.with_name(f".{file.name}.{os.urandom(4).hex()}.partial")
+        with kept_in(self.path):
+            try:
+                pq.write_table(self._table(sets, values), partial, compression="zstd")
+                partial.replace(file)
+            finally:
+                partial.unlink(missing_ok=True)
+
+    def _table(self, sets: Array, values: Mapping[str, NDArray[Any]]) -> pa.Table:
+        """Return a chunk as a table: swept parameters, time, what is kept, status."""
+        import pyarrow as pa
+
+        times = self.t.size if self.form.layout.over_time else 1
+        columns = {name: np.repeat(sets[:, place], times) for name, place in self.swept.items()}
+        if self.form.layout.over_time:
+            columns[TIME] = np.tile(self.t, len(sets))
+        for name in self.form.variables:
+            given = values[name]
+            columns[name] = given.ravel() if given.ndim > 1 else np.repeat(given, times)
+        fields = [
+            pa.field(name, pa.from_numpy_dtype(column.dtype), metadata=units(self.unit_of[name]))
+            for name, column in columns.items()
+        ]
+        return pa.table([pa.array(column) for column in columns.values()], schema=pa.schema(fields))
+
+
 class ParquetStore:
     """A folder of Parquet files."""
 
-    IS_SHARED = True
-
     def __init__(self, path: Path, contents: Contents) -> None:
-        self._path, self._contents = path, contents
+        plan, form = contents.plan, contents.form
+        units_of = {name: unit for name, (_, _, unit) in contents.coordinates.items()}
+        units_of |= {name: item.unit for name, item in form.variables.items()}
+        swept = {name: plan.parameters.index(name) for name in plan.sweep}
+        self._contents = contents
+        self._writer = ParquetWriter(path, form, swept, contents.t, units_of)
 
     @classmethod
     def opened(cls, path: Path, contents: Contents) -> ParquetStore:
@@ -56,61 +119,29 @@ class ParquetStore:
                 (folder / ABOUT).write_text(text, encoding="utf-8")
         return cls(path, contents)
 
-    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
-        """Write a chunk: its file."""
-        import pyarrow.parquet as pq
+    def writer(self) -> ParquetWriter:
+        """Return what a worker writes its chunks with."""
+        return self._writer
 
-        file = self._file(number)
-        partial = file.with_name(f".{file.name}.{os.urandom(4).hex()}.partial")
-        with kept_in(self._path):
-            try:
-                pq.write_table(self._table(number, values), partial, compression="zstd")
-                partial.replace(file)
-            finally:
-                partial.unlink(missing_ok=True)
+    def take(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
+        """Do nothing: workers write."""
 
     def done(self) -> NDArray[np.bool_]:
         """Return which chunks have a file."""
-        count = len(self._contents.plan)
-        there = {file.name for file in self._path.iterdir()}
-        found = (self._file(number).name in there for number in range(count))
+        there = {file.name for file in self._writer.path.iterdir()}
+        count = len(self._contents.form.grid)
+        found = (self._writer.file(number).name in there for number in range(count))
         return np.fromiter(found, dtype=bool, count=count)
 
     def read(self, number: int, name: str) -> NDArray[Any]:
         """Return the values of a chunk, of one array."""
         import pyarrow.parquet as pq
 
-        values = pq.read_table(self._file(number), columns=[name])[name].to_numpy()
-        shape, variable = self._contents.plan.shape(number), self._contents.variable(name)
-        parts: NDArray[Any] = values.reshape(*shape, -1)
-        return parts if variable.dimensions[-1] == TIME else parts[..., 0]
+        values = pq.read_table(self._writer.file(number), columns=[name])[name].to_numpy()
+        form = self._contents.form
+        parts: NDArray[Any] = values.reshape(*form.grid.shape(number), -1)
+        return parts if form.is_over_time(name) else parts[..., 0]
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the results, read into memory."""
         return self._contents.filled(self)
-
-    def _file(self, number: int) -> Path:
-        digits = len(str(len(self._contents.plan) - 1))
-        return self._path / f"part-{number:0{digits}}.parquet"
-
-    def _table(self, number: int, values: Mapping[str, NDArray[Any]]) -> pa.Table:
-        """Return a chunk as a table: swept parameters, time, what is kept, status."""
-        import pyarrow as pa
-
-        contents = self._contents
-        times = contents.t.size if contents.layout.over_time else 1
-        swept = zip(contents.plan.sweep, contents.plan.swept(number), strict=True)
-        columns = {name: np.repeat(given, times) for name, given in swept}
-        count = len(values[contents.variables[-1].name])
-        if contents.layout.over_time:
-            columns[TIME] = np.tile(contents.t, count)
-        for item in contents.variables:
-            given = values[item.name]
-            columns[item.name] = given.ravel() if given.ndim > 1 else np.repeat(given, times)
-        unit_of = {name: unit for name, (_, _, unit) in contents.coordinates.items()}
-        unit_of |= {item.name: item.unit for item in contents.variables}
-        fields = [
-            pa.field(name, pa.from_numpy_dtype(column.dtype), metadata=units(unit_of[name]))
-            for name, column in columns.items()
-        ]
-        return pa.table([pa.array(column) for column in columns.values()], schema=pa.schema(fields))

@@ -24,36 +24,20 @@ VARIANT = "variant"
 """The dimension of parameter sets that are not a grid."""
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """The variants of a sweep, in chunks.
+@dataclass(frozen=True)
+class Grid:
+    """The dimensions of a sweep, cut into chunks; it knows no values.
 
     Attributes
     ----------
-    parameters
-        Names of the k parameters of the module.
-    common : ndarray, shape (k,)
-        Values of those that are not swept.
-    sweep
-        Arrays of values, by the names of the parameters that are swept.
-    is_product
-        Whether every value of one goes with every value of the others; else they go in pairs.
+    sizes
+        How long each dimension is, by name; time is none of them.
     most
         Largest number of variants in a chunk.
     """
 
-    parameters: tuple[str, ...]
-    common: Array
-    sweep: Mapping[str, Array]
-    is_product: bool
+    sizes: dict[str, int]
     most: int
-
-    @cached_property
-    def sizes(self) -> dict[str, int]:
-        """The dimensions of the results and how long they are, without time."""
-        if self.is_product or len(self.sweep) == 1:
-            return {name: values.size for name, values in self.sweep.items()}
-        return {VARIANT: next(iter(self.sweep.values())).size}
 
     @cached_property
     def block(self) -> tuple[int, ...]:
@@ -97,19 +81,56 @@ class Plan:
         """Return how long a chunk is along each dimension; the last ones are shorter."""
         return tuple(part.stop - part.start for part in self.region(number))
 
+    def count(self, number: int) -> int:
+        """Return how many variants a chunk has."""
+        return math.prod(self.shape(number))
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The variants of a sweep, in chunks.
+
+    Attributes
+    ----------
+    parameters
+        Names of the k parameters of the module.
+    common : ndarray, shape (k,)
+        Values of those that are not swept.
+    sweep
+        Arrays of values, by the names of the parameters that are swept.
+    is_product
+        Whether every value of one goes with every value of the others; else they go in pairs.
+    most
+        Largest number of variants in a chunk.
+    """
+
+    parameters: tuple[str, ...]
+    common: Array
+    sweep: Mapping[str, Array]
+    is_product: bool
+    most: int
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The dimensions of the results, and its chunks."""
+        sizes = {name: values.size for name, values in self.sweep.items()}
+        if not self.is_product and len(sizes) > 1:
+            sizes = {VARIANT: next(iter(sizes.values()))}
+        return Grid(sizes, self.most)
+
     def axes(self) -> dict[str, tuple[str, Array]]:
         """Return of each swept parameter its dimension and its values along that."""
-        first = next(iter(self.sizes))
+        sizes = self.grid.sizes
+        first = next(iter(sizes))
         return {
-            name: (name if name in self.sizes else first, values)
-            for name, values in self.sweep.items()
+            name: (name if name in sizes else first, values) for name, values in self.sweep.items()
         }
 
     def swept(self, number: int) -> Sequence[Array]:
         """Return the values of the swept parameters in the variants of a chunk, (B,) each."""
-        region, dimensions = self.region(number), tuple(self.sizes)
+        region, dimensions = self.grid.region(number), tuple(self.grid.sizes)
         parts = [values[region[dimensions.index(name)]] for name, values in self.axes().values()]
-        grid = np.meshgrid(*parts, indexing="ij") if len(self.sizes) > 1 else parts
+        grid = np.meshgrid(*parts, indexing="ij") if len(dimensions) > 1 else parts
         return [values.ravel() for values in grid]
 
     def sets(self, number: int) -> Array:

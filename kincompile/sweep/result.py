@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.names import column_name, escaped
+from kincompile.names import column_name, escaped, listed
 from kincompile.runtime.status import Status
 from kincompile.sweep.layout import PENDING, STATUS
 
@@ -67,7 +67,7 @@ class Sweep:
                 values, counts = np.unique(self.store.read(number, STATUS), return_counts=True)
                 found.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
             else:
-                found[PENDING] += int(np.prod(contents.plan.shape(number))) * per_variant
+                found[PENDING] += contents.plan.grid.count(number) * per_variant
         return {status_name(number): found[number] for number in sorted(found)}
 
     def __str__(self) -> str:
@@ -76,14 +76,14 @@ class Sweep:
         counts = ", ".join(f"{count:,} {name}" for name, count in self.statuses().items())
         place = f" in {escaped(self.where)}" if self.where else ""
         return (
-            f"{self.contents.name}: {plan.variants:,} variants x {self.contents.t.size} times"
+            f"{self.contents.name}: {plan.grid.variants:,} variants x {self.contents.t.size} times"
             f"{place}; {what}: {counts}"
         )
 
     def __repr__(self) -> str:
         """Return one line, for which nothing is read."""
-        names = [item.name for item in self.contents.layout.kept]
-        return f"<Sweep of {self.contents.name}: {self.contents.plan.sizes}, {', '.join(names)}>"
+        names = listed(item.name for item in self.contents.layout.kept)
+        return f"<Sweep of {self.contents.name}: {self.contents.plan.grid.sizes}, {names}>"
 
 
 def status_name(number: int) -> str:

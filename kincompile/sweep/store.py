@@ -25,17 +25,18 @@ if TYPE_CHECKING:
 class Memory:
     """Results that are kept in this process."""
 
-    IS_SHARED = False
-
     def __init__(self, contents: Contents) -> None:
-        self._contents = contents
-        self._done = np.zeros(len(contents.plan), dtype=bool)
-        self._arrays = contents.arrays()
+        self._contents, self._form = contents, contents.form
+        self._done = np.zeros(len(self._form.grid), dtype=bool)
+        self._arrays = self._form.empty()
 
-    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
+    def writer(self) -> None:
+        """Return nothing: workers hand their values back."""
+
+    def take(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
         """Keep the values of a chunk, by name."""
-        for name, block in self._contents.blocks(number, values).items():
-            self._arrays[name][self._contents.region(number, name)] = block
+        for name, block in self._form.blocks(number, values).items():
+            self._arrays[name][self._form.region(number, name)] = block
         self._done[number] = True
 
     def done(self) -> NDArray[np.bool_]:
@@ -44,7 +45,7 @@ class Memory:
 
     def read(self, number: int, name: str) -> NDArray[Any]:
         """Return the values of a chunk, of one array."""
-        found: NDArray[Any] = self._arrays[name][self._contents.region(number, name)]
+        found: NDArray[Any] = self._arrays[name][self._form.region(number, name)]
         return found
 
     def to_xarray(self) -> xarray.Dataset:

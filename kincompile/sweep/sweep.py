@@ -176,17 +176,17 @@ def _solve_missing(
 ) -> None:
     """Solve the chunks that are not in the store yet."""
     is_done = kept.done()
-    done = sum(int(np.prod(plan.shape(k))) for k in np.flatnonzero(is_done).tolist())
+    done = sum(plan.grid.count(k) for k in np.flatnonzero(is_done).tolist())
     if progress and done:
-        progress(done, plan.variants)
+        progress(done, plan.grid.variants)
     missing = np.flatnonzero(~is_done).tolist()
-    shared = job.written_by(kept) if kept.IS_SHARED else job
-    for number, values in solved(shared, plan, missing, executor, pending):
+    job = job.written_by(kept.writer())
+    for number, values in solved(job, plan, missing, executor, pending):
         if values is not None:
-            kept.write(number, values)
-        done += int(np.prod(plan.shape(number)))
+            kept.take(number, values)
+        done += plan.grid.count(number)
         if progress:
-            progress(done, plan.variants)
+            progress(done, plan.grid.variants)
 
 
 def _require_all(result: Sweep) -> None:
@@ -197,19 +197,19 @@ def _require_all(result: Sweep) -> None:
     SweepError
         If chunks are missing though no worker failed.
     """
-    missing = np.count_nonzero(~result.store.done())
+    missing, total = np.count_nonzero(~result.store.done()), len(result.contents.plan.grid)
     if missing:
         raise SweepError(
-            f"{missing} of {len(result.contents.plan)} chunks are not in {result.where}, and no "
-            "worker failed: they were written elsewhere. Give a folder that all workers see under "
-            "this name, or no store, and workers hand their results back.",
+            f"{missing} of {total} chunks are not in {result.where}, and no worker failed: they "
+            "were written elsewhere. Give a folder that all workers see under this name, or no "
+            "store, and workers hand their results back.",
             result,
         )
 
 
 def _stopped(error: StoppedError, result: Sweep) -> str:
     """Say that the executor stopped the sweep, what is kept and what to do."""
-    done, total = int(result.store.done().sum()), len(result.contents.plan)
+    done, total = int(result.store.done().sum()), len(result.contents.plan.grid)
     if result.where:
         kept = f"{escaped(result.where)} has them; the same call goes on from there"
     else:

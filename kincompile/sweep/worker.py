@@ -30,10 +30,10 @@ _MODULES: dict[str, ModuleType] = {}
 
 
 class Writer(Protocol):
-    """What writes a chunk; a worker may have a copy of it."""
+    """What writes a chunk; it is sent to workers, with each chunk, so that it is small."""
 
-    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the values of a chunk, by name."""
+    def write(self, number: int, sets: Array, values: Mapping[str, NDArray[Any]]) -> None:
+        """Keep the values of a chunk, by name, whose parameters are (B, k)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class Job:
     layout: Layout
     writer: Writer | None
 
-    def written_by(self, writer: Writer) -> Job:
+    def written_by(self, writer: Writer | None) -> Job:
         """Return the job of workers that write what they have solved."""
         return replace(self, writer=writer)
 
@@ -116,5 +116,5 @@ def run(job: Job, number: int, sets: Array) -> dict[str, NDArray[Any]] | None:
         values = job.layout.values(solution)
     if job.writer is None:
         return values
-    job.writer.write(number, values)
+    job.writer.write(number, sets, values)
     return None

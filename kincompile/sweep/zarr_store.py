@@ -24,17 +24,41 @@ if TYPE_CHECKING:
     import zarr
     from numpy.typing import NDArray
 
-    from kincompile.sweep.contents import Contents
+    from kincompile.sweep.contents import Contents, Form
+
+
+class ZarrWriter:
+    """Writes chunks into a Zarr group, in the process of a worker too."""
+
+    def __init__(self, path: Path, form: Form) -> None:
+        self.path, self.form = path, form
+        self._arrays: dict[str, zarr.Array[Any]] = {}
+
+    def __reduce__(self) -> tuple[type[ZarrWriter], tuple[Path, Form]]:
+        """Return what makes the copy of a worker, which opens the group itself."""
+        return ZarrWriter, (self.path, self.form)
+
+    def write(self, number: int, sets: NDArray[Any], values: Mapping[str, NDArray[Any]]) -> None:
+        """Write a chunk: the file of each array, statuses last."""
+        del sets  # they are coordinates of the group
+        with kept_in(self.path):
+            for name, block in self.form.blocks(number, values).items():
+                self.array(name)[self.form.region(number, name)] = block
+
+    def array(self, name: str) -> zarr.Array[Any]:
+        """Return an array of the group; it is opened once, which takes milliseconds."""
+        if name not in self._arrays:
+            import zarr
+
+            self._arrays[name] = zarr.open_array(self.path / name, mode="r+")
+        return self._arrays[name]
 
 
 class ZarrStore:
     """A folder with a Zarr group, format 3."""
 
-    IS_SHARED = True
-
-    def __init__(self, path: Path, contents: Contents) -> None:
-        self._path, self._contents = path, contents
-        self._arrays: dict[str, Any] = {}
+    def __init__(self, path: Path, form: Form) -> None:
+        self._form, self._writer = form, ZarrWriter(path, form)
 
     @classmethod
     def opened(cls, path: Path, contents: Contents) -> ZarrStore:
@@ -50,57 +74,42 @@ class ZarrStore:
         else:
             with made_whole(path) as folder:
                 _make(zarr.open_group(folder, mode="w-"), contents)
-        return cls(path, contents)
+        return cls(path, contents.form)
 
-    def __getstate__(self) -> tuple[Path, Contents]:
-        """Return what a worker needs; it opens the group itself."""
-        return self._path, self._contents
+    def writer(self) -> ZarrWriter:
+        """Return what a worker writes its chunks with."""
+        return self._writer
 
-    def __setstate__(self, state: tuple[Path, Contents]) -> None:
-        """Restore the store."""
-        self.__init__(*state)  # type: ignore[misc]
-
-    def write(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
-        """Write a chunk: the file of each array, statuses last."""
-        with kept_in(self._path):
-            for name, block in self._contents.blocks(number, values).items():
-                self._array(name)[self._contents.region(number, name)] = block
-
-    def read(self, number: int, name: str) -> NDArray[Any]:
-        """Return the values of a chunk, of one array."""
-        return np.asarray(self._array(name)[self._contents.region(number, name)])
-
-    def _array(self, name: str) -> Any:
-        """Return an array of the group; it is opened once, which takes milliseconds."""
-        if name not in self._arrays:
-            import zarr
-
-            self._arrays[name] = zarr.open_array(self._path / name, mode="r+")
-        return self._arrays[name]
+    def take(self, number: int, values: Mapping[str, NDArray[Any]]) -> None:
+        """Do nothing: workers write."""
 
     def done(self) -> NDArray[np.bool_]:
         """Return which chunks have statuses."""
-        plan, folder = self._contents.plan, self._path / STATUS / "c"
-        ending = ("0",) if self._contents.layout.over_time else ()
+        grid, folder = self._form.grid, self._writer.path / STATUS / "c"
+        ending = ("0",) if self._form.layout.over_time else ()
         files = (
-            folder.joinpath(*map(str, plan.place(number)), *ending) for number in range(len(plan))
+            folder.joinpath(*map(str, grid.place(number)), *ending) for number in range(len(grid))
         )
-        return np.fromiter((file.is_file() for file in files), dtype=bool, count=len(plan))
+        return np.fromiter((file.is_file() for file in files), dtype=bool, count=len(grid))
+
+    def read(self, number: int, name: str) -> NDArray[Any]:
+        """Return the values of a chunk, of one array."""
+        return np.asarray(self._writer.array(name)[self._form.region(number, name)])
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the results, which are read when they are used."""
         with package_of_extra("xarray", "tables"):
             import xarray
         found: xarray.Dataset
-        found = xarray.open_zarr(self._path, chunks=None, consolidated=False)
+        found = xarray.open_zarr(self._writer.path, chunks=None, consolidated=False)
         return found
 
 
 def _make(group: zarr.Group, contents: Contents) -> None:
     """Make the arrays, empty but for the coordinates."""
-    swept = " ".join(name for name in contents.coordinates if name not in contents.plan.sizes)
+    swept = " ".join(name for name in contents.coordinates if name not in contents.form.grid.sizes)
     group.attrs.update({**contents.about, "coordinates": swept})
-    for item in contents.variables:
+    for item in contents.form.variables.values():
         group.create_array(
             item.name,
             shape=item.shape,

@@ -10,6 +10,7 @@ const AXES = ['x', 'y', 'z'];
 const LIGHT = [-0.42, 0.55, 0.72];  // to the right, up, and towards the viewer
 const SHADES = 16;
 const PIECE = 5;  // sizes, the longest part of a solid: what is nearer is drawn later
+const MARKS = 3;  // sizes that a mark reaches beyond its place
 const EYE = 4.5;  // how far the eye is, in half diagonals of the extent
 const STANDARD = {  // azimuth of the viewer, and how high it stands
   front: [-Math.PI / 2, 0], side: [0, 0], top: [-Math.PI / 2, Math.PI / 2],
@@ -80,6 +81,7 @@ const orbit = {
   height: STANDARD.isometric[1],
   fitted: STANDARD.isometric,  // the direction for which all of it fits: turning does not change sizes
   isPerspective: false,
+  reach: null,  // how far the motion goes from the middle of its extent, as fitted: to the side, and up
 
   /* Turn the drawing as it is dragged, in pixels. */
   pan(right, down) {
@@ -91,7 +93,29 @@ const orbit = {
   /* One of the standard views, all of it seen. */
   look(name) {
     [this.azimuth, this.height] = this.fitted = STANDARD[name];
+    this.reach = null;
+    this.measure();
     stage.fit();
+  },
+
+  /* Find how far the motion goes; with what was found before, so that nothing jumps. */
+  measure() {
+    const { drawing, extent } = player.data, middle = middleOfExtent(extent), axes = axesSeenFrom(this.fitted);
+    const found = this.reach ?? [0, 0];
+    for (const [frame, point] of drawing.marks.flatMap(reachOf)) {
+      for (const { q } of isGround(frame) ? player.states.slice(0, 1) : player.states) {
+        const way = minus(inWorld(q, frame, point), middle);
+        for (const k of [0, 1]) found[k] = Math.max(found[k], Math.abs(product(way, axes[k])) + MARKS * drawing.size);
+      }
+    }
+    this.reach = found;
+  },
+
+  /* What has to be seen of an extent: of the motion's own, what is there, of another one all of it. */
+  reachOf(extent) {
+    if (this.reach && extent.every((x, k) => x === player.data.extent[k])) return this.reach;
+    const half = minus(extent.filter((_, k) => k % 2), middleOfExtent(extent));
+    return axesSeenFrom(this.fitted).slice(0, 2).map(axis => product(axis.map(Math.abs), half));
   },
 
   keys: {
@@ -122,6 +146,8 @@ const orbit = {
     made.ariaPressed = 'false';
     bar.style.marginTop = '.5rem';
     document.getElementById('drawn').append(bar);
+    this.measure();
+    player.onMotion(() => this.measure());
     stage.canvas.addEventListener('contextmenu', event => event.preventDefault());
     for (const id of ['poles', 'centrodes']) document.getElementById(id).closest('label').hidden = true;
     document.getElementById('pointing').append(' Drag beside the bodies to turn the drawing, with Shift or the right '
@@ -133,14 +159,12 @@ const orbit = {
    camera { zoom, centre } says what is looked at. */
 class View {
   constructor(extent, width, height, margin, camera = null) {
-    const low = [0, 2, 4].map(k => extent[k]), high = [1, 3, 5].map(k => extent[k]);
-    const half = minus(high, low).map(x => x / 2);
-    const [wide, tall] = axesSeenFrom(orbit.fitted).map(axis => product(axis.map(Math.abs), half));
+    const [wide, tall] = orbit.reachOf(extent), middle = middleOfExtent(extent);
     this.fit = Math.min((width / 2 - margin) / wide, (height / 2 - margin) / tall);
     this.scale = this.fit * (camera ? camera.zoom : 1);
-    this.centre = camera ? camera.centre : plus(low, half);
+    this.centre = camera ? camera.centre : middle;
     [this.right, this.up, this.back] = axesSeenFrom([orbit.azimuth, orbit.height]);
-    this.eye = orbit.isPerspective ? EYE * Math.hypot(...half) : Infinity;
+    this.eye = orbit.isPerspective ? EYE * distanceBetween(middle, extent.filter((_, k) => k % 2)) : Infinity;
     [this.left, this.top] = [width / 2, height / 2];
   }
 
@@ -176,6 +200,10 @@ class View {
     const way = this.eye === Infinity ? this.back : minus(plus(this.centre, this.back, this.eye), place);
     return product(normal, way) > 0;
   }
+}
+
+function middleOfExtent(extent) {
+  return [0, 2, 4].map(k => (extent[k] + extent[k + 1]) / 2);
 }
 
 /* To the right, up and towards the viewer. */

@@ -33,6 +33,9 @@ SENSITIVITIES = "_sensitivities"
 FORCES = "_forces"
 """Where a module of a mechanism with loads keeps what compiles its forces, on request."""
 
+DYNAMICS = "_dynamics"
+"""Where a module of a mechanism with loads keeps what compiles its equations of motion."""
+
 DRIVERS = "_drivers"
 """Where a module keeps the function that describes its drivers at a time and parameters."""
 
@@ -94,6 +97,30 @@ class ForceModules:
 
     compiled: Callable[[bool], ModuleType | None]
     joints: Mapping[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DynamicModules:
+    """The equations of motion of a mechanism, compiled.
+
+    Attributes
+    ----------
+    accelerations
+        A module without equations whose outputs are the accelerations, then the power of loads and
+        drivers.
+    corrections
+        The same, of changes of the coordinates and then of the rates that lead a state back to its
+        constraints.
+    redundant
+        Names of equations that repeat others and are left out.
+    free
+        Coordinates that may be given, as many as there are degrees of freedom.
+    """
+
+    accelerations: ModuleType
+    corrections: ModuleType
+    redundant: tuple[str, ...]
+    free: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

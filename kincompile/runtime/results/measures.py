@@ -27,6 +27,7 @@ from kincompile.runtime.problem import problem
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
 from kincompile.runtime.results.plot import runs
+from kincompile.runtime.singular.events import quintic
 from kincompile.tables import table
 
 if TYPE_CHECKING:
@@ -202,6 +203,7 @@ class _ObservedMotion:
         on_grid = np.array((self.y, self.y_dot, self.y_ddot)).transpose(1, 0, 2)
         self._known: dict[float, Array] = dict(zip(self.t.tolist(), on_grid, strict=True))
         self._states: dict[int, State | None] = {}
+        self._is_free = len(module.EQUATIONS) < len(solution.coordinates)
         start = self._position(0)
         equations = problem(self._module, self._p, start, self.t[0], staged=True)
         self._march = March(equations, equations.engine, TOLERANCE)
@@ -238,26 +240,36 @@ class _ObservedMotion:
     def _observed(self, t: float) -> Array:
         """Return all outputs and their rates at a time, shape (3, k)."""
         if t not in self._known:
-            state = self._state(t)
+            motion = self._interpolated(t) if self._is_free else self._followed(t)
             found = np.full((3, len(self.names)), np.nan)
-            if state is not None:
-                motion = state.point.q, state.q_dot, state.q_ddot
+            if motion is not None:
                 with np.errstate(all="ignore"):
                     found = np.array(self._module.observe(*motion, t, self._p))
             self._known[t] = found
         return self._known[t]
 
-    def _state(self, t: float) -> State | None:
+    def _followed(self, t: float) -> tuple[Array, Array, Array] | None:
         """Follow the motion from a neighbour on the grid, the nearer one first."""
-        last = self.t.size - 1
-        after = min(int(np.searchsorted(self.t, t)), last)
-        near = sorted({max(after - 1, 0), after}, key=lambda k: abs(float(self.t[k]) - t))
+        near = sorted(self._neighbours(t), key=lambda k: abs(float(self.t[k]) - t))
         for state in filter(None, map(self._on_grid, near)):
             with np.errstate(all="ignore"):
                 outcome = self._march.advance(state, t, MAX_CORRECTIONS)
             if outcome.position is not None:
-                return outcome.state
+                found = outcome.state
+                return None if found is None else (found.point.q, found.q_dot, found.q_ddot)
         return None
+
+    def _interpolated(self, t: float) -> tuple[Array, Array, Array]:
+        """Return a motion that follows from forces, between its points."""
+        own, rows = self._solution, self.rows[self._neighbours(t)]
+        ends = [(own.q[row], own.q_dot[row], own.q_ddot[row]) for row in rows.tolist()]
+        times = own.t[rows].tolist()
+        return ends[0] if len(ends) == 1 else quintic(times[0], ends[0], times[1], ends[1], t)
+
+    def _neighbours(self, t: float) -> list[int]:
+        """Return the numbers of the points before and after a time."""
+        after = min(int(np.searchsorted(self.t, t)), self.t.size - 1)
+        return sorted({max(after - 1, 0), after})
 
     def _on_grid(self, k: int) -> State | None:
         """Return a point of the grid as a state from which the motion is followed."""

@@ -49,7 +49,7 @@ class Solution(MotionTable):
     residual : ndarray, shape (N,)
         Largest absolute value of Phi after the last correction; NaN where nothing was evaluated.
     iterations : ndarray of int, shape (N,)
-        Newton iterations since the previous point, sub-steps included.
+        Newton iterations since the previous point, sub-steps included; of `kc.simulate` steps.
     success : bool
         Whether every point converged.
     message : str
@@ -68,7 +68,7 @@ class Solution(MotionTable):
     statistics : dict
         How it was found: ``coarse``, points of the coarse march of a grid; ``marched``, points that
         were followed one by one with a pivoted solve; of large mechanisms ``pivoted``, solves for
-        which the planned one was not good enough.
+        which the planned one was not good enough. Of a simulation ``steps`` and ``evaluations``.
     events : list of Event
         Lock-ups, bifurcations and jumps, in order, each with `.kind`, `.t`, `.bodies`, `.message`.
         Those of variants are found by solving a variant alone.

@@ -106,9 +106,10 @@ def _verdict(solution: Solution) -> str:
     """Return the points by status, the iterations and the largest residual."""
     counts = [(np.count_nonzero(solution.status == status), status) for status in Status]
     by_status = ", ".join(f"{count} {status.name}" for count, status in counts if count)
+    kind = "step" if "steps" in solution.statistics else "Newton iteration"
     return (
         f"{counted(solution.t.size, 'point')} from t = {solution.t[0]:g} to {solution.t[-1]:g}: "
-        f"{by_status}; {counted(int(solution.iterations.sum()), 'Newton iteration')}, "
+        f"{by_status}; {counted(int(solution.iterations.sum()), kind)}, "
         f"largest residual {_largest_residual(solution)}"
     )
 

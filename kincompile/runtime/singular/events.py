@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.engine import Point
     from kincompile.runtime.problem import Problem
 
+    Motion = tuple[Vector, Vector, Vector]
+
 LOCK_UP, BIFURCATION, BRANCH_SWITCH = "lock-up", "bifurcation", "branch switch"
 """Kinds of events."""
 
@@ -121,20 +123,21 @@ class Passage:
 
     def at(self, t: float) -> tuple[Vector, Vector, Vector]:
         """Return position, velocity and acceleration between the two, by interpolation."""
-        h = self.after.t - self.before.t
-        left = np.array([self.before.point.q, h * self.before.q_dot, h * h * self.before.q_ddot])
-        right = np.array([self.after.point.q, h * self.after.q_dot, h * h * self.after.q_ddot])
-        coefficients = np.concatenate((left[:2], left[2:] / 2, _QUINTIC @ np.vstack((left, right))))
-        s = (t - self.before.t) / h
-        powers = s ** np.arange(6)
-        order = np.arange(1, 6)
-        first = np.append(0.0, order * powers[:5])
-        second = np.append([0.0, 0.0], (order * (order - 1))[1:] * powers[:4])
-        return (
-            powers @ coefficients,
-            first @ coefficients / h,
-            second @ coefficients / h**2,
-        )
+        ends = [(x.t, (x.point.q, x.q_dot, x.q_ddot)) for x in (self.before, self.after)]
+        return quintic(*ends[0], *ends[1], t)
+
+
+def quintic(t0: float, first: Motion, t1: float, last: Motion, t: float) -> Motion:
+    """Return position, velocity and acceleration between two points of a motion that have them."""
+    h = t1 - t0
+    left, right = (np.array([x[0], h * x[1], h * h * x[2]]) for x in (first, last))
+    coefficients = np.concatenate((left[:2], left[2:] / 2, _QUINTIC @ np.vstack((left, right))))
+    s = (t - t0) / h
+    powers = s ** np.arange(6)
+    order = np.arange(1, 6)
+    rates = np.append(0.0, order * powers[:5])
+    second = np.append([0.0, 0.0], (order * (order - 1))[1:] * powers[:4])
+    return powers @ coefficients, rates @ coefficients / h, second @ coefficients / h**2
 
 
 _QUINTIC = np.array([

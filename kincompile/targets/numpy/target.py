@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any, Literal
 
 from kincompile.ir.elimination import plan_solve
@@ -96,8 +95,15 @@ def files(
 
 
 def _has(name: str, text: str) -> bool:
-    """Return whether a constant is used; a search for whole words alone takes a millisecond."""
-    return name in text and re.search(rf"\b{name}\b", text) is not None
+    """Return whether a constant is used as a word; `re` takes milliseconds for `pi` in `pin`."""
+    start = text.find(name)
+    while start >= 0:
+        end = start + len(name)
+        beside = text[start - 1 : start] + text[end : end + 1]
+        if not any(letter.isalnum() or letter == "_" for letter in beside):
+            return True
+        start = text.find(name, end)
+    return False
 
 
 def _constants(code: InlineProgram) -> dict[str, Any]:

@@ -32,6 +32,10 @@ NOT_LOADED = {
         "kincompile.targets.c kincompile.targets.octave"
     ),
     "run MODEL": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} scipy.sparse.csgraph",
+    "simulate HEAVY": (
+        "kincompile.derivation kincompile.compare kincompile.verify kincompile.view rich "
+        f"platformdirs matplotlib sksundae {LANGUAGES}"
+    ),
     "inspect MODEL": f"{PAGES} {EXTRA} {LANGUAGES} kincompile.targets.numpy kincompile.runtime",
     "derive MODEL -o PAGE.html": (
         f"{EXTRA} {LARGE} kincompile.view.page kincompile.view.mechanism_plot kincompile.compare "
@@ -72,6 +76,9 @@ def test_that_a_command_loads_what_it_uses(line, pendulum, tmp_path):
     hand = tmp_path / "hand.txt"
     hand.write_text("nu = [0, 0, 2]\n", encoding="utf-8")
     places = {"MODEL": pendulum, "HAND": hand, "PAGE.html": tmp_path / "page.html"}
+    places["HEAVY"] = tmp_path / "heavy.py"
+    text = pendulum.read_text(encoding="utf-8").replace("0.5)", "0.5), mass=1, inertia=1")
+    places["HEAVY"].write_text(text, encoding="utf-8")
     places |= {"DRAWING.svg": tmp_path / "drawing.svg"}
     places |= {"FOLDER": tmp_path / "new", "KIT": tmp_path / "kit"}
     if "KIT" in line:

@@ -46,7 +46,7 @@ def hinge(slope: float | None = None) -> spatial.Mechanism:
 MECHANISMS = [*(linkage.mechanism for linkage in LINKAGES), six_struts, hinge]
 
 
-@pytest.mark.parametrize("target", ["numpy", "c"])
+@pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("make", MECHANISMS, ids=["rssr", "wishbone", "six_struts", "hinge"])
 def test_that_x_is_that_of_lapack(make, target: str) -> None:
     module = kc.compile(make(), target=target)

@@ -10,7 +10,7 @@ import kincompile as kc
 from kincompile import spatial
 
 X, Y, Z = np.eye(3)
-TARGETS = ["numpy", "c"]
+TARGETS = ["numpy", pytest.param("c", marks=pytest.mark.slow)]  # gcc takes seconds
 quiet = pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
 
 

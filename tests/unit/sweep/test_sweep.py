@@ -1,5 +1,6 @@
 """Sweeps give the numbers of the closed form, with dimensions, units and statuses."""
 
+import pickle
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
@@ -160,7 +161,23 @@ def test_chunks_cover_every_variant_once_in_order(sizes, most):
     names = "abc"[: len(sizes)]
     sweep = {n: np.arange(float(size)) for n, size in zip(names, sizes, strict=True)}
     plan = Plan(tuple(names), np.zeros(len(sizes)), sweep, True, most)
-    sets = np.concatenate([plan.sets(number) for number in range(len(plan))])
-    assert all(len(plan.sets(number)) <= most for number in range(len(plan)))
+    sets = np.concatenate([plan.sets(number) for number in range(len(plan.grid))])
+    assert all(len(plan.sets(number)) <= most for number in range(len(plan.grid)))
     grid = np.meshgrid(*sweep.values(), indexing="ij")
     assert sets.tolist() == np.column_stack([x.ravel() for x in grid]).tolist()
+
+
+@pytest.mark.parametrize("ending", [".zarr", ".parquet", None])
+def test_what_is_sent_with_a_chunk_does_not_grow_with_the_sweep(ending, tmp_path):
+    sizes = []
+    for count in (10, 100_000):
+
+        class Noting:
+            def submit(self, *given):
+                sizes.append(len(pickle.dumps(given)))
+                raise RuntimeError("enough")
+
+        store = ending and tmp_path / f"{count}{ending}"
+        with pytest.raises(kc.SweepError, match="enough"):
+            sweep(p={"a": np.linspace(1, 2, count)}, chunk=5, store=store, executor=Noting())
+    assert abs(sizes[1] - sizes[0]) < 200

@@ -1,0 +1,113 @@
+"""`kincompile simulate`: the motion of a model that follows from its masses and forces."""
+
+from __future__ import annotations
+
+import click
+
+import kincompile as kc
+from kincompile.cli.motion import motion_times, set_values, time_options
+from kincompile.cli.progress import progress_bar
+from kincompile.cli.shared import (
+    NOT_CONVERGED,
+    output_option,
+    print_data,
+    read_model,
+    require_output,
+)
+from kincompile.errors import InputError
+from kincompile.runtime.dynamics.solvers import METHODS
+from kincompile.runtime.results.summary import summary
+from kincompile.runtime.results.write import require_known_suffix
+
+
+@click.command("simulate")
+@click.argument("model")
+@time_options
+@click.option(
+    "--position",
+    "positions",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A coordinate at the start, held exactly, such as crank.phi=30deg.",
+)
+@click.option(
+    "--velocity",
+    "velocities",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A velocity at the start, such as crank.phi_dot=2.",
+)
+@click.option(
+    "--stop",
+    "stops",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="End where a coordinate or output has this value.",
+)
+@click.option("--method", type=click.Choice(METHODS), default="DOP853", help="The integrator.")
+@click.option("--rtol", type=float, default=1e-9, help="Relative tolerance of a step.")
+@click.option("--through", type=click.Choice(["smooth"]), help="Go on past singular positions.")
+@click.option(
+    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show and write angles in degrees."
+)
+@click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
+@output_option("Write the motion: .csv, .npz or .json.", required=False)
+@click.pass_context
+def command(
+    context: click.Context,
+    model: str,
+    start: str,
+    end: str | None,
+    points: int | None,
+    values: tuple[str, ...],
+    positions: tuple[str, ...],
+    velocities: tuple[str, ...],
+    stops: tuple[str, ...],
+    method: str,
+    rtol: float,
+    through: str | None,
+    angle_unit: str,
+    has_forces: bool,
+    output: str | None,
+) -> None:
+    """Simulate MODEL: the motion that follows from its masses and forces.
+
+    Without --position and --velocity it begins at the guess, at rest. The summary goes to stdout,
+    or to stderr where a file is written. Where the motion cannot go on, what was found is written
+    nevertheless, and the exit code is 3.
+    """  # fmt: skip
+    if output is not None:
+        require_known_suffix(output)
+        require_output(output, model, "the model itself")
+    mechanism = read_model(model)
+    numbers = set_values(mechanism, values)
+    times = motion_times(mechanism, start, end, points, None, numbers)
+    if times.size < 2:
+        raise InputError("a simulation takes time: give --end and --points of at least 2.")
+    module = kc.compile(mechanism)
+    with progress_bar() as progress:
+        solution = kc.simulate(
+            module,
+            times,
+            numbers,
+            position=set_values(mechanism, positions, "--position"),
+            velocity=set_values(mechanism, velocities, "--velocity"),
+            stops=set_values(mechanism, stops, "--stop"),
+            method=method,
+            rtol=rtol,
+            through=through,
+            progress=progress,
+        )
+    text = f"{summary(solution, angle_unit)}\n{solution.message}"
+    written = solution
+    if has_forces:
+        found = kc.forces(solution)
+        text, written = f"{text}\n\n{found.summary()}", found.motion
+    if output is None:
+        print_data(text + "\n")
+    else:
+        kc.write(written, output, angle_unit=angle_unit)
+        click.echo(f"{text}\nWrote {output}", err=True)
+    if not solution.success:
+        click.echo(f"Error: {solution.message}", err=True)
+        context.exit(NOT_CONVERGED)

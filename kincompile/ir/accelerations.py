@@ -1,0 +1,225 @@
+r"""Forward dynamics as outputs: straight-line code with the solve for the accelerations in it.
+
+.. math:: M \ddot q + \Phi_q^T \lambda = Q, \qquad \Phi_q \ddot q = \gamma
+
+is the equation of motion with its constraints differentiated twice (index 1). The same matrix, with
+other right sides, leads a state back to its constraints by the smallest movement, measured by M:
+
+.. math:: \Phi_q \Delta q = -\Phi, \qquad \Phi_q \Delta\dot q = \nu - \Phi_q \dot q.
+
+Where M does not resist a movement, as of a contact or of the length of Euler parameters, a multiple
+of :math:`\Phi_q^T \Phi_q` is added to it, and to Q accordingly: that changes no acceleration.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.errors import StructuralError
+from kincompile.ir.augmented import plan_augmented
+from kincompile.ir.differentiate import tangents
+from kincompile.ir.graph import Graph
+from kincompile.ir.inline import Entry
+from kincompile.ir.observing import observing_program
+from kincompile.ir.straight_solve import StraightSolve
+from kincompile.model.points import OutputColumn
+from kincompile.names import correction, force_units, listed, rate, solved
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
+
+
+def require_masses(code: InlineProgram) -> None:
+    """Refuse a mechanism some bodies of which have no mass.
+
+    Raises
+    ------
+    StructuralError
+        With the bodies, and what to do.
+    """
+    heavy = {entry.row for entry in code.entries("M") if entry.row == entry.column}
+    light = [body.name for body in code.program.bodies if not heavy.issuperset(body.columns)]
+    if light:
+        have = "has" if len(light) == 1 else "have"
+        raise StructuralError(
+            f"{code.program.name}: {listed(light)} {have} no mass, and how a body without mass "
+            "moves no force decides: give mass=... and inertia=... to m.body, however small."
+        )
+
+
+def observing_accelerations(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
+    """Return a program whose outputs are the accelerations of a mechanism that moves freely.
+
+    Parameters
+    ----------
+    code
+        A mechanism whose bodies have masses.
+    left_out
+        Rows of equations that repeat others.
+
+    Returns
+    -------
+    Program
+        Its outputs are the accelerations, and the power of loads and drivers together.
+    """
+    motion = _Motion(code, left_out)
+    found = motion.accelerations()
+    titles = [OutputColumn(solved(name), "") for name in motion.names]
+    body = code.program.bodies[0] if code.program.bodies else None
+    length = code.program.coordinates[body.columns.start].unit if body else ""
+    titles.append(OutputColumn(solved("power"), force_units(length)[2]))
+    return _program(code, "accelerations", motion, found, titles, left_out)
+
+
+def observing_corrections(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
+    """Return a program whose outputs lead coordinates and rates back to their constraints.
+
+    Its outputs are the changes of the coordinates, then those of the rates.
+    """
+    motion = _Motion(code, left_out)
+    found = motion.corrections()
+    titles = [OutputColumn(correction(name, k), "") for k in range(2) for name in motion.names]
+    return _program(code, "corrections", motion, found, titles, left_out)
+
+
+def _program(
+    code: InlineProgram,
+    name: str,
+    motion: _Motion,
+    nodes: Sequence[int],
+    titles: Sequence[OutputColumn],
+    left_out: Collection[int],
+) -> Program:
+    outputs = {"outputs": nodes}
+    key = tuple(sorted(left_out))
+    return observing_program(code.program, name, motion.graph, outputs, titles, key=key)
+
+
+class _Motion:
+    """The equations of motion of a mechanism, with their planned solve.
+
+    Attributes
+    ----------
+    graph
+        The mechanism's code, to which that of the solve is added.
+    names
+        The coordinates.
+    """
+
+    def __init__(self, code: InlineProgram, left_out: Collection[int]) -> None:
+        program = code.program
+        self._code, self.graph = code, Graph(code.nodes)
+        self.names = program.names_of("coordinates")
+        self._n, self._m = len(self.names), len(program.equations)
+        self._Phi_q = [entry for entry in code.entries("Phi_q") if entry.row not in left_out]
+        self._q_dot = [self.graph.input(rate(name)) for name in self.names]
+        self._rows = self._rows_of(self._Phi_q)
+        self._weights = self._weighted()
+        M = self._mass_matrix()
+        self._plan = plan_augmented(
+            self._n,
+            self._m,
+            [(x.row, x.column, self.graph.value_of(x.node)) for x in M],
+            [(x.row, x.column, code.number(x.node)) for x in self._Phi_q],
+            left_out,
+        )
+        jacobian = [Entry(self._n + x.row, x.column, x.node) for x in self._Phi_q]
+        mirrored = [Entry(x.column, x.row, x.node) for x in jacobian]
+        self._solve = StraightSolve(self.graph, [*M, *jacobian, *mirrored], self._plan)
+
+    def _rows_of(self, entries: Sequence[Entry]) -> dict[int, dict[int, int]]:
+        """Return the nodes of Phi_q by row and column."""
+        rows: dict[int, dict[int, int]] = {}
+        for entry in entries:
+            rows.setdefault(entry.row, {})[entry.column] = entry.node
+        return rows
+
+    def _weighted(self) -> dict[int, int]:
+        """Return the rows whose squares are added to M, with their weights.
+
+        They are those of coordinates without mass, and the norms of Euler parameters. The weight
+        makes what is added as large as the masses that the row connects.
+        """
+        graph, program = self.graph, self._code.program
+        mass = {x.row: x.node for x in self._code.entries("M") if x.row == x.column}
+        norms = {item.first_row for item in program.instances if item.is_own}
+        weights = {}
+        for row, entries in self._rows.items():
+            if mass.keys() >= entries.keys() and row not in norms:
+                continue
+            inertia, square = graph.const(0), graph.const(0)
+            for column, node in entries.items():
+                inertia = graph.add(inertia, mass.get(column, graph.const(0)))
+                square = graph.add(square, graph.square(node))
+            weights[row] = graph.div(inertia, square)
+        return weights
+
+    def _mass_matrix(self) -> list[Entry]:
+        """Return the entries of M, with what is added to it."""
+        graph = self.graph
+        found = {(x.row, x.column): x.node for x in self._code.entries("M")}
+        for row, weight in self._weights.items():
+            entries = self._rows[row]
+            for i, first in entries.items():
+                for j, second in entries.items():
+                    term = graph.mul(weight, graph.mul(first, second))
+                    found[i, j] = graph.add(found.get((i, j), graph.const(0)), term)
+        return [Entry(*place, node) for place, node in sorted(found.items())]
+
+    def _pushed(self, force: Sequence[int], right: Sequence[int]) -> list[int]:
+        """Return generalised forces with what is added to them, for a right side of Phi_q."""
+        graph, found = self.graph, list(force)
+        for row, weight in self._weights.items():
+            for column, node in self._rows[row].items():
+                term = graph.mul(graph.mul(weight, node), right[row])
+                found[column] = graph.add(found[column], term)
+        return found
+
+    def accelerations(self) -> list[int]:
+        """Return the accelerations, and the power of loads and drivers."""
+        gamma, Q = self._column("gamma", self._m), self._column("Q", self._n)
+        found = self._solve.solve([*self._pushed(Q, gamma), *gamma])
+        return [*found[: self._n], self._power(Q, found[self._n :])]
+
+    def _power(self, Q: Sequence[int], multipliers: Sequence[int]) -> int:
+        r"""Return the power of loads and drivers, of which the kinetic energy is the work.
+
+        Q has the forces of inertia, whose power is :math:`-\dot q^T \dot M \dot q/2`.
+        """
+        graph, q_dot = self.graph, self._q_dot
+        half = graph.div(graph.const(1), graph.const(2))
+        total = graph.const(0)
+        for force, speed in zip(Q, q_dot, strict=True):
+            total = graph.add(total, graph.mul(force, speed))
+        M = self._code.entries("M")
+        motion = dict(zip(map(graph.input, self.names), q_dot, strict=True))
+        for x, slope in zip(M, tangents(graph, [x.node for x in M], motion), strict=True):
+            speeds = graph.mul(q_dot[x.row], q_dot[x.column])
+            total = graph.add(total, graph.mul(half, graph.mul(slope, speeds)))
+        for factor, nu in zip(multipliers, self._column("nu", self._m), strict=True):
+            total = graph.sub(total, graph.mul(factor, nu))
+        return total
+
+    def corrections(self) -> list[int]:
+        """Return the corrections of coordinates and of rates."""
+        graph = self.graph
+        position = [graph.neg(node) for node in self._column("Phi", self._m)]
+        velocity = self._column("nu", self._m)
+        for entry in self._Phi_q:
+            term = graph.mul(entry.node, self._q_dot[entry.column])
+            velocity[entry.row] = graph.sub(velocity[entry.row], term)
+        found = []
+        for right in (position, velocity):
+            still = self._pushed([graph.const(0)] * self._n, right)
+            found += self._solve.solve([*still, *right])[: self._n]
+        return found
+
+    def _column(self, quantity: str, size: int) -> list[int]:
+        """Return the nodes of a vector."""
+        found = [self.graph.const(0)] * size
+        for entry in self._code.entries(quantity):
+            found[entry.row] = entry.node
+        return found

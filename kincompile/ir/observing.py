@@ -1,0 +1,69 @@
+"""Programs without equations: what is known of a mechanism along its motion, as outputs alone."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from kincompile.ir.graph import Graph
+from kincompile.ir.kernels import pruned_kernel
+from kincompile.ir.program import Instance, OutputDerivatives
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from kincompile.ir.program import Program
+    from kincompile.model.bodies import Parameter
+    from kincompile.model.points import OutputColumn
+
+
+def observing_program(
+    program: Program,
+    name: str,
+    graph: Graph,
+    outputs: Mapping[str, Sequence[int]],
+    titles: Sequence[OutputColumn],
+    *,
+    key: object = (),
+    added: Sequence[Parameter] = (),
+) -> Program:
+    """Return a program without equations and loads, with these outputs.
+
+    Parameters
+    ----------
+    program
+        The mechanism.
+    name
+        What the outputs are, such as ``forces``.
+    graph
+        The mechanism's code, with that of the outputs.
+    outputs
+        Nodes by quantity, ``outputs`` and perhaps their rates.
+    titles
+        Name and unit of each output.
+    key
+        What else tells one such program from another.
+    added
+        Further parameters.
+    """
+    entries = {
+        quantity: [(row, 0, node) for row, node in enumerate(nodes)]
+        for quantity, nodes in outputs.items()
+    }
+    kernel = pruned_kernel(name.capitalize(), graph, entries)
+    values = Graph(program.values)
+    bindings = tuple(values.input(item) for item in kernel.inputs)
+    content = repr((program.fingerprint, name, key))
+    return replace(
+        program,
+        equations=(),
+        instances=(),
+        loads=(),
+        redundant=(),
+        parameters=(*program.parameters, *added),
+        values=tuple(values.nodes),
+        fingerprint=hashlib.sha256(content.encode()).hexdigest()[:32],
+        unsolvable="it has no equations",
+        observers=(Instance(kernel, OutputDerivatives(name, (), tuple(titles)), 0, (), bindings),),
+    )

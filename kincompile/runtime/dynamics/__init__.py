@@ -1,0 +1,1 @@
+"""Motions that follow from forces: consistent starts, integration, projection, events."""

@@ -1,0 +1,176 @@
+"""The equations of motion of a mechanism with its parameters set, as compiled code gives them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.criteria import RESIDUAL_FACTOR, TOLERANCE, probe_of
+from kincompile.errors import InputError, UnsupportedError
+from kincompile.runtime.engine.code import DYNAMICS, code_of
+from kincompile.runtime.problem import problem
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
+    from kincompile.runtime.engine.code import Array, DynamicModules
+    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.inputs import Inputs
+
+    Evaluate = Callable[[Array, float], Array]
+
+HELD = 1e-12
+"""Correction of a state, in scales, up to which its constraints hold."""
+
+CORRECTIONS = 8
+"""Corrections of a state that drifted, until its constraints hold: each squares what is missing."""
+
+
+def dynamic_modules(module: ModuleType) -> DynamicModules:
+    """Return the compiled equations of motion of a mechanism.
+
+    Raises
+    ------
+    InputError
+        If it has no masses and forces, or was loaded from a file.
+    UnsupportedError
+        If it is in grouped form.
+    StructuralError
+        If a body has no mass, or constraints contradict each other.
+    """
+    found: Callable[[], DynamicModules] | None = vars(module).get(DYNAMICS)
+    if found is not None:
+        return found()
+    if not hasattr(module, "LOADS"):
+        raise InputError(
+            f"{module.NAME} has no masses and no forces, from which a motion would follow: give "
+            "its bodies masses, m.body(..., mass=..., inertia=...), and set m.gravity."
+        )
+    if code_of(module).evaluate is not None:
+        raise UnsupportedError(
+            f"{module.NAME} is in grouped form, as large mechanisms are, whose equations of motion "
+            "are not compiled: use form='inline'."
+        )
+    raise InputError(
+        f"the module of {module.NAME} was loaded from a file, which knows no more than its own "
+        "functions: compile the model, and simulate that."
+    )
+
+
+class Equations:
+    """The equations of motion at the parameters of a simulation.
+
+    A state is y = (q, q_dot, work), with the work of loads and drivers since the start.
+
+    Attributes
+    ----------
+    code
+        The kinematic module.
+    joints
+        Its constraints, with the scales of coordinates and equations.
+    independent
+        Rows of equations that repeat no other.
+    """
+
+    def __init__(self, inputs: Inputs, modules: DynamicModules) -> None:
+        self.code, self._p = inputs.code, inputs.p
+        self.n = inputs.guess.size
+        self.names_free = modules.free
+        self._accelerate = _evaluator(modules.accelerations, self.n, inputs.p)
+        self._correct = _evaluator(modules.corrections, self.n, inputs.p)
+        left_out = set(modules.redundant)
+        rows = [k for k, name in enumerate(self.code.equations) if name not in left_out]
+        self.independent = np.array(rows, dtype=int)
+        self.evaluations = 0
+        self.measure_at(inputs.guess, float(inputs.t[0]))
+
+    def measure_at(self, q: Array, t: float) -> None:
+        """Take the scales of coordinates and equations from a position."""
+        self.joints = problem(self.code.module, self._p, q, t)
+
+    @property
+    def scale(self) -> Array:
+        """Scale of each coordinate."""
+        return self.joints.reference
+
+    def rate(self, t: float, y: Array) -> Array:
+        """Return the rate of a state; NaN where there is none."""
+        self.evaluations += 1
+        n = self.n
+        found = self._accelerate(y, t)
+        return np.concatenate((y[n : 2 * n], found))
+
+    def corrected(self, t: float, y: Array) -> tuple[Array, float]:
+        """Return a state led back to its constraints, and by how much at most, in scales.
+
+        It is moved as little as possible, as the masses measure it; the work stays.
+        """
+        n, drift = self.n, 0.0
+        for _ in range(CORRECTIONS):
+            change = self._correct(y, t)
+            y = y.copy()
+            y[: 2 * n] += change
+            sizes = np.abs(change.reshape(2, n)) / self.scale
+            drift = max(drift, float(sizes.max(initial=0.0)))
+            if self.joints.is_small(change[:n], y[:n], HELD):
+                return y, drift
+        return y, np.nan
+
+    def point(self, q: Array, t: float) -> Point | None:
+        """Return a position with its Phi_q; None where the equations have no finite value."""
+        found = self.joints.at(q, t)
+        return found if found is not None and np.isfinite(found.Phi_q).all() else None
+
+    def holds(self, point: Point) -> bool:
+        """Say whether all equations hold, those too that repeat others."""
+        return bool(self.joints.holds(point, RESIDUAL_FACTOR * TOLERANCE))
+
+    def scaled(self, point: Point) -> Array:
+        """Return Phi_q of independent equations, all coordinates and equations to one scale."""
+        matrix = self.joints.weights()[:, np.newaxis] * point.Phi_q * self.scale
+        return np.asarray(matrix[self.independent])
+
+    def inertia(self, q: Array, t: float) -> Array:
+        """Return M."""
+        return np.asarray(self.code.module.M(q, t, self._p))
+
+    def nu(self, q: Array, t: float) -> Array:
+        """Return the right side of the velocity equation."""
+        return np.asarray(self.code.nu(q, t, self._p))
+
+    def generic(self, q: Array) -> Array:
+        """Return a position beside one."""
+        return np.asarray(q + self.scale * probe_of(q.size))
+
+
+def _evaluator(module: ModuleType, n: int, p: Array) -> Evaluate:
+    """Return what gives the outputs of a module at a state (2 n + 1,), NaN where there are none."""
+    size = len(module.OUTPUTS)
+    compiled = vars(module).get("observe_into")
+    if compiled is not None:
+        return _compiled(compiled, n, size, p)
+    observe, floats, numbers = module.LANES["observe"], module.FLOATS, p.tolist()
+
+    def evaluate(y: Array, t: float) -> Array:
+        values = y.tolist()
+        q_dot = values[n : 2 * n]
+        try:
+            return np.array(observe(floats, values[:n], q_dot, q_dot, t, numbers))
+        except (ArithmeticError, ValueError):
+            return np.full(size, np.nan)
+
+    return evaluate
+
+
+def _compiled(observe: Callable[..., None], n: int, size: int, p: Array) -> Evaluate:
+    """Return the same of a module whose functions are compiled."""
+    found, sets = np.empty((1, size, 1)), np.ascontiguousarray(p)
+
+    def evaluate(y: Array, t: float) -> Array:
+        q, q_dot = y[:n, np.newaxis], y[n : 2 * n, np.newaxis]
+        observe((q, q_dot, q_dot), np.array([t]), sets, found)
+        return found[0, :, 0].copy()
+
+    return evaluate

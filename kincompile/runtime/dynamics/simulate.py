@@ -1,0 +1,213 @@
+"""Forward dynamics: the motion that follows from masses and forces.
+
+inputs     checked; the equations of motion are compiled on request   equations.Equations
+  -> a state that the constraints allow                               start.position_at, velocity_at
+  -> step by step, led back to the constraints after each             integrate.Integration
+       what happens within a step is located                          happenings.Watch
+  -> a Solution, with energies and drift as columns                   simulate
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
+from kincompile.errors import InputError, SolveError
+from kincompile.names import force_units, listed
+from kincompile.runtime.dynamics.equations import Equations, dynamic_modules
+from kincompile.runtime.dynamics.happenings import Watch
+from kincompile.runtime.dynamics.integrate import Integration
+from kincompile.runtime.dynamics.start import (
+    NotAssembledError,
+    given_values,
+    position_at,
+    velocity_at,
+)
+from kincompile.runtime.inputs import read_inputs
+from kincompile.runtime.results.solution import Solution
+from kincompile.runtime.status import Status
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from numpy.typing import ArrayLike
+
+    from kincompile.runtime.follow import Progress
+    from kincompile.runtime.inputs import Inputs, Values
+
+ADDED = ("kinetic_energy", "work", "energy_drift", "constraint_drift")
+"""Columns that a simulation adds to those of the motion."""
+
+
+def simulate(
+    module: ModuleType,
+    t: ArrayLike,
+    p: Values = None,
+    guess: Values = None,
+    *,
+    position: Mapping[str, float] | None = None,
+    velocity: Values = None,
+    events: Mapping[str, float] | None = None,
+    stops: Mapping[str, float] | None = None,
+    method: str = "DOP853",
+    rtol: float = 1e-9,
+    atol: float | None = None,
+    max_step: float = math.inf,
+    through: str | None = None,
+    throw: bool = False,
+    progress: Progress | None = None,
+) -> Solution:
+    r"""Simulate a mechanism: the motion that follows from its masses and forces.
+
+    Solves :math:`M \ddot q + \Phi_q^T \lambda = Q`, :math:`\Phi_q \ddot q = \gamma` for the
+    accelerations by code that is planned at compile time, lets a library integrate them, and leads
+    the state back to :math:`\Phi = 0` and :math:`\Phi_q \dot q = \nu` after every step.
+
+    Parameters
+    ----------
+    module
+        A module of `kc.compile`, of a mechanism whose bodies have masses. It may have drivers, and
+        as many degrees of freedom besides as it likes.
+    t : array_like, shape (N,)
+        Times, rising or falling; the motion begins at the first.
+    p, guess
+        Parameters, and where the position at the first time is looked for, as in `kc.solve`.
+    position : mapping, optional
+        Coordinates that are given exactly at the first time, ``{"crank.phi": 0.3}``; the others are
+        those near the guess that the constraints allow.
+    velocity : mapping or array_like, shape (n,), optional
+        Velocities at the first time, ``{"crank.phi_dot": 2}``; the others are those of the least
+        kinetic energy that the constraints allow. As an array, the velocities that are allowed and
+        nearest to it. Without it all that no driver moves begins at rest.
+    events, stops : mapping, optional
+        Values of coordinates or outputs, ``{"slider.x": 0.35}``, at which an event is located in
+        time; the motion goes on, or it ends there.
+    method : {"DOP853", "Radau", "CVODE"}
+        SciPy's explicit method of order 8 or its implicit one of order 5, or the multistep method
+        of SUNDIALS for stiff systems (``pip install 'kincompile[stiff]'``).
+    rtol, atol : float
+        Relative tolerance of a step; absolute one, in radians and sizes of the mechanism and per
+        second, without it as `rtol`.
+    max_step : float
+        The longest step [s].
+    through : {"smooth"}, optional
+        Go on through a singular configuration, as the integrator happens to step across it; without
+        it the motion ends there.
+    throw : bool
+        Raise `SolveError` unless every point was found.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with the times that were reached.
+
+    Returns
+    -------
+    Solution
+        Of the times, as `kc.solve` gives it. Its further columns are ``kinetic_energy``; ``work``,
+        what loads and drivers have done since the start; ``energy_drift``, kinetic energy less that
+        at the start less the work; and ``constraint_drift``, the largest correction, in radians or
+        sizes of the mechanism, that led back to the constraints since the point before. ``.events``
+        are what was located, ``.statistics`` steps and evaluations.
+
+    Raises
+    ------
+    InputError
+        When a value has the wrong name, shape, type or is not finite, or the module has no loads.
+    StructuralError
+        When a body has no mass, or constraints contradict each other.
+    UnsupportedError
+        When a package is missing, or the module is in grouped form.
+    SolveError
+        With `throw`, when a point was not reached; `.solution` has what was found.
+    """
+    inputs = read_inputs(
+        module, t, p, guess, TOLERANCE, MAX_ITERATIONS, None, through, may_move=True
+    )
+    modules = dynamic_modules(module)
+    names = inputs.code.coordinates
+    _check(inputs, rtol, atol, max_step)
+    held = given_values(names, position or {}, 0, "position")
+    rates = {}
+    if isinstance(velocity, Mapping):
+        rates = given_values(names, velocity, 1, "velocity")
+        velocity = None
+    elif velocity is not None and np.shape(velocity) != (len(names),):
+        raise InputError(
+            f"velocity has shape {np.shape(velocity)}, expected ({len(names)},): a velocity for "
+            f"each of {listed(names)}, or a dict of those that are given."
+        )
+    with np.errstate(all="ignore"):
+        equations = Equations(inputs, modules)
+        watch = Watch(equations, inputs, events or {}, stops or {}, smooth=through is not None)
+        integration = Integration(equations, inputs, watch, progress)
+        try:
+            first = float(inputs.t[0])
+            point = position_at(equations, inputs.guess, first, held)
+            equations.measure_at(point.q, first)
+            state = velocity_at(equations, point, rates, velocity)
+        except NotAssembledError as error:
+            integration.never_began(str(error))
+        else:
+            integration.run(np.concatenate((point.q, state, [0.0])), method, rtol, atol, max_step)
+    solution = _solution(inputs, integration)
+    if throw and not solution.success:
+        raise SolveError(solution.message, solution)
+    return solution
+
+
+def _check(inputs: Inputs, rtol: Any, atol: Any, max_step: Any) -> None:
+    """Refuse tolerances and names that cannot be."""
+    problems = [
+        f"{name} is {value!r}: give a positive number."
+        for name, value in (("rtol", rtol), ("atol", atol), ("max_step", max_step))
+        if value is not None and not (isinstance(value, int | float | np.number) and value > 0)
+    ]
+    times, names = inputs.t, getattr(inputs.code.module, "OUTPUTS", ())
+    if times.size < 2 or times[0] == times[-1]:
+        problems.append("t has no span: give the time of the start and at least one other time.")
+    if taken := {*ADDED}.intersection((*names, *inputs.code.coordinates)):
+        problems.append(
+            f"{inputs.code.name} has the name {min(taken)!r}, which is that of a column of a "
+            "simulation: rename it."
+        )
+    if problems:
+        raise InputError(problems)
+
+
+def _solution(inputs: Inputs, found: Integration) -> Solution:
+    """Return the motion, with its energies as columns."""
+    code = inputs.code
+    solution = Solution(
+        t=found.t,
+        q=found.q,
+        q_dot=found.q_dot,
+        q_ddot=found.q_ddot,
+        status=found.status,
+        residual=found.residual,
+        iterations=found.steps,
+        success=bool((found.status == Status.CONVERGED).all()),
+        message=found.message,
+        name=code.name,
+        coordinates=code.coordinates,
+        equations=code.equations,
+        units=dict(code.units),
+        parameters=dict(zip(code.parameters, inputs.p.tolist(), strict=True)),
+        sweep={},
+        statistics=found.statistics,
+        events=found.events,
+        module=code.module,
+    )
+    energy = _energy_unit(code.units, code.bodies, code.coordinates)
+    units = dict(zip(ADDED, (energy, energy, energy, ""), strict=True))
+    columns = np.stack((found.kinetic, found.work, found.energy_drift, found.drift), axis=-1)
+    return solution.observing(solution.observed.joined(ADDED, units, columns))
+
+
+def _energy_unit(
+    units: Mapping[str, str], bodies: tuple[tuple[str, int, int], ...], names: tuple[str, ...]
+) -> str:
+    """Return the unit of energies."""
+    length = units[names[bodies[0][1]]] if bodies else ""
+    return force_units(length)[1].replace("N*m", "J")

@@ -1,0 +1,182 @@
+"""Integrators of libraries, step by step: SciPy's DOP853 and Radau, and CVODE of SUNDIALS.
+
+None is our own. After a step of SciPy's the state is led back to its constraints, and the next step
+goes on from there. CVODE keeps a history of states that must not be touched: its states are led
+back where they are given out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from kincompile.errors import InputError, package_of_extra
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from kincompile.runtime.engine.code import Array
+
+    Rate = Callable[[float, Array], Array]
+
+METHODS = ("DOP853", "Radau", "CVODE")
+"""Integrators: explicit of order 8, implicit of order 5, and multistep for stiff systems."""
+
+FAILED = "the step that its tolerances ask for has become too small for floating point"
+
+
+class Stepper(Protocol):
+    """An integrator that goes from step to step.
+
+    Attributes
+    ----------
+    problem
+        Why it can go no further; "" as long as it can.
+    """
+
+    problem: str
+
+    @property
+    def t(self) -> float:
+        """Time after the last step."""
+
+    @property
+    def y(self) -> Array:
+        """State after the last step."""
+
+    def step(self) -> None:
+        """Take a step, not beyond the last time."""
+
+    def put(self, y: Array) -> None:
+        """Go on from another state, where that is possible."""
+
+    def between(self) -> Callable[[float], Array]:
+        """Return the states within the last step."""
+
+
+def stepper(
+    method: str, rate: Rate, t: Array, y: Array, tolerance: tuple[float, Array], max_step: float
+) -> Stepper:
+    """Return an integrator at its first state.
+
+    Parameters
+    ----------
+    method
+        One of `METHODS`.
+    rate
+        The rate of a state at a time.
+    t
+        First and last time.
+    y
+        The first state.
+    tolerance
+        Relative, and absolute for each number.
+    max_step
+        The longest step.
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    UnsupportedError
+        If the package is not installed.
+    """
+    if method not in METHODS:
+        raise InputError(f"method is {method!r}: give one of {', '.join(METHODS)}.")
+    make: type[_OneStep | _Multistep] = _Multistep if method == "CVODE" else _OneStep
+    return make(method, rate, t, y, tolerance, max_step)
+
+
+class _OneStep:
+    """A solver of SciPy."""
+
+    def __init__(
+        self, method: str, rate: Rate, t: Array, y: Array, tolerance: tuple[float, Array],
+        max_step: float,
+    ) -> None:  # fmt: skip
+        from scipy import integrate
+
+        rtol, atol = tolerance
+        self.problem = ""
+        self._rate = rate
+        solver = getattr(integrate, method)
+        self._solver: Any = solver(
+            rate, float(t[0]), y, float(t[-1]), rtol=rtol, atol=atol, max_step=max_step
+        )
+
+    @property
+    def t(self) -> float:
+        """Time after the last step."""
+        return float(self._solver.t)
+
+    @property
+    def y(self) -> Array:
+        """State after the last step."""
+        return np.asarray(self._solver.y)
+
+    def step(self) -> None:
+        """Take one step."""
+        try:
+            self._solver.step()
+        except ValueError:  # numbers that are not finite, in the linear algebra of Radau
+            self.problem = FAILED
+        if self._solver.status == "failed":
+            self.problem = FAILED
+
+    def put(self, y: Array) -> None:
+        """Go on from another state."""
+        self._solver.y = y
+        self._solver.f = self._rate(self._solver.t, y)
+
+    def between(self) -> Callable[[float], Array]:
+        """Return SciPy's own interpolation."""
+        found: Callable[[float], Array] = self._solver.dense_output()
+        return found
+
+
+class _Multistep:
+    """CVODE of SUNDIALS, from scikit-sundae."""
+
+    def __init__(
+        self, method: str, rate: Rate, t: Array, y: Array, tolerance: tuple[float, Array],
+        max_step: float,
+    ) -> None:  # fmt: skip
+        del method
+        with package_of_extra("scikit-sundae", "stiff"):
+            from sksundae.cvode import CVODE
+
+        def into(t: float, y: Array, found: Array) -> int:
+            found[:] = rate(t, y)
+            return int(not np.isfinite(found).all())  # 1: try a smaller step
+
+        rtol, atol = tolerance
+        longest = max_step if np.isfinite(max_step) else 0.0
+        finite = np.where(np.isfinite(atol), atol, LARGE)
+        self.problem, self.t, self.y, self._end = "", float(t[0]), y, float(t[-1])
+        self._solver = CVODE(
+            into, rtol=rtol, atol=finite, max_step=longest, max_num_steps=MOST_STEPS
+        )
+        self._solver.init_step(self.t, y)
+
+    def step(self) -> None:
+        """Take one step."""
+        found = self._solver.step(self._end, "onestep", tstop=self._end)
+        if not found.success:
+            self.problem = f"CVODE says: {found.message}"
+            return
+        self.t, self.y = float(found.t), np.asarray(found.y)
+
+    def put(self, y: Array) -> None:
+        """Do nothing: the history stays."""
+
+    def between(self) -> Callable[[float], Array]:
+        """Return the interpolation of its history, which a request for a time behind it gives."""
+        return lambda t: np.asarray(self._solver.step(t).y)
+
+
+MOST_STEPS = 100_000
+"""Steps of a method between two of the times that were asked for, after which it is given up."""
+
+LARGE = 1e100
+"""An absolute tolerance that never counts."""

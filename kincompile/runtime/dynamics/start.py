@@ -1,0 +1,158 @@
+"""The state from which a motion begins: positions and velocities that the constraints allow.
+
+What is given is held. Of what is left open, coordinates are those nearest to the guess, and the
+velocities those of the least kinetic energy: what nobody sets in motion is at rest.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
+from kincompile.errors import InputError
+from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.runtime.singular.reach import missed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from kincompile.runtime.dynamics.equations import Equations
+    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.inputs import Values
+
+RANK = 1e-9
+"""Singular value, relative to the largest, that is zero."""
+
+AGREE = 1e-8
+"""Part of the velocities up to which those given agree with the constraints."""
+
+LARGEST_TURN = 1.0
+"""Largest change of a coordinate in one correction, in scales."""
+
+
+def given_values(
+    code_names: Sequence[str], given: Mapping[str, Any], order: int, what: str
+) -> dict[int, float]:
+    """Return values by column from a mapping of names, of rates with or without ``_dot``.
+
+    Raises
+    ------
+    InputError
+        With every name that is none, and every value that is no finite number.
+    """
+    found: dict[int, float] = {}
+    problems = []
+    for key, value in given.items():
+        name = column_name(str(key))
+        if order and name not in code_names:
+            name = name.removesuffix(rate("", order))
+        if name not in code_names:
+            near = suggestion(name, code_names) or "."
+            problems.append(f"{what}: there is no coordinate {key!r}{near}")
+        elif not (isinstance(value, int | float | np.number) and np.isfinite(value)):
+            problems.append(f"{what} of {key!r} is {value!r}: give a finite number.")
+        else:
+            found[code_names.index(name)] = float(value)
+    if problems:
+        problems[-1] += f" The coordinates are {listed(code_names)}."
+        raise InputError(problems)
+    return found
+
+
+class NotAssembledError(Exception):
+    """No position was found, or no velocity; the sentence says what is missed."""
+
+
+def position_at(equations: Equations, guess: Array, t: float, held: Mapping[int, float]) -> Point:
+    """Return the position near a guess at which the constraints hold and some values are given.
+
+    Raises
+    ------
+    NotAssembledError
+        Where there is none.
+    """
+    q = guess.copy()
+    q[list(held)] = list(held.values())
+    open_ = np.array([column for column in range(q.size) if column not in held], dtype=int)
+    scale, weights = equations.scale, equations.joints.weights()
+    point = None
+    for _ in range(MAX_ITERATIONS):
+        point = equations.point(q, t)
+        if point is None:
+            break
+        matrix = (weights[:, np.newaxis] * point.Phi_q * scale)[:, open_]
+        change = -np.linalg.lstsq(matrix, weights * point.Phi, rcond=RANK)[0]
+        size = float(np.abs(change).max(initial=0.0))
+        moved = np.zeros_like(q)
+        moved[open_] = scale[open_] * change * min(1.0, LARGEST_TURN / max(size, 1e-300))
+        q = q + moved
+        if equations.joints.is_small(moved, q, TOLERANCE):
+            found = equations.point(q, t)
+            if found is not None and equations.holds(found):
+                return found
+            break
+    raise NotAssembledError(_unmet(equations, point, held))
+
+
+def _unmet(equations: Equations, point: Point | None, held: Mapping[int, float]) -> str:
+    """Say which equation is missed most."""
+    if point is None:
+        return "an equation has no finite value there: give a guess nearer to the mechanism."
+    row = int(np.argmax(np.abs(point.Phi) * equations.joints.weights()))
+    fixed = [equations.code.coordinates[column] for column in held]
+    given = f" with {listed(fixed)} as given" if fixed else ""
+    return (
+        f"no position was found{given}: nearest, {missed(equations.joints, point, row)}. Give a "
+        "guess nearer to the assembled mechanism, or values that it can have."
+    )
+
+
+def velocity_at(
+    equations: Equations, point: Point, held: Mapping[int, float], wanted: Values
+) -> Array:
+    """Return velocities that the constraints allow, some of them given.
+
+    Parameters
+    ----------
+    equations, point
+        The mechanism, at its position.
+    held
+        Velocities that are given, by column.
+    wanted
+        Velocities to be near to, shape (n,); None for rest.
+
+    Raises
+    ------
+    NotAssembledError
+        Where those given contradict the constraints.
+    """
+    q, t, n = point.q, point.t, point.q.size
+    scale, weights = equations.scale, equations.joints.weights()
+    rows = np.eye(n)[list(held)]
+    nu = equations.nu(q, t)
+    near = np.zeros(n) if wanted is None else np.asarray(wanted, dtype=np.float64)
+    matrix = np.vstack((weights[:, np.newaxis] * point.Phi_q * scale, rows))
+    given = np.array(list(held.values()))
+    sides = np.concatenate((weights * nu, given / scale[list(held)]))
+    sides = sides - matrix @ (near / scale)
+    _, sizes, right = np.linalg.svd(matrix)
+    rank = int((sizes > RANK * sizes[:1]).sum())
+    found = np.linalg.lstsq(matrix, sides, rcond=RANK)[0]
+    free = right[rank:].T
+    inertia = scale[:, np.newaxis] * equations.inertia(q, t) * scale
+    if free.size:
+        reduced = free.T @ inertia @ free
+        found = found - free @ np.linalg.lstsq(reduced, free.T @ inertia @ found, rcond=None)[0]
+    rest = np.abs(matrix @ found - sides)
+    level = np.abs(matrix) @ np.abs(found) + np.abs(sides)
+    if (rest > AGREE * level.max(initial=0.0)).any():
+        names = listed(equations.code.coordinates[column] for column in held)
+        raise NotAssembledError(
+            f"the velocities of {names} cannot all be as given: the constraints connect them. "
+            f"Give those of as many coordinates as there are degrees of freedom, such as "
+            f"{listed(equations.names_free) or 'none, for drivers determine all'}."
+        )
+    return np.asarray(near + scale * found)

@@ -1,0 +1,57 @@
+"""`kincompile simulate`: motions that follow from forces, written as any motion."""
+
+import csv
+import math
+
+import pytest
+
+MODEL = """
+kincompile = 1
+name = "drop"
+gravity = [0, -10]
+analysis = { end = 1.0, points = 5 }
+bodies = [{ name = "stone", mass = 2, inertia = 1 }]
+constraints = [
+    { type = "AbsoluteX", name = "wire", body = "stone", point = [0, 0], value = 0 },
+    { type = "AbsoluteAngle", name = "level", body = "stone", angle = 0 },
+]
+"""
+
+
+@pytest.fixture
+def drop(tmp_path):
+    """Return the file of a stone that slides down a wire."""
+    path = tmp_path / "drop.toml"
+    path.write_text(MODEL, encoding="utf-8")
+    return path
+
+
+def test_that_a_stone_falls_and_its_energies_are_written(kincompile, drop, tmp_path):
+    done = kincompile("simulate", drop, "--position", "stone.y=3", "-o", tmp_path / "fall.csv")
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert "5 CONVERGED" in done.stderr
+    with (tmp_path / "fall.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[-1]["y_stone [m]"]) == pytest.approx(3 - 5)
+    assert float(rows[-1]["kinetic_energy [J]"]) == pytest.approx(100)
+    assert float(rows[-1]["work [J]"]) == pytest.approx(100)
+
+
+def test_that_a_stop_and_the_forces_are_in_the_summary(kincompile, drop):
+    options = ("--velocity", "stone.y_dot=5", "--stop", "stone.y=0.5", "--forces")
+    done = kincompile("simulate", drop, *options)
+    assert (done.exit_code, done.stderr) == (0, "")
+    # 5 t - 5 t^2 = 1/2 on the way up.
+    time = (1 - math.sqrt(0.6)) / 2
+    assert f"comes to its stop, 0.5, at t = {time:.10g}" in done.stdout
+    assert "drop: forces" in done.stdout
+
+
+def test_that_mistakes_are_messages(kincompile, drop):
+    done = kincompile("simulate", drop, "--position", "ston.y=3")
+    assert done.exit_code == 2
+    assert "there is no coordinate 'ston.y'; did you mean 'y_stone'?" in done.stderr
+    assert kincompile("simulate", drop, "--points", "1", "--end", "0").exit_code == 2
+    over = kincompile("simulate", drop, "--position", "stone.x=3")
+    assert over.exit_code == 3
+    assert "cannot begin" in over.stderr
