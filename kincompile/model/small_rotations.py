@@ -56,6 +56,7 @@ def turned_joint(joint: Joint) -> Joint:
         spins = map(sympy.Symbol, spin_names(body))
         points[f"omega_{frame.index}"] = (0,) * 3 if body.is_ground else tuple(spins)
         columns += [None] * 6 if body.is_ground else turned_columns(body)
+    columns += joint.columns[sum(len(body.coordinates) for body in joint.bodies) :]
     template = replace(joint.template, frames=tuple(frames))
     return replace(joint, template=template, points=points, columns=tuple(columns))
 
