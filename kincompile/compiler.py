@@ -349,6 +349,19 @@ def _dynamic_modules(code: InlineProgram, system: ConstraintSystem, target: str)
     return DynamicModules(accelerations, corrections, redundant, free)
 
 
+def forces_program(system: ConstraintSystem) -> Program | None:
+    """Return the program whose outputs are the forces of a mechanism along a motion, or None.
+
+    None where its equations do not determine the motion, or redundant ones forbid a planned solve.
+    """
+    from kincompile.ir.forces import observing_forces
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RedundantConstraintWarning)
+        code = _lowered(system, "inline")
+    return observing_forces(code) if isinstance(code, InlineProgram) else None
+
+
 def _observing(program: Program, target: str) -> ModuleType:
     """Return the module of a program without equations."""
     from kincompile.runtime.load import from_source

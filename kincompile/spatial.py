@@ -12,5 +12,10 @@ Everything that is not a body or a joint is called as in the plane.
 from kincompile.runtime.results.orientation import orientation as orientation
 from kincompile.space import outputs as outputs
 from kincompile.space.catalogue import *  # noqa: F403
+from kincompile.space.loads import FollowerForce as FollowerForce
+from kincompile.space.loads import FollowerTorque as FollowerTorque
+from kincompile.space.loads import Force as Force
+from kincompile.space.loads import Spring as Spring
+from kincompile.space.loads import Torque as Torque
 from kincompile.space.mechanism import Mechanism as Mechanism
 from kincompile.space.sketch import Sketch as Sketch

@@ -54,7 +54,7 @@ def accumulated(linkage: Linkage) -> Analysis:
 def generated(linkage: Linkage) -> Analysis:
     """Return the same as C that CasADi generates, gcc -O3."""
     step = _step(linkage)
-    return _analysis(linkage, lambda count: _external(step.mapaccum("march", count)))
+    return _analysis(linkage, lambda count: external(step.mapaccum("march", count)))
 
 
 def _analysis(linkage: Linkage, build: Any) -> Analysis:
@@ -71,7 +71,7 @@ def _analysis(linkage: Linkage, build: Any) -> Analysis:
     return analyse
 
 
-def _external(function: Any) -> Any:
+def external(function: Any) -> Any:
     """Compile a function's generated C and load it."""
     with tempfile.TemporaryDirectory() as folder:
         generator = casadi.CodeGenerator("march.c")
@@ -86,7 +86,7 @@ def sensitivities(linkage: Linkage, *, is_compiled: bool) -> Callable[[Vector, V
 
     A step of Newton's method from a position has the derivative of the position.
     """
-    four = all_four(*_equations(linkage))
+    four = all_four(*equations(linkage))
     symbols = four.sx_in()
     position = casadi.Function("position", [symbols[0], *symbols[2:]], four(*symbols)[:2])
     before, time = casadi.MX.sym("before", symbols[0].numel()), casadi.MX.sym("time")
@@ -101,7 +101,7 @@ def sensitivities(linkage: Linkage, *, is_compiled: bool) -> Callable[[Vector, V
     def differentiate(times: Vector, q: Vector) -> Vector:
         if times.size not in built:
             mapped = function.map(times.size)
-            built[times.size] = _external(mapped) if is_compiled else mapped
+            built[times.size] = external(mapped) if is_compiled else mapped
         p = np.repeat(linkage.values[:, np.newaxis], times.size, axis=1)
         found = built[times.size](q.T, times[np.newaxis], p).full()
         return np.moveaxis(found.reshape(3, q.shape[1], times.size, -1), 1, 2)
@@ -109,7 +109,7 @@ def sensitivities(linkage: Linkage, *, is_compiled: bool) -> Callable[[Vector, V
     return differentiate
 
 
-def _equations(linkage: Linkage) -> tuple[Any, Any, Any, Any]:
+def equations(linkage: Linkage) -> tuple[Any, Any, Any, Any]:
     """Return Phi, q, t and p of a linkage in SX."""
     require(casadi, "casadi")
     q, t = casadi.SX.sym("q", len(linkage.guess)), casadi.SX.sym("t")
@@ -120,7 +120,7 @@ def _equations(linkage: Linkage) -> tuple[Any, Any, Any, Any]:
 
 def _step(linkage: Linkage) -> Any:
     """Return the function (q before, t, p) -> (q, q_dot, q_ddot) of a linkage."""
-    return step_function(*_equations(linkage))
+    return step_function(*equations(linkage))
 
 
 def all_four(Phi: Any, q: Any, t: Any, p: Any) -> Any:

@@ -73,12 +73,14 @@ def equations(d: Derived) -> str:
     """Return the C functions position, velocity and acceleration."""
     e = d.equations
     sides = {"position": e.Phi, "velocity": d.nu, "acceleration": d.gamma}
-    functions = [_function(name, side.flat(), d) for name, side in sides.items()]
+    functions = [function(name, side.flat(), d.Phi_q.flat(), d) for name, side in sides.items()]
     return "\n".join((f"#define N {len(e.q)}", f"#define K {len(e.p)}", *functions))
 
 
-def _function(name: str, side: Sequence[sympy.Expr], d: Derived) -> str:
-    entries = d.Phi_q.flat()
+def function(
+    name: str, side: Sequence[sympy.Expr], entries: Sequence[sympy.Expr], d: Derived
+) -> str:
+    """Return a C function that puts a right side into b and the entries of a matrix into A."""
     symbols = {
         symbol: sympy.Symbol(f"{array}[{k}]")
         for array, vector in (("q", d.equations.q), ("w", d.equations.q_dot), ("p", d.equations.p))

@@ -29,24 +29,41 @@ THUMBNAILS = (
 )  # fmt: skip
 """The examples that the README shows; the first is its large picture."""
 
+STILL = ("double_wishbone_with_steering", "delta_robot", "stewart_gough")
+"""Those in space: a picture of solids at 48 times would take megabytes."""
+
 
 def drawn() -> dict[str, str]:
     """Return the pictures of the README, and of joints in space, by the name of their file."""
     moved = {f"{name}.svg": moving(name) for name in THUMBNAILS}
-    return {**moved, "joints_in_space.svg": joints_in_space()}
+    stands = {f"{name}.svg": still(name) for name in STILL}
+    return {**moved, **stands, "joints_in_space.svg": joints_in_space()}
 
 
 def moving(name: str) -> str:
     """Return the motion of an example as an SVG that moves; of free equations, as curves."""
-    model = kc.read_model(EXAMPLES / f"{name}.toml")
-    times = np.linspace(0, float(model.end), FRAMES + 1)
-    solution = kc.solve(kc.compile(model), times)
+    model, solution = solved(name)
     if isinstance(model, kc.ConstraintSystem):
         return svg_text(solution.plot().figure)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "motion.svg"
         kc.animate(solution, path, seconds=6, trace=TRACES.get(name))
         return path.read_text(encoding="utf-8")
+
+
+def still(name: str) -> str:
+    """Return an example in space at its start, with the paths of its points, as an SVG."""
+    with tempfile.TemporaryDirectory() as folder:
+        _, solution = solved(f"space/{name}")
+        path = Path(folder) / "start.svg"
+        kc.draw(solution, path)
+        return path.read_text(encoding="utf-8")
+
+
+def solved(name: str) -> tuple[kc.Mechanism | kc.ConstraintSystem, kc.Solution]:
+    """Return an example and its motion."""
+    model = kc.read_model(EXAMPLES / f"{name}.toml")
+    return model, kc.solve(kc.compile(model), np.linspace(0, float(model.end), FRAMES + 1))
 
 
 def svg_text(figure: Figure) -> str:

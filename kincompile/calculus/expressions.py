@@ -308,7 +308,7 @@ class Cross(Vector):
 class TimesG(Vector):
     """G(p) v of a v with four components, or G(p)^T v of one with three; G = [-e, -e~ + e0 I]."""
 
-    p: VectorSymbol
+    p: Vector
     vector: Vector
     is_transposed: bool = False
 

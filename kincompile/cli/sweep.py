@@ -21,6 +21,7 @@ from kincompile.names import listed
 from kincompile.sweep.overview import overview
 from kincompile.sweep.page import sweep_page
 from kincompile.sweep.samples import values_of
+from kincompile.sweep.worker import end_with_parent
 from kincompile.writing import require_writable, write_atomically
 
 
@@ -91,8 +92,11 @@ def command(
         kept = {"columns": table.columns, "measures": table.measures}
     options = {"product": product or (table.product and not sweeps), "assembly": assembly}
     # Fresh processes: a copy of this one would have its memory, and its threads as they stand.
-    context = get_context("spawn")
-    pool = ProcessPoolExecutor(processes, context) if processes > 1 else nullcontext()
+    pool = (
+        ProcessPoolExecutor(processes, get_context("spawn"), end_with_parent)
+        if processes > 1
+        else nullcontext()
+    )
     with pool as executor, progress_bar() as progress:
         found = kc.sweep(
             mechanism, numbers | swept, times, **kept, **options,

@@ -162,9 +162,12 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
                 )
             )
         case Rotated(rotation, vector, directions):
-            changes = [along(item, direction, record) for item in rotation.coordinates]
+            rules = _ROTATION[rotation.letters]
+            # A is of degree 2 in Euler parameters: its third derivative is zero.
+            turning = rotation.coordinates if len(directions) < len(rules) else ()
+            changes = [along(item, direction, record) for item in turning]
             moved = along(vector, direction, record)
-            name = _ROTATION[rotation.letters][len(directions)]
+            name = rules[min(len(directions), len(rules) - 1)]
             if any(
                 isinstance(item, Scaled) and isinstance(item.vector, TimesG) for item in changes
             ):
@@ -179,6 +182,12 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
                     ),
                     rotated(rotation, moved, directions),
                 )
+            )
+        case TimesG(p, vector, False):
+            by_p, by_vector = (along(item, direction, record) for item in (p, vector))
+            pairs = (by_p, vector), (p, by_vector)
+            return Rule.PRODUCT, vector_sum(
+                tuple(TimesG(*pair) for pair in pairs if ZERO_VECTOR not in pair)
             )
         case TimesG(p, vector, True) if p in direction:
             factor, change = split_factor(along(p, direction))

@@ -20,8 +20,8 @@ VERSION = 1
 """Version of the format, the value of the key `kincompile`."""
 MOST_POINTS = 10_000_000
 """Largest time grid that a file may ask for."""
-MOST_VARIANTS = 100_000_000
-"""Largest number of values of a parameter that a file may ask for."""
+MOST_VARIANTS = 10_000_000
+"""Largest number of values of all parameters together that a file may ask for."""
 MOST_DRAWN, MOST_JOINTS = 300, 30
 """Largest number of joints, parts and parameters of a drawing, and of joints of one link."""
 SMOOTHNESS = 4

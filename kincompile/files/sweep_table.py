@@ -102,6 +102,7 @@ class _TableReader(FieldReader):
             given = {}
         parameters = {name: self._values(name, value) for name, value in given.items()}
         self._require_samples(parameters, samples)
+        self._require_few(parameters, samples or 1)
         columns, measures = (self._names(row.get(key), key) for key in ("columns", "measures"))
         return SweepTable(parameters, samples, self._product(row), columns, measures or ())
 
@@ -145,6 +146,18 @@ class _TableReader(FieldReader):
             if isinstance(value, Span) and value.count is None and samples is None:
                 text = "give it a count of equally spaced values, or the sweep a number of samples"
                 self.problem(("sweep", "parameters", name), text)
+
+    def _require_few(
+        self, parameters: Mapping[str, tuple[float, ...] | Span], samples: int
+    ) -> None:
+        """Report more values than a file may ask for, before they are made."""
+        spans = [item for item in parameters.values() if isinstance(item, Span)]
+        total = sum(samples if item.count is None else item.count for item in spans)
+        if total > MOST_VARIANTS:
+            text = (
+                f"{total:,} values are more than the {MOST_VARIANTS:,} of a file; sweep in Python"
+            )
+            self.problem(("sweep", "parameters"), text)
 
     def _names(self, given: Any, key: str) -> tuple[str, ...] | None:
         """Return a list of names, None where none is given."""

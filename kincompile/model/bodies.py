@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import sympy
 
@@ -34,12 +34,15 @@ class BodyKind:
         Name of the constraint type that drives each.
     elsewhere
         What to take in place of constraint types of the other kinds of bodies, by their names.
+    masses
+        The module that makes a load of a body's mass; loaded where a body has one.
     """
 
     frame: type[Frame]
     units: tuple[str | None, ...]
     drivers: tuple[str, ...]
     elsewhere: Mapping[str, str]
+    masses: str = "kincompile.model.masses"
 
     @property
     def ground(self) -> tuple[int, ...]:
@@ -85,7 +88,7 @@ class Body(Shown):
     is_ground: bool = field(default=False, kw_only=True)
     kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
     mass: Scalar | None = field(default=None, kw_only=True)
-    inertia: Scalar | None = field(default=None, kw_only=True)
+    inertia: Any = field(default=None, kw_only=True)
     centre: Scalars = field(default=(0, 0), kw_only=True)
     density: Scalar | None = field(default=None, kw_only=True)
     thickness: Scalar | None = field(default=None, kw_only=True)
@@ -101,7 +104,9 @@ class Body(Shown):
     def is_heavy(self) -> bool:
         """Whether it was given anything that belongs to a mass."""
         given = (self.mass, self.inertia, self.density, self.thickness)
-        return any(item is not None for item in given) or tuple(self.centre) != (0, 0)
+        return any(item is not None for item in given) or tuple(self.centre) != (0,) * len(
+            self.kind.axes
+        )
 
     @property
     def coordinates(self) -> tuple[str, ...]:

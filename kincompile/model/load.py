@@ -43,7 +43,11 @@ class Load(Element):
         given = cls.arguments().values()
         values: tuple[Leaf, ...] = (
             *(Symbol(item.symbol) for item in given if item.kind is Kind.LOAD),
-            *(VectorSymbol(item.symbol) for item in given if item.kind is Kind.LOADS),
+            *(
+                VectorSymbol(item.symbol, len(cls.bodies.axes))
+                for item in given
+                if item.kind is Kind.LOADS
+            ),
         )
         return LoadTemplate(
             cls.__name__, cls.frames(), (), (), cls.kinetic_energy(), cls.work(), values

@@ -6,6 +6,7 @@ Every problem is collected, none is raised.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -16,7 +17,6 @@ from kincompile.model.arguments import Kind
 from kincompile.model.dimensions import unit_problems
 from kincompile.model.expressions import as_sympy, symbol_names
 from kincompile.model.load import Load
-from kincompile.model.masses import mass_of
 from kincompile.model.outputs import Output, ResolvedOutput, highest_rate
 from kincompile.model.resolve import (
     check_bodies,
@@ -119,7 +119,11 @@ def resolved_loads(
     bodies: Iterable[Body], loads: Sequence[Any], gravity: Any, scope: Scope, length_unit: str
 ) -> tuple[AppliedLoad, ...]:
     """Return the masses of bodies, then the loads, as far as they are good."""
-    masses = (mass_of(body, gravity, scope) for body in bodies)
+    masses = (
+        import_module(body.kind.masses).mass_of(body, gravity, scope)
+        for body in bodies
+        if body.is_heavy
+    )
     given = chain((item for item in masses if item is not None), loads)
     found = (_resolved(item, scope) for item in given)
     known = tuple(item for item in found if item is not None)

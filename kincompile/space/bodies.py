@@ -37,8 +37,10 @@ SPATIAL = BodyKind(
         "RevoluteTranslational": "spatial.PointOnLine",
         "TranslationalDistance": "spatial.RelativeTranslation",
         "Gear": "an Equation between two spatial.JointAngle",
+        **{name: f"spatial.{name}" for name in ("Force", "FollowerForce", "Torque", "Spring")},
         "RackAndPinion": "an Equation between a spatial.JointAngle and a way",
     },
+    masses="kincompile.space.masses",
 )
 
 
@@ -50,6 +52,7 @@ class SpatialBody(Body):
     """
 
     guess: Scalars = SPATIAL.ground
+    centre: Scalars = field(default=(0, 0, 0), kw_only=True)
     kind: BodyKind = field(default=SPATIAL, kw_only=True, repr=False)
 
     @property

@@ -30,7 +30,7 @@ class Mechanism(PlanarMechanism):
     point_type = SpatialPoint
     bodies: list[SpatialBody]  # type: ignore[assignment]
 
-    def body(  # type: ignore[override]  # a place and an orientation; it has no mass yet
+    def body(  # type: ignore[override]  # a place and an orientation
         self,
         name: str,
         position: Scalars = (0, 0, 0),
@@ -41,6 +41,9 @@ class Mechanism(PlanarMechanism):
         x: PointLike | None = None,
         y: PointLike | None = None,
         z: PointLike | None = None,
+        mass: Scalar | None = None,
+        inertia: Any = None,
+        centre: PointLike = (0, 0, 0),
     ) -> SpatialBody:
         """Add a body and return it.
 
@@ -62,6 +65,11 @@ class Mechanism(PlanarMechanism):
         x, y, z
             Directions of its axes in the ground's frame. Of two that are not at a right angle the
             first is kept.
+        mass, inertia
+            Mass, and the inertia about the centre of mass along the body's axes: its diagonal
+            (J_xi, J_eta, J_zeta) or a matrix of three rows; numbers or expressions of parameters.
+        centre
+            Centre of mass (xi, eta, zeta) in the body's frame [length].
 
         Warns
         -----
@@ -80,7 +88,7 @@ class Mechanism(PlanarMechanism):
             if remark:
                 warnings.warn(f"body {name!r}: {remark}", KincompileWarning, stacklevel=2)
         start = (*_flat(position), *p)
-        body = SpatialBody(name, start, problem=problem)
+        body = SpatialBody(name, start, problem=problem, mass=mass, inertia=inertia, centre=centre)
         self.bodies.append(body)
         return body
 

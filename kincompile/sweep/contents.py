@@ -107,6 +107,12 @@ class Form:
             name: values[name].reshape(*shape, *values[name].shape[1:]) for name in self.variables
         }
 
+    @property
+    def size(self) -> int:
+        """How many bytes all arrays have."""
+        arrays = self.variables.values()
+        return sum(math.prod(item.shape) * np.dtype(item.dtype).itemsize for item in arrays)
+
     def empty(self) -> dict[str, NDArray[Any]]:
         """Return the arrays, empty."""
         return {

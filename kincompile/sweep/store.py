@@ -53,6 +53,12 @@ class Memory:
         return self._contents.dataset(self._arrays)
 
 
+MOST_BYTES = 8_000_000_000
+"""Largest results that are kept in memory."""
+
+MOST_CHUNKS = 10_000_000
+"""Largest number of chunks, of which each is a file or more."""
+
 STORES: dict[str, type[ZarrStore | ParquetStore]] = {".zarr": ZarrStore, ".parquet": ParquetStore}
 """Kinds of folders, by ending."""
 
@@ -67,7 +73,18 @@ def open_store(path: str | os.PathLike[str] | None, contents: Contents) -> Store
     UnsupportedError
         If the package that writes it is not installed.
     """
+    form = contents.form
+    if len(form.grid) > MOST_CHUNKS:
+        raise InputError(
+            f"{form.grid.variants:,} variants are {len(form.grid):,} chunks, more than "
+            f"{MOST_CHUNKS:,}: give fewer values, or a larger chunk."
+        )
     if path is None:
+        if form.size > MOST_BYTES:
+            raise InputError(
+                f"the results of {form.grid.variants:,} variants have {form.size / 1e9:,.0f} GB, "
+                "too much for memory: give a store, such as store='NAME.zarr', or keep less."
+            )
         return Memory(contents)
     kind = STORES.get(Path(path).suffix)
     if kind is None:

@@ -12,7 +12,7 @@ from kincompile.ir.lower import lower
 from kincompile.verify.oracles import DIFFERENCE, slope
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -52,18 +52,18 @@ def errors_of_outputs(
 
     compared = {"outputs_dot": "outputs", "outputs_ddot": "outputs_dot"}
     errors_of = {
-        name: _relative(at(0.0, name), slope(partial(at, quantity=of), DIFFERENCE), may_lack=True)
+        name: _relative(at(0.0, name), *_differences(partial(at, quantity=of)), may_lack=True)
         for name, of in compared.items()
     }
     if model is not None:
-        errors_of["outputs"] = _relative(module.outputs(*states), _of_model(model, *states))
+        errors_of["outputs"] = _relative(module.outputs(*states), _of_model(model, *states), 0.0)
     for quantity, found in errors_of.items():
         for name, error in zip(module.OUTPUTS, found, strict=True):
             yield quantity, name, "", error
-    by = [slope(partial(aside, column=k), DIFFERENCE) for k in range(reference.size)]
+    by = [_differences(partial(aside, column=k)) for k in range(reference.size)]
     jacobian = module.outputs_q(*states)
     errors = np.array([
-        _relative(jacobian[..., k] * reference[k], rough) for k, rough in enumerate(by)
+        _relative(jacobian[..., k] * reference[k], *rough) for k, rough in enumerate(by)
     ])  # fmt: skip
     for name, own in zip(module.OUTPUTS, errors.T, strict=True):
         worst = int(np.argmax(own))
@@ -79,15 +79,27 @@ def _of_model(
     return interpret(program, q, q_dot, t, p.T, q_ddot)[place]
 
 
-def _relative(found: Array, rough: Array, *, may_lack: bool = False) -> list[float]:
+def _differences(function: Callable[[float], Array]) -> tuple[Array, Array]:
+    """Return a derivative at 0 by differences, and by how much half the step changes it.
+
+    Near a kink or a pole, as where links are nearly folded, that is more than `LIMIT`.
+    """
+    found, closer = slope(function, DIFFERENCE), slope(function, DIFFERENCE / 2)
+    return closer, np.abs(found - closer)
+
+
+def _relative(
+    found: Array, rough: Array, doubt: Array | float, *, may_lack: bool = False
+) -> list[float]:
     """Return the largest error of each output, relative to its largest derivative, 1 at least.
 
-    A rate that is a number nowhere is not there: it would need a third derivative.
+    Within its own doubt what it is compared with proves nothing. A rate that is a number nowhere is
+    not there: it would need a third derivative.
     """
     known = np.isfinite(rough)
     if may_lack:
         known &= np.isfinite(found).any(axis=0)
-    errors = np.where(known, np.abs(found - rough), 0.0)
+    errors = np.where(known, np.maximum(np.abs(found - rough) - doubt, 0.0), 0.0)
     sizes = np.where(known, np.abs(rough), 0.0).max(axis=0)
     errors = np.nan_to_num(errors, nan=np.inf).max(axis=0)
     relative: list[float] = (errors / np.maximum(1.0, sizes)).tolist()

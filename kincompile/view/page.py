@@ -18,7 +18,12 @@ from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
 from kincompile.targets.templates import fill, read
 from kincompile.view.page_data import as_json, page_data
-from kincompile.view.page_scripts import WORLDS, geometry_script, solver_script
+from kincompile.view.page_scripts import (
+    WORLDS,
+    forces_script,
+    geometry_script,
+    solver_script,
+)
 from kincompile.view.worlds import dimension_of
 from kincompile.writing import write_atomically
 
@@ -36,7 +41,8 @@ STYLES = ("style.css", "newton.css", "live.css")
 """Style sheets, in order."""
 
 SCRIPTS = (
-    "player.js", "units.js", "draw.js", "stage.js", "poles.js", "tools.js", "tip.js", "columns.js",
+    "player.js", "units.js", "draw.js", "stage.js", "poles.js", "forces.js",
+    "tools.js", "tip.js", "columns.js",
     "plots.js", "tables.js", "showing.js", "newton.js", "newton_tables.js", "newton_stage.js",
     "newton_panel.js", "live.js", "measures.js", "grab.js", "start.js",
 )  # fmt: skip
@@ -151,6 +157,7 @@ def page(
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "scripts": [
             solver_script(system),
+            forces_script(system),
             geometry_script(system, shown["drawing"]),
             *(read(f"view/{name}") for name in scripts_for(dimension_of(system))),
         ],

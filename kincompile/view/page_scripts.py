@@ -6,8 +6,10 @@ import json
 from typing import TYPE_CHECKING
 
 import kincompile.compiler as compiler
-from kincompile.errors import UnsupportedError
+from kincompile.errors import ModelError, UnsupportedError
 from kincompile.ir.graph import Graph
+from kincompile.ir.inline import inline
+from kincompile.targets.emission import emit_program
 from kincompile.targets.javascript.dialect import JAVASCRIPT
 from kincompile.targets.javascript.target import RESERVED
 from kincompile.targets.lines import indented, wrapped
@@ -51,6 +53,27 @@ def solver_script(model: Mechanism | ConstraintSystem) -> str:
         f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{emitted.source}"
         f"return module.exports.solver ? module.exports : {json.dumps({'reason': DEPENDENT})};\n"
         "})();\n"
+    )
+
+
+def forces_script(model: Mechanism | ConstraintSystem) -> str:
+    """Return the script that declares `forces`: a module whose outputs are forces, or null.
+
+    There is none without loads, where redundant joints share them, and in large mechanisms.
+    """
+    system = model.system()
+    program = None
+    if system.loads and len(system.coordinates) <= MOST_COORDINATES:
+        try:
+            program = compiler.forces_program(system)
+        except (ModelError, UnsupportedError):  # a name is taken, or a type has no reactions
+            program = None
+    if program is None:
+        return "const forces = null;\n"
+    source = emit_program("javascript", inline(program)).source
+    return (
+        f"const forces = (() => {{\nconst module = {{ exports: {{}} }};\n{source}"
+        "return module.exports;\n})();\n"
     )
 
 

@@ -27,6 +27,7 @@ const columns = {
     const { data } = player;
     const groups = [
       ...ordersOf(['Outputs', 'Rates of outputs', 'Second rates of outputs'], named(data), 'y', data.outputs),
+      { title: 'Forces', items: reactions.items() },
       { title: 'Paths', items: stage.points.flatMap(pathItems) },
       { title: 'Points', items: stage.points.flatMap(pointItems) },
       ...ordersOf(['Positions', 'Velocities', 'Accelerations'], data.coordinates, 'q', data.coordinates),

@@ -185,7 +185,7 @@ function distanceAlong(q, mark) {
 /* ---- colours ---- */
 
 const COLOURS = ['paper', 'ink', 'quiet', 'line', 'tint', 'bad', 'velocity', 'acceleration', 'drive',
-  'plot', 'pole', 'measure'];
+  'plot', 'pole', 'force', 'measure'];
 
 /* The colours of the style sheet, and so of the theme; of each body a strong one and a tint. */
 function paletteNow(drawing = player.data.drawing) {

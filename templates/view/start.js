@@ -244,7 +244,7 @@ function start() {
 /* The motion is another one: what was computed from the last one is dropped. */
 function forget() {
   live.fit();
-  for (const keeper of [units, columns, poles, stage]) keeper.forget();
+  for (const keeper of [units, columns, poles, reactions, stage]) keeper.forget();
   plots.redraw();
   showVerdict();
   markTimeline();

@@ -36,6 +36,7 @@ function pointTip(point, state) {
       const own = unit + per, parts = rates[kind].map(part => units.text(part, own)).join(', ');
       lines.push(tipLine(`${sign} = (${parts}), ${units.full(Math.hypot(...rates[kind]), own)}`, kind));
     }
+    lines.push(...reactions.lines(here.map(({ name }) => name), state).map(line => tipLine(line, 'force')));
   }
   return [tipTitle(here.map(({ name }) => name).join(', ')), ...names, ...lines];
 }

@@ -129,6 +129,7 @@ const tools = {
     for (const [id, act] of Object.entries(acts)) byId(id).addEventListener('click', act);
     this.buildMeasure();
     if (!isSpatial) this.buildPoles();
+    reactions.build();
     this.buildLegend();
     stage.underlays.push((...given) => grid.draw(...given));
     stage.overlays.push((...given) => measure.draw(...given));

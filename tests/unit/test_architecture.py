@@ -56,6 +56,7 @@ DEFERRED = {
     "kincompile.files.file_format",
     "kincompile.files.model_file",
     "kincompile.ir.lower",
+    "kincompile.model.resolve_loads",
     "kincompile.model.system",
     "kincompile.targets.registry",
     "kincompile.view.worlds",

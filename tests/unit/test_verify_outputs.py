@@ -29,6 +29,23 @@ def test_that_right_outputs_pass(model):
     assert {("outputs_dot", "speed"), ("outputs_ddot", "x_end"), ("outputs_q", "angle")} <= names
 
 
+def test_that_where_differences_are_rough_a_right_output_is_not_called_wrong():
+    """At a random state the two links of the angle are nearly in line."""
+    m = kc.Mechanism("four_bar_asked")
+    r = m.parameter("r", 1.0, "m")
+    crank, rod = m.body("crank"), m.body("rod", (1, 0, 0.96))
+    rocker = m.body("rocker", (3.2, 0, 1.76))
+    m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
+    m.add(kc.Revolute("A", crank, (r, 0), rod, (0, 0)))
+    m.add(kc.Revolute("B", rod, (3, 0), rocker, (2.5, 0)))
+    m.add(kc.Revolute("C", m.ground, (3.2, 0), rocker, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", crank, 2 * kc.pi * kc.t))
+    ends = m.point("A1", rod, (0, 0)), m.point("B1", rod, (3, 0)), m.point("C1", rocker, (0, 0))
+    m.output("mu", outputs.transmission_angle(*ends), "rad")
+    found = kc.verify(m)
+    assert found.passed, found
+
+
 def test_that_a_wrong_sign_in_outputs_is_found(model):
     source = kc.emit(model).source
     at = source.index(" - ", source.index("def _observe("))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import RESIDUAL_FACTOR, TOLERANCE, probe_of
+from kincompile.criteria import RESIDUAL_FACTOR, TOLERANCE
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.runtime.engine.code import DYNAMICS, code_of
 from kincompile.runtime.problem import problem
@@ -68,6 +68,8 @@ class Equations:
     ----------
     code
         The kinematic module.
+    parameters : ndarray, shape (k,)
+        Its parameters.
     joints
         Its constraints, with the scales of coordinates and equations.
     independent
@@ -75,7 +77,7 @@ class Equations:
     """
 
     def __init__(self, inputs: Inputs, modules: DynamicModules) -> None:
-        self.code, self._p = inputs.code, inputs.p
+        self.code, self.parameters = inputs.code, inputs.p
         self.n = inputs.guess.size
         self.names_free = modules.free
         self._accelerate = _evaluator(modules.accelerations, self.n, inputs.p)
@@ -88,7 +90,7 @@ class Equations:
 
     def measure_at(self, q: Array, t: float) -> None:
         """Take the scales of coordinates and equations from a position."""
-        self.joints = problem(self.code.module, self._p, q, t)
+        self.joints = problem(self.code.module, self.parameters, q, t)
 
     @property
     def scale(self) -> Array:
@@ -134,15 +136,11 @@ class Equations:
 
     def inertia(self, q: Array, t: float) -> Array:
         """Return M."""
-        return np.asarray(self.code.module.M(q, t, self._p))
+        return np.asarray(self.code.module.M(q, t, self.parameters))
 
     def nu(self, q: Array, t: float) -> Array:
         """Return the right side of the velocity equation."""
-        return np.asarray(self.code.nu(q, t, self._p))
-
-    def generic(self, q: Array) -> Array:
-        """Return a position beside one."""
-        return np.asarray(q + self.scale * probe_of(q.size))
+        return np.asarray(self.code.nu(q, t, self.parameters))
 
 
 def _evaluator(module: ModuleType, n: int, p: Array) -> Evaluate:

@@ -24,6 +24,7 @@ from kincompile.runtime.dynamics.integrate import Integration
 from kincompile.runtime.dynamics.start import (
     NotAssembledError,
     given_values,
+    moving,
     position_at,
     velocity_at,
 )
@@ -80,7 +81,8 @@ def simulate(
         Coordinates that are given exactly at the first time, ``{"crank.phi": 0.3}``; the others are
         those near the guess that the constraints allow.
     velocity : mapping or array_like, shape (n,), optional
-        Velocities at the first time, ``{"crank.phi_dot": 2}``; the others are those of the least
+        Velocities at the first time, ``{"crank.phi_dot": 2}``, in space angular velocities too,
+        ``{"rotor.omega_zeta": 20}``; the others are those of the least
         kinetic energy that the constraints allow. As an array, the velocities that are allowed and
         nearest to it. Without it all that no driver moves begins at rest.
     events, stops : mapping, optional
@@ -131,7 +133,8 @@ def simulate(
     held = given_values(names, position or {}, 0, "position")
     rates = {}
     if isinstance(velocity, Mapping):
-        rates = given_values(names, velocity, 1, "velocity")
+        known = (*names, *moving(module)[1]) if inputs.code.covers() else names
+        rates = given_values(known, velocity, 1, "velocity")
         velocity = None
     elif velocity is not None and np.shape(velocity) != (len(names),):
         raise InputError(

@@ -13,10 +13,12 @@ import numpy as np
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.runtime.engine.code import JOINT_POINTS
 from kincompile.runtime.singular.reach import missed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from types import ModuleType
 
     from kincompile.runtime.dynamics.equations import Equations
     from kincompile.runtime.engine.code import Array
@@ -34,30 +36,30 @@ LARGEST_TURN = 1.0
 
 
 def given_values(
-    code_names: Sequence[str], given: Mapping[str, Any], order: int, what: str
-) -> dict[int, float]:
-    """Return values by column from a mapping of names, of rates with or without ``_dot``.
+    known: Sequence[str], given: Mapping[str, Any], order: int, what: str
+) -> dict[str, float]:
+    """Return values by name, of rates with or without ``_dot``.
 
     Raises
     ------
     InputError
         With every name that is none, and every value that is no finite number.
     """
-    found: dict[int, float] = {}
+    found: dict[str, float] = {}
     problems = []
     for key, value in given.items():
         name = column_name(str(key))
-        if order and name not in code_names:
+        if order and name not in known:
             name = name.removesuffix(rate("", order))
-        if name not in code_names:
-            near = suggestion(name, code_names) or "."
+        if name not in known:
+            near = suggestion(name, known) or "."
             problems.append(f"{what}: there is no coordinate {key!r}{near}")
         elif not (isinstance(value, int | float | np.number) and np.isfinite(value)):
             problems.append(f"{what} of {key!r} is {value!r}: give a finite number.")
         else:
-            found[code_names.index(name)] = float(value)
+            found[name] = float(value)
     if problems:
-        problems[-1] += f" The coordinates are {listed(code_names)}."
+        problems[-1] += f" There are {listed(known)}."
         raise InputError(problems)
     return found
 
@@ -66,7 +68,7 @@ class NotAssembledError(Exception):
     """No position was found, or no velocity; the sentence says what is missed."""
 
 
-def position_at(equations: Equations, guess: Array, t: float, held: Mapping[int, float]) -> Point:
+def position_at(equations: Equations, guess: Array, t: float, given: Mapping[str, float]) -> Point:
     """Return the position near a guess at which the constraints hold and some values are given.
 
     Raises
@@ -74,7 +76,8 @@ def position_at(equations: Equations, guess: Array, t: float, held: Mapping[int,
     NotAssembledError
         Where there is none.
     """
-    q = guess.copy()
+    q, names = guess.copy(), equations.code.coordinates
+    held = {names.index(name): value for name, value in given.items()}
     q[list(held)] = list(held.values())
     open_ = np.array([column for column in range(q.size) if column not in held], dtype=int)
     scale, weights = equations.scale, equations.joints.weights()
@@ -94,15 +97,14 @@ def position_at(equations: Equations, guess: Array, t: float, held: Mapping[int,
             if found is not None and equations.holds(found):
                 return found
             break
-    raise NotAssembledError(_unmet(equations, point, held))
+    raise NotAssembledError(_unmet(equations, point, list(given)))
 
 
-def _unmet(equations: Equations, point: Point | None, held: Mapping[int, float]) -> str:
+def _unmet(equations: Equations, point: Point | None, fixed: Sequence[str]) -> str:
     """Say which equation is missed most."""
     if point is None:
         return "an equation has no finite value there: give a guess nearer to the mechanism."
     row = int(np.argmax(np.abs(point.Phi) * equations.joints.weights()))
-    fixed = [equations.code.coordinates[column] for column in held]
     given = f" with {listed(fixed)} as given" if fixed else ""
     return (
         f"no position was found{given}: nearest, {missed(equations.joints, point, row)}. Give a "
@@ -111,7 +113,7 @@ def _unmet(equations: Equations, point: Point | None, held: Mapping[int, float])
 
 
 def velocity_at(
-    equations: Equations, point: Point, held: Mapping[int, float], wanted: Values
+    equations: Equations, point: Point, given: Mapping[str, float], wanted: Values
 ) -> Array:
     """Return velocities that the constraints allow, some of them given.
 
@@ -119,8 +121,8 @@ def velocity_at(
     ----------
     equations, point
         The mechanism, at its position.
-    held
-        Velocities that are given, by column.
+    given
+        Velocities that are given, by name: rates of coordinates, or columns of `moving`.
     wanted
         Velocities to be near to, shape (n,); None for rest.
 
@@ -131,12 +133,13 @@ def velocity_at(
     """
     q, t, n = point.q, point.t, point.q.size
     scale, weights = equations.scale, equations.joints.weights()
-    rows = np.eye(n)[list(held)]
-    nu = equations.nu(q, t)
+    rows = _rates(equations, point, list(given))
     near = np.zeros(n) if wanted is None else np.asarray(wanted, dtype=np.float64)
-    matrix = np.vstack((weights[:, np.newaxis] * point.Phi_q * scale, rows))
-    given = np.array(list(held.values()))
-    sides = np.concatenate((weights * nu, given / scale[list(held)]))
+    sizes = np.abs(rows * scale).max(axis=1, initial=0.0)
+    asked = 1 / np.where(sizes > 0, sizes, 1.0)
+    matrix = np.vstack((weights[:, np.newaxis] * point.Phi_q, asked[:, np.newaxis] * rows)) * scale
+    values = np.array(list(given.values()))
+    sides = np.concatenate((weights * equations.nu(q, t), asked * values))
     sides = sides - matrix @ (near / scale)
     _, sizes, right = np.linalg.svd(matrix)
     rank = int((sizes > RANK * sizes[:1]).sum())
@@ -149,10 +152,38 @@ def velocity_at(
     rest = np.abs(matrix @ found - sides)
     level = np.abs(matrix) @ np.abs(found) + np.abs(sides)
     if (rest > AGREE * level.max(initial=0.0)).any():
-        names = listed(equations.code.coordinates[column] for column in held)
         raise NotAssembledError(
-            f"the velocities of {names} cannot all be as given: the constraints connect them. "
+            f"the velocities of {listed(given)} cannot all be as given: constraints connect them. "
             f"Give those of as many coordinates as there are degrees of freedom, such as "
             f"{listed(equations.names_free) or 'none, for drivers determine all'}."
         )
     return np.asarray(near + scale * found)
+
+
+def moving(module: ModuleType) -> tuple[ModuleType, tuple[str, ...]]:
+    """Return what has velocities beside the coordinates: angular velocities in space."""
+    compiled = vars(module).get(JOINT_POINTS)
+    own = module if compiled is None else compiled()
+    names = tuple(name for name in getattr(own, "OUTPUTS", ()) if name.startswith("omega_"))
+    return own, names
+
+
+def _rates(equations: Equations, point: Point, names: Sequence[str]) -> Array:
+    """Return how velocities depend on those of the coordinates, shape (k, n).
+
+    An angular velocity is linear in them: its values at unit rates are its coefficients.
+    """
+    n, own = point.q.size, equations.code.coordinates
+    rows = np.zeros((len(names), n))
+    module = None
+    for k, name in enumerate(names):
+        if name in own:
+            rows[k, own.index(name)] = 1.0
+            continue
+        module = module or moving(equations.code.module)[0]
+        place, unit = module.OUTPUTS.index(name), np.eye(n)
+        q, t = np.broadcast_to(point.q, (n, n)), np.full(n, point.t)
+        rows[k] = np.asarray(module.observe(q, unit, 0 * unit, t, equations.parameters)[0])[
+            :, place
+        ]
+    return rows

@@ -274,6 +274,11 @@ def forces(solution: Solution) -> Forces:
     """
     require_solution(solution)
     module = solution.require_module("its forces")
+    if code_of(module).covers():
+        raise UnsupportedError(
+            f"{module.NAME} is a mechanism in space, whose reactions are not compiled yet: its "
+            "motion follows from forces by kc.simulate, and module.M and module.Q are there."
+        )
     modules = _modules(module)
     points = _Points.of(solution, code_of(module), modules)
     names, units, found, shared = points.forces()

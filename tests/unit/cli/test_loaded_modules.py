@@ -47,6 +47,7 @@ NOT_LOADED = {
     ),
     "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
+    "equilibrium HEAVY": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} scipy.interpolate",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
     "mark KIT": "rich platformdirs matplotlib kincompile.view.page kincompile.verify",
     "sweep MODEL --sweep length=1:2:2 --target numpy --processes 1": (

@@ -1,8 +1,10 @@
 """`kincompile sweep`: from TOML alone to a folder, a summary and a page."""
 
 import json
+import sys
 
 import numpy as np
+import psutil
 import pytest
 import xarray
 
@@ -107,6 +109,19 @@ def test_what_cannot_be_assembled_is_counted_and_alone_is_exit_code_3(
     assert "the mechanism cannot be assembled there" in page.read_text(encoding="utf-8")
 
 
+def test_workers_end_with_a_run_that_is_killed(model, tmp_path, start_process):
+    store = tmp_path / "a.parquet"
+    table = "[sweep]\nparameters = { a = { from = 1, to = 2, count = 100000 } }\n"
+    options = ["-o", str(store), "--target", "numpy", "--chunk", "10", "--processes", "2"]
+    run = start_process([sys.executable, "-m", "kincompile", "sweep", str(model(table)), *options])
+    while len(list(store.glob("*.parquet"))) < 4 and run.poll() is None:
+        pass
+    workers = psutil.Process(run.pid).children(recursive=True)
+    run.kill()
+    assert len(workers) >= 2
+    assert psutil.wait_procs(workers, timeout=60)[1] == []
+
+
 def test_samples_fill_a_box_evenly(model):
     spans = "a = { from = 1, to = 3 }, omega = { from = -1, to = 0 }"
     table = f"[sweep]\nsamples = 1000\nparameters = {{ {spans} }}"
@@ -147,6 +162,8 @@ def test_a_file_without_a_table_says_nothing(model, tmp_path):
         ("parameters = { a = [1] }\nproduct = 1", "expected true or false, not 1"),
         ("parameters = { a = [1] }\ncolumns = 'x_tip'", "expected a list of names in quotes"),
         ("parameters = { a = { from = 1, to = 2 } }\nproduct = true\nsamples = 2", "a would be"),
+        ("parameters = { a = { from = 1, to = 2, count = 10000000 }, omega = { from = 1, to = 2, "
+         "count = 10 } }", "10,000,010 values are more than the 10,000,000 of a file"),
         ("parameters = { b = [1] }", "there is no parameter 'b'"),
         ("parameters = { a = [] }", "give real numbers"),
     ],

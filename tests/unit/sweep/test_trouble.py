@@ -155,6 +155,11 @@ def test_a_place_that_no_sweep_wrote_is_refused(ending, tmp_path):
         ({"measures": ["x_arm.stroke"]}, "x_arm is no output"),
         ({"columns": ["a.b"], "measures": ["x.y"]}, "2 problems"),
         ({"chunk": 0}, "chunk is 0"),
+        ({"p": dict.fromkeys(("a", "omega"), np.ones(100_000)), "product": True}, "have 810 GB"),
+        (
+            {"p": dict.fromkeys(("a", "omega"), np.ones(100_000)), "product": True, "chunk": 1},
+            "10,000,000,000 variants are 10,000,000,000 chunks, more than 10,000,000",
+        ),
         ({"pending": 0}, "pending is 0"),
         ({"store": "results.csv"}, "end its name in .zarr, .parquet"),
         ({"target": "octave"}, "only modules of the targets numpy, c can be loaded"),
@@ -163,6 +168,13 @@ def test_a_place_that_no_sweep_wrote_is_refused(ending, tmp_path):
 def test_what_is_wrong_is_said_in_names(options, message):
     with pytest.raises(kc.KincompileError, match=message.replace(".", r"\.")):
         sweep(**options)
+
+
+def test_an_output_called_as_the_statuses_is_refused():
+    m = crank()
+    m.output("status", kc.t)
+    with pytest.raises(kc.InputError, match="what the statuses are called in the results: rename"):
+        sweep(m, columns=["status"])
 
 
 def test_a_first_set_that_cannot_be_assembled_does_not_stop_the_others():
