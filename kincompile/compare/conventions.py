@@ -9,6 +9,7 @@ import numpy as np
 
 from kincompile.compare.comparison import Convention
 from kincompile.errors import InputError
+from kincompile.model.small_rotations import BY_OMEGA, BY_P
 from kincompile.names import listed
 
 if TYPE_CHECKING:
@@ -24,11 +25,11 @@ USUAL = {"nu": "-Phi_t", "gamma": "right side"}
 
 FORM = "form"
 """The convention that says by what Phi_q has derivatives, and gamma the second rates."""
-BY_P, BODY_FIXED, GLOBAL = "r-p", "r-omega", "global r-omega"
+GLOBAL = f"global {BY_OMEGA}"
 
 _CHOICES: Mapping[str, tuple[str, ...]] = {
     **{name: (OPPOSITE[name], USUAL[name]) for name in OPPOSITE},
-    FORM: (BY_P, BODY_FIXED, GLOBAL),
+    FORM: (BY_P, BY_OMEGA, GLOBAL),
 }
 
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from kincompile.compare.conventions import BODY_FIXED, BY_P, GLOBAL
+from kincompile.compare.conventions import GLOBAL
 from kincompile.compare.layouts import expected_widths, usual_layout
 from kincompile.compare.reference import OF_LOADS, Reference, Subject
 from kincompile.compare.turned import TurnedReference
 from kincompile.compare.written import MATRICES
 from kincompile.errors import InputError
-from kincompile.model.small_rotations import is_norm
+from kincompile.model.small_rotations import BY_OMEGA, BY_P, is_norm
 from kincompile.names import listed
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ class Forms:
         found = {BY_P: base}
         block = None if self.constraint is None else base.block(self.constraint)
         if base.spins and (block is None or not is_norm(block.constraint)):
-            for form, is_global in ((BODY_FIXED, False), (GLOBAL, True)):
+            for form, is_global in ((BY_OMEGA, False), (GLOBAL, True)):
                 if form not in base.kept:  # with the system, for the next hand-in
                     base.kept[form] = TurnedReference(base, is_global)
                 found[form] = base.kept[form]

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
 
+BY_P, BY_OMEGA = "r-p", "r-omega"
+"""The names of the two forms."""
+
+
 def is_norm(constraint: Joint | FreeEquation) -> bool:
     """Return whether a constraint is the norm row of a body, which small rotations keep."""
     return constraint.name in {f"norm_{body.name}" for body in constraint.bodies}
