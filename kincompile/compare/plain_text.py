@@ -90,7 +90,7 @@ def _vector(expression: Vector) -> str:
             return f"{_bracketed(_vector(left))}~ {_bracketed(_vector(right))}"
         case TimesG(p, vector, is_transposed):
             mark = "^T" if is_transposed else ""
-            return f"G_{p.name.removeprefix('p_')}{mark} {_bracketed(_vector(vector))}"
+            return f"G_{_vector(p).removeprefix('p_')}{mark} {_bracketed(_vector(vector))}"
         case RotationSlope(EulerRotation(p), vector):
             return f"B({p.name}, {_vector(vector)})"
         case RowOfSlope(left, slope):

@@ -224,9 +224,10 @@ class Notation:
         return self._row([self._skew(expr.left), self._factor(expr.right)])
 
     def _print_TimesG(self, expr: TimesG) -> Printed:
-        matrix = self._matrix("G", expr.p.name)
+        name = expr.p.name if isinstance(expr.p, VectorSymbol) else ""
+        matrix = self._matrix("G", name)
         if expr.is_transposed:
-            index = self._index_text(split_name(expr.p.name)[1])
+            index = self._index_text(split_name(name)[1])
             matrix = self._scripts(self._letter("G", bold=True), index, self._letter("T"))
         return self._row([matrix, self._factor(expr.vector)])
 
