@@ -67,6 +67,14 @@ _LAW: dict[str, Any] = {"enum": list(RISES)}
 _CORNERS: dict[str, Any] = {"type": "boolean"}
 
 
+_SEED: dict[str, Any] = {"type": "integer", "minimum": 0}
+
+DISTRIBUTIONS = ("normal", "uniform", "truncated")
+SEARCHES = ("sobol", "differential evolution")
+MINIMIZERS = ("SLSQP", "trust-constr")
+"""What tolerances may be distributed by, and how a fit may search and end."""
+
+
 def _list(name: str) -> dict[str, Any]:
     return {"type": "array", "items": {"$ref": f"#/$defs/{name}"}}
 
@@ -89,6 +97,40 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "points": Field(_list("point"), is_required=False),
         "outputs": Field(_list("output"), is_required=False),
         "sweep": Field({"$ref": "#/$defs/sweep"}, is_required=False),
+        "tolerance": Field({"$ref": "#/$defs/tolerance"}, is_required=False),
+        "fit": Field({"$ref": "#/$defs/fit"}, is_required=False),
+    },
+    "tolerance": {
+        "of": Field(_NAMES, is_required=False),
+        "parameters": Field(
+            {
+                "type": "object",
+                "additionalProperties": {
+                    "anyOf": [_EXPRESSION, _POINT, {"$ref": "#/$defs/deviation"}]
+                },
+            },
+            is_required=False,
+        ),
+        "clearances": Field(
+            {"type": "object", "additionalProperties": _EXPRESSION}, is_required=False
+        ),
+        "samples": Field(_VARIANTS, is_required=False),
+        "seed": Field(_SEED, is_required=False),
+    },
+    "deviation": {
+        "low": Field(_EXPRESSION),
+        "high": Field(_EXPRESSION),
+        "distribution": Field({"enum": list(DISTRIBUTIONS)}, is_required=False),
+        "sigmas": Field(_EXPRESSION, is_required=False),
+    },
+    "fit": {
+        "parameters": Field({"type": "object", "additionalProperties": _POINT}),
+        "targets": Field(_list("target")),
+        "samples": Field(_VARIANTS, is_required=False),
+        "starts": Field(_VARIANTS, is_required=False),
+        "search": Field({"enum": list(SEARCHES)}, is_required=False),
+        "minimizer": Field({"enum": list(MINIMIZERS)}, is_required=False),
+        "seed": Field(_SEED, is_required=False),
     },
     "sweep": {
         "parameters": Field(
@@ -207,6 +249,38 @@ _LINE: Mapping[str, Field] = {
     "on": Field(_NAME, is_required=False),
 }
 
+_WEIGHT: Mapping[str, Field] = {"weight": Field(_EXPRESSION, is_required=False)}
+_PASSING: Mapping[str, Field] = {
+    "times": Field({"type": "array", "items": _EXPRESSION}, is_required=False),
+    **_WEIGHT,
+    "within": Field(_EXPRESSION, is_required=False),
+    "between": Field(_POINT, is_required=False),
+}
+_ROWS: dict[str, Any] = {"type": "array", "items": {"type": "array", "items": _EXPRESSION}}
+
+TARGETS: Mapping[str, Mapping[str, Field]] = {
+    "path": {"path": Field(_TEXT), "points": Field(_ROWS), **_PASSING},
+    "value": {
+        "value": Field(_TEXT), "values": Field({"type": "array", "items": _EXPRESSION}), **_PASSING,
+    },
+    "pose": {
+        "pose": Field(_TEXT), "poses": Field(_ROWS),
+        "angle_weight": Field(_EXPRESSION, is_required=False), **_PASSING,
+    },
+    "time_ratio": {
+        "time_ratio": Field(_TEXT), "ratio": Field(_EXPRESSION), **_WEIGHT,
+        "within": Field(_EXPRESSION, is_required=False),
+    },
+    "limit": {
+        "limit": Field(_TEXT),
+        "least": Field(_EXPRESSION, is_required=False),
+        "most": Field(_EXPRESSION, is_required=False),
+        "title": Field(_TEXT, is_required=False),
+    },
+    "moves": {"moves": Field({"const": True})},
+}  # fmt: skip
+"""Targets of a fit: the functions of `kc.targets`, and their arguments."""
+
 PARTS: Mapping[str, Mapping[str, Field]] = {
     "link": {
         "link": Field(_NAME),
@@ -303,6 +377,7 @@ def model_schema() -> dict[str, Any]:
             **tables,
             **in_space,
             "part": {"oneOf": parts},
+            "target": {"oneOf": [_object(item) for item in TARGETS.values()]},
             "constraint": {"oneOf": _constraints(PLANE)},
             "spatial_constraint": {"oneOf": _constraints(SPACE)},
             "load": {"oneOf": [_object(load_fields(item)) for item in LOADS.values()]},
