@@ -60,7 +60,7 @@ def write_pages() -> None:
         "gallery.md": _gallery(),
     }
     for name in _examples():
-        pages[f"examples/{name}.md"] = _example_page(name)
+        pages[f"examples/{_last(name)}.md"] = _example_page(name)
     for name in documented_names():
         pages[f"api/{name}.md"] = _api_page(name)
     pages["api/spatial.md"] = _spatial_page()
@@ -86,7 +86,8 @@ def _address(path: str) -> str:
         return f"/{OUTSIDE[path]}.md"
     if place.parts[0] == "docs":
         return f"/{place.relative_to('docs')}"
-    if place.parent == PurePosixPath("examples") and place.suffix in (".py", ".toml"):
+    folders = (PurePosixPath("examples"), PurePosixPath("examples/space"))
+    if place.parent in folders and place.suffix in (".py", ".toml"):
         return f"/made/examples/{place.stem}.md"
     return f"/{normpath('../' + path)}"
 
@@ -126,9 +127,19 @@ def _outside(path: str) -> str:
 
 
 def _examples() -> list[str]:
-    """Return the names of the examples, in the order of their table."""
+    """Return the examples, in the order of their tables, as `four_bar` and `space/rssr`."""
+    return [name for name, _ in _rows()]
+
+
+def _rows() -> list[tuple[str, str]]:
+    """Return each example, and what it shows."""
     table = (EXAMPLES / "README.md").read_text(encoding="utf-8")
-    return re.findall(r"^\| `(\w+)\.py` \|", table, re.MULTILINE)
+    return re.findall(r"^\| `([\w/]+)\.py` \| (.*?) \|", table, re.MULTILINE)
+
+
+def _last(name: str) -> str:
+    """Return the name of an example without its folder."""
+    return PurePosixPath(name).name
 
 
 def title(name: str) -> str:
@@ -138,9 +149,7 @@ def title(name: str) -> str:
 
 def _gallery() -> str:
     """Return the page with all examples, each as a card that moves."""
-    rows = re.findall(
-        r"^\| `(\w+)\.py` \| (.*?) \|", (EXAMPLES / "README.md").read_text(encoding="utf-8"), re.M
-    )
+    rows = [(_last(name), what) for name, what in _rows()]
     cards = "".join(
         f":::{{grid-item-card}} {title(name)}\n:link: examples/{name}\n:link-type: doc\n"
         f":img-top: motions/{name}.svg\n:img-alt: {title(name)} in motion\n{what}\n:::\n\n"
@@ -157,9 +166,9 @@ def _example_page(name: str) -> str:
     source = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
     first, *rest = inspect.cleandoc(source.split('"""')[1]).split("\n\n")
     return "\n".join([
-        f"# {title(name)}", "", first, "", *rest, "",
-        _live(name, "../.."), "",
-        f"`kincompile view examples/{name}.toml -o {name}.html` writes this page.", "",
+        f"# {title(_last(name))}", "", first, "", *rest, "",
+        _live(_last(name), "../.."), "",
+        f"`kincompile view examples/{name}.toml -o {_last(name)}.html` writes this page.", "",
         "::::{tab-set}",
         ":::{tab-item} Python", f"```{{literalinclude}} ../../../examples/{name}.py", "```", ":::",
         ":::{tab-item} TOML", f"```{{literalinclude}} ../../../examples/{name}.toml",
@@ -184,10 +193,12 @@ def _write_motions() -> None:
     live_folder.mkdir(parents=True, exist_ok=True)
     for name in _examples():
         model = EXAMPLES / f"{name}.toml"
-        live = live_folder / f"{name}.html"
+        live = live_folder / f"{_last(name)}.html"
         if live.exists() and live.stat().st_mtime > max(newest, model.stat().st_mtime):
             continue
-        write(GENERATED / "motions", {f"{name}.svg": pictures.moving(name)})
+        last = _last(name)
+        shown = pictures.still(last) if name.startswith("space/") else pictures.moving(name)
+        write(GENERATED / "motions", {f"{last}.svg": shown})
         kc.page(kc.read_model(model)).write(live)
     for lesson in course.LESSONS:
         kc.page(course.model_of(lesson)).write(live_folder / f"lesson_{lesson}.html")

@@ -11,7 +11,7 @@ import click
 
 import kincompile as kc
 from kincompile.errors import InputError
-from kincompile.writing import require_writable
+from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,6 +53,29 @@ def set_option(what: str) -> Callable[[Command], Command]:
     """Return the option ``--set NAME=VALUE``, which gives values by name."""
     text = f"Value of a {what}, such as a=0.25 or phi=30deg; may be given several times."
     return click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help=text)
+
+
+def page_option(command: Command) -> Command:
+    """Add the option ``--page FILE``."""
+    option = click.option(
+        "--page", metavar="FILE", callback=_page, help="Page of the results to write, .html."
+    )
+    return option(command)
+
+
+def _page(context: click.Context, option: click.Parameter, given: str | None) -> str | None:
+    """Return the name of a page, which can be written."""
+    del context, option
+    if given is not None:
+        if Path(given).suffix not in (".html", ".htm"):
+            raise InputError(f"cannot write {given}: end its name in .html")
+        require_writable(given)
+    return given
+
+
+def write_page(path: str, html: str) -> None:
+    """Write a page of results, and say so."""
+    click.echo(f"Wrote {write_atomically(path, html)}", err=True)
 
 
 def print_data(text: str) -> None:

@@ -14,12 +14,17 @@ import click
 import kincompile as kc
 from kincompile.cli.motion import motion_options, motion_times, set_values, sweep_options
 from kincompile.cli.progress import progress_bar
-from kincompile.cli.shared import NOT_CONVERGED, deg_option, output_option, print_data, read_model
+from kincompile.cli.shared import (
+    NOT_CONVERGED,
+    deg_option,
+    output_option,
+    page_option,
+    print_data,
+    read_model,
+    write_page,
+)
 from kincompile.errors import InputError
 from kincompile.names import listed
-from kincompile.sweep.overview import overview
-from kincompile.sweep.worker import end_with_parent
-from kincompile.writing import require_writable, write_atomically
 
 
 @click.command("sweep")
@@ -27,7 +32,7 @@ from kincompile.writing import require_writable, write_atomically
 @output_option(
     "Folder to write: .zarr or .parquet; one that is there is gone on with.", required=False
 )
-@click.option("--page", metavar="FILE", help="Page of the results to write, .html.")
+@page_option
 @partial(motion_options, has_through=False)
 @sweep_options
 @click.option(
@@ -75,13 +80,12 @@ def command(
     found is summarised on stdout; -o writes all of it while it comes, and a run that was stopped
     goes on where it was. What cannot be solved has a status; where nothing can, the exit code is 3.
     """
-    # These load SymPy, which --help does without.
     from kincompile.files.sweep_table import SweepTable, read_sweep_table
+    from kincompile.sweep.overview import overview
     from kincompile.sweep.page import sweep_page
     from kincompile.sweep.samples import values_of
+    from kincompile.sweep.worker import end_with_parent
 
-    if page is not None:
-        require_writable(page)
     mechanism = read_model(model)
     table = read_sweep_table(model) or SweepTable({})
     swept: dict[str, Any] = sweeps or values_of(table)
@@ -108,7 +112,7 @@ def command(
     if output is not None:
         click.echo(f"Wrote {output}", err=True)
     if page is not None:
-        click.echo(f"Wrote {write_atomically(page, sweep_page(found, angle_unit))}", err=True)
+        write_page(page, sweep_page(found, angle_unit))
     if not {"CONVERGED", "CORNER"} & found.statuses().keys():
         click.echo("Error: no set of parameters was solved", err=True)
         ctx.exit(NOT_CONVERGED)

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import stats
 
 from kincompile.errors import InputError
+from kincompile.files.file_format import DISTRIBUTIONS
 from kincompile.names import listed, shown
 
 if TYPE_CHECKING:
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 
 _LAWS: Any = stats
 """SciPy makes its distributions at run time, where a type checker does not see them."""
-
-DISTRIBUTIONS = ("normal", "uniform", "truncated")
-"""Names of distributions."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
 from kincompile.design.trial import EAGERNESS, Trial, Workbench
 from kincompile.design.variation import require_mechanism
 from kincompile.errors import InputError, KincompileWarning
+from kincompile.files.file_format import MINIMIZERS, SEARCHES
 from kincompile.model.outputs import Output
 from kincompile.names import listed, suggestion
 from kincompile.runtime.singular.assemblies import assemblies
@@ -45,9 +46,6 @@ if TYPE_CHECKING:
 
 _SCIPY: Any = optimize
 """Its types leave out what it exports."""
-
-SEARCHES = ("sobol", "differential evolution")
-MINIMIZERS = ("SLSQP", "trust-constr")
 
 BRIEFLY, TO_THE_END = (1e-6, 40), (1e-14, 200)
 """Relative change at which least squares ends, and motions that it tries from one start."""

@@ -59,6 +59,7 @@ def tolerance(
     t: ArrayLike | None = None,
     p: Mapping[str, float] | None = None,
     guess: Mapping[str, float] | None = None,
+    assembly: int | None = None,
     samples: int = 0,
     seed: int = 0,
 ) -> ToleranceAnalysis:
@@ -82,6 +83,8 @@ def tolerance(
         Times; those of the model without.
     p, guess : mapping, optional
         Nominal values of parameters, and where Newton starts, as `kc.solve` takes them.
+    assembly : int, optional
+        The way to assemble the mechanism, instead of a guess.
     samples
         Number of samples of Monte Carlo, by Sobol's sequence; a power of two spreads them best.
         Each is solved exactly. Without them worst case and RSS alone.
@@ -110,7 +113,7 @@ def tolerance(
     module = compile_model(with_clearances(model, loose))
     columns = columns_of(module, of)
     times = np.linspace(0.0, model.end, model.points) if t is None else t
-    nominal = solve(module, times, dict(p or {}), dict(guess or {}), throw=True)
+    nominal = solve(module, times, dict(p or {}), guess, assembly=assembly, throw=True)
     names = [name for group, _ in sources.values() for name in group]
     gradients = _gradients(nominal, names, columns)
     bands = _effects(gradients, sources)

@@ -160,11 +160,11 @@ class ToleranceAnalysis(Shown):
             )
         for column in self.columns:
             at = self.widest(column)
-            lines += ["", *self._summary(column, at)]
+            lines += ["", *self.summary(column, at)]
             lines += indented(table(TITLES, self.rows(column, at), right=TITLES[1:]))
         return "\n".join(lines)
 
-    def _summary(self, column: str, at: int) -> list[str]:
+    def summary(self, column: str, at: int) -> list[str]:
         """Return what all sources together do at a time, in lines."""
         unit = f" {self.units[column]}".rstrip()
         value = self.nominal[at, self._place(column)]
@@ -283,11 +283,15 @@ class ToleranceAnalysis(Shown):
         parts = []
         for column in self.columns:
             at = self.widest(column)
-            title = "; ".join(line.strip() for line in self._summary(column, at))
+            title = "; ".join(line.strip() for line in self.summary(column, at))
             parts.append(table_html(column, title, TITLES, self.rows(column, at)))
-            drawing = partial(self._draw_both, column)
-            parts.append(figure_html(f"tolerances of {column}", (9.6, 3.4), drawing))
+            parts.append(self.plots_html(column))
         return "\n".join(parts)
+
+    def plots_html(self, column: str) -> str:
+        """Return bands and tornado of a column as HTML; "" where matplotlib is not installed."""
+        drawing = partial(self._draw_both, column_name(column))
+        return figure_html(f"tolerances of {column}", (9.6, 3.4), drawing)
 
     def _draw_both(self, column: str, figure: Figure) -> None:
         """Draw bands and tornado side by side into an empty figure."""

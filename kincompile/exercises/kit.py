@@ -165,6 +165,11 @@ def exercise(
             f"{getattr(model, 'name', model)} is no mechanism of bodies and joints, which an "
             "exercise needs: it is a system of free equations"
         )
+    if len(model.ground.kind.axes) > 2:
+        raise InputError(
+            f"{model.name} is a mechanism in space, and exercises are of those in the plane; "
+            "compare checks what somebody derived for it"
+        )
     if not 1 <= students <= MOST_STUDENTS:
         raise InputError(f"{students} students: give a number from 1 to {MOST_STUDENTS}")
     made = variants(model, students, seed, Choices(signs, lengths))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.files.data_text import MAX_PROBLEMS, listed_problems
 from kincompile.files.safe_expressions import ExpressionError, parse_expression
+from kincompile.model.expressions import evaluate
 from kincompile.names import LONGEST, escaped, listed, name_problem, shown, suggestion, unit_problem
 
 if TYPE_CHECKING:
@@ -168,6 +169,33 @@ class FieldReader:
             text = f"{line}column {error.column} of {shown(value)}: {error.problem}"
             self.problem(address, text)
             return 1.0
+
+    def finite(self, given: Any, address: Address) -> float:
+        """Return a number, or that of a formula without names; 1.0 as a placeholder."""
+        known = len(self.problems)
+        found = evaluate(self.constant(given, address, {}), {})
+        if found is not None and math.isfinite(found):
+            return found
+        if len(self.problems) == known:
+            self.problem(address, f"{shown(given)} is not a finite number")
+        return 1.0
+
+    def texts(self, given: Any, address: Address) -> tuple[str, ...] | None:
+        """Return a list of names, None where none is given."""
+        if given is None:
+            return None
+        if isinstance(given, list) and all(isinstance(item, str) for item in given):
+            return tuple(given)
+        self.problem(address, f"expected a list of names in quotes, not {shown(given)}")
+        return None
+
+    def count(self, given: Any, address: Address, most: int, least: int = 1) -> int | None:
+        """Return a whole number, None where none is given."""
+        if given is None or (type(given) is int and least <= given <= most):
+            return given
+        text = f"expected a whole number from {least} to {most:,}, not {shown(given)}"
+        self.problem(address, text)
+        return 1
 
     def expressions(
         self, value: Any, address: Address, names: Mapping[str, sympy.Expr], what: str, count: int

@@ -67,6 +67,14 @@ _LAW: dict[str, Any] = {"enum": list(RISES)}
 _CORNERS: dict[str, Any] = {"type": "boolean"}
 
 
+_SEED: dict[str, Any] = {"type": "integer", "minimum": 0}
+
+DISTRIBUTIONS = ("normal", "uniform", "truncated")
+SEARCHES = ("sobol", "differential evolution")
+MINIMIZERS = ("SLSQP", "trust-constr")
+"""What tolerances may be distributed by, and how a fit may search and end."""
+
+
 def _list(name: str) -> dict[str, Any]:
     return {"type": "array", "items": {"$ref": f"#/$defs/{name}"}}
 
@@ -89,6 +97,40 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "points": Field(_list("point"), is_required=False),
         "outputs": Field(_list("output"), is_required=False),
         "sweep": Field({"$ref": "#/$defs/sweep"}, is_required=False),
+        "tolerance": Field({"$ref": "#/$defs/tolerance"}, is_required=False),
+        "fit": Field({"$ref": "#/$defs/fit"}, is_required=False),
+    },
+    "tolerance": {
+        "of": Field(_NAMES, is_required=False),
+        "parameters": Field(
+            {
+                "type": "object",
+                "additionalProperties": {
+                    "anyOf": [_EXPRESSION, _POINT, {"$ref": "#/$defs/deviation"}]
+                },
+            },
+            is_required=False,
+        ),
+        "clearances": Field(
+            {"type": "object", "additionalProperties": _EXPRESSION}, is_required=False
+        ),
+        "samples": Field(_VARIANTS, is_required=False),
+        "seed": Field(_SEED, is_required=False),
+    },
+    "deviation": {
+        "low": Field(_EXPRESSION),
+        "high": Field(_EXPRESSION),
+        "distribution": Field({"enum": list(DISTRIBUTIONS)}, is_required=False),
+        "sigmas": Field(_EXPRESSION, is_required=False),
+    },
+    "fit": {
+        "parameters": Field({"type": "object", "additionalProperties": _POINT}),
+        "targets": Field(_list("target")),
+        "samples": Field(_VARIANTS, is_required=False),
+        "starts": Field(_VARIANTS, is_required=False),
+        "search": Field({"enum": list(SEARCHES)}, is_required=False),
+        "minimizer": Field({"enum": list(MINIMIZERS)}, is_required=False),
+        "seed": Field(_SEED, is_required=False),
     },
     "sweep": {
         "parameters": Field(
@@ -180,6 +222,7 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         "constraints": Field(_list("spatial_constraint")),
         "points": Field(_list("spatial_point"), is_required=False),
         "gravity": Field(_TRIPLE, is_required=False),
+        "loads": Field(_list("spatial_load"), is_required=False),
     },
     "body": {
         "name": Field(_NAME),
@@ -189,6 +232,9 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         ),
         **{key: Field(_TRIPLE, is_required=False) for key in ("axis", "x", "y", "z")},
         "angle": Field(_EXPRESSION, is_required=False),
+        "mass": Field(_EXPRESSION, is_required=False),
+        "inertia": Field({"anyOf": [_TRIPLE, {**_TRIPLE, "items": _TRIPLE}]}, is_required=False),
+        "centre": Field(_TRIPLE, is_required=False),
     },
     "point": {**FIELDS["point"], "local": Field(_TRIPLE)},
 }
@@ -206,6 +252,38 @@ _LINE: Mapping[str, Field] = {
     "along": Field({"anyOf": [_TEXT, _POINT]}),
     "on": Field(_NAME, is_required=False),
 }
+
+_WEIGHT: Mapping[str, Field] = {"weight": Field(_EXPRESSION, is_required=False)}
+_PASSING: Mapping[str, Field] = {
+    "times": Field({"type": "array", "items": _EXPRESSION}, is_required=False),
+    **_WEIGHT,
+    "within": Field(_EXPRESSION, is_required=False),
+    "between": Field(_POINT, is_required=False),
+}
+_ROWS: dict[str, Any] = {"type": "array", "items": {"type": "array", "items": _EXPRESSION}}
+
+TARGETS: Mapping[str, Mapping[str, Field]] = {
+    "path": {"path": Field(_TEXT), "points": Field(_ROWS), **_PASSING},
+    "value": {
+        "value": Field(_TEXT), "values": Field({"type": "array", "items": _EXPRESSION}), **_PASSING,
+    },
+    "pose": {
+        "pose": Field(_TEXT), "poses": Field(_ROWS),
+        "angle_weight": Field(_EXPRESSION, is_required=False), **_PASSING,
+    },
+    "time_ratio": {
+        "time_ratio": Field(_TEXT), "ratio": Field(_EXPRESSION), **_WEIGHT,
+        "within": Field(_EXPRESSION, is_required=False),
+    },
+    "limit": {
+        "limit": Field(_TEXT),
+        "least": Field(_EXPRESSION, is_required=False),
+        "most": Field(_EXPRESSION, is_required=False),
+        "title": Field(_TEXT, is_required=False),
+    },
+    "moves": {"moves": Field({"const": True})},
+}  # fmt: skip
+"""Targets of a fit: the functions of `kc.targets`, and their arguments."""
 
 PARTS: Mapping[str, Mapping[str, Field]] = {
     "link": {
@@ -232,7 +310,6 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
     Kind.VALUE: _VALUE,
     Kind.LOAD: _VALUE,
-    Kind.LOADS: {"type": "array", "items": _VALUE, "minItems": 2, "maxItems": 2},
     Kind.DISTANCE: _VALUE,
     Kind.BODY: _NAME,
     Kind.PROFILE: {"anyOf": [_EXPRESSION, {"$ref": "#/$defs/profile"}]},
@@ -243,6 +320,8 @@ def _kind(kind: Kind, count: int) -> Mapping[str, Any]:
     """Return the schema of an argument, whose points have so many components."""
     if kind in (Kind.POINT, Kind.AXIS):
         return _components(count)
+    if kind is Kind.LOADS:
+        return {"type": "array", "items": _VALUE, "minItems": count, "maxItems": count}
     return _KINDS.get(kind, _EXPRESSION)
 
 
@@ -276,8 +355,6 @@ def model_schema() -> dict[str, Any]:
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
     in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in ("body", "point")}
-    from kincompile.model.loads import LOADS
-
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
     parts[0]["additionalProperties"] = {"anyOf": [_EXPRESSION, _POINT]}
@@ -303,11 +380,18 @@ def model_schema() -> dict[str, Any]:
             **tables,
             **in_space,
             "part": {"oneOf": parts},
+            "target": {"oneOf": [_object(item) for item in TARGETS.values()]},
             "constraint": {"oneOf": _constraints(PLANE)},
             "spatial_constraint": {"oneOf": _constraints(SPACE)},
-            "load": {"oneOf": [_object(load_fields(item)) for item in LOADS.values()]},
+            "load": {"oneOf": _loads(PLANE)},
+            "spatial_load": {"oneOf": _loads(SPACE)},
         },
     }
+
+
+def _loads(count: int) -> list[dict[str, Any]]:
+    """Return the schemas of all loads in the plane, or in space."""
+    return [_object(load_fields(item)) for item in dimensions(count).loads().values()]
 
 
 def _constraints(count: int) -> list[dict[str, Any]]:

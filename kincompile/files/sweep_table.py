@@ -9,7 +9,6 @@ measures = ["foot.x.stroke"]
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,14 +17,11 @@ from kincompile.files.content import file_content
 from kincompile.files.data_text import listed_problems, read_json, read_toml
 from kincompile.files.file_fields import FieldReader
 from kincompile.files.file_format import FIELDS, MOST_VARIANTS
-from kincompile.model.expressions import evaluate
 from kincompile.names import shown
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
-
-    from kincompile.files.data_lines import Address
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +91,7 @@ class _TableReader(FieldReader):
             return None
         if not self.has_fields(("sweep",), row, FIELDS["sweep"]):
             return None
-        samples = self._count(row.get("samples"), ("sweep", "samples"))
+        samples = self.count(row.get("samples"), ("sweep", "samples"), MOST_VARIANTS)
         given = row["parameters"]
         if not isinstance(given, dict):
             self.problem(("sweep", "parameters"), f"expected names and values, not {shown(given)}")
@@ -103,40 +99,24 @@ class _TableReader(FieldReader):
         parameters = {name: self._values(name, value) for name, value in given.items()}
         self._require_samples(parameters, samples)
         self._require_few(parameters, samples or 1)
-        columns, measures = (self._names(row.get(key), key) for key in ("columns", "measures"))
+        columns, measures = (
+            self.texts(row.get(key), ("sweep", key)) for key in ("columns", "measures")
+        )
         return SweepTable(parameters, samples, self._product(row), columns, measures or ())
 
     def _values(self, name: str, given: Any) -> tuple[float, ...] | Span:
         """Return the values of a parameter, or from where to where they go."""
         address = ("sweep", "parameters", name)
         if isinstance(given, list):
-            return tuple(self._number(item, (*address, k)) for k, item in enumerate(given))
+            return tuple(self.finite(item, (*address, k)) for k, item in enumerate(given))
         if not isinstance(given, dict):
             text = "expected a list of values, or { from = 0.2, to = 0.6, count = 5 }"
             self.problem(address, f"{text}, not {shown(given)}")
             return ()
         if not self.has_fields(address, given, FIELDS["span"]):
             return ()
-        first, last = (self._number(given[key], (*address, key)) for key in ("from", "to"))
-        return Span(first, last, self._count(given.get("count"), (*address, "count")))
-
-    def _number(self, given: Any, address: Address) -> float:
-        """Return a number, or that of a formula without names."""
-        known = len(self.problems)
-        found = evaluate(self.constant(given, address, {}), {})
-        if found is not None and math.isfinite(found):
-            return found
-        if len(self.problems) == known:
-            self.problem(address, f"{shown(given)} is not a finite number")
-        return 1.0
-
-    def _count(self, given: Any, address: Address) -> int | None:
-        """Return a whole number of at least 1, None where none is given."""
-        if given is None or (type(given) is int and 1 <= given <= MOST_VARIANTS):
-            return given
-        text = f"expected a whole number from 1 to {MOST_VARIANTS:,}, not {shown(given)}"
-        self.problem(address, text)
-        return 1
+        first, last = (self.finite(given[key], (*address, key)) for key in ("from", "to"))
+        return Span(first, last, self.count(given.get("count"), (*address, "count"), MOST_VARIANTS))
 
     def _require_samples(
         self, parameters: Mapping[str, tuple[float, ...] | Span], samples: int | None
@@ -158,15 +138,6 @@ class _TableReader(FieldReader):
                 f"{total:,} values are more than the {MOST_VARIANTS:,} of a file; sweep in Python"
             )
             self.problem(("sweep", "parameters"), text)
-
-    def _names(self, given: Any, key: str) -> tuple[str, ...] | None:
-        """Return a list of names, None where none is given."""
-        if given is None:
-            return None
-        if isinstance(given, list) and all(isinstance(item, str) for item in given):
-            return tuple(given)
-        self.problem(("sweep", key), f"expected a list of names in quotes, not {shown(given)}")
-        return None
 
     def _product(self, row: Mapping[str, Any]) -> bool:
         """Return whether every value goes with every other one."""

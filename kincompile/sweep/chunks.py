@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from concurrent.futures import FIRST_COMPLETED, wait
 from contextlib import contextmanager
 from itertools import islice
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import KincompileError
@@ -53,6 +53,8 @@ def solved(
         return
     left = iter(numbers)
     waiting: dict[Future[Values], int] = {}
+    # Each future reports itself: to ask all that wait would cost more the more there are.
+    finished: SimpleQueue[Future[Values]] = SimpleQueue()
     most = pending or PER_WORKER * _workers(executor)
     try:
         while True:
@@ -60,13 +62,13 @@ def solved(
                 with _of_executor():
                     future = executor.submit(run, job, number, plan.sets(number))
                 waiting[future] = number
+                future.add_done_callback(finished.put)
             if not waiting:
                 return
-            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                number = waiting.pop(future)
-                with _of_executor():
-                    values = future.result()
-                yield number, values
+            future = finished.get()
+            with _of_executor():
+                values = future.result()
+            yield waiting.pop(future), values
     finally:
         for future in waiting:
             future.cancel()

@@ -11,6 +11,7 @@ import os
 import threading
 import warnings
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
     from kincompile.sweep.layout import Layout
 
-_MODULES: dict[str, ModuleType] = {}
-
 
 class Writer(Protocol):
     """What writes a chunk; it is sent to workers, with each chunk, so that it is small."""
@@ -39,7 +38,7 @@ class Writer(Protocol):
         """Keep the values of a chunk, by name, whose parameters are (B, k)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Sources:
     """The emitted source of a mechanism, from which a worker makes its module.
 
@@ -72,14 +71,23 @@ class Sources:
             found.update(np.ascontiguousarray(array).tobytes())
         object.__setattr__(self, "digest", found.hexdigest())
 
+    def __eq__(self, other: object) -> bool:
+        """Say whether two have the same text."""
+        return isinstance(other, Sources) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        """Return a number that goes with `__eq__`."""
+        return hash(self.digest)
+
     def module(self) -> ModuleType:
         """Return the module, compiled once a process."""
-        if self.digest not in _MODULES:
-            module = from_source(self.numpy, self.name, self.arrays)
-            if self.native:
-                module = make_native(module, self.native)
-            _MODULES[self.digest] = module
-        return _MODULES[self.digest]
+        return _module(self)
+
+
+@lru_cache(maxsize=8)
+def _module(sources: Sources) -> ModuleType:
+    module = from_source(sources.numpy, sources.name, sources.arrays)
+    return make_native(module, sources.native) if sources.native else module
 
 
 @dataclass(frozen=True, slots=True)

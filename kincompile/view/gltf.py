@@ -136,7 +136,7 @@ def _rod(file: _File, drawn: Drawing, mark: Span, q: Array) -> list[int]:
     nodes = []
     for solid in solids(replace(drawn, marks=(mark,))):
         node = file.node(mark.joint, file.mesh(mark.joint, [solid], replace(solid, mark=upright)))
-        is_driven = solid.piece.on == "line" and np.ptp(lengths) > CONSTANT * longest
+        is_driven = solid.piece.on != "barrel" and np.ptp(lengths) > CONSTANT * longest
         scales = np.stack((lengths * 0 + 1, lengths * 0 + 1, lengths / longest), axis=-1)
         file.animate(node, start, turns, scales if is_driven else None)
         nodes.append(node)

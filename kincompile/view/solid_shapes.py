@@ -29,9 +29,9 @@ SOLID_LOOKS: Mapping[str, Look] = {
 class Piece(Stroke):
     """A part of a shape in space, as a chain of corners beside a line.
 
-    Its axes are those that `on` names, as of a stroke, with "reach", along what slides; "edges" of
-    a body; "turn", across the axis. A corner is a part of the line's length, sizes along it, and
-    sizes away from it.
+    Its axes are those that `on` names, as of a stroke, with "reach", along what slides; "stem",
+    from the barrel on; "edges" of a body; "turn", across the axis. A corner is a part of the line's
+    length, sizes along it, and sizes away from it.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ SOLIDS: Mapping[str, tuple[Piece, ...]] = {
     "weld": (_solid("body", "axis", _about(1.3, -0.9, 0.9), 4),),
     "rod": (_solid("steel", "line", _tube(0.4), 8),),
     "cylinder": (
-        _solid("steel", "line", _tube(0.4), 8),
+        _solid("steel", "stem", _tube(0.4), 8),
         _solid("body", "barrel", _tube(0.9, (0, -0.6), (1, 0))),
     ),
     "dimension": (Piece("dimension", "line", ((0, 0, 0), (1, 0, 0))),),

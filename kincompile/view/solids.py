@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Protocol
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from kincompile.view.shapes import Look
     from kincompile.view.solid_shapes import Piece
 
-LONGEST = 5.0
+LONGEST = 8.0
 """Length of the longest facet of a solid, in sizes: what is nearer is drawn later."""
 
 BALL = 7
@@ -184,7 +184,8 @@ def _lines(mark: Mark, on: str, places: Places) -> list[_Line]:
             ]
         case Span():
             start, end = (places.at(to.frame, to.point) for to in (mark.first, mark.second))
-            return [_between(start, end, mark.barrel if on == "barrel" else np.inf)]
+            line = _between(start, end, mark.barrel if on == "barrel" else np.inf)
+            return [_from(line, mark.barrel) if on == "stem" else line]
         case Drive():
             axis = np.array(mark.axis, dtype=np.float64)
             return [_Line(places.at(mark.place.frame, mark.place.point), axis, beside(axis))]
@@ -215,6 +216,12 @@ def _between(start: Array, end: Array, most: float = np.inf) -> _Line:
     length = float(np.linalg.norm(way))
     axis = way / length if length else np.array((0.0, 0.0, 1.0))
     return _Line(start, axis, beside(axis), min(length, most))
+
+
+def _from(line: _Line, far: float) -> _Line:
+    """Return the rest of a line, from a length on."""
+    far = min(far, line.length)
+    return replace(line, start=line.start + far * line.axis, length=line.length - far)
 
 
 def beside(axis: Array) -> Array:

@@ -9,7 +9,7 @@ const isSpatial = true;
 const AXES = ['x', 'y', 'z'];
 const LIGHT = [-0.42, 0.55, 0.72];  // to the right, up, and towards the viewer
 const SHADES = 16;
-const PIECE = 5;  // sizes, the longest part of a solid: what is nearer is drawn later
+const PIECE = 8;  // sizes, the longest part of a solid: what is nearer is drawn later
 const MARKS = 3;  // sizes that a mark reaches beyond its place
 const EYE = 4.5;  // how far the eye is, in half diagonals of the extent
 const STANDARD = {  // azimuth of the viewer, and how high it stands
@@ -150,8 +150,10 @@ const orbit = {
     player.onMotion(() => this.measure());
     stage.canvas.addEventListener('contextmenu', event => event.preventDefault());
     for (const id of ['poles', 'centrodes']) document.getElementById(id).closest('label').hidden = true;
-    document.getElementById('pointing').append(' Drag beside the bodies to turn the drawing, with Shift or the right '
-      + 'button to move it; Alt with the arrows turns it, with Shift moves it. 1 front, 2 side, 3 top, 4 isometric, P perspective.');
+    const pointing = document.getElementById('pointing'), moves = 'moves the drawing';
+    const said = [...pointing.childNodes].find(node => node.data?.includes(moves));
+    said.data = said.data.replace(moves, 'turns the drawing, with Shift or the right button it moves');
+    pointing.append(' 1 front, 2 side, 3 top, 4 isometric, P perspective.');
   },
 };
 
@@ -260,7 +262,11 @@ function linesOf(q, mark, on) {
   if (on === 'edges') {
     return wiresOf(mark.points).edges.map(ends => between(...ends.map(point => inWorld(q, mark.frame, point))));
   }
-  if (mark.kind === 'span') return [between(at(mark.first), at(mark.second), on === 'barrel' ? mark.barrel : Infinity)];
+  if (mark.kind === 'span') {
+    const line = between(at(mark.first), at(mark.second), on === 'barrel' ? mark.barrel : Infinity);
+    const inside = on === 'stem' ? Math.min(mark.barrel, line.length) : 0;
+    return [{ ...line, start: plus(line.start, line.axis, inside), length: line.length - inside }];
+  }
   if (mark.kind === 'drive') return [{ start: at(mark.place), axis: mark.axis, aside: besideOf(mark.axis), length: 0 }];
   const { place: { frame, point }, reach } = mark;
   const [axis, aside] = [mark.axis, mark.cross].map(v => directionOf(q, frame, v));

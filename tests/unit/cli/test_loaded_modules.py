@@ -22,6 +22,21 @@ LANGUAGES = "kincompile.targets.c kincompile.targets.octave kincompile.targets.j
 EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2"
 RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
 
+TASKS = """
+[tolerance]
+parameters = { length = 0.01 }
+
+[fit]
+parameters = { length = [0.5, 2] }
+samples = 4
+starts = 1
+targets = [{ value = "phi_bob", values = [0.1], times = [0.1], within = 9 }]
+"""
+SPACE = (
+    "kincompile.space kincompile.spatial kincompile.view.solids kincompile.view.solid_joints "
+    "kincompile.view.solid_shapes kincompile.view.solid_picture kincompile.view.gltf"
+)
+
 NOT_LOADED = {
     "assemblies MODEL": (
         f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify"
@@ -43,9 +58,11 @@ NOT_LOADED = {
     ),
     "draw MODEL -o DRAWING.svg": (
         f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify "
-        "kincompile.view.page ezdxf watchfiles"
+        f"kincompile.view.page ezdxf watchfiles {SPACE}"
     ),
-    "view MODEL -o PAGE.html": f"{EXTRA} {LARGE} kincompile.derivation kincompile.compare",
+    "view MODEL -o PAGE.html": (
+        f"{EXTRA} {LARGE} {SPACE} kincompile.derivation kincompile.compare"
+    ),
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
     "equilibrium HEAVY": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} scipy.interpolate",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
@@ -53,6 +70,14 @@ NOT_LOADED = {
     "sweep MODEL --sweep length=1:2:2 --target numpy --processes 1": (
         f"{LARGE} {LANGUAGES} {RANK} rich platformdirs matplotlib zarr pyarrow xarray scipy.stats "
         "kincompile.view.page kincompile.compare kincompile.verify"
+    ),
+    "tolerance TASK": (
+        f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify "
+        "kincompile.compare"
+    ),
+    "fit TASK": (
+        f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify "
+        "kincompile.compare"
     ),
     "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
 }
@@ -82,6 +107,9 @@ def test_that_a_command_loads_what_it_uses(line, pendulum, tmp_path):
     places["HEAVY"].write_text(text, encoding="utf-8")
     places |= {"DRAWING.svg": tmp_path / "drawing.svg"}
     places |= {"FOLDER": tmp_path / "new", "KIT": tmp_path / "kit"}
+    task = tmp_path / "task.toml"
+    task.write_text(kc.read_model(pendulum).to_toml() + TASKS, encoding="utf-8")
+    places |= {"TASK": task}
     if "KIT" in line:
         kc.exercise(kc.read_model(pendulum)).write(places["KIT"])
     loaded = loaded_by([str(places.get(word, word)) for word in line.split()])

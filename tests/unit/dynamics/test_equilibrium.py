@@ -280,3 +280,19 @@ def test_that_an_equilibrium_is_shown_written_and_knows_its_parameters(tmp_path)
     assert path.read_text().splitlines()[0].startswith("t")
     module = kc.load(kc.emit(rod()).write(tmp_path)[0])
     assert kc.equilibrium(module)["rod.phi"][0] == pytest.approx(1.18715766125861, abs=1e-13)
+
+
+def test_that_a_simulated_motion_swings_about_it_and_comes_to_rest_there():
+    """The period of small swings is 2 pi sqrt(J/K); with a damper the motion ends at rest."""
+    module = kc.compile(rod())
+    found = kc.equilibrium(module)
+    rest, held = found["rod.phi"][0], found.stiffness("rod.phi")[0]
+    inertia = 2 / 12 + 2 * 0.5**2
+    period = 2 * np.pi * np.sqrt(inertia / held)
+    times = [0.0, period / 2, period]
+    swing = kc.simulate(module, times, position={"rod.phi": rest + 1e-4})["rod.phi"] - rest
+    np.testing.assert_allclose(swing, [1e-4, -1e-4, 1e-4], rtol=2e-4)
+    m = rod()
+    m.add(kc.TorsionSpring("damper", m.ground, m.bodies[0], damping=6))
+    damped = kc.simulate(kc.compile(m), [0.0, 10.0])
+    assert damped["rod.phi"][-1] == pytest.approx(rest, abs=1e-7)

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import kincompile as kc
 from kincompile import spatial
+from kincompile.cli import cli
 from kincompile.files.model_file import read_data_model
 from kincompile.space.catalogue import CONSTRAINTS
 from kincompile.spatial import outputs
@@ -53,7 +55,7 @@ def everything() -> spatial.Mechanism:
     return m
 
 
-@pytest.mark.parametrize("form", ["toml", "json"])
+@pytest.mark.parametrize("form", ["toml", pytest.param("json", marks=pytest.mark.slow)])
 def test_that_every_constraint_can_be_written_and_read(form: str) -> None:
     m = everything()
     again = read(m.to_toml() if form == "toml" else m.to_json(), form)
@@ -160,3 +162,32 @@ def test_axes_of_slider() -> None:
     m = crossed_cranks(1.0)
     m.constraints[0] = spatial.Revolute("O", m.ground, O, 2 * Z, m.bodies[0], O, 3 * Z)
     assert "axis_i = [0.0, 0.0, 2.0]" in m.to_toml()
+
+
+def test_that_an_exercise_in_space_is_refused() -> None:
+    with pytest.raises(kc.InputError, match="in space, and exercises are of those in the plane"):
+        kc.exercise(crossed_cranks(1.0))
+
+
+COMMANDS = {
+    "run": ("--points", "5"),
+    "inspect": (),
+    "assemblies": (),
+    "compile": ("-o", "{}/module.py"),
+    "derive": ("-o", "{}/page.html"),
+    "draw": ("-o", "{}/drawing.svg"),
+    "view": ("-o", "{}/view.html"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", ["py", "toml"])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_that_commands_take_a_file_in_space(command: str, ending: str, tmp_path: Path) -> None:
+    file = Path(__file__).parents[3] / "examples" / "space" / f"rssr.{ending}"
+    options = [item.format(tmp_path) for item in COMMANDS[command]]
+    done = CliRunner().invoke(cli, [command, str(file), *options])
+    assert done.exit_code == 0, done.output
+    for option in options:
+        if option.startswith(str(tmp_path)):
+            assert Path(option).stat().st_size > 1000

@@ -1,0 +1,72 @@
+"""`kincompile fit`: dimensions with which a model reaches the targets of its file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+import kincompile as kc
+from kincompile.cli.motion import set_values
+from kincompile.cli.shared import (
+    NOT_CONVERGED,
+    output_option,
+    page_option,
+    print_data,
+    read_model,
+    require_output,
+    set_option,
+    write_page,
+)
+from kincompile.errors import InputError
+from kincompile.writing import write_atomically
+
+ENDINGS = (".toml", ".json")
+
+
+@click.command("fit")
+@click.argument("model")
+@output_option("Model to write with the dimensions found: .toml or .json.", required=False)
+@page_option
+@set_option("parameter")
+@click.option("--samples", type=click.IntRange(min=1), help="Sets of parameters to search.")
+@click.option("--starts", type=click.IntRange(min=1), help="How many of them are followed.")
+@click.pass_context
+def command(
+    context: click.Context,
+    model: str,
+    output: str | None,
+    page: str | None,
+    values: tuple[str, ...],
+    samples: int | None,
+    starts: int | None,
+) -> None:
+    """Find dimensions with which MODEL reaches the targets of its table [fit].
+
+    What was found goes to stdout; -o writes the model with these dimensions, --page a page that
+    shows it move. Where a target is not reached, or a limit is not kept, what comes nearest is
+    written nevertheless, and the exit code is 3.
+    """
+    from kincompile.design.page import fit_page
+    from kincompile.design.task_tables import read_fit
+    from kincompile.design.variation import require_mechanism
+
+    if output is not None:
+        if Path(output).suffix not in ENDINGS:
+            raise InputError(f"cannot write {output}: end its name in .toml or .json")
+        require_output(output, model, "the model itself")
+    mechanism = require_mechanism(read_model(model), "kincompile fit")
+    options = {"samples": samples, "starts": starts}
+    given = read_fit(model, mechanism) | {
+        name: value for name, value in options.items() if value is not None
+    }
+    found = kc.fit(mechanism, p=set_values(mechanism, values), **given)
+    print_data(f"{found}\n")
+    if output is not None:
+        text = found.model.to_json() if output.endswith(".json") else found.model.to_toml()
+        click.echo(f"Wrote {write_atomically(output, text)}", err=True)
+    if page is not None:
+        write_page(page, fit_page(found))
+    if not found.success:
+        click.echo(f"Error: {found.message}", err=True)
+        context.exit(NOT_CONVERGED)

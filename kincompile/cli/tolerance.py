@@ -1,0 +1,48 @@
+"""`kincompile tolerance`: what the tolerances of a model's file do to its motion."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import click
+
+import kincompile as kc
+from kincompile.cli.motion import motion_options, motion_times, set_values
+from kincompile.cli.shared import page_option, print_data, read_model, write_page
+
+
+@click.command("tolerance")
+@click.argument("model")
+@page_option
+@partial(motion_options, has_through=False)
+@click.option("--samples", type=click.IntRange(min=0), help="Samples of Monte Carlo.")
+def command(
+    model: str,
+    page: str | None,
+    start: str,
+    end: str | None,
+    points: int | None,
+    grid: str | None,
+    values: tuple[str, ...],
+    assembly: int | None,
+    samples: int | None,
+) -> None:
+    """Say how far the motion of MODEL deviates, as its table [tolerance] says.
+
+    Worst case, root sum of squares and, with samples, Monte Carlo go to stdout: of each column at
+    the time at which it deviates most, with what each dimension contributes. --page writes the
+    bands over time too.
+    """
+    from kincompile.design.page import tolerance_page
+    from kincompile.design.task_tables import read_tolerance
+
+    mechanism = read_model(model)
+    given = read_tolerance(model)
+    if samples is not None:
+        given["samples"] = samples
+    numbers = set_values(mechanism, values)
+    times = motion_times(mechanism, start, end, points, grid, numbers)
+    found = kc.tolerance(mechanism, t=times, p=numbers, assembly=assembly, **given)
+    print_data(f"{found}\n")
+    if page is not None:
+        write_page(page, tolerance_page(found))
