@@ -43,7 +43,8 @@ FLATTEST, STEEPEST = 1e-3, np.radians(16)
 def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = ()) -> str:
     """Return a mechanism as the text of a DXF file.
 
-    Circles and arcs of marks are true ones; the centre of a pin's circle is where the joint is.
+    Circles and arcs of marks are true ones; the centre of a pin's circle is where the joint is. A
+    mechanism in space is faces and lines.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
     length_unit
         The unit of length; one that DXF does not know is left open ($INSUNITS 0).
     paths
-        Lines on the layer of paths, each of shape (k, 2).
+        Lines on the layer of paths, each of shape (k, 2), in space (k, 3).
 
     Raises
     ------

@@ -14,7 +14,7 @@ class Grab {
   down(place, event) {
     if (!hasMotion() || player.count < 2 || !player.state.isFound) return false;
     const frame = stage.bodyAt([event.offsetX, event.offsetY])?.frame;
-    if (!frame || stage.fingers.size > 1) return false;
+    if (!frame || stage.fingers.size > 1 || event.button > 0) return false;
     const held = heldAt(player.state.q, frame, place, stage.view);
     this.held = { ...held, from: [event.clientX, event.clientY], isMoved: false };
     stage.canvas.setPointerCapture(event.pointerId);

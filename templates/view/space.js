@@ -150,8 +150,10 @@ const orbit = {
     player.onMotion(() => this.measure());
     stage.canvas.addEventListener('contextmenu', event => event.preventDefault());
     for (const id of ['poles', 'centrodes']) document.getElementById(id).closest('label').hidden = true;
-    document.getElementById('pointing').append(' Drag beside the bodies to turn the drawing, with Shift or the right '
-      + 'button to move it; Alt with the arrows turns it, with Shift moves it. 1 front, 2 side, 3 top, 4 isometric, P perspective.');
+    const pointing = document.getElementById('pointing'), moves = 'moves the drawing';
+    const said = [...pointing.childNodes].find(node => node.data?.includes(moves));
+    said.data = said.data.replace(moves, 'turns the drawing, with Shift or the right button it moves');
+    pointing.append(' 1 front, 2 side, 3 top, 4 isometric, P perspective.');
   },
 };
 

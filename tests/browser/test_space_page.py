@@ -197,7 +197,8 @@ def test_the_ghosts_of_newtons_iterates_and_a_guess_that_is_turned(page: Any) ->
     assert before.shape == (21,)
 
 
-def test_what_is_said_of_a_point_and_of_a_body(page: Any) -> None:
+def test_what_is_said_of_a_point_of_a_body_and_of_keys(page: Any) -> None:
+    assert "turns the drawing, with Shift" in page.locator("#pointing").text_content()
     page.evaluate("stage.select(stage.points.find(point => point.name === 'tip'))")
     tip = page.locator("#tip").inner_text()
     assert "z = " in tip

@@ -55,7 +55,7 @@ def everything() -> spatial.Mechanism:
     return m
 
 
-@pytest.mark.parametrize("form", ["toml", "json"])
+@pytest.mark.parametrize("form", ["toml", pytest.param("json", marks=pytest.mark.slow)])
 def test_that_every_constraint_can_be_written_and_read(form: str) -> None:
     m = everything()
     again = read(m.to_toml() if form == "toml" else m.to_json(), form)
