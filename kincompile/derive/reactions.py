@@ -8,6 +8,7 @@ C(t) does the work :math:`\lambda^T \Phi_C \delta C`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,10 @@ from kincompile.calculus.expressions import (
     ZERO,
     Basis,
     Norm,
+    Number,
     Scalar,
     Symbol,
+    TimesG,
     Vector,
     VectorSymbol,
     dot,
@@ -36,6 +39,10 @@ if TYPE_CHECKING:
     from kincompile.derive.rules import Direction
 
 
+SPACE = 3
+"""Components of a vector in space."""
+
+
 @dataclass(frozen=True, slots=True)
 class Reaction:
     """What a constraint does to one of its bodies.
@@ -45,7 +52,8 @@ class Reaction:
     force
         Components along the fixed axes.
     moment
-        About the joint's point of this body, or its origin where it has none.
+        About the joint's point of this body, or its origin where it has none; in space components
+        along the fixed axes.
     """
 
     force: tuple[Scalar, ...]
@@ -63,7 +71,7 @@ class Reactions:
     drive
         What the driver does, along its value C: a force or a torque; zero where there is no C.
     along_axis
-        The force on the last body along the joint's axis and across it; none without an axis.
+        The force on the last body along the joint's axis, in the plane across it too; none without.
     """
 
     bodies: tuple[Reaction, ...]
@@ -109,6 +117,8 @@ def _along_axis(template: Template, axis: tuple[str, str] | None) -> tuple[Scala
     (frame,) = (item for item in template.frames if item.index == index)
     v, last = VectorSymbol(symbol, frame.size), template.frames[-1]
     unit = Norm(v) ** -1 * frame.A(v)
+    if frame.size == SPACE:
+        return (_work(template, {last.r: unit}),)
     return tuple(_work(template, {last.r: way}) for way in (unit, perpendicular(unit)))
 
 
@@ -120,11 +130,29 @@ def _reaction(template: Template, frame: Frame, point: str | None) -> Reaction:
         if point is not None:
             direction[frame.r] = -along(frame.A(VectorSymbol(point, frame.size)), turn)
         moment.append(_work(template, direction))
+    if frame.size == SPACE:
+        moment = _along_fixed_axes(frame, moment)
     return Reaction(tuple(force), tuple(moment))
 
 
+def _along_fixed_axes(frame: Frame, components: list[Scalar]) -> list[Scalar]:
+    """Return the components along the fixed axes of a vector given along a body's axes."""
+    axes = [Basis(k, SPACE) for k in range(SPACE)]
+    turned = [frame.A(axis) for axis in axes]
+    return [
+        sum_of(tuple(dot(axis, a) * x for a, x in zip(turned, components, strict=True)))
+        for axis in axes
+    ]
+
+
 def _turns(frame: Frame) -> Iterator[Direction]:
-    """Yield the directions in which a body turns in the plane, at unit rates."""
+    """Yield the directions in which a body turns at unit rates: in space about its own axes."""
+    if frame.size == SPACE:
+        (p,) = (item for item in frame.coordinates if item != frame.r)
+        for k in range(SPACE):  # p_dot = G^T omega'/2
+            turn = TimesG(p, Basis(k, SPACE), is_transposed=True)  # type: ignore[arg-type]
+            yield {p: Number(Fraction(1, 2)) * turn}
+        return
     for coordinate in frame.coordinates:
         if coordinate != frame.r:
             for unit in units(coordinate):

@@ -88,11 +88,14 @@ class BodyReader(SketchReader):
         before = len(self.problems)
         given: dict[str, Any] = {
             key: self.components(row[key], (*address, key), "[x, y, z]")
-            for key in ("position", "axis", "x", "y", "z")
+            for key in ("position", "axis", "x", "y", "z", "centre")
             if key in row
         }
-        if "angle" in row:
-            given["angle"] = self.expression(row["angle"], (*address, "angle"), self.names)
+        for key in ("angle", "mass"):
+            if key in row:
+                given[key] = self.expression(row[key], (*address, key), self.names)
+        if "inertia" in row:
+            given["inertia"] = self._inertia(row["inertia"], (*address, "inertia"))
         if "orientation" in row:
             place = (*address, "orientation")
             given["orientation"] = self._orientation(row["orientation"], place)
@@ -105,9 +108,19 @@ class BodyReader(SketchReader):
     def _orientation(self, given: Any, address: Address) -> Any:
         """Return four Euler parameters, or the three rows of a rotation matrix."""
         if isinstance(given, list) and len(given) == 3:
-            rows = enumerate(given)
-            return [self.components(row, (*address, k), "[., ., .]") for k, row in rows]
+            return self._rows(given, address)
         return self.components(given, address, "[e0, e1, e2, e3]")
+
+    def _inertia(self, given: Any, address: Address) -> Any:
+        """Return three principal moments, or the three rows of a matrix."""
+        if isinstance(given, list) and any(isinstance(row, list) for row in given):
+            return self._rows(given, address)
+        return self.components(given, address, "[J_xi, J_eta, J_zeta]")
+
+    def _rows(self, given: list[Any], address: Address) -> list[tuple[Any, ...]]:
+        """Return the rows of a matrix."""
+        rows = enumerate(given)
+        return [self.components(row, (*address, k), "[., ., .]") for k, row in rows]
 
     def components(self, given: Any, address: Address, words: str) -> tuple[Any, ...]:
         """Return numbers or formulas, as many as the words have: ``[xi, eta]``."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.bodies import Body
     from kincompile.model.constraint import Constraint
+    from kincompile.model.load import Load
 
 PLANE, SPACE = 2, 3
 """Values of the key `space`."""
@@ -48,6 +49,16 @@ class Dimensions:
     def count(self) -> int:
         """Two in the plane, three in space."""
         return len(self.ground.kind.axes)
+
+    def loads(self) -> Mapping[str, type[Load]]:
+        """Return the types of loads by name, which only a model that has any needs."""
+        if self.count == PLANE:
+            from kincompile.model.loads import LOADS
+
+            return LOADS
+        from kincompile.space.loads import LOADS as IN_SPACE
+
+        return IN_SPACE
 
 
 @cache

@@ -222,6 +222,7 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         "constraints": Field(_list("spatial_constraint")),
         "points": Field(_list("spatial_point"), is_required=False),
         "gravity": Field(_TRIPLE, is_required=False),
+        "loads": Field(_list("spatial_load"), is_required=False),
     },
     "body": {
         "name": Field(_NAME),
@@ -231,6 +232,9 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         ),
         **{key: Field(_TRIPLE, is_required=False) for key in ("axis", "x", "y", "z")},
         "angle": Field(_EXPRESSION, is_required=False),
+        "mass": Field(_EXPRESSION, is_required=False),
+        "inertia": Field({"anyOf": [_TRIPLE, {**_TRIPLE, "items": _TRIPLE}]}, is_required=False),
+        "centre": Field(_TRIPLE, is_required=False),
     },
     "point": {**FIELDS["point"], "local": Field(_TRIPLE)},
 }
@@ -306,7 +310,6 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
     Kind.VALUE: _VALUE,
     Kind.LOAD: _VALUE,
-    Kind.LOADS: {"type": "array", "items": _VALUE, "minItems": 2, "maxItems": 2},
     Kind.DISTANCE: _VALUE,
     Kind.BODY: _NAME,
     Kind.PROFILE: {"anyOf": [_EXPRESSION, {"$ref": "#/$defs/profile"}]},
@@ -317,6 +320,8 @@ def _kind(kind: Kind, count: int) -> Mapping[str, Any]:
     """Return the schema of an argument, whose points have so many components."""
     if kind in (Kind.POINT, Kind.AXIS):
         return _components(count)
+    if kind is Kind.LOADS:
+        return {"type": "array", "items": _VALUE, "minItems": count, "maxItems": count}
     return _KINDS.get(kind, _EXPRESSION)
 
 
@@ -350,8 +355,6 @@ def model_schema() -> dict[str, Any]:
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
     in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in ("body", "point")}
-    from kincompile.model.loads import LOADS
-
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
     parts[0]["additionalProperties"] = {"anyOf": [_EXPRESSION, _POINT]}
@@ -380,9 +383,15 @@ def model_schema() -> dict[str, Any]:
             "target": {"oneOf": [_object(item) for item in TARGETS.values()]},
             "constraint": {"oneOf": _constraints(PLANE)},
             "spatial_constraint": {"oneOf": _constraints(SPACE)},
-            "load": {"oneOf": [_object(load_fields(item)) for item in LOADS.values()]},
+            "load": {"oneOf": _loads(PLANE)},
+            "spatial_load": {"oneOf": _loads(SPACE)},
         },
     }
+
+
+def _loads(count: int) -> list[dict[str, Any]]:
+    """Return the schemas of all loads in the plane, or in space."""
+    return [_object(load_fields(item)) for item in dimensions(count).loads().values()]
 
 
 def _constraints(count: int) -> list[dict[str, Any]]:

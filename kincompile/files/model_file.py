@@ -243,25 +243,24 @@ class _ModelReader(BodyReader):
 
     def _load(self, address: Address, row: Row) -> Load | None:
         """Return a load, None where something is wrong with it."""
-        from kincompile.model.loads import LOADS
-
+        known = self.words.loads()
         before = len(self.problems)
         name = self.name(row, address, "a load")
-        kind = self._type_of(row, address, LOADS)
+        kind = self._type_of(row, address, known)
         if kind is None:
             return None
         self.is_free(name, address, "load")
         self.remember(f"{kind} {name!r}", address)
         self.remember(f"the load {name!r}", address)
-        self.has_fields(address, row, load_fields(LOADS[kind]))
+        self.has_fields(address, row, load_fields(known[kind]))
         given = {
             key: self._argument(item, row[key], (*address, key))
-            for key, item in LOADS[kind].arguments().items()
+            for key, item in known[kind].arguments().items()
             if key in row
         }
         for key in given:
             self.remember(f"{kind} {name!r}, {key}", (*address, key))
-        return LOADS[kind](name, **given) if len(self.problems) == before else None
+        return known[kind](name, **given) if len(self.problems) == before else None
 
     def _type_of(self, row: Row, address: Address, known: Collection[str]) -> str | None:
         """Return the type of a constraint or a load."""
@@ -350,9 +349,11 @@ class _ModelReader(BodyReader):
         if item.kind is Kind.LOAD:
             return self._force(given, address)
         if item.kind is Kind.LOADS:
-            if not isinstance(given, list) or len(given) != 2:
-                self.problem(address, f"expected [F_x, F_y], not {shown(given)}")
-                return 1.0, 1.0
+            size = self.words.count
+            if not isinstance(given, list) or len(given) != size:
+                expected = ("[F_x, F_y]", "[F_x, F_y, F_z]")[size - PLANE]
+                self.problem(address, f"expected {expected}, not {shown(given)}")
+                return (1.0,) * size
             return tuple(self._force(part, (*address, k)) for k, part in enumerate(given))
         return self.expression(given, address, self.names)
 

@@ -85,15 +85,29 @@ def _is_own(item: Joint | FreeEquation) -> bool:
 
 def _body(item: Body) -> dict[str, Any]:
     guess = [value(number) for number in item.guess]
+    row: dict[str, Any] = {"name": item.name}
     if len(item.kind.axes) == SPACE:
-        return {"name": item.name, "position": guess[:SPACE], "orientation": guess[SPACE:]}
-    row: dict[str, Any] = {"name": item.name, "guess": guess}
+        row |= {"position": guess[:SPACE], "orientation": guess[SPACE:]}
+        row |= {} if item.mass is None else {"mass": value(item.mass)}
+        row |= {} if item.inertia is None else {"inertia": _nested(item.inertia)}
+        return _with_centre(row, item)
+    row["guess"] = guess
     corners = [[value(number) for number in corner] for corner in item.outline]
     row |= {"outline": corners} if corners else {}
     given = {key: getattr(item, key) for key in ("mass", "inertia", "density", "thickness")}
     row |= {key: value(number) for key, number in given.items() if number is not None}
+    return _with_centre(row, item)
+
+
+def _with_centre(row: dict[str, Any], item: Body) -> dict[str, Any]:
+    """Return a body's table with its centre of mass, where that is not its origin."""
     centre = [value(number) for number in item.centre]
-    return {**row, "centre": centre} if centre != [0, 0] else row
+    return {**row, "centre": centre} if any(number != 0 for number in centre) else row
+
+
+def _nested(given: Any) -> list[Any]:
+    """Return a vector or the rows of a matrix as lists of values."""
+    return [_nested(item) if hasattr(item, "__len__") else value(item) for item in given]
 
 
 def _outputs(system: ConstraintSystem) -> list[dict[str, Any]]:

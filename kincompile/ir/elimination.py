@@ -254,8 +254,12 @@ def _cheapest(graph: Graph, matrix: Matrix, any_pivot: bool) -> Pivot | None:
             in_column[column] = in_column.get(column, 0) + 1
     best: tuple[int, int, int] | None = None
     for row, entries in matrix.items():
-        for column, node in entries.items():
-            if not any_pivot and graph.value_of(node) is None:
+        numbers = {column: graph.value_of(node) for column, node in entries.items()}
+        sizes = {column: abs(float(x)) for column, x in numbers.items() if x is not None}
+        least = SAFE * max(sizes.values(), default=0.0)
+        for column in entries:
+            # A number such as cos(pi/2) = 6e-17 is no pivot.
+            if not any_pivot and not sizes.get(column, -1.0) >= least:
                 continue
             rank = ((len(entries) - 1) * (in_column[column] - 1), row, column)
             if best is None or rank < best:
@@ -333,6 +337,8 @@ def _eliminate_block(
     return [eliminated[pivot.row][pivot.column] for pivot in pivots]
 
 
+SAFE = 1e-3
+"""Size of a plain number, relative to the largest of its row, from which on it is a pivot."""
 LARGEST_CLOSED_FORM = 3
 """Blocks up to this size are solved by their adjugate, as Cramer's rule does."""
 LARGEST_PIVOTED = 6

@@ -170,6 +170,7 @@ def _axis_of(joint: Joint) -> tuple[str, str] | None:
     """Return the symbol of a joint's axis and the index of its body; of two that on body j."""
     given = joint.written.arguments().values()
     axes = [(item.symbol, item.on) for item in given if item.kind is Kind.AXIS]
+    axes = [axis for axis in axes if axis[0].startswith("h_")] or axes  # in space, of a triad
     known = {frame.index for frame in joint.template.frames}
     return next((item for item in reversed(axes) if item[1] in known), None)
 
@@ -182,12 +183,13 @@ class _Forces:
         body = code.program.bodies[0] if code.program.bodies else None
         length = code.program.coordinates[body.columns.start].unit if body else ""
         self._force, self._torque, self._power = force_units(length)
+        self._size = len(AXES) if body and len(body.columns) > len(AXES) else len("xy")
 
     def rows(self) -> Iterator[_Row]:
         """Yield the forces in order."""
         for section in self._code.constraints:
             constraint = section.instance.constraint
-            if isinstance(constraint, Joint):
+            if isinstance(constraint, Joint) and not section.instance.is_own:
                 yield from self._joint(section, constraint)
             if constraint.is_driver:
                 yield _Row(f"P_{constraint.name}", self._power, self._power_of(section))
@@ -210,11 +212,14 @@ class _Forces:
         known = _bound(section.instance) | self._multipliers(section, joint)
         found = kernel.bound(self._graph, known)
         size = joint.template.frames[0].size
-        own = (size + 1) * len(joint.bodies)
+        turns = [""] if size == len("xy") else [f"_{axis}" for axis in AXES]
+        each = size + len(turns)
+        own = each * len(joint.bodies)
         numbers, drive, by_axis = found[:own], found[own], found[own + 1 :]
-        names = [*(f"F_{axis}" for axis in AXES[:size]), "T"]
-        rows = [*zip(names, numbers[-size - 1 :], strict=True)]
-        rows += [("T_i", numbers[size])] if len(joint.bodies) > 1 else []
+        names = [*(f"F_{axis}" for axis in AXES[:size]), *(f"T{turn}" for turn in turns)]
+        rows = [*zip(names, numbers[-each:], strict=True)]
+        if len(joint.bodies) > 1:
+            rows += zip([f"T_i{turn}" for turn in turns], numbers[size:each], strict=True)
         rows += zip(("F_along", "F_across"), by_axis, strict=False)
         has_value = "C" in joint.scalars
         skipped = {self._graph.const(0), *([drive] if has_value else [])}
@@ -249,20 +254,27 @@ class _Forces:
         return total
 
     def _on_ground(self) -> Iterator[_Row]:
-        """Yield what shakes the ground: weight and applied forces less the rate of momentum."""
-        graph = self._graph
-        force, moment = [graph.const(0)] * 2, graph.const(0)
+        """Yield what shakes the ground: weight and applied forces less the rate of momentum.
+
+        In space the force alone.
+        """
+        graph, size = self._graph, self._size
+        force, moment = [graph.const(0)] * size, graph.const(0)
         for instance in self._code.program.loads:
             if len(instance.bodies) > 1:  # what it does to one body it does to the other, reversed
                 continue
-            x, y, turn = self._effective(instance)
-            force = [graph.add(total, own) for total, own in zip(force, (x, y), strict=True)]
-            place = [self._named(column) for column in instance.columns[:2]]
-            lever = graph.sub(graph.mul(place[0], y), graph.mul(place[1], x))
-            moment = graph.add(moment, graph.add(turn, lever))
+            found = self._effective(instance)
+            pairs = zip(force, found[:size], strict=True)
+            force = [graph.add(total, own) for total, own in pairs]
+            if size == len("xy"):
+                x, y, turn = found
+                place = [self._named(column) for column in instance.columns[:2]]
+                lever = graph.sub(graph.mul(place[0], y), graph.mul(place[1], x))
+                moment = graph.add(moment, graph.add(turn, lever))
         for axis, node in zip(AXES, force, strict=False):
             yield _Row(f"F_{axis}_ground", self._force, node)
-        yield _Row("T_ground", self._torque, moment)
+        if size == len("xy"):
+            yield _Row("T_ground", self._torque, moment)
 
     def _effective(self, instance: Instance) -> list[int]:
         """Return the generalised forces of a load on its body less those of inertia."""

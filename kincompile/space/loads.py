@@ -32,6 +32,8 @@ from kincompile.space.bodies import SPATIAL
 from kincompile.space.symbols import AXES, i, j, s_i, separation
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from kincompile.derive.loads import Work
     from kincompile.derive.rules import Direction
     from kincompile.model.constraint import Numbers
@@ -202,3 +204,8 @@ class Mass(SpatialLoad):
 
 SMALL = 1e-9
 """Part of an inertia that may be a rounding error."""
+
+LOADS: Mapping[str, type[Load]] = {
+    item.__name__: item for item in (Force, FollowerForce, Torque, FollowerTorque, Spring)
+}
+"""The types by name; the mass of a body is not one of them."""

@@ -21,6 +21,7 @@ from kincompile.runtime.engine.code import FORCES, code_of
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.force_measures import ForceMeasures, force_measures
+from kincompile.runtime.results.orientation import orientation
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.tables import indented, table
 
@@ -52,14 +53,14 @@ class Reaction:
 
     Attributes
     ----------
-    force : ndarray, shape (N, 2)
+    force : ndarray, shape (N, 2), in space (N, 3)
         On body j, or the one body, along the fixed axes. On body i it is the opposite.
-    moment : ndarray, shape (N,)
+    moment : ndarray, shape (N,), in space (N, 3) along the fixed axes
         On body j, about the joint's point of it.
-    moment_on_i : ndarray, shape (N,)
+    moment_on_i : ndarray, shape (N,), in space (N, 3)
         On body i, about the joint's point of that.
     along_axis : ndarray, shape (N, 2)
-        The force on body j along the joint's axis and across it; NaN where it has no axis.
+        The force on body j along the joint's axis and, in the plane, across it; else NaN.
     """
 
     force: Array
@@ -134,18 +135,33 @@ class Forces(Shown):
         """The reactions by the name of the joint."""
         return {name: self._reaction(name, bodies) for name, bodies in self._joints.items()}
 
+    @property
+    def _axes(self) -> str:
+        """The fixed axes: two in the plane, three in space."""
+        is_spatial = any(x.startswith("e0_") for x in self.motion.coordinates)
+        return "xyz" if is_spatial else "xy"
+
+    def _moment(self, kind: str, name: str) -> Array:
+        """Return a moment of a joint, shape (N,), in space (N, 3)."""
+        if self._axes == "xy":
+            return self._column(f"{kind}_{name}")
+        return np.stack([self._column(f"{kind}_{axis}_{name}") for axis in "xyz"], axis=-1)
+
     def _reaction(self, name: str, bodies: tuple[str, ...]) -> Reaction:
-        drive = f"drive_{name}"
-        force = np.stack([self._column(f"F_{axis}_{name}") for axis in "xy"], axis=-1)
-        moment = self._column(f"T_{name}")
-        has_forces = any(f"F_{axis}_{name}" in self.names for axis in "xy")
-        if drive in self.names and f"T_{name}" not in self.names and not has_forces:
-            moment = self._column(drive)
-        on_i = self._column(f"T_i_{name}") if len(bodies) > 1 else np.full_like(moment, np.nan)
-        axes = [f"F_along_{name}", f"F_across_{name}"]
-        by_axis = np.full_like(force, np.nan)
-        if any(axis in self.names for axis in axes):
-            by_axis = np.stack([self._column(axis) for axis in axes], axis=-1)
+        drive, axes = f"drive_{name}", self._axes
+        force = np.stack([self._column(f"F_{axis}_{name}") for axis in axes], axis=-1)
+        moment = self._moment("T", name)
+        has_forces = any(f"F_{axis}_{name}" in self.names for axis in axes)
+        if axes == "xy" and drive in self.names and f"T_{name}" not in self.names:
+            moment = moment if has_forces else self._column(drive)
+        on_i = self._moment("T_i", name) if len(bodies) > 1 else np.full_like(moment, np.nan)
+        ways = [f"F_along_{name}"]
+        if axes == "xy":
+            ways.append(f"F_across_{name}")
+        by_axis = np.full((*force.shape[:-1], 2), np.nan)
+        if any(way in self.names for way in ways):
+            for k, way in enumerate(ways):
+                by_axis[..., k] = self._column(way)
         return Reaction(force, moment, on_i, by_axis)
 
     @property
@@ -163,12 +179,16 @@ class Forces(Shown):
     @property
     def ground(self) -> Reaction:
         """What shakes the ground: force and moment about the origin."""
-        force = np.stack([self._column(f"F_{axis}_ground") for axis in "xy"], axis=-1)
+        force = np.stack([self._column(f"F_{axis}_ground") for axis in self._axes], axis=-1)
         nothing = np.full(force.shape[:-1], np.nan)
-        return Reaction(force, self._column("T_ground"), nothing, np.full_like(force, np.nan))
+        moment = self._column("T_ground") if self._axes == "xy" else nothing
+        return Reaction(force, moment, nothing, np.full((*nothing.shape, 2), np.nan))
 
     def in_axes_of(self, body: str, force: Array) -> Array:
-        """Return forces (N, 2) in the axes of a body, which turn with it."""
+        """Return forces (N, 2), in space (N, 3), in the axes of a body, which turn with it."""
+        if self._axes == "xyz":
+            turned = orientation(self.motion, body).as_matrix()
+            return np.asarray(np.einsum("...ji,...j->...i", turned, force))
         angle = self.motion[f"{body}.phi"]
         x, y = force[..., 0], force[..., 1]
         c, s = np.cos(angle), np.sin(angle)
@@ -188,7 +208,8 @@ class Forces(Shown):
     def columns(self) -> dict[str, tuple[Array, str]]:
         """Return values and unit of what is measured: drives, powers, loads, sizes of reactions."""
         units = self.motion.observed.units
-        kinds = ("drive_", "P_", "load_", "T_")
+        is_planar = self._axes == "xy"
+        kinds = ("drive_", "P_", "load_", *(("T_",) if is_planar else ()))
         found = {
             name: (self._column(name), units[name]) for name in self.names if name.startswith(kinds)
         }
@@ -196,6 +217,9 @@ class Forces(Shown):
             unit = units.get(f"F_x_{name}", units.get(f"F_y_{name}"))
             if unit is not None:
                 found[f"F_{name}"] = reaction.size, unit
+            if not is_planar and f"T_x_{name}" in self.names:
+                size = np.asarray(np.linalg.norm(reaction.moment, axis=-1))
+                found[f"T_{name}"] = size, units[f"T_x_{name}"]
         return found
 
     def plot(self, *names: str, **options: Any) -> Axes:
@@ -274,11 +298,6 @@ def forces(solution: Solution) -> Forces:
     """
     require_solution(solution)
     module = solution.require_module("its forces")
-    if code_of(module).covers():
-        raise UnsupportedError(
-            f"{module.NAME} is a mechanism in space, whose reactions are not compiled yet: its "
-            "motion follows from forces by kc.simulate, and module.M and module.Q are there."
-        )
     modules = _modules(module)
     points = _Points.of(solution, code_of(module), modules)
     names, units, found, shared = points.forces()

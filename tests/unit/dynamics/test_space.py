@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import kincompile as kc
 from kincompile import spatial
+from tests.unit.dynamics.test_inverse import TABLE
 
 G = 9.81
 F6 = {
@@ -245,9 +246,103 @@ def test_that_a_rod_on_a_spring_rests_in_space_as_in_the_plane():
     assert math.dist((x, y, z), (0, 0, 1.2)) == pytest.approx(0.463096960926194, abs=1e-9)
 
 
-def test_that_forces_in_space_say_what_is_there():
+def turned_slider_crank(turn):
+    """Return the slider-crank D1 in a plane that is turned by a matrix; and nothing redundant."""
+    m = spatial.Mechanism("turned")
+    m.gravity = tuple(turn @ (0, -G, 0))
+    z, x = tuple(turn[:, 2]), tuple(turn[:, 0])
+
+    def body(name, place, angle, mass, inertia, centre):
+        c, s = math.cos(angle), math.sin(angle)
+        return m.body(
+            name, tuple(turn @ (*place, 0)), x=tuple(turn @ (c, s, 0)), y=tuple(turn @ (-s, c, 0)),
+            mass=mass, inertia=(0.6 * inertia, 0.7 * inertia, inertia), centre=(*centre, 0),
+        )  # fmt: skip
+
+    crank = body("crank", (0, 0), 0.3, 1.2, 0.002, (0.04, 0.01))
+    rod = body("rod", (0.245, 0.02), -0.03, 0.8, 0.006, (-0.03, 0.005))
+    slider = body("slider", (0.395, 0.02), 0, 1.5, 0.001, (0.02, 0.01))
+    o, e_x, e_y, e_z = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)
+    m.add(spatial.Revolute("O", m.ground, o, z, crank, o, e_z))
+    m.add(spatial.Spherical("A", crank, (0.1, 0, 0), rod, (-0.15, 0, 0)))
+    m.add(spatial.Universal("B", rod, (0.15, 0, 0), e_z, slider, o, e_y))
+    place = tuple(turn @ (0, 0.02, 0))
+    m.add(spatial.Translational("C", m.ground, place, x, z, slider, o, e_x, e_y))
+    angle = 0.3 + 10 * kc.t + 2 * kc.t**2
+    m.add(spatial.RelativeRotation("motor", m.ground, z, x, crank, e_z, e_x, angle))
+    m.add(spatial.Force("load", slider, (0.03, 0, 0), tuple(turn @ (-200, 15, 0))))
+    return m
+
+
+@pytest.mark.parametrize("angles", [(0, 0, 0), (1.5, 0, 0.6), (0.4, -1.1, 0.8)])
+def test_that_a_turned_slider_crank_has_the_reactions_of_the_plane(angles):
+    turn = Rotation.from_euler("xyz", angles).as_matrix()
+    found = kc.forces(kc.solve(kc.compile(turned_slider_crank(turn)), [0.0, 0.15, 0.4]))
+    for name in "OAB":
+        force = found.reactions[name].force @ turn
+        np.testing.assert_allclose(force[:, :2], TABLE[name], atol=1e-10)
+        np.testing.assert_allclose(force[:, 2], 0, atol=1e-10)
+    guide, motor = found.reactions["C"], found.reactions["motor"]
+    np.testing.assert_allclose((guide.force @ turn)[:, 1], TABLE["guide"], atol=1e-10)
+    np.testing.assert_allclose((guide.moment @ turn)[:, 2], TABLE["couple"], atol=1e-11)
+    np.testing.assert_allclose(guide.along_axis[:, 0], 0, atol=1e-10)
+    np.testing.assert_allclose(found.drivers["motor"].value, TABLE["motor"], atol=1e-10)
+    about = (motor.moment @ turn)[:, 2]
+    np.testing.assert_allclose(about, TABLE["motor"], atol=1e-10)
+    np.testing.assert_allclose(motor.moment_on_i, -motor.moment, atol=1e-11)
+    # A pin bears nothing about its axis, nor a cross about either arm.
+    np.testing.assert_allclose((found.reactions["O"].moment @ turn)[:, 2], 0, atol=1e-11)
+    in_rod = found.in_axes_of("rod", found.reactions["A"].force)
+    np.testing.assert_allclose(
+        np.linalg.norm(in_rod, axis=1), found.reactions["A"].size, rtol=1e-12
+    )
+    assert {"F_O", "T_C", "drive_motor", "P_motor"} <= found.columns().keys()
+
+
+def test_that_a_top_stands_on_the_reaction_of_its_free_body():
+    """Force and moment at the tip of a body that moves freely, against Newton and Euler."""
     m = spatial.Mechanism("top")
-    m.body("top", mass=1, inertia=(1, 2, 3))
-    found = kc.simulate(kc.compile(m), [0, 0.1])
-    with pytest.raises(kc.UnsupportedError, match="in space, whose reactions are not compiled"):
-        kc.forces(found)
+    m.gravity = (0, 0, -G)
+    top = m.body(
+        "top", axis=(1, 0, 0), angle=0.4, mass=2, inertia=(0.03, 0.04, 0.02), centre=(0, 0, 0.25)
+    )
+    m.add(spatial.Universal("tip", m.ground, (0, 0, 0), (0, 1, 0), top, (0, 0, 0), (1, 0, 0)))
+    m.point("middle", top, (0, 0, 0.25))
+    motion = kc.simulate(kc.compile(m), [0, 0.1, 0.3], velocity={"top.omega_x": 3})
+    found = kc.forces(motion)
+    place = np.column_stack([motion[f"middle.{axis}"] for axis in "xyz"])
+    acceleration = np.column_stack([motion[f"middle.{axis}_ddot"] for axis in "xyz"])
+    force = 2 * (acceleration + np.array([0, 0, G]))
+    np.testing.assert_allclose(found.reactions["tip"].force, force, atol=1e-9)
+    np.testing.assert_allclose(found.ground.force, -force, atol=1e-9)
+    inertia = np.diag([0.03, 0.04, 0.02])
+    for k, (q, q_dot, q_ddot) in enumerate(zip(motion.q, motion.q_dot, motion.q_ddot, strict=True)):
+        spin, change = (2 * g_of(q[3:]) @ rates[3:] for rates in (q_dot, q_ddot))
+        turned = Rotation.from_quat(q[3:], scalar_first=True)
+        momentum = turned.apply(inertia @ change + np.cross(spin, inertia @ spin))
+        weight = np.cross(place[k], (0, 0, -2 * G))
+        expected = momentum + np.cross(place[k], 2 * acceleration[k]) - weight
+        np.testing.assert_allclose(found.reactions["tip"].moment[k], expected, atol=1e-9)
+
+
+def test_that_files_keep_masses_and_loads(tmp_path):
+    m = spatial.Mechanism("hang")
+    m.gravity = (0, 0, -G)
+    k = m.parameter("k", 60.0)
+    inertia = ((0.1, 0, 0), (0, 0.2, k / 6000), (0, k / 6000, 0.2))
+    rod = m.body("rod", (0.4, 0, -0.3), mass=2, inertia=inertia, centre=(0, 0, 0.1))
+    m.body("ball", (1, 0, 0), mass=k / 30, inertia=(1, 1, 1))
+    m.add(spatial.Spherical("O", m.ground, (0, 0, 0), rod, (-0.5, 0, 0)))
+    m.add(spatial.Spring("s", m.ground, (0, 0, 1.2), rod, (0.5, 0, 0), stiffness=k))
+    m.add(spatial.FollowerTorque("roll", rod, (-rod.omega_fixed[0] / 10, 0, 0)))
+    path = tmp_path / "hang.toml"
+    path.write_text(m.to_toml(), encoding="utf-8")
+    read = kc.read_model(path)
+    assert read.to_toml() == m.to_toml()
+    before, after = kc.compile(m), kc.compile(read)
+    q, q_dot = state(2, 14)
+    np.testing.assert_array_equal(before.M(q, 0.0), after.M(q, 0.0))
+    np.testing.assert_array_equal(before.Q(q, q_dot, 0.0), after.Q(q, q_dot, 0.0))
+    path.write_text(m.to_toml().replace("mass = 2", "mass = -2"), encoding="utf-8")
+    with pytest.raises(kc.ModelError, match="the mass is -2, and must be positive"):
+        kc.read_model(path).system()
