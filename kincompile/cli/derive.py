@@ -16,6 +16,9 @@ DERIVATIONS = (".slides.html", ".html", ".tex", ".md", ".ipynb")
 LEVELS = ("vector", "expanded", "numeric")
 """The levels of a derivation."""
 
+FORMS = ("r-p", "r-omega")
+"""The forms of a derivation in space."""
+
 
 @click.command("derive")
 @click.argument("model")
@@ -26,6 +29,7 @@ LEVELS = ("vector", "expanded", "numeric")
 @click.option(
     "--levels", default=",".join(LEVELS), metavar="LEVEL,...", help="Levels that are shown."
 )
+@click.option("--form", default=FORMS[0], metavar="FORM", help="In space: r-p, or r-omega (Haug).")
 def command(
     model: str,
     output: str,
@@ -33,6 +37,7 @@ def command(
     values: tuple[str, ...],
     constraint: str | None,
     levels: str,
+    form: str,
 ) -> None:
     """Show how Phi_q, nu and gamma of MODEL follow from Phi, step by step.
 
@@ -51,6 +56,7 @@ def command(
         state or None,
         constraint=constraint,
         levels=[level.strip() for level in levels.split(",") if level.strip()],
+        form=form,
     )
     found.write(output)
     click.echo(f"Wrote {output}", err=True)

@@ -24,12 +24,7 @@ from kincompile.cli.shared import (
     write_page,
 )
 from kincompile.errors import InputError
-from kincompile.files.sweep_table import SweepTable, read_sweep_table
 from kincompile.names import listed
-from kincompile.sweep.overview import overview
-from kincompile.sweep.page import sweep_page
-from kincompile.sweep.samples import values_of
-from kincompile.sweep.worker import end_with_parent
 
 
 @click.command("sweep")
@@ -85,6 +80,12 @@ def command(
     found is summarised on stdout; -o writes all of it while it comes, and a run that was stopped
     goes on where it was. What cannot be solved has a status; where nothing can, the exit code is 3.
     """
+    from kincompile.files.sweep_table import SweepTable, read_sweep_table
+    from kincompile.sweep.overview import overview
+    from kincompile.sweep.page import sweep_page
+    from kincompile.sweep.samples import values_of
+    from kincompile.sweep.worker import end_with_parent
+
     mechanism = read_model(model)
     table = read_sweep_table(model) or SweepTable({})
     swept: dict[str, Any] = sweeps or values_of(table)

@@ -20,14 +20,14 @@ from typing import TYPE_CHECKING
 
 from kincompile.compare.comparer import NUMBERS, Comparer
 from kincompile.compare.comparison import Verdict
-from kincompile.compare.conventions import stated_signs
+from kincompile.compare.conventions import stated_conventions
+from kincompile.compare.given_forms import Forms
 from kincompile.compare.hand_file import read_hand_file
-from kincompile.compare.layouts import expected_widths, usual_layout
 from kincompile.compare.load_comparer import LoadComparer
 from kincompile.compare.reference import COMPARED, OF_LOADS, QUANTITIES, Reference, Subject
 from kincompile.compare.report import Report
 from kincompile.compare.states import given_states
-from kincompile.compare.written import MATRICES, TOLD, read_written, vocabulary
+from kincompile.compare.written import TOLD, read_written, vocabulary
 from kincompile.errors import InputError
 from kincompile.names import listed
 
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from kincompile.compare.reference import ConstraintBlock
     from kincompile.compare.states import States
     from kincompile.compare.written import Written
     from kincompile.model.mechanism import Mechanism
@@ -76,12 +75,15 @@ def compare(
         (of gamma and Q ``f(q, q_dot, t)``), which may take the parameters p as a last argument.
     constraint
         Name of the one constraint that is checked alone. Phi_q then has the columns of the whole
-        system, or of the constraint's bodies, i before j.
+        system, or of the constraint's bodies, i before j; in space seven a body, or six.
     aliases
         Names of the author's own, each with its expression, for instance ``{"w": "phi3_dot"}``.
     conventions
         What the author says that nu and gamma are: ``{"nu": "Phi_t", "gamma": "left side"}`` have
-        the opposite sign, which is a mistake where it is not stated.
+        the opposite sign, which is a mistake where it is not stated. In space ``form`` says by what
+        Phi_q has derivatives, and gamma the second rates: ``"r-p"`` (ME751), ``"r-omega"`` (Haug:
+        r and small rotations about the body's axes, without norm rows) or ``"global r-omega"``; the
+        shape and the numbers say it where it is not stated.
     states
         States at which the values of arrays belong: ``q`` (N, n), and where they matter ``q_dot``
         (N, n), ``t`` (N,), ``p`` (N, k). Random states where None.
@@ -101,12 +103,14 @@ def compare(
     InputError
         If a formula cannot be read, holds an unknown name, or has the wrong shape.
     """
-    reference = model if isinstance(model, Reference) else Reference(model)
-    block = None if constraint is None else reference.block(constraint)
     given = {"Phi": Phi, "Phi_q": Phi_q, "nu": nu, "gamma": gamma, "M": M, "Q": Q}
-    written = _read(reference, block, given, aliases or {}, at_states=states is not None)
-    subject = Subject(reference, block, _states(reference, written, states))
-    return _compared(subject, written, stated_signs(conventions or {}), strict)
+    forms = Forms(_reference(model), stated_conventions(conventions or {}), constraint)
+    written = _read(forms, given, aliases or {}, at_states=states is not None)
+    return _compared(forms, written, states, strict)
+
+
+def _reference(model: Mechanism | ConstraintSystem | Reference) -> Reference:
+    return model if isinstance(model, Reference) else Reference(model)
 
 
 def _states(
@@ -114,7 +118,7 @@ def _states(
 ) -> States:
     """Return where to compare: functions without parameters have the default ones."""
     if given is not None:
-        return given_states(given, reference.system)
+        return reference.normalised(given_states(given, reference.system))
     if all(item.takes_parameters for item in written.values()):
         return reference.random
     return reference.random.with_default_parameters(reference.defaults)
@@ -151,38 +155,75 @@ def compare_file(
         As `compare` does; a message begins with the file and the line.
     """
     file = read_hand_file(Path(path))
-    reference = model if isinstance(model, Reference) else Reference(model)
+    reference = _reference(model)
     constraint = file.constraint if constraint is None else constraint
-    block = None if constraint is None else reference.block(constraint)
+    if constraint is not None:
+        reference.block(constraint)
     try:
-        written = _read(reference, block, file.quantities, file.aliases)
-        signs = stated_signs(file.conventions)
+        forms = Forms(reference, stated_conventions(file.conventions), constraint)
+        written = _read(forms, file.quantities, file.aliases)
     except InputError as error:
         raise InputError([f"{file.name}, {problem}" for problem in error.problems]) from error
-    return _compared(Subject(reference, block, reference.random), written, signs, strict)
+    return _compared(forms, written, None, strict)
 
 
 def _compared(
-    subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float], strict: bool
+    forms: Forms,
+    written: Mapping[str, Written],
+    given: Mapping[str, ArrayLike] | None,
+    strict: bool,
 ) -> Report:
-    """Compare at the given states, and where something differs at others that may explain it."""
+    """Compare in each form that fits, until one explains everything; the best is reported."""
     of_equations, of_loads = (
         {name: item for name, item in written.items() if name in names}
         for names in (QUANTITIES, OF_LOADS)
     )
-    if not of_equations:
-        return _of_loads(subject, of_loads, strict)
-    best = Comparer(subject, of_equations, signs, strict)
+    reports = []
+    if of_equations:
+        reports.append(_best(forms, of_equations, given, strict).report())
+    if of_loads:
+        states = _states(forms.reference, written, given)
+        subject = Subject(forms.reference, None, states)
+        reports.append(_of_loads(subject, of_loads, strict))
+    report, *others = reports
+    for added in others:
+        conventions = tuple(dict.fromkeys((*report.conventions, *added.conventions)))
+        entries = report.entries + added.entries
+        report = replace(report, entries=entries, conventions=conventions)
+    return report
+
+
+def _best(
+    forms: Forms,
+    written: Mapping[str, Written],
+    given: Mapping[str, ArrayLike] | None,
+    strict: bool,
+) -> Comparer:
+    """Return the comparison in the form that explains the most, the system's own first."""
+    best: Comparer | None = None
+    for form in forms.fitting({name: item.shape for name, item in written.items()}):
+        subject = form.subject(_states(form.reference, written, given))
+        found = _in_one_form(subject, written, forms.stated.signs, strict)
+        # Global axes in some constraints alone are a slip, and no way to write.
+        is_whole = not found.wrong_count or not form.reference.is_global
+        if best is None or (is_whole and found.wrong_count < best.wrong_count):
+            best = found
+        if not best.wrong_count:
+            break
+    assert best is not None, "shapes are checked before"
+    return best
+
+
+def _in_one_form(
+    subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float], strict: bool
+) -> Comparer:
+    """Compare at the given states, and where something differs at others that may explain it."""
+    best = Comparer(subject, written, signs, strict)
     for states, convention in best.other_states():
-        other = Comparer(replace(subject, states=states), of_equations, signs, strict, convention)
+        other = Comparer(replace(subject, states=states), written, signs, strict, convention)
         if other.wrong_count < best.wrong_count:
             best = other
-    report = best.report()
-    if not of_loads:
-        return report
-    added = _of_loads(subject, of_loads, strict)
-    conventions = dict.fromkeys((*report.conventions, *added.conventions))
-    return replace(report, entries=report.entries + added.entries, conventions=tuple(conventions))
+    return best
 
 
 def _of_loads(subject: Subject, written: Mapping[str, Written], strict: bool) -> Report:
@@ -200,8 +241,7 @@ def _of_loads(subject: Subject, written: Mapping[str, Written], strict: bool) ->
 
 
 def _read(
-    reference: Reference,
-    block: ConstraintBlock | None,
+    forms: Forms,
     given: Mapping[str, object],
     aliases: Mapping[str, object],
     at_states: bool = False,
@@ -211,14 +251,14 @@ def _read(
     if not given:
         raise InputError(f"there is nothing to compare: give at least one of {listed(COMPARED)}.")
     if any(name in OF_LOADS for name in given):
-        _require_loads(reference, block)
-    words = vocabulary(reference, aliases)
+        _require_loads(forms)
+    words = vocabulary(forms.reference, aliases)
     written: dict[str, Written] = {}
     problems: list[str] = []
     for name, value in given.items():
-        check = partial(_shape_problems, reference, block, name)
+        check = partial(forms.shape_problems, name)
         try:
-            written[name] = read_written(name, value, words, reference, at_states, check)
+            written[name] = read_written(name, value, words, forms.reference, at_states, check)
             problems += check(*written[name].shape)
         except InputError as error:
             problems += [item for item in error.problems if item != TOLD]
@@ -227,35 +267,16 @@ def _read(
     return written
 
 
-def _shape_problems(
-    reference: Reference, block: ConstraintBlock | None, name: str, rows: int, columns: int
-) -> list[str]:
-    names = reference.equations if block is None else block.constraint.equation_names
-    names = reference.coordinates if name in OF_LOADS else names
-    found = []
-    if rows != len(names):
-        found.append(
-            f"{name} has {rows} rows; expected {len(names)}, one for each of: {listed(names, 60)}"
-        )
-    if name == "M" and columns != len(names):
-        found.append(f"M has {columns} columns; expected {len(names)}, as many as rows")
-    if name == "Phi_q" and usual_layout(reference, block, columns) is None:
-        widths = expected_widths(reference, block)
-        found.append(f"Phi_q has {columns} columns; expected {widths}")
-    if name not in MATRICES and columns != 1:
-        found.append(f"{name} has {columns} columns; it is a vector: expected one")
-    return found
-
-
-def _require_loads(reference: Reference, block: ConstraintBlock | None) -> None:
+def _require_loads(forms: Forms) -> None:
     """Refuse M and Q of a mechanism that has none, and of one constraint."""
-    if block is not None:
+    if forms.constraint is not None:
         raise InputError(
-            f"M and Q are those of the whole system, not of {block.constraint.name!r}: leave "
+            f"M and Q are those of the whole system, not of {forms.constraint!r}: leave "
             "constraint out."
         )
-    if not reference.system.loads:
+    system = forms.reference.system
+    if not system.loads:
         raise InputError(
-            f"{reference.system.name} has no masses and no forces, so that M and Q are zero: give "
+            f"{system.name} has no masses and no forces, so that M and Q are zero: give "
             "its bodies masses, m.body(..., mass=..., inertia=...), or add loads."
         )

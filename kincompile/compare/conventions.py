@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.compare.comparison import Convention
 from kincompile.errors import InputError
+from kincompile.model.small_rotations import BY_OMEGA, BY_P
 from kincompile.names import listed
 
 if TYPE_CHECKING:
@@ -21,9 +23,34 @@ OPPOSITE = {"nu": "Phi_t", "gamma": "left side"}
 
 USUAL = {"nu": "-Phi_t", "gamma": "right side"}
 
+FORM = "form"
+"""The convention that says by what Phi_q has derivatives, and gamma the second rates."""
+GLOBAL = f"global {BY_OMEGA}"
 
-def stated_signs(stated: Mapping[str, str]) -> dict[str, float]:
-    """Return the signs of nu and gamma as their author states them.
+_CHOICES: Mapping[str, tuple[str, ...]] = {
+    **{name: (OPPOSITE[name], USUAL[name]) for name in OPPOSITE},
+    FORM: (BY_P, BY_OMEGA, GLOBAL),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """What an author says of a hand-in.
+
+    Attributes
+    ----------
+    signs
+        -1 for nu or gamma with the opposite sign.
+    form
+        The form of a mechanism in space, "" where it has to be found.
+    """
+
+    signs: Mapping[str, float]
+    form: str = ""
+
+
+def stated_conventions(stated: Mapping[str, str]) -> Stated:
+    """Return the signs of nu and gamma, and the form, as their author states them.
 
     Raises
     ------
@@ -33,21 +60,24 @@ def stated_signs(stated: Mapping[str, str]) -> dict[str, float]:
     problems = [
         f"the convention {name} = {value!r} is not known; write {_choices()}"
         for name, value in stated.items()
-        if name not in OPPOSITE or value not in (OPPOSITE[name], USUAL[name])
+        if value not in _CHOICES.get(name, ())
     ]
     if problems:
         raise InputError(problems)
-    return {name: -1.0 for name, value in stated.items() if value == OPPOSITE[name]}
+    signs = {name: -1.0 for name, value in stated.items() if value == OPPOSITE.get(name)}
+    return Stated(signs, stated.get(FORM, ""))
 
 
 def _choices() -> str:
     return "; ".join(
-        f'{name} = "{opposite}" or "{USUAL[name]}"' for name, opposite in OPPOSITE.items()
+        " or ".join((f'{name} = "{items[0]}"', *(f'"{item}"' for item in items[1:])))
+        for name, items in _CHOICES.items()
     )
 
 
 def conventions_found(matching: Matching, reference: Reference) -> Iterator[Convention]:
     """Yield the conventions of a matching."""
+    yield from [reference.convention] if reference.convention else []
     equations = reference.equations
     if text := matching.layout.convention:
         kind = "ground columns" if "ground" in text else "order of columns"

@@ -75,7 +75,7 @@ class Dependence:
 def _changes(reference: Reference, states: States) -> list[tuple[str, States]]:
     """Return the states with one symbol changed, each with the symbol's name."""
     found = [("t", replace(states, t=CHANGE * states.t))]
-    for k, name in enumerate(reference.coordinates):
+    for k, name in enumerate(reference.base.coordinates):
         found.append((name, replace(states, q=_scaled(states.q, k))))
         found.append((rate(name), replace(states, q_dot=_scaled(states.q_dot, k))))
     for k, item in enumerate(reference.system.parameters):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from math import prod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 MOST_TERMS = 80
 """Longer entries are not taken apart: one term in so many is no longer recognisable."""
+MOST_EXPANDED = 1000
+"""Terms up to which an entry is multiplied out; like ones are among them, and join."""
 
 
 def entry_faults(
@@ -46,15 +49,18 @@ def entry_faults(
     states
         Where to evaluate.
     """
-    entry = sympy.expand(reference.expression(quantity, row, column))
+    entry = reference.expression(quantity, row, column)
+    if _count(entry) <= MOST_EXPANDED:
+        entry = sympy.expand(entry)
+    printed = reference.printed(entry)
     angles = [
         sympy.Symbol(name)
         for name, is_angle in zip(reference.coordinates, reference.angular, strict=True)
         if is_angle
     ]
-    faults = [*whole_faults(quantity, "the entry", lambda factor: factor * entry, str(entry))]
+    faults = [*whole_faults(quantity, "the entry", lambda factor: factor * entry, printed)]
     text = "sine and cosine are swapped throughout"
-    faults.append(Fault(SINE_COSINE, text, _sine_cosine(entry), str(entry)))
+    faults.append(Fault(SINE_COSINE, text, _sine_cosine(entry), printed))
     terms = sympy.Add.make_args(entry)
     parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
     replaced = [0] * len(faults)  # number of the part in whose place the result stands
@@ -71,6 +77,16 @@ def entry_faults(
     for k, fault in enumerate(faults):
         if not equal[k]:
             yield replace(fault, result={(row, column): wrong[:, k, 0]})
+
+
+def _count(expression: Any) -> int:
+    """Return of how many terms an expression is when its products are multiplied out, at most."""
+    if expression.is_Add:
+        return sum(map(_count, expression.args))
+    if expression.is_Mul:
+        return prod(map(_count, expression.args))
+    base, exponent = expression.as_base_exp()
+    return _count(base) ** int(exponent) if exponent.is_Integer and exponent > 1 else 1
 
 
 def _faults_of_term(

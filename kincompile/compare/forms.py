@@ -118,6 +118,9 @@ def _of_joint(
         values = {name: found.of(name) for name in QUANTITIES}
         Phi_q = np.zeros((len(states), len(block.rows), len(reference.coordinates)))
         Phi_q[:, :, columns] = values["Phi_q"][:, :, kept]
+        for body, own in zip(reference.system.bodies, reference.body_columns, strict=True):
+            turns = list(own[3:])
+            Phi_q[:, :, turns] = reference.in_axes(Phi_q[:, :, turns], body, states)
         return {**values, "Phi_q": Phi_q}
 
     return Form(kind, text, block.rows, evaluate, joint=other)
@@ -154,7 +157,7 @@ def _derived(reference: Reference, rows: Sequence[int], Phi: Sequence[sympy.Expr
     system = reference.system
     free = system.coordinates[sum(map(len, system.body_columns)) :]
     try:
-        formulas = Reference(
+        formulas = reference.another(
             ConstraintSystem(
                 system.name,
                 [item.name for item in free],
@@ -182,12 +185,13 @@ def _differenced(reference: Reference, rows: Sequence[int], Phi: Function) -> Fo
     def evaluate(states: States) -> Mapping[str, Array]:
         now = min(1.0, reference.system.end)
         zero, one = np.zeros_like(states.q), np.ones_like(states.t)
-        return {
+        values = {
             "Phi": Phi(states),
             "Phi_q": _by_coordinates(Phi, reference, states)[..., 0, :],
             "nu": -_difference(Phi, states, (zero, one), FIRST, now),
             "gamma": -_difference(Phi, states, (states.q_dot, one), SECOND, now),
         }
+        return reference.expressed(values, states)
 
     return Form(EQUIVALENT, OTHER, tuple(rows), evaluate, accuracy=ACCURACY)
 
@@ -195,7 +199,7 @@ def _differenced(reference: Reference, rows: Sequence[int], Phi: Function) -> Fo
 def _by_coordinates(function: Function, reference: Reference, states: States) -> Array:
     """Return the partial derivatives by the coordinates, along a last axis."""
     columns, still = [], np.zeros_like(states.t)
-    for k, size in enumerate(reference.sizes):
+    for k, size in enumerate(reference.base.sizes):
         direction = np.zeros_like(states.q)
         direction[:, k] = 1.0
         columns.append(_difference(function, states, (direction, still), FIRST, size))
@@ -246,7 +250,8 @@ def jacobian_form(subject: Subject, rows: Sequence[int], Phi_q: Function) -> For
 
 def _is_gradient(Phi_q: Function, subject: Subject) -> bool:
     """Return whether each row is the gradient of some function of q: its curl vanishes."""
-    states, sizes = subject.states, subject.reference.sizes
+    states, sizes = subject.states, subject.reference.base.sizes
+    Phi_q = subject.reference.gradient(Phi_q)
     second = _by_coordinates(Phi_q, subject.reference, states) * (sizes[:, None] * sizes)
     size = np.max(np.abs(second)) + np.max(np.abs(Phi_q(states) * sizes))
     return bool(np.max(np.abs(second - np.swapaxes(second, -1, -2))) <= ACCURACY * size)
@@ -270,9 +275,11 @@ def _known_forms(block: ConstraintBlock, subject: Subject) -> Iterator[Form]:
 def _other_extensions(block: ConstraintBlock, subject: Subject) -> Iterator[Form]:
     """Yield a constraint in space with other rotation matrices, equal where p^T p = 1.
 
-    They have other derivatives by p than the homogeneous A = E G^T.
+    They have other derivatives by p than the homogeneous A = E G^T; by small rotations the same.
     """
     joint = block.constraint
+    if subject.reference is not subject.reference.base:
+        return
     if not isinstance(joint, Joint) or joint.template.dimension == 2:
         return
     for text, change in EXTENSIONS.items():

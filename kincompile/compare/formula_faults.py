@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.calculus.expressions import (
     ONE,
     ZERO,
+    Cross,
     Dot,
     Expression,
     Number,
@@ -30,6 +31,7 @@ from kincompile.calculus.expressions import (
     Sum,
     Symbol,
     TimeFunction,
+    TimesG,
     Vector,
     VectorSum,
     VectorSymbol,
@@ -42,6 +44,7 @@ from kincompile.compare.fault import (
     A_FOR_B,
     DRIVER_RATE,
     FACTOR,
+    GLOBAL_OMEGA,
     MISSING_FACTOR,
     MISSING_RATE,
     MISSING_SQUARE,
@@ -51,13 +54,14 @@ from kincompile.compare.fault import (
     MIXED_RATES,
     SECOND_DERIVATIVE,
     SINE_COSINE,
+    TILDE,
     TRANSPOSED,
     XI_ETA,
     Fault,
     term_faults,
 )
 from kincompile.compare.plain_text import described
-from kincompile.compare.vectors import Exchanged
+from kincompile.compare.vectors import Exchanged, WrongTilde
 from kincompile.derive.collected import is_rate
 from kincompile.names import rate
 
@@ -138,6 +142,10 @@ def _here(node: Expression, symbols: Symbols) -> Iterator[Fault[Expression]]:
             yield from _wrong_orders(node)
         case ProfileFunction():
             yield from _wrong_orders(node)
+        case Cross(left, right):
+            name = f"{described(left)}~"
+            yield Fault(TILDE, f"the sign of {name} is wrong", times(-1, node))
+            yield Fault(MISSING_RATE, f"the factor {name} is missing", right)
         case Rotated() | VectorSymbol() | RotationSlope():
             yield from swaps(node, symbols)
 
@@ -200,6 +208,10 @@ def swaps(node: Expression, symbols: Symbols) -> Iterator[Fault[Expression]]:
         if partner is not None:
             text = f"{partner} stands where {node.name} belongs"
             yield Fault(MIXED_POINTS, text, VectorSymbol(partner, node.size))
+    if isinstance(node, VectorSymbol) and node.name in ("omega_i", "omega_j"):
+        text = f"the global {node.name} stands where {described(node)} of the body belongs"
+        p = VectorSymbol(node.name.replace("omega", "p"), 4)
+        yield Fault(GLOBAL_OMEGA, text, Rotated(EulerRotation(p), node))
     if (other := rate_or_position(node)) is not None:
         yield Fault(
             MIXED_RATES, f"{described(other)} stands where {described(node)} belongs", other
@@ -241,15 +253,21 @@ def _wrong_rotations(node: Rotated, symbols: Symbols) -> Iterator[Fault[Expressi
 
 
 def _wrong_slopes(node: Rotated | RotationSlope) -> Iterator[Fault[Expression]]:
-    """Yield the mistakes for A s and B(p, s) of Euler parameters."""
+    """Yield the mistakes for A s, B(p, s) and A s~ of Euler parameters."""
     assert isinstance(node.rotation, EulerRotation)
-    is_slope = isinstance(node, RotationSlope) or bool(node.along)
+    is_small = isinstance(node, RotationSlope) and node.is_small
+    is_slope = not is_small and (isinstance(node, RotationSlope) or bool(node.along))
     name = f"{'B' if is_slope else 'A'}_{node.rotation.p.name.removeprefix('p_')}"
     back = replace(node, rotation=replace(node.rotation, is_back=True))
     text = f"the signs of e~ are wrong in {name}" if is_slope else f"{name} is transposed"
     yield Fault(TRANSPOSED, text, back)
     if is_slope:
         yield Fault(FACTOR, f"the 2 of {name} is missing", times(Fraction(1, 2), node))
+        wrong = replace(node, rotation=WrongTilde(node.rotation.p))
+        yield Fault(TILDE, f"the sign of {described(node.vector)}~ is wrong in {name}", wrong)
+    if is_small:
+        text = f"the sign of {described(node.vector)}~ is wrong in {described(node)}"
+        yield Fault(TILDE, text, times(-1, node))
 
 
 def everywhere(
@@ -289,8 +307,13 @@ def _children(node: Expression) -> Iterator[tuple[Any, Callable[[Any], Expressio
             yield vector, lambda new: Rotated(rotation, new, along)
         case Perpendicular(vector):
             yield vector, Perpendicular
-        case RotationSlope(rotation, vector):
-            yield vector, lambda new: RotationSlope(rotation, new)
+        case RotationSlope(rotation, vector, is_small):
+            yield vector, lambda new: RotationSlope(rotation, new, is_small)
+        case Cross(left, right):
+            yield left, lambda new: Cross(new, right)
+            yield right, lambda new: Cross(left, new)
+        case TimesG(p, vector, is_transposed):
+            yield vector, lambda new: TimesG(p, new, is_transposed)
         case RowOfSlope(left, slope):
             yield left, lambda new: RowOfSlope(new, slope)
             yield slope, lambda new: _row_of(left, new)

@@ -27,6 +27,7 @@ from kincompile.calculus.expressions import (
     Power,
     Product,
     Rotated,
+    RotationSlope,
     Scalar,
     Sum,
     Symbol,
@@ -38,7 +39,7 @@ from kincompile.calculus.expressions import (
     split_coefficient,
 )
 from kincompile.calculus.rotations import PlaneRotation
-from kincompile.calculus.space import EulerRotation
+from kincompile.calculus.space import EulerRotation, TurnedFrame
 from kincompile.calculus.symbols import PlaneFrame
 from kincompile.compare.agreement import agrees
 from kincompile.compare.collected import (
@@ -55,6 +56,7 @@ from kincompile.compare.fault import (
     DRIVER_DEGREES,
     E0_LAST,
     FACTOR,
+    GLOBAL_OMEGA,
     MISSING_SQUARE,
     MIXED_ANGLES,
     MIXED_POINTS,
@@ -65,6 +67,7 @@ from kincompile.compare.fault import (
     SIGN,
     SINE_COSINE,
     SQUARES,
+    TILDE,
     TRANSPOSED,
     X_AND_Y,
     Fault,
@@ -143,6 +146,8 @@ class JointFaults:
     def __init__(self, joint: Joint, quantity: str, reference: Reference, states: States) -> None:
         self._joint = joint
         self._quantity = quantity
+        self._reference = reference
+        self._states = states
         self._blocks = derive(joint.template)
         self._partials = partials(joint.template)
         self._expansion = NumericExpansion(joint, reference, states)
@@ -161,6 +166,7 @@ class JointFaults:
             yield from self._if_different(fault.kind, fault.text, values)
         if self._quantity == "Phi_q":
             yield from self._exchanged_columns()
+            yield from self._about_global_axes()
             yield from self._opposite_rows()
         else:
             yield from self._exchanged_rows()
@@ -195,7 +201,10 @@ class JointFaults:
         with np.errstate(all="ignore"):
             if self._quantity != "Phi_q":
                 return component_values(expression, self._expansion)[..., None]
-            return column_values(self._partials[b][k].columns(expression), self._expansion)
+            columns = column_values(self._partials[b][k].columns(expression), self._expansion)
+        if k % 2 == 0 or k // 2 >= len(self._joint.bodies):
+            return columns
+        return self._reference.in_axes(columns, self._joint.bodies[k // 2], self._states)
 
     def _corner(self, place: Index) -> Index:
         """Return row and column of the first entry of a part."""
@@ -284,6 +293,20 @@ class JointFaults:
                     swapped = {place: self._right[place][..., order] for place in chosen}
                     yield from self._if_different(kind, text, swapped)
 
+    def _about_global_axes(self) -> Iterator[NumericFault]:
+        """Yield the Jacobians with small rotations about the global axes, Phi_pi = Phi_pi' A^T."""
+        turned: dict[Index, Array] = {}
+        for k, frame in enumerate(self._joint.template.frames):
+            if isinstance(frame, TurnedFrame):
+                entries = np.broadcast_arrays(*self._expansion.entries(frame.rotation))
+                back = np.stack(entries).reshape(3, 3, -1).transpose(2, 1, 0)
+                places = [(b, 2 * k + 1) for b in range(len(self._blocks))]
+                turned |= {place: self._right[place] @ back for place in places}
+        text = "the small rotations are about the global axes, not about those of the body"
+        for chosen in (*([place] for place in turned), list(turned)):
+            values = {place: turned[place] for place in chosen}
+            yield from self._if_different(GLOBAL_OMEGA, text, values)
+
 
 def _faults_everywhere(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
     """Yield the formulas with one symbol mistaken for another wherever it occurs."""
@@ -313,7 +336,7 @@ def _same_slips(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
         if kind == MISSING_SQUARE:
             is_square = isinstance(node, Power) and node.exponent == 2 and is_rate(node)
             return node.base if isinstance(node, Power) and is_square else None
-        if not isinstance(node, Rotated):
+        if not isinstance(node, Rotated | RotationSlope | VectorSymbol):
             return None
         return next((item.result for item in swaps(node, symbols) if item.kind == kind), None)
 
@@ -321,6 +344,8 @@ def _same_slips(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
         A_FOR_B: "A stands where B belongs, or B where A, for every body",
         TRANSPOSED: "the rotations of all bodies are transposed",
         SINE_COSINE: "sine and cosine are swapped for every body",
+        TILDE: "the sign of the tilde is wrong for every body",
+        GLOBAL_OMEGA: "the global omega stands where the body's own omega' belongs, for every body",
         MISSING_SQUARE: "w stands where w^2 belongs, for every body",
     }
     for kind, text in texts.items():

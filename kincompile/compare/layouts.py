@@ -71,7 +71,7 @@ def usual_layout(reference: Reference, block: ConstraintBlock | None, width: int
 
 def _ground(reference: Reference) -> Columns:
     """Return the columns of the ground, as many as a body has."""
-    return (None,) * len(next(iter(reference.system.body_columns), ()))
+    return (None,) * len(next(iter(reference.body_columns), ()))
 
 
 def expected_widths(reference: Reference, block: ConstraintBlock | None) -> str:
@@ -105,7 +105,7 @@ def other_layouts(reference: Reference, usual: Layout) -> Iterator[Layout]:
 
 def _split(reference: Reference, columns: Columns) -> tuple[list[Columns], Columns]:
     """Return the columns of each body, ground included, and the other columns."""
-    widths: dict[int | None, int] = {own[0]: len(own) for own in reference.system.body_columns}
+    widths: dict[int | None, int] = {own[0]: len(own) for own in reference.body_columns}
     widths[None] = len(_ground(reference))
     groups: list[Columns] = []
     while columns and (width := widths.get(columns[0], 0)):
@@ -122,14 +122,22 @@ def _orders(bodies: Sequence[Columns]) -> Iterator[tuple[Columns, ...]]:
         yield tuple(reversed(bodies))
 
 
+_ORIENTATIONS = {
+    3: (2, "angle", "angles"),
+    6: (3, "small rotation", "small rotations"),
+    7: (3, *("Euler parameters",) * 2),
+}
+"""By the number of columns of a body: where those of its orientation begin, and their names."""
+
+
 def _arrangements(
     order: tuple[Columns, ...], is_moved: bool
 ) -> Iterator[tuple[list[str], list[int | None]]]:
     """Yield the ways to write the coordinates of bodies in a given order, each with its name."""
     words = [MOVED] if is_moved else []
     yield words, [column for triple in order for column in triple]
-    place = {3: 2, 7: 3}.get(len(order[0]), len(order[0])) if order else 0
-    turn, turns = ("angle", "angles") if place == 2 else ("Euler parameters",) * 2
+    width = len(order[0]) if order else 0
+    place, turn, turns = _ORIENTATIONS.get(width, (width, "", ""))
     turned_first = [column for own in order for column in (*own[place:], *own[:place])]
     yield [*words, f"each body has its {turn} first"], turned_first
     by_kind = [column for kind in zip(*order, strict=True) for column in kind]

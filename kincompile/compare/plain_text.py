@@ -8,6 +8,7 @@ from kincompile.calculus.expressions import (
     Angle,
     Basis,
     Circular,
+    Cross,
     Dot,
     Expression,
     Norm,
@@ -25,6 +26,7 @@ from kincompile.calculus.expressions import (
     Sum,
     Symbol,
     TimeFunction,
+    TimesG,
     Vector,
     VectorSum,
     VectorSymbol,
@@ -74,7 +76,7 @@ def _scalar(expression: Scalar) -> str:
 def _vector(expression: Vector) -> str:
     match expression:
         case VectorSymbol(name):
-            return name
+            return f"{name}'" if name.startswith(("omega_", "pi_")) else name
         case Basis(axis, size):
             return f"e_{'xyz'[axis]}" if size < 4 else f"e_{axis}"
         case Rotated(EulerRotation(p), vector, along):
@@ -82,6 +84,13 @@ def _vector(expression: Vector) -> str:
                 return f"A_{p.name.removeprefix('p_')} {_bracketed(_vector(vector))}"
             first, last = (p, *along)[-2:]
             return f"B({described(first)}, {_vector(vector)}) {_bracketed(described(last))}"
+        case RotationSlope(EulerRotation(p), vector, True):
+            return f"A_{p.name.removeprefix('p_')} {_bracketed(_vector(vector))}~"
+        case Cross(left, right):
+            return f"{_bracketed(_vector(left))}~ {_bracketed(_vector(right))}"
+        case TimesG(p, vector, is_transposed):
+            mark = "^T" if is_transposed else ""
+            return f"G_{_vector(p).removeprefix('p_')}{mark} {_bracketed(_vector(vector))}"
         case RotationSlope(EulerRotation(p), vector):
             return f"B({p.name}, {_vector(vector)})"
         case RowOfSlope(left, slope):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -32,6 +33,8 @@ from kincompile.names import listed, rate, suggestion
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence
 
+    from kincompile.compare.comparison import Convention
+    from kincompile.model.bodies import Body
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.resolve import FreeEquation, Joint
     from kincompile.model.system import ConstraintSystem
@@ -92,13 +95,27 @@ class Reference:
     ----------
     kept
         What comparisons at the random states have found out about the system, for the next ones.
+    base
+        The formulas by the coordinates of the system; itself, except in another form.
+    body_columns
+        The columns of Phi_q of each body.
     """
+
+    convention: Convention | None = None
+    """The form that it is, where that is not the system's own."""
+    is_global: bool = False
 
     def __init__(self, model: Mechanism | ConstraintSystem) -> None:
         self.system = system_of(model)
         self.program = lower(self.system)
+        self.base = self
+        self.constraints = tuple(self.system.constraints)
+        self.body_columns = tuple(self.system.body_columns)
         self.coordinates = tuple(item.name for item in self.system.coordinates)
-        self.rates = frozenset(map(rate, self.coordinates))
+        self.spins = {
+            name: spin for body in self.system.bodies for name, spin, _ in body.on_request
+        }
+        self.rates = frozenset((*map(rate, self.coordinates), *self.spins))
         self.equations = self.system.equations
         self.angular = is_angular(self.system)
         self.defaults = default_parameters(self.system)
@@ -109,17 +126,31 @@ class Reference:
         self._values: WeakKeyDictionary[States, Values] = WeakKeyDictionary()
         self.kept: dict[Hashable, Any] = {}
         self._evaluated: WeakKeyDictionary[States, dict[sympy.Expr, Array]] = WeakKeyDictionary()
+        self._inputs: WeakKeyDictionary[States, dict[str, Array]] = WeakKeyDictionary()
+
+    def _share(self, base: Reference) -> None:
+        """Take from another reference to the same system what does not depend on columns."""
+        self.base, self.system, self.program = base, base.system, base.program
+        self.spins, self.rates, self.defaults = base.spins, base.rates, base.defaults
+        self._evaluated, self._inputs = base._evaluated, base._inputs
+        self._values, self.kept = WeakKeyDictionary(), {}
+
+    def another(self, model: Mechanism | ConstraintSystem) -> Reference:
+        """Return the formulas of another system of these coordinates, in this form."""
+        return Reference(model)
 
     @cached_property
     def blocks(self) -> tuple[ConstraintBlock, ...]:
         """The blocks of the constraints, in order."""
+        counts = (len(item.equation_names) for item in self.constraints)
+        offsets = list(accumulate(counts, initial=0))[:-1]
         return tuple(
             ConstraintBlock(
                 item,
                 tuple(range(first, first + len(item.equation_names))),
                 tuple(None if name is None else self.columns[name] for name in item.columns),
             )
-            for first, item in zip(self.system.row_offsets, self.system.constraints, strict=True)
+            for first, item in zip(offsets, self.constraints, strict=True)
         )
 
     def block(self, name: str) -> ConstraintBlock:
@@ -179,11 +210,29 @@ class Reference:
         """Generic states, off the manifold."""
 
         def is_usable(states: States) -> Array:
-            found = self.values(states)
+            found = self.values(self.normalised(states))
             parts = [np.isfinite(found.of(name)).all(axis=(-2, -1)) for name in QUANTITIES]
             return np.asarray(np.logical_and.reduce(parts))
 
-        return random_states(self.system, is_usable)
+        return self.normalised(random_states(self.system, is_usable))
+
+    def normalised(self, states: States) -> States:
+        """Return states at which formulas in this form are compared: all, by r and p."""
+        return states
+
+    def expressed(self, values: Mapping[str, Array], states: States) -> Mapping[str, Array]:
+        """Return quantities by the coordinates, (N, rows, 1 or n) each, in this form: as is."""
+        del states
+        return values
+
+    def in_axes(self, block: Array, body: Body, states: States) -> Array:
+        """Return columns by the rotation of a body, (N, rows, k), in this form: as they are."""
+        del body, states
+        return block
+
+    def gradient(self, Phi_q: Callable[[States], Array]) -> Callable[[States], Array]:
+        """Return a function that gives Phi_q by the coordinates, not in this form."""
+        return Phi_q
 
     def near(self, rows: Sequence[int], like: States) -> States | None:
         """Return states near the assembled guess at which the given equations hold.
@@ -250,14 +299,26 @@ class Reference:
         return {name: float(value[k]) for name, value in self.inputs(states).items()}
 
     def inputs(self, states: States) -> dict[str, Array]:
-        """Return the values of coordinates, rates, parameters and t by name, (N,) each."""
+        """Return the values of coordinates, rates, parameters and t by name, (N,) each.
+
+        In space also those of the angular velocities of bodies.
+        """
+        if states not in self._inputs:
+            self._inputs[states] = self._inputs_at(states)
+        return self._inputs[states]
+
+    def _inputs_at(self, states: States) -> dict[str, Array]:
         inputs = {"t": states.t}
         for k, item in enumerate(self.system.parameters):
             inputs[item.name] = states.p[:, k]
-        for k, name in enumerate(self.coordinates):
+        for k, name in enumerate(self.base.coordinates):
             inputs[name] = states.q[:, k]
             inputs[rate(name)] = states.q_dot[:, k]
-        return inputs
+        graph = Graph()
+        convert = Converter(graph, graph.input).convert
+        nodes = {name: convert(spin) for name, spin in self.spins.items() if name not in inputs}
+        results = run(graph.nodes, inputs, self.program.tables)
+        return inputs | {name: results[node] for name, node in nodes.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,8 +353,8 @@ class Subject:
     def in_degrees(self, states: States) -> States:
         """Return states with angles and their rates as numbers of degrees."""
         if states is not self.states:
-            return states.in_degrees(self.reference.angular)
-        return self.kept("degrees", lambda: states.in_degrees(self.reference.angular))
+            return states.in_degrees(self.reference.base.angular)
+        return self.kept("degrees", lambda: states.in_degrees(self.reference.base.angular))
 
     def near(self, rows: Sequence[int]) -> States | None:
         """Return states near the guess at which some of the system's equations hold, if any."""

@@ -6,15 +6,16 @@ it, written in vectors, gets its numbers in the same way as the right one.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.calculus.expand import Expansion
+from kincompile.calculus.expand import Expansion, cross_product
 from kincompile.calculus.expressions import (
     Angle,
     Circular,
+    Cross,
     Dot,
     Norm,
     Perpendicular,
@@ -23,9 +24,11 @@ from kincompile.calculus.expressions import (
     Rotated,
     Scaled,
     Sum,
+    TimesG,
     VectorSum,
     VectorSymbol,
 )
+from kincompile.calculus.space import EulerRotation
 from kincompile.compare.reference import Values
 from kincompile.derive.derivation import derive
 from kincompile.model.symbolic import SymbolicEnvironment
@@ -55,6 +58,7 @@ if TYPE_CHECKING:
 _COMPOUND = (
     Angle,
     Circular,
+    Cross,
     Dot,
     Norm,
     Perpendicular,
@@ -63,6 +67,7 @@ _COMPOUND = (
     Rotated,
     Scaled,
     Sum,
+    TimesG,
     VectorSum,
 )
 
@@ -71,6 +76,30 @@ class Exchanged(VectorSymbol):
     """A body-fixed vector whose components xi and eta are exchanged: a fault."""
 
     __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
+class WrongTilde(EulerRotation):
+    """Euler parameters whose B(p, s) has the wrong sign of s~: a fault.
+
+    B(p, s) = 2 [(e0 I + e~) s, e s^T - (e0 I + e~) s~].
+    """
+
+    def components(
+        self,
+        entries: Components,
+        vector: Components,
+        along: tuple[Components, ...],
+        expand: Callable[[Expression], Components],
+    ) -> Components:
+        """Return A v as it is, of B(p, v) w the wrong one."""
+        right = EulerRotation.components(self, entries, vector, along, expand)
+        if not along:
+            return right
+        (e0, *e), (_, *f) = along if len(along) == 2 else (expand(self.p), *along)
+        turned = cross_product(vector, tuple(f))
+        more = zip(right, turned, cross_product(tuple(e), turned), strict=True)
+        return tuple(a + 4 * (e0 * b + c) for a, b, c in more)
 
 
 class NumericEnvironment:

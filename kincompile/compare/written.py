@@ -174,7 +174,8 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
     """Return the names of a system and the author's own.
 
     A coordinate ``phi3`` has the rate ``phi3_dot``, also ``phi3d``. The coordinates of bodies may
-    be numbered, ``x1``, ``y1``, ``phi_1``, and so may all coordinates, ``q1``, ``q2``.
+    be numbered, ``x1``, ``y1``, ``phi_1``, and so may all coordinates, ``q1``, ``q2``. A body in
+    space has angular velocities, ``omega_x_rod`` and, about its own axes, ``omega_xi_rod``.
 
     Parameters
     ----------
@@ -191,6 +192,7 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
     """
     if len(aliases) > MAX_ALIASES:
         raise InputError(f"there are {len(aliases)} aliases; at most {MAX_ALIASES} are read")
+    reference = reference.base
     names, refused = _names_of(reference)
     words = Vocabulary(names, refused, _help(reference))
     problems = []
@@ -222,14 +224,18 @@ def _names_of(reference: Reference) -> tuple[dict[str, sympy.Expr], dict[str, st
         for end in ("_dot", "d"):
             names.setdefault(f"{written}{end}", names[rate(name)])
         refused[rate(written, 2)] = refused[f"{written}dd"] = _NO_ACCELERATIONS
+    for name in reference.spins:
+        names.setdefault(name, sympy.Symbol(name))
+        refused[rate(name)] = refused[f"{name}d"] = _NO_ACCELERATIONS
     names.setdefault("I", IMAGINARY)
     return names, refused
 
 
 def _numbered(reference: Reference) -> Iterator[tuple[str, str]]:
     """Yield coordinates as courses number them: x1, y1, phi1, also x_1, of body 1; q1 of all."""
-    for number, columns in enumerate(reference.system.body_columns, 1):
-        for letter, column in zip(("x", "y", "phi"), columns, strict=False):
+    bodies = zip(reference.system.bodies, reference.body_columns, strict=True)
+    for number, (body, columns) in enumerate(bodies, 1):
+        for letter, column in zip(body.kind.letters, columns, strict=True):
             for written in (f"{letter}{number}", f"{letter}_{number}"):
                 yield written, reference.coordinates[column]
     for number, name in enumerate(reference.coordinates, 1):
@@ -242,6 +248,8 @@ def _help(reference: Reference) -> str:
     system = reference.system
     names = [*reference.coordinates, *(item.name for item in system.parameters), "t"]
     text = f"the names are: {listed(names, 60)}, and rates such as {rate(names[0])}"
+    if reference.spins:
+        text += f", {listed(reference.spins, 6)}"
     if system.bodies:
         numbers = listed(f"{k} {body.name}" for k, body in enumerate(system.bodies, 1))
         text += (

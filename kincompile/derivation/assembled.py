@@ -87,6 +87,20 @@ EULER_PARAMETERS: Runs = (
 )
 """What the letters of a derivation in space mean (Haug, chapter 9)."""
 
+IDENTITIES = (
+    "E p = 0", "G p = 0", "E E^T = I", "G G^T = I", "E^T E = I - p p^T", "G^T G = I - p p^T",
+    "A = E G^T", "A^T A = I", "E p_dot = - E_dot p", "G p_dot = - G_dot p", "E_dot p_dot = 0",
+    "G_dot p_dot = 0", "E G_dot^T = E_dot G^T", "A_dot = 2 E_dot G^T", "A_dot = 2 E G_dot^T",
+    "A_dot = omega~ A", "A_dot = A omega'~", "omega = 2 E p_dot", "omega' = 2 G p_dot",
+    "omega = A omega'", "p_dot = 1/2 E^T omega", "p_dot = 1/2 G^T omega'",
+    "omega'~ = 2 G G_dot^T", "omega~ = 2 E_dot E^T", "omega_dot = 2 E p_ddot",
+    "omega'_dot = 2 G p_ddot", "omega_dot = A omega'_dot",
+    "p_ddot = 1/2 G^T omega'_dot - 1/4 p omega'^T omega'",
+    "omega'^T omega' = 4 p_dot^T p_dot", "B(p,s) p = 2 A s", "B(p_dot,s) p = B(p,s) p_dot",
+    "1/2 B(p,s) G^T = - A s~", "A_dot s = B(p,s) p_dot",
+)  # fmt: skip
+"""Identities where p^T p = 1 and p^T p_dot = 0, factors with a space between them."""
+
 
 def unknowns_section(figures: Figures) -> Chapter:
     """Return the mechanism drawn, its coordinates and parameters, with the chosen state."""
@@ -102,6 +116,9 @@ def unknowns_section(figures: Figures) -> Chapter:
     blocks.append(table(("column", "coordinate", "unit", "guess", "chosen state"), rows))
     if len(evaluation.system.ground.kind.axes) > 2:
         blocks.append(text(*EULER_PARAMETERS))
+        rows_of_three = [IDENTITIES[k : k + 3] for k in range(0, len(IDENTITIES), 3)]
+        lines = [tuple(Verbatim(item) for item in row) for row in rows_of_three]
+        blocks.append(table(("", "", ""), lines, "Identities, where p^T p = 1 and p^T p_dot = 0"))
     if evaluation.system.parameters:
         known: Rows = [
             (Verbatim(item.name), item.unit, _math(values[item.name]))

@@ -25,10 +25,12 @@ from kincompile.derivation.to_html import as_html, as_slides
 from kincompile.derivation.to_latex import as_tex
 from kincompile.derivation.to_markdown import as_markdown
 from kincompile.derivation.to_notebook import as_notebook
+from kincompile.derivation.turned_section import R_OMEGA, turned_section
 from kincompile.errors import InputError
 from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
+from kincompile.model.small_rotations import BY_OMEGA, BY_P, is_norm, turned_joint
 from kincompile.names import listed, suggestion
 from kincompile.tables import counted
 from kincompile.writing import write_atomically
@@ -127,6 +129,7 @@ def derivation(
     *,
     constraint: str | None = None,
     levels: Iterable[str] = LEVELS,
+    form: str = BY_P,
 ) -> Derivation:
     """Show how Phi_q, nu and gamma of a mechanism follow from Phi, step by step.
 
@@ -142,6 +145,9 @@ def derivation(
         Name of the constraint to show; all, and the assembled system, by default.
     levels
         Which of the levels are shown: in vectors, in sines and cosines, in numbers.
+    form
+        In space by what Phi_q has derivatives, and gamma the second rates: ``"r-p"`` (ME751) or
+        ``"r-omega"``, r and small rotations pi' about the axes of the bodies (Haug).
 
     Returns
     -------
@@ -158,10 +164,12 @@ def derivation(
     """
     system = system_of(model)
     _require_known(system, constraint, shown := tuple(levels))
+    _require_form(system, constraint, form)
     chosen = evaluation(system, state)
     figures = Figures(chosen)
-    names, sections = constraint_chapters(figures, constraint)
-    constraints = Chapter("constraints", ("The constraints, one by one",), (), sections)
+    names, sections = constraint_chapters(figures, constraint, form)
+    intro = () if form == BY_P else (R_OMEGA,)
+    constraints = Chapter("constraints", ("The constraints, one by one",), intro, sections)
     chapters = [unknowns_section(figures), constraints]
     if constraint is None:
         chapters.append(assembled_section(chosen))
@@ -178,25 +186,43 @@ def derivation(
 
 
 def constraint_chapters(
-    figures: Figures, constraint: str | None = None
+    figures: Figures, constraint: str | None = None, form: str = BY_P
 ) -> tuple[dict[Expression, Glyph], tuple[Chapter, ...]]:
-    """Return the nine steps of each constraint, or of one, and the abbreviations in them."""
+    """Return the nine steps of each constraint, or of one, and the abbreviations in them.
+
+    In the r-omega form there are no norm rows; free equations are derived by the coordinates.
+    """
     chosen = figures.evaluation
     constraints = chosen.system.constraints
+    section = joint_section if form == BY_P else turned_section
     sections = tuple(
-        joint_section(figures, item, rows)
+        section(figures, item, rows)
         if isinstance(item, Joint)
         else equation_section(chosen, item, rows)
         for item, rows in zip(constraints, chosen.code.constraints, strict=True)
-        if constraint in (None, item.name)
+        if constraint in (None, item.name) and (form == BY_P or not is_norm(item))
     )
     names: dict[Expression, Glyph] = {}
     for item in constraints:
         if isinstance(item, Joint):
-            names |= abbreviations(item.template)
+            names |= abbreviations((item if form == BY_P else turned_joint(item)).template)
     for load in chosen.system.loads:
         names |= load_abbreviations(load.template)
     return names, sections
+
+
+def _require_form(system: ConstraintSystem, constraint: str | None, form: str) -> None:
+    """Check that a mechanism, or a constraint of it, has a form."""
+    if form not in (BY_P, BY_OMEGA):
+        raise InputError(f"there is no form {form!r}; forms are: {listed((BY_P, BY_OMEGA))}")
+    if form == BY_P:
+        return
+    if not any(body.on_request for body in system.bodies):
+        raise InputError(
+            f"{system.name} is no mechanism of bodies in space: it has no {BY_OMEGA} form"
+        )
+    if any(item.name == constraint and is_norm(item) for item in system.constraints):
+        raise InputError(f"{constraint} is a norm row, which the {BY_OMEGA} form does not have")
 
 
 def _require_known(

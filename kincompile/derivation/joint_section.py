@@ -74,27 +74,31 @@ def joint_section(figures: Figures, joint: Joint, rows: Rows) -> Chapter:
     columns = [name for name in joint.columns if name is not None]
     blocks = derive(joint.template)
     evaluation = figures.evaluation
-    steps = _JointSteps(evaluation, rows, joint.name, columns, blocks, "vector", joint)
-    return steps.section(
-        joint.template.type_name,
-        joint.is_driver,
-        steps.attributes(figures.joint(joint)),
-        steps.constraint(),
-        steps.rules(),
-        steps.jacobian(),
-        steps.nu(*steps.nu_notes()),
-        steps.gamma(*steps.gamma_blocks()),
-        steps.expansion(),
-        steps.placement(),
-        steps.numbers(*steps.matrices(), *steps.vectors()),
-    )
+    steps = JointSteps(evaluation, rows, joint.name, columns, blocks, "vector", joint)
+    return steps.nine(figures.joint(joint))
 
 
 @dataclass(frozen=True, slots=True)
-class _JointSteps(Steps[RowBlock]):
+class JointSteps(Steps[RowBlock]):
     """The steps of a joint or a driver, derived in vectors."""
 
     joint: Joint
+
+    def nine(self, picture: Picture | None) -> Chapter:
+        """Return all steps, the figure in the first."""
+        return self.section(
+            self.joint.template.type_name,
+            self.joint.is_driver,
+            self.attributes(picture),
+            self.constraint(),
+            self.rules(),
+            self.jacobian(),
+            self.nu(*self.nu_notes()),
+            self.gamma(*self.gamma_blocks()),
+            self.expansion(),
+            self.placement(),
+            self.numbers(*self.matrices(), *self.vectors()),
+        )
 
     def symbol(self, letter: str, k: int) -> Glyph:
         """Return the symbol of a row block, numbered where there are several."""
@@ -110,6 +114,7 @@ class _JointSteps(Steps[RowBlock]):
         return all(step.rule is Rule.SUM for step in telling(steps))
 
     def attributes(self, picture: Picture | None) -> Chapter:
+        """Return the step of the attributes, as written and in numbers."""
         written = type(self.joint.written)
         meaning = (written.__doc__ or "").strip().splitlines()[0]
         source = text(f"{meaning} Source: {self.joint.source}.")
@@ -118,6 +123,7 @@ class _JointSteps(Steps[RowBlock]):
         return self.step(1, "The joint and its attributes", source, *figure, attributes, level="")
 
     def constraint(self) -> Chapter:
+        """Return the step of Phi, with the abbreviations in it."""
         blocks: list[Block] = []
         for k, block in enumerate(self.derivatives):
             zero = ZERO_BLOCK if isinstance(block.Phi, Vector) else ZERO
@@ -129,6 +135,7 @@ class _JointSteps(Steps[RowBlock]):
         return self.step(2, "The constraint in vectors", *blocks)
 
     def rules(self) -> Chapter:
+        """Return the step of the rules that fired for Phi_q."""
         rows = []
         for k, row in enumerate(partials(self.joint.template)):
             for item in row:
@@ -145,6 +152,7 @@ class _JointSteps(Steps[RowBlock]):
         return self.step(3, "The rules used", note, table(header, rows))
 
     def jacobian(self) -> Chapter:
+        """Return the step of the blocks of Phi_q."""
         template = self.joint.template
         blocks: list[Block] = []
         for variable, columns in block_columns(template):
@@ -160,12 +168,14 @@ class _JointSteps(Steps[RowBlock]):
         return self.step(4, "The blocks of the Jacobian in vectors", *blocks)
 
     def nu_notes(self) -> list[Block]:
+        """Return what is said below nu: the rules used."""
         lines: list[tuple[Run | Runs, ...]] = []
         for block in self.derivatives:
             lines += [(Math(PHI_T), *line) for line in _rule_lines(block.Phi_t_steps)]
         return [*self._constant_note(), *_fired(lines)]
 
     def gamma_blocks(self) -> list[Block]:
+        """Return gamma term by term, collected, and the rules used."""
         blocks: list[Block] = []
         lines: list[tuple[Run | Runs, ...]] = []
         for k, block in enumerate(self.derivatives):
@@ -194,6 +204,7 @@ class _JointSteps(Steps[RowBlock]):
         return [text("Here ", value, " is constant: ", rate, " = ", second, " = 0.")]
 
     def matrices(self) -> Iterator[Block]:
+        """Yield the rotation matrices in numbers."""
         template = self.joint.template
         if template.dimension == 3:
             yield from self._rotations()
@@ -215,6 +226,7 @@ class _JointSteps(Steps[RowBlock]):
             yield Display(Equated((Glyph("A", frame.index), Matrix(rows))))
 
     def vectors(self) -> Iterator[Block]:
+        """Yield the turned vectors in numbers."""
         template, values = self.joint.template, self.evaluation.values
         expansion = Expansion(SymbolicEnvironment(self.joint), template.dimension)
         named: list[tuple[Formula, Vector]] = [(item, item) for item in known_vectors(template)]

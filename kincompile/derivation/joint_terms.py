@@ -12,12 +12,14 @@ from kincompile.calculus.expressions import (
     Angle,
     Basis,
     Circular,
+    Cross,
     Dot,
     Expression,
     Number,
     Power,
     Product,
     Rotated,
+    RotationSlope,
     Scalar,
     Scaled,
     Sum,
@@ -27,7 +29,7 @@ from kincompile.calculus.expressions import (
     VectorSymbol,
 )
 from kincompile.calculus.rotations import PlaneRotation
-from kincompile.calculus.space import EulerRotation
+from kincompile.calculus.space import EulerRotation, TurnedFrame
 from kincompile.derivation.document import Math
 from kincompile.derivation.formulas import (
     IDENTITY,
@@ -51,6 +53,10 @@ if TYPE_CHECKING:
 
 _PHI = Symbol("phi")
 _A, _B = Glyph("A"), Glyph("B")
+_TURNING = RotationSlope(
+    EulerRotation(VectorSymbol("p", 4)), VectorSymbol("omega", 3), is_small=True
+)
+"""A omega'~."""
 
 RULES: Mapping[Rule, Runs] = {
     Rule.SUM: ("sum rule",),
@@ -60,6 +66,7 @@ RULES: Mapping[Rule, Runs] = {
     Rule.B_TO_A: (Math(Equated((DerivativeSymbol(_B, _PHI, "d"), Joined(("-", _A))))),),
     Rule.A_TO_SLOPE: ("d(A s) = B(p, s) dp",),
     Rule.SLOPE: ("d(B(p, s) w) = B(w, s) dp",),
+    Rule.TURN: (Math(Equated((Glyph("A", dots=1), _TURNING))),),
     Rule.ANGLE: ("d atan2(s, c) = (c ds - s dc)/(s² + c²)",),
     Rule.DRIVER: ("driver, a function of ", Math(Symbol("t"))),
     Rule.PROFILE: ("profile, chain rule",),
@@ -73,7 +80,7 @@ def parts(expression: Any) -> Iterator[Expression]:
     match expression:
         case Sum(items) | VectorSum(items) | Product(items):
             inner: tuple[Expression, ...] = items
-        case Dot(left, right) | Scaled(left, right) | Angle(left, right):
+        case Dot(left, right) | Scaled(left, right) | Angle(left, right) | Cross(left, right):
             inner = (left, right)
         case Power(base, _) | Circular(_, base):
             inner = (base,)
@@ -141,7 +148,12 @@ def _times_identity(factor: Scalar) -> Formula:
 def block_columns(template: Template) -> list[tuple[Formula, slice]]:
     """Return what each block of Phi_q is a derivative by, q_i or alpha_i, and its coordinates."""
     ends = accumulate((len(item.coordinates) for item in template.owners), initial=0)
-    names: list[Formula] = [Glyph("q", frame.index) for frame in template.frames]
+    names: list[Formula] = [
+        Joined((frame.r, ",", frame.coordinates[1]))
+        if isinstance(frame, TurnedFrame)
+        else Glyph("q", frame.index)
+        for frame in template.frames
+    ]
     names += [contact.alpha for contact in template.contacts]
     return [(name, slice(*own)) for name, own in zip(names, pairwise(ends), strict=True)]
 

@@ -114,6 +114,10 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
         dot = self._element("mo", mark, stretchy="false")
         return self._element("mover", base, dot, accent="true")
 
+    def _tilded(self, base: Element) -> Element:
+        mark = self._element("mo", "~", stretchy="false")
+        return self._element("mover", base, mark, accent="true")
+
     def _scripts(self, base: Element, index: Element | None, exponent: Element | None) -> Element:
         if index is not None and exponent is not None:
             return self._element("msubsup", base, index, exponent)

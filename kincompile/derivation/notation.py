@@ -16,6 +16,7 @@ from kincompile.calculus.expressions import (
     Angle,
     Basis,
     Circular,
+    Cross,
     Dot,
     Norm,
     Number,
@@ -30,6 +31,7 @@ from kincompile.calculus.expressions import (
     Sum,
     Symbol,
     TimeFunction,
+    TimesG,
     VectorSum,
     VectorSymbol,
 )
@@ -72,7 +74,7 @@ CONNECTIVES = {"&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}"}
 LONGEST_NUMERATOR = 24
 """Most nodes above a fraction bar, since no line can be broken within a fraction."""
 
-BODY_FIXED = ("s", "v")
+BODY_FIXED = ("s", "v", "omega", "pi")
 """Letters of vectors given in the frame of a body, which have a prime."""
 
 
@@ -121,6 +123,9 @@ class Notation:
     def _dotted(self, base: Printed, dots: int) -> Printed:
         """Return something with dots over it."""
 
+    def _tilded(self, base: Printed) -> Printed:
+        """Return something with a tilde over it: a skew matrix."""
+
     def _scripts(self, base: Printed, index: Printed | None, exponent: Printed | None) -> Printed:
         """Return something with an index, an exponent, or both."""
 
@@ -148,11 +153,12 @@ class Notation:
         def _print(self, expr: Any, **kwargs: Any) -> Printed:
             """Print anything; the printer of SymPy has it."""
 
-    def _named(self, name: str, *, is_vector: bool) -> Printed:
+    def _named(self, name: str, *, is_vector: bool, is_skew: bool = False) -> Printed:
         letter, index, dots = split_name(name)
         prime = self._operator("\N{PRIME}") if is_vector and letter in BODY_FIXED else None
         base = self._letter(letter, bold=is_vector)
         base = self._dotted(base, dots) if dots else base
+        base = self._tilded(base) if is_skew else base
         return self._scripts(base, self._index_text(index) if index else None, prime)
 
     def _fenced(self, value: Printed) -> Printed:
@@ -198,7 +204,32 @@ class Notation:
 
     def _print_RotationSlope(self, expr: RotationSlope) -> Printed:
         (p,) = expr.rotation.coordinates
+        if expr.is_small and isinstance(p, VectorSymbol):
+            return self._row([self._matrix("A", p.name), self._skew(expr.vector)])
         return self._slope(p, expr.vector)
+
+    def _matrix(self, letter: str, name: str) -> Printed:
+        """Return a matrix of a body with the index of something else of it."""
+        index = split_name(name)[1]
+        base = self._letter(letter, bold=True)
+        return self._scripts(base, self._index_text(index) if index else None, None)
+
+    def _skew(self, vector: Any) -> Printed:
+        """Return v~."""
+        if isinstance(vector, VectorSymbol):
+            return self._named(vector.name, is_vector=True, is_skew=True)
+        return self._tilded(self._factor(vector))
+
+    def _print_Cross(self, expr: Cross) -> Printed:
+        return self._row([self._skew(expr.left), self._factor(expr.right)])
+
+    def _print_TimesG(self, expr: TimesG) -> Printed:
+        name = expr.p.name if isinstance(expr.p, VectorSymbol) else ""
+        matrix = self._matrix("G", name)
+        if expr.is_transposed:
+            index = self._index_text(split_name(name)[1])
+            matrix = self._scripts(self._letter("G", bold=True), index, self._letter("T"))
+        return self._row([matrix, self._factor(expr.vector)])
 
     def _print_RowOfSlope(self, expr: RowOfSlope) -> Printed:
         return self._row([self._transposed(expr.left), self._short(expr.slope)])

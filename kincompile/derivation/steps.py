@@ -32,7 +32,10 @@ from kincompile.derivation.formulas import (
 from kincompile.tables import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from kincompile.derivation.document import Block, Run, Runs
     from kincompile.derivation.evaluation import Evaluation
@@ -132,13 +135,19 @@ class Steps(ABC, Generic[Derived]):
             f"offset. {'Row' if count == 1 else 'Rows'} {row_range(first, count)} counted from 0, "
             f"{row_range(first + 1, count)} counted from 1."
         )
-        names = self.evaluation.coordinates
-        lines = [(Verbatim(names[k]), str(k), str(k + 1)) for k in self._column_numbers()]
+        names = self.names
+        lines = [(Verbatim(names[k]), str(k), str(k + 1)) for k in self.column_numbers()]
         columns = table(("coordinate", "column from 0", "from 1"), lines)
         title = "Placement by row and column offset"
         return self.step(8, title, note, columns, level="expanded")
 
-    def _column_numbers(self) -> list[int]:
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the columns of Phi_q."""
+        return self.evaluation.coordinates
+
+    def column_numbers(self) -> list[int]:
+        """Return the columns of Phi_q in which something can stand."""
         return sorted({entry.column for entry in self.rows.entries["Phi_q"]})
 
     def numbers(self, *vectors: Block) -> Chapter:
@@ -156,15 +165,19 @@ class Steps(ABC, Generic[Derived]):
             rows.append((Verbatim(name), *numbers))
         return table(("coordinate", "value", "rate"), rows)
 
+    def arrays(self, rows: slice, columns: Sequence[int]) -> Mapping[str, NDArray[np.float64]]:
+        """Return Phi, nu, gamma and some columns of Phi_q in numbers."""
+        shown = {key: self.evaluation.shown[key][rows] for key in QUANTITIES}
+        return shown | {"Phi_q": shown["Phi_q"][:, columns]}
+
     def _results(self) -> Sequence[Block]:
         """Return the numbers of Phi, of its columns of Phi_q, of nu and of gamma."""
         first, count = self.rows.instance.first_row, len(self.rows.entries["Phi"])
-        columns = self._column_numbers()
+        columns = self.column_numbers()
         names: list[Run] = []
         for column in columns:
-            names += [", " if names else "", Verbatim(self.evaluation.coordinates[column])]
-        shown = {key: self.evaluation.shown[key][first : first + count] for key in QUANTITIES}
-        shown["Phi_q"] = shown["Phi_q"][:, columns]
+            names += [", " if names else "", Verbatim(self.names[column])]
+        shown = self.arrays(slice(first, first + count), columns)
         phi, phi_q, nu, gamma = (
             Display(Equated((replace(symbol, exponent=self.name), decimals(shown[key]))))
             for key, symbol in zip(QUANTITIES, (PHI, PHI_Q, NU, GAMMA), strict=True)

@@ -83,6 +83,9 @@ class TexPrinter(Notation, LatexPrinter):
     def _dotted(self, base: str, dots: int) -> str:
         return rf"{DOTS[dots]}{{{base}}}" if dots < len(DOTS) else rf"{base}^{{({dots})}}"
 
+    def _tilded(self, base: str) -> str:
+        return rf"\tilde{{{base}}}"
+
     def _scripts(self, base: str, index: str | None, exponent: str | None) -> str:
         below = "" if index is None else f"_{{{index}}}"
         above = "" if exponent is None else f"^{{{exponent}}}"

@@ -87,9 +87,13 @@ def _partial(
 ) -> PartialDerivative:
     if not isinstance(rate, VectorSymbol):
         return PartialDerivative(coordinate, *recorded(Phi, {coordinate: ONE}))
-    entry, steps = recorded(Phi, template.direction({coordinate: rate}))
+    direction = template.direction({coordinate: rate})
+    entry, steps = recorded(Phi, direction)
+    leaves = direction.keys() - {coordinate}  # p, whose change is no multiple of pi'
     read_off = tuple(
-        Step(step.rule, step.expression, coefficient(step.derivative, rate)) for step in steps
+        Step(step.rule, step.expression, coefficient(step.derivative, rate))
+        for step in steps
+        if step.expression not in leaves
     )
     return PartialDerivative(coordinate, coefficient(entry, rate), read_off)
 

@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 
     from kincompile.calculus.symbols import Frame
     from kincompile.model.bodies import Body
-    from kincompile.model.matrices import CheckedSystem
+    from kincompile.model.system import ConstraintSystem
+
+
+BY_P, BY_OMEGA = "r-p", "r-omega"
+"""The names of the two forms."""
 
 
 def is_norm(constraint: Joint | FreeEquation) -> bool:
@@ -56,17 +60,26 @@ def turned_joint(joint: Joint) -> Joint:
         spins = map(sympy.Symbol, spin_names(body))
         points[f"omega_{frame.index}"] = (0,) * 3 if body.is_ground else tuple(spins)
         columns += [None] * 6 if body.is_ground else turned_columns(body)
+    columns += joint.columns[sum(len(body.coordinates) for body in joint.bodies) :]
     template = replace(joint.template, frames=tuple(frames))
     return replace(joint, template=template, points=points, columns=tuple(columns))
 
 
-def turned_constraints(system: CheckedSystem) -> tuple[Joint | FreeEquation, ...]:
+def turned_constraints(system: ConstraintSystem) -> tuple[Joint | FreeEquation, ...]:
     """Return the constraints of a system in space without norm rows, joints by r and pi'."""
     return tuple(
-        turned_joint(item) if isinstance(item, Joint) and item.bodies else item
+        turned_joint(item)
+        if isinstance(item, Joint)
+        else replace(item, columns=_with_turns(item.columns, system.bodies))
         for item in system.constraints
         if not is_norm(item)
     )
+
+
+def _with_turns(columns: Sequence[str], bodies: Sequence[Body]) -> tuple[str, ...]:
+    """Return the columns of a free equation, all pi' of a body in place of any of its p."""
+    turns = {name: turned_columns(body)[3:] for body in bodies for name in body.coordinates[3:]}
+    return tuple(dict.fromkeys(new for name in columns for new in turns.get(name, (name,))))
 
 
 def turned_rows(
@@ -85,8 +98,11 @@ def turned_rows(
 def _free_row(
     expression: sympy.Expr, equation: FreeEquation, bodies: Sequence[Body]
 ) -> EquationRow:
-    found = derive_equation(expression, equation.columns)
-    entries = dict(zip(equation.columns, found.Phi_q, strict=True))
+    turns = {name for body in bodies for name in turned_columns(body)[3:]}
+    parameters = [name for body in bodies for name in body.coordinates[3:]]
+    columns = [*(name for name in equation.columns if name not in turns), *parameters]
+    found = derive_equation(expression, columns)
+    entries = dict(zip(columns, found.Phi_q, strict=True))
     gamma, rates = found.gamma, dict[sympy.Expr, sympy.Expr]()
     for body in bodies:
         names = body.coordinates[3:]

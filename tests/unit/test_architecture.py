@@ -46,13 +46,14 @@ BOTH_SIDES = {
 # package promises: `import kincompile` loads nothing, a name loads its module. The table of targets
 # loads the modules of the one that is emitted, the command line the command that is called, and the
 # compiler the stages that a model needs. The options of a motion are formulas: to read them takes
-# SymPy, and to print a help does not; so do the tables of tolerances and fits. Masses and forces
-# are loaded where a mechanism has any.
+# SymPy, and to print a help does not; so do the tables of sweeps, tolerances and fits. Masses and
+# forces are loaded where a mechanism has any.
 DEFERRED = {
     PACKAGE,
     "kincompile.cli",
     "kincompile.cli.fit",
     "kincompile.cli.motion",
+    "kincompile.cli.sweep",
     "kincompile.cli.tolerance",
     "kincompile.compiler",
     "kincompile.files.dimensions",

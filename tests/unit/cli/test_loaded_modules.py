@@ -30,7 +30,7 @@ parameters = { length = 0.01 }
 parameters = { length = [0.5, 2] }
 samples = 4
 starts = 1
-targets = [{ value = "phi_arm", values = [0.1], times = [0.1], within = 9 }]
+targets = [{ value = "phi_bob", values = [0.1], times = [0.1], within = 9 }]
 """
 SPACE = (
     "kincompile.space kincompile.spatial kincompile.view.solids kincompile.view.solid_joints "

@@ -130,12 +130,24 @@ def wrong_sign(Phi_q: Any) -> None:
     Phi_q[0, 3] *= -1
 
 
+def wrong_tilde(Phi_q: Any) -> None:
+    e0, *e = sympy.symbols("e0_rod e1_rod e2_rod e3_rod")
+    e, s = sympy.Matrix(e), sympy.Matrix([-0.1, 0.2, 0.3])
+    inner = e0 * sympy.eye(3) + tilde(e)
+    Phi_q[:3, 4:] = 2 * (e * s.T + inner * tilde(s))
+
+
+def tilde(v: Any) -> Any:
+    return sympy.Matrix([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+
 @pytest.mark.parametrize(
     ("spoil", "named"),
     [
         (wrong_half, "half what it should be"),
         (wrong_order, "e0 stands last"),
         (wrong_sign, "the entry has the wrong sign"),
+        (wrong_tilde, "the sign of s_j~ is wrong in B_j"),
     ],
 )
 def test_that_slips_of_the_field_are_named(right: dict[str, Any], spoil: Any, named: str) -> None:
@@ -146,8 +158,21 @@ def test_that_slips_of_the_field_are_named(right: dict[str, Any], spoil: Any, na
     assert named in str(report)
 
 
+def test_that_half_the_norm_row_is_a_convention(right: dict[str, Any]) -> None:
+    half = {name: item.copy() for name, item in right.items()}
+    for item in half.values():
+        item[6, :] /= 2  # ME751 has p^T p/2 - 1/2
+    report = kc.compare(pendulum(), **half)
+    assert report.equal
+    assert "norm_rod" in next(c.text for c in report.conventions if c.kind == "row scale")
+    half["gamma"] = right["gamma"]
+    report = kc.compare(pendulum(), **half)
+    assert {entry.row for entry in report.different} == {"norm_rod"}
+    assert "half what it should be" in str(report)
+
+
 def test_that_a_transposed_rotation_is_named() -> None:
     turned = extended(lambda usual, _: usual.T)
     report = kc.compare(pendulum(), Phi_q=turned)
     assert not report.equal
-    assert "signs of e~ are wrong in B_j" in str(report)
+    assert "the rotations of all bodies are transposed" in str(report)

@@ -1,0 +1,182 @@
+"""Published cases of synthesis, beside pylinkage's optimizer.
+
+``python -m benchmarks.synthesis`` fits a four-bar to five points with prescribed crank angles, to
+the function y = x^1.5 on 1..4 and to Hoeken's straight line. Limits are the best published errors.
+pylinkage's particle swarm gets the same five points, bounds and limits; its positions are those of
+the closed form in plain floats, which is faster than any linkage of its own.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+import kincompile as kc
+from benchmarks import machine
+from benchmarks.peers.common import Skipped, optional, require
+from benchmarks.tables import Target, print_table, print_targets
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+POINTS = ((3, 3), (2.759, 3.363), (2.372, 3.663), (1.890, 3.862), (1.355, 3.943))
+ANGLES = tuple(math.radians(angle) for angle in (30, 45, 60, 75, 90))
+BEST_PATH, BEST_FUNCTION, BEST_LINE = 7.4157513068e-7, 1.05040439537708, 0.00243843327159
+"""Sum of squares; largest error [deg]; deviation from a line, relative to its length."""
+
+LENGTHS = ("r1", "r2", "r3", "r4")
+LARGEST, SMALLEST = 50.0, 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What one way has reached: error, evaluations and time [s]."""
+
+    what: str
+    error: float
+    evaluations: str
+    seconds: float
+
+    def cells(self) -> list[str]:
+        """Return the cells of the table."""
+        return [self.what, f"{self.error:.6g}", self.evaluations, f"{self.seconds:.2f}"]
+
+
+def four_bar(name: str, **defaults: float) -> kc.Mechanism:
+    """Return a four-bar whose crank angle is t, with the point P on its coupler."""
+    m = kc.Mechanism(name, end=2 * math.pi, points=73)
+    given = {"r1": 3.7, "r2": 2.0, "r3": 4.0, "r4": 2.7, "u": 1.7, "v": 1.7} | defaults
+    r1, r2, r3, r4, u, v = (m.parameter(key, value, "m") for key, value in given.items())
+    crank, rod = m.body("crank", (0, 0, 0.5)), m.body("rod", (1.7, 1, 0.8))
+    rocker = m.body("rocker", (r1, 0, 1.9))
+    m.add(kc.Revolute("A", crank, (0, 0), m.ground, (0, 0)))
+    m.add(kc.Revolute("B", crank, (r2, 0), rod, (0, 0)))
+    m.add(kc.Revolute("C", rod, (r3, 0), rocker, (r4, 0)))
+    m.add(kc.Revolute("D", rocker, (0, 0), m.ground, (r1, 0)))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    m.point("P", rod, (u, v))
+    return m
+
+
+def row_of(what: str, found: kc.Fit, error: float) -> Row:
+    """Return the row of a fit."""
+    counts = found.counts
+    evaluations = f"{counts.motions} motions, {counts.gradients} Jacobians, {counts.sampled} sets"
+    return Row(what, error, evaluations, counts.seconds)
+
+
+def path() -> Row:
+    """Fit five points with prescribed crank angles; the crank is the shortest, by Grashof."""
+    r1, r2, r3, r4 = sympy.symbols(LENGTHS)
+    spare = (r1 + r4 - r3 - r2, r1 + r3 - r4 - r2, r3 + r4 - r1 - r2, r1 - r2, r3 - r2, r4 - r2)
+    limits = [kc.targets.limit(item, least=0) for item in spare]
+    size = dict.fromkeys(LENGTHS, (SMALLEST, LARGEST))
+    bounds = size | dict.fromkeys(("u", "v"), (-LARGEST, LARGEST))
+    target = kc.targets.path("P", POINTS, ANGLES)
+    found = kc.fit(four_bar("five_points"), [target, *limits], bounds=bounds)
+    return row_of("`kc.fit`", found, found.error)
+
+
+def function() -> Row:
+    """Fit the rocker to y = x^1.5 at 61 points: input 20 to 110 degrees, output 40 to 130."""
+    x = np.linspace(1, 4, 61)
+    theta, phi = (np.radians(a + b * 90) for a, b in ((20, (x - 1) / 3), (40, (x**1.5 - 1) / 7)))
+    m = four_bar("freudenstein", r1=1.0, r2=0.6, r3=0.8, r4=0.6)
+    bounds = dict.fromkeys(("r2", "r3", "r4"), (0.2, 2.0))
+    found = kc.fit(m, kc.targets.value("rocker.phi", phi, theta), bounds=bounds, samples=256)
+    largest = max(abs(item.off) for item in found.reached)
+    return row_of("function, largest error [deg]", found, math.degrees(largest))
+
+
+def line() -> Row:
+    """Fit a straight line of length 4 over half a turn of a crank of 1: Hoeken's case."""
+    angles = np.linspace(math.pi / 2, 3 * math.pi / 2, 37)
+    m = four_bar("line", r1=2.0, r2=1.0, r3=2.5, r4=2.5, u=5.0, v=0.0)
+    bounds = {"r1": (1.5, 3), "r3": (2, 4), "r4": (2, 4), "u": (4, 7), "v": (-1, 1)}
+    straight = kc.targets.value("P.y", np.full(37, 4.0), angles)
+    ends = kc.targets.value("P.x", [4.0, 0.0], angles[[0, -1]])
+    found = kc.fit(m, [straight, ends], bounds=bounds, samples=256)
+    fine = kc.solve(kc.compile(found.model), np.linspace(angles[0], angles[-1], 1001))
+    return row_of(
+        "line, deviation by length", found, float(np.ptp(fine["P.y"]) / np.ptp(fine["P.x"]))
+    )
+
+
+class Swarm:
+    """pylinkage's particle swarm on the five points."""
+
+    def __init__(self) -> None:
+        self.evaluations = 0
+
+    def get_coords(self) -> list[tuple[float, float]]:
+        """Return no joints: the objective knows them."""
+        return []
+
+    def error(self, linkage: Any, sizes: Sequence[float], positions: Any) -> float:
+        """Return the sum of squares, or a large number where there is no such crank-rocker."""
+        del linkage, positions
+        self.evaluations += 1
+        r1, r2, r3, r4, u, v = sizes
+        if r2 > min(r1, r3, r4) or r2 + max(r1, r3, r4) > r1 + r3 + r4 - max(r1, r3, r4):
+            return 1e6
+        errors = []
+        for side in (1, -1):
+            total = 0.0
+            for angle, (x, y) in zip(ANGLES, POINTS, strict=True):
+                pin = cmath.rect(r2, angle)
+                across = r1 - pin
+                length = abs(across)
+                cosine = (r3 * r3 + length * length - r4 * r4) / (2 * r3 * length)
+                if abs(cosine) > 1:
+                    return 1e6
+                coupler = cmath.rect(1, cmath.phase(across) + side * math.acos(cosine))
+                total += abs(pin + coupler * complex(u, v) - complex(x, y)) ** 2
+            errors.append(total)
+        return min(errors)
+
+
+def swarm() -> Row:
+    """Let pylinkage's optimizer, with its own settings, look for the five points."""
+    require(optional("pylinkage"), "pylinkage")
+    from pylinkage.optimization import particle_swarm_optimization
+
+    own, begun = Swarm(), time.perf_counter()
+    low, high = [SMALLEST] * 4 + [-LARGEST] * 2, [LARGEST] * 6
+    found = particle_swarm_optimization(
+        own.error, own, dimensions=6, bounds=(low, high), order_relation=min, verbose=False
+    )
+    error = float(found.scores["score"][0])
+    return Row(
+        "pylinkage particle swarm", error, f"{own.evaluations} motions", time.perf_counter() - begun
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    before = machine.load()
+    ours, others = path(), [function(), line()]
+    rows = [ours]
+    try:
+        rows.append(swarm())
+    except Skipped as reason:
+        print(f"pylinkage is left out: {reason}")
+    heads = ("case", "error", "evaluations", "s")
+    print_table("Five points with prescribed angles", heads, (row.cells() for row in rows))
+    print_table("Function and straight line", heads, (row.cells() for row in others))
+    targets = [
+        Target("five points, sum of squares", ours.error, "at most", BEST_PATH * (1 + 1e-9)),
+        Target("function, largest error", others[0].error, "at most", BEST_FUNCTION, "deg"),
+        Target("line, deviation by length", others[1].error, "at most", BEST_LINE),
+    ]
+    print_targets("Synthesis: best published", targets)
+    print(f"{machine.description()}. Load before {before}, after {machine.load()}.")
+
+
+if __name__ == "__main__":
+    main()
