@@ -16,7 +16,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.mechanism_plot import axes_of, draw, write_name
 from kincompile.view.svg import Timing, as_svg
 from kincompile.view.traces import described, moving_system, traced_places
-from kincompile.view.worlds import PLANE, dimension_of, motion_file, solid_svgs
+from kincompile.view.worlds import motion_file, solid_svgs
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -98,11 +98,8 @@ def animate(
     UnsupportedError
         If matplotlib, or for MP4 ffmpeg, is not installed.
     """
-    ending = "" if path is None else Path(path).suffix.lower()
-    if path is not None and ending == SVG:
-        return _written_svg(solution, Path(path), model, seconds, trace)
-    if path is not None and ending == GLB:
-        return _written_glb(solution, Path(path), model, seconds, trace)
+    if path is not None and Path(path).suffix.lower() in (SVG, GLB):
+        return _written_alone(solution, Path(path), model, seconds, trace)
     with package_of_extra("matplotlib", "plot"):
         from matplotlib import animation
         from matplotlib import pyplot as plt
@@ -184,54 +181,61 @@ def _playing_time(t: NDArray[np.float64], seconds: float | None) -> float:
     return length
 
 
-def _written_svg(
+def _written_alone(
     solution: Solution,
     path: Path,
     model: Mechanism | ConstraintSystem | None,
     seconds: float | None,
     trace: Iterable[str] | None,
 ) -> Path:
-    """Write a motion as SVG; browsers draw what is between its frames."""
+    """Write a motion to a file that needs no matplotlib."""
     require_writable(path)
     system = moving_system(solution, model, WHAT)
-    q, t = solution.q[solution.good], solution.t[solution.good]
-    length = _playing_time(t, seconds)
-    most = length * FRAME_RATE
-    if dimension_of(system) > PLANE:
-        most = min(most, FRAMES_IN_SPACE)
-    step = max(1, round(t.size / most))
-    rows = np.append(np.arange(0, t.size - 1, step), t.size - 1)
-    shapes = drawing(system, solution.parameters, q)
-    timing = Timing(length, (t[rows] - t[0]) / ((t[-1] - t[0]) or 1.0))
-    description = described(shapes, f"in motion from t = {t[0]:g} to {t[-1]:g} {TIME_UNIT}")
-    paths = [place.at(solution.q) for place in traced_places(shapes, trace)]
-    in_svg = solid_svgs().svg_in_space if shapes.is_spatial else as_svg
-    return write_atomically(path, in_svg(shapes, q[rows], description, paths=paths, timing=timing))
-
-
-def _written_glb(
-    solution: Solution,
-    path: Path,
-    model: Mechanism | ConstraintSystem | None,
-    seconds: float | None,
-    trace: Iterable[str] | None,
-) -> Path:
-    """Write a motion in space as glTF, with a keyframe at each point that was found."""
-    require_writable(path)
-    system = moving_system(solution, model, WHAT)
-    q, t = solution.q[solution.good], solution.t[solution.good]
-    shapes = drawing(system, solution.parameters, q)
+    shapes = drawing(system, solution.parameters, solution.q[solution.good])
+    places = traced_places(shapes, trace)
+    if path.suffix.lower() == SVG:
+        return write_atomically(path, _svg_of(solution, shapes, places, seconds))
     if not shapes.is_spatial:
         raise InputError(
             f"cannot write {path}: {solution.name} moves in a plane, and {GLB} is for motions in "
             f"space; end its name in {listed((SVG, *WRITERS))}"
         )
+    return write_atomically(path, _glb_of(solution, shapes, places, seconds, system.length_unit))
+
+
+def _svg_of(
+    solution: Solution, shapes: Drawing, places: Iterable[FramePoint], seconds: float | None
+) -> str:
+    """Return a motion as SVG; of one in the plane browsers draw what is between its frames."""
+    q, t = solution.q[solution.good], solution.t[solution.good]
+    length = _playing_time(t, seconds)
+    most = length * FRAME_RATE
+    if shapes.is_spatial:
+        most = min(most, FRAMES_IN_SPACE)
+    step = max(1, round(t.size / most))
+    rows = np.append(np.arange(0, t.size - 1, step), t.size - 1)
+    timing = Timing(length, (t[rows] - t[0]) / ((t[-1] - t[0]) or 1.0))
+    description = described(shapes, f"in motion from t = {t[0]:g} to {t[-1]:g} {TIME_UNIT}")
+    paths = [place.at(solution.q) for place in places]
+    in_svg: Callable[..., str] = solid_svgs().svg_in_space if shapes.is_spatial else as_svg
+    return in_svg(shapes, q[rows], description, paths=paths, timing=timing)
+
+
+def _glb_of(
+    solution: Solution,
+    shapes: Drawing,
+    places: Iterable[FramePoint],
+    seconds: float | None,
+    length_unit: str,
+) -> bytes:
+    """Return a motion in space as glTF, with a keyframe at each point that was found."""
+    q, t = solution.q[solution.good], solution.t[solution.good]
     elapsed = np.abs(t - t[0])
     if seconds is not None and t.size > 1:
         elapsed *= _playing_time(t, seconds) / elapsed[-1]
-    paths = [place.at(q) for place in traced_places(shapes, trace)]
-    file = motion_file().as_glb(shapes, elapsed, q, system.length_unit, paths)
-    return write_atomically(path, file)
+    paths = [place.at(q) for place in places]
+    file: bytes = motion_file().as_glb(shapes, elapsed, q, length_unit, paths)
+    return file
 
 
 def _require_writer(path: Path, is_available: Callable[[str], bool]) -> None:

@@ -1,5 +1,7 @@
 """Mechanisms whose motion is known in closed form."""
 
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -40,3 +42,8 @@ def files_of(folder: Path) -> dict[str, bytes]:
         for path in sorted(folder.rglob("*"))
         if path.is_file()
     }
+
+
+def processes(count: int) -> ProcessPoolExecutor:
+    """Return a pool of fresh processes: a fork of one with threads, as Zarr has, is warned of."""
+    return ProcessPoolExecutor(count, get_context("forkserver"))

@@ -1,7 +1,7 @@
 """Sweeps give the numbers of the closed form, with dimensions, units and statuses."""
 
 import pickle
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas as pd
@@ -9,7 +9,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.sweep.plan import Plan
-from tests.unit.sweep.models import TIMES, crank, files_of, folding
+from tests.unit.sweep.models import TIMES, crank, files_of, folding, processes
 
 LENGTHS = np.array([0.2, 0.5, 0.9, 1.1, 1.7])
 SPEEDS = np.array([0.5, 1.0, 2.5])
@@ -90,7 +90,7 @@ def test_the_outputs_are_kept_where_nothing_is_named():
     assert list(sweep().to_xarray().data_vars) == ["x_tip", "y_tip", "status"]
 
 
-@pytest.mark.parametrize("kind", [ProcessPoolExecutor, ThreadPoolExecutor])
+@pytest.mark.parametrize("kind", [processes, ThreadPoolExecutor])
 def test_an_executor_changes_no_bit(kind):
     alone = sweep(columns=["x_tip"], chunk=2)
     with kind(2) as executor:

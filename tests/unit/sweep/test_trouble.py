@@ -6,7 +6,7 @@ import resource
 import signal
 import subprocess
 import sys
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ import pytest
 
 import kincompile as kc
 from tests.unit.sweep import killed
-from tests.unit.sweep.models import crank, files_of, folding
+from tests.unit.sweep.models import crank, files_of, folding, processes
 
 ROOT = Path(__file__).resolve().parents[3]
 P = {"a": np.linspace(0.1, 1.0, 6)}
@@ -45,7 +45,7 @@ def test_a_worker_that_dies_is_an_error_and_what_was_solved_is_kept(store, tmp_p
             worker.kill()
 
     with (
-        ProcessPoolExecutor(2) as executor,
+        processes(2) as executor,
         pytest.raises(kc.SweepError, match=r"crank: the executor stopped after \d+ of 20 ch") as e,
     ):
         killed.sweep(place, executor=executor, progress=kill)
@@ -59,7 +59,7 @@ def test_a_worker_that_dies_is_an_error_and_what_was_solved_is_kept(store, tmp_p
 
 
 def test_an_executor_that_is_closed_or_fails_is_an_error():
-    executor = ProcessPoolExecutor(1)
+    executor = processes(1)
     executor.shutdown()
     with pytest.raises(kc.SweepError, match=r"after 0 of 20 chunks .*cannot schedule new futures"):
         killed.sweep(None, executor=executor)
@@ -86,7 +86,7 @@ def test_a_full_disk_is_an_error_and_the_sweep_goes_on_when_there_is_space(
         for pid in children if workers else [0]:
             resource.prlimit(pid, resource.RLIMIT_FSIZE, (10, before[1]))
 
-    executor = ProcessPoolExecutor(workers) if workers else None
+    executor = processes(workers) if workers else None
     try:
         with pytest.raises(kc.InputError, match=r"cannot write to .*File too large.*is kept"):
             killed.sweep(store, progress=fill, executor=executor, pending=1)
