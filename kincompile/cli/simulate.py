@@ -9,6 +9,7 @@ from kincompile.cli.motion import motion_times, set_values, time_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     NOT_CONVERGED,
+    deg_option,
     output_option,
     print_data,
     read_model,
@@ -47,9 +48,7 @@ from kincompile.runtime.results.write import require_known_suffix
 @click.option("--method", type=click.Choice(METHODS), default="DOP853", help="The integrator.")
 @click.option("--rtol", type=float, default=1e-9, help="Relative tolerance of a step.")
 @click.option("--through", type=click.Choice(["smooth"]), help="Go on past singular positions.")
-@click.option(
-    "--deg", "angle_unit", flag_value="deg", default="rad", help="Show and write angles in degrees."
-)
+@deg_option("Show and write angles in degrees.")
 @click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
 @output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context

@@ -27,10 +27,11 @@ from kincompile.design.search import Search
 from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
 from kincompile.design.trial import EAGERNESS, Trial, Workbench
 from kincompile.design.variation import require_mechanism
-from kincompile.errors import InputError, KincompileWarning
+from kincompile.errors import InputError, KincompileWarning, UnsupportedError
 from kincompile.files.file_format import MINIMIZERS, SEARCHES
 from kincompile.model.outputs import Output
 from kincompile.names import listed, suggestion
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.singular.assemblies import assemblies
 
 if TYPE_CHECKING:
@@ -117,6 +118,7 @@ def fit(
     _check_options(samples, starts, search, minimizer)
     extended = _with_limits(model, wanted)
     module = compile_model(extended)
+    _require_plan(module)
     demands = read_demands(module, extended.system(), wanted)
     bench = Workbench(module, demands, names, dict(p or {}))
     guesses = _guesses(module, demands.first_time, p)
@@ -269,6 +271,23 @@ def _with_limits(model: Mechanism, targets: Sequence[Target]) -> Mechanism:
         ),
     ]
     return changed
+
+
+def _require_plan(module: ModuleType) -> None:
+    """Check that many sets of parameters can be solved together.
+
+    Raises
+    ------
+    UnsupportedError
+        If equations are redundant, or the module is in grouped form.
+    """
+    code = code_of(module)
+    if code.redundant or code.lanes is None:
+        reason = f"repeats equations ({listed(code.redundant)})" if code.redundant else "is large"
+        raise UnsupportedError(
+            f"{module.NAME} {reason}: kc.fit takes mechanisms with as many independent equations "
+            "as coordinates, in the inline form. kincompile inspect names what can be left out."
+        )
 
 
 def _guesses(module: ModuleType, t: float, p: Mapping[str, float] | None) -> Array:

@@ -265,6 +265,15 @@ def test_targets_check_what_they_are_given(make, words):
         make()
 
 
+@pytest.mark.filterwarnings("ignore::kincompile.errors.RedundantConstraintWarning")
+def test_redundant_equations_are_refused():
+    m = fourbar()
+    rod, rocker = (body for body in m.bodies if body.name in ("rod", "rocker"))
+    m.add(kc.Revolute("C2", rod, (sympy.Symbol("r3"), 0), rocker, (sympy.Symbol("r4"), 0)))
+    with pytest.raises(kc.UnsupportedError, match="repeats equations"):
+        kc.fit(m, kc.targets.path("P", [(3, 3)], [0.5]), bounds={"u": (1, 2)})
+
+
 def test_points_are_matched_in_their_order_at_least_cost():
     rng = np.random.default_rng(3)
     off = rng.random((5, 7, 3))
