@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from kincompile.files.text_places import TextPlace, TextPlaces
+from kincompile.model.directions import angle_between, length_of, turning
 from kincompile.model.expressions import NotAnExpressionError, as_expression, deg, evaluate
 from kincompile.model.laws import RISES
 from kincompile.model.points import rate
@@ -41,20 +42,22 @@ MAX_EXPONENT = 64
 MAX_BITS = 1024
 """Bits of a whole number or fraction: as large as a double can be."""
 
-FUNCTIONS: Mapping[str, tuple[Callable[..., sympy.Expr], int]] = {
+FUNCTIONS: Mapping[str, tuple[Callable[..., sympy.Expr], int, int]] = {
     **{
-        name: (getattr(sympy, name), 1)
+        name: (getattr(sympy, name), 1, 1)
         for name in (
             "sin", "cos", "tan", "cot", "sec", "csc", "asin", "acos", "atan", "sinh", "cosh",
             "tanh", "asinh", "acosh", "atanh", "exp", "log", "sqrt",
         )
     },
-    "atan2": (sympy.atan2, 2), "ln": (sympy.log, 1),
-    "arcsin": (sympy.asin, 1), "arccos": (sympy.acos, 1), "arctan": (sympy.atan, 1),
-    "arctan2": (sympy.atan2, 2), "rate": (rate, 1),
-    **{law.__name__: (law, law.nargs.args[0]) for law in RISES.values()},
+    "atan2": (sympy.atan2, 2, 2), "ln": (sympy.log, 1, 1),
+    "arcsin": (sympy.asin, 1, 1), "arccos": (sympy.acos, 1, 1), "arctan": (sympy.atan, 1, 1),
+    "arctan2": (sympy.atan2, 2, 2), "rate": (rate, 1, 1),
+    **{law.__name__: (law, *law.nargs.args[:1] * 2) for law in RISES.values()},
+    "length_of": (length_of, 2, 3), "turning": (turning, 4, 4),
+    "angle_between": (angle_between, 4, 4),
 }  # fmt: skip
-"""Functions that may be called, each with its number of arguments."""
+"""Functions that may be called, each with the least and the largest number of arguments."""
 
 CONSTANTS: Mapping[str, sympy.Expr] = {"pi": sympy.pi, "deg": deg}
 
@@ -409,10 +412,11 @@ class _Reader:
             raise self._error(
                 f"{name!r} is not a function{suggestion(name, FUNCTIONS)}; {remedy}", node
             )
-        function, count = FUNCTIONS[name]
-        if node.keywords or len(node.args) != count:
+        function, least, most = FUNCTIONS[name]
+        if node.keywords or not least <= len(node.args) <= most:
             given = len(node.args) + len(node.keywords)
-            wanted = f"{count} argument{'s' if count > 1 else ''}"
+            counts = f"{least}" if least == most else f"{least} or {most}"
+            wanted = f"{counts} argument{'s' if most > 1 else ''}"
             raise self._error(f"{name} takes {wanted}, not {given}", node)
         return function(*(self.read(item, depth + 1) for item in node.args))
 

@@ -13,6 +13,7 @@ from kincompile.files.dimensions import SPACE
 from kincompile.files.file_format import SMOOTHNESS, VERSION, load_fields
 from kincompile.model.arguments import Kind
 from kincompile.model.constraint import CamConstraint, Constraint
+from kincompile.model.directions import VectorFunction
 from kincompile.model.expressions import as_expression, as_sympy, deg, t
 from kincompile.model.laws import TableLaw
 from kincompile.model.outputs import ResolvedOutput
@@ -213,6 +214,11 @@ def value(given: Any) -> int | float | str:
     rare = expression.atoms(sympy.NumberSymbol) - {sympy.pi, sympy.E, deg}
     if rare:
         expression = expression.xreplace({symbol: sympy.Float(symbol) for symbol in rare})
+    named = {
+        item: sympy.Function(type(item).__name__)(*item.args)
+        for item in expression.atoms(VectorFunction)
+    }
+    expression = expression.xreplace(named)  # people read it written out, a file by its name
     return str(_Printer().doprint(expression))  # type: ignore[no-untyped-call]
 
 

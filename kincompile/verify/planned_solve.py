@@ -32,6 +32,9 @@ OF_LARGEST = 1e-4
 """Part of the largest equation's terms that counts for all: rounding errors go from large equations
 to small ones."""
 
+ASIDE = 0.03
+"""Imaginary part of complex coordinates, of themselves: nearly as regular as the real ones."""
+
 SEED = 1990
 
 
@@ -94,7 +97,7 @@ class PlannedSolve:
         """
         engine = Planned(self._code, self._at.p.T)
         try:
-            q = self._at.q + 1j * self._other
+            q = self._at.q * (1 + ASIDE * 1j * self._other)
             nonzeros = self._module.Phi_q_nonzeros(q, self._at.t, self._at.p)
             point = engine.evaluate(q.T, self._at.t)
         except TypeError:

@@ -57,9 +57,8 @@ def check(seed: int) -> tuple[int, int]:
     loop, t = random_loop(random), TIMES[random.integers(0, len(TIMES))]
     scale, noise = float(10 ** random.uniform(-6, 6)), float(random.choice((0.0, 0.02, 0.1)))
     module = kc.compile(mechanism(loop, scale, noise, random))
-    # The planned solve is judged by the motion. Of complex numbers it may divide by zero.
-    checks = [item for item in kc.verify(module).checks if item.quantity in DERIVED]
-    assert {item.quantity for item in checks} == set(DERIVED)
+    checks = kc.verify(module).checks
+    assert {item.quantity for item in checks} >= set(DERIVED)
     assert not [item for item in checks if not item.passed], f"seed {seed}"
     found = kc.solve(module, t)
     good = found.status == kc.Status.CONVERGED

@@ -37,7 +37,7 @@ REFUSED_AT_ONCE = f"{IMPORT}\ns = kc.ConstraintSystem('s', 'x y', [kc.t], guess=
 
 # what is in model.py; the arguments, M for the model; parts of the message
 CASES = {
-    "no command": (GOOD, "simulate M", ["No such command 'simulate'"]),
+    "no command": (GOOD, "animate M", ["No such command 'animate'"]),
     "no model": (GOOD, "run", ["Missing argument 'MODEL'"]),
     "no output": (GOOD, "compile M", ["Missing option '-o'"]),
     "missing file": (GOOD, "run nowhere.py", ["nowhere.py: there is no such file; check"]),

@@ -54,7 +54,7 @@ def test_that_a_formula_is_read_as_it_is_meant(text: str, expected: sympy.Expr) 
 
 
 def test_that_every_smooth_function_can_be_called() -> None:
-    readable = {function for function, _ in FUNCTIONS.values()} | {sympy.Piecewise, PeriodicSpline}
+    readable = {function for function, *_ in FUNCTIONS.values()} | {sympy.Piecewise, PeriodicSpline}
     assert set(SMOOTH) <= readable
 
 
