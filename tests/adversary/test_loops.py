@@ -17,7 +17,7 @@ import kincompile as kc
 from tests.adversary.loops import Loop, Rocker, mechanism, motion, random_loop
 
 TIMES = (np.linspace(0, 3, 60), np.linspace(0, 4, 9), np.linspace(0, -3, 25))
-PARTS, EACH = 4, 500
+PARTS, EACH = 20, 100
 DERIVED = ("Phi", "Phi_q", "nu", "gamma")
 
 
