@@ -30,7 +30,7 @@ ROWS = (
     Row("random chains in compiled C, against NumPy and their closed form",
         ("test_many_random_chains[c]",)),
     Row("random loops in space, all points against their closed form, derivatives by complex steps",
-        ("test_two_thousand_random_loops_in_space",)),
+        ("test_many_random_loops_in_space",)),
     Row("bad starts of four chains, up to half a turn and two sizes off, in NumPy",
         ("test_two_thousand_bad_starts",)),
     Row("the same bad starts in JavaScript, against the runtime's",
