@@ -62,6 +62,8 @@ class SolvePlan:
     turned
         Column of e0 of each body whose stretch s and small rotation pi' have four columns after
         those of Phi_q.
+    straight
+        Size up to which blocks are straight-line code; LAPACK solves larger ones.
     """
 
     nodes: tuple[Node, ...]
@@ -72,17 +74,18 @@ class SolvePlan:
     determinants: tuple[int, ...]
     solution: tuple[int, ...]
     turned: tuple[int, ...] = ()
+    straight: int = 3
 
     @property
     def has_choices(self) -> bool:
         """Whether rows change places: there is a block of more than three, not solved by LAPACK."""
         sizes = (len(block.rows) for block in self.blocks)
-        return any(LARGEST_CLOSED_FORM < size <= LARGEST_PIVOTED for size in sizes)
+        return any(LARGEST_CLOSED_FORM < size <= self.straight for size in sizes)
 
     @property
     def has_large_blocks(self) -> bool:
         """Whether there is a block that LAPACK solves."""
-        return any(len(block.rows) > LARGEST_PIVOTED for block in self.blocks)
+        return any(len(block.rows) > self.straight for block in self.blocks)
 
 
 def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan | None:
@@ -143,10 +146,12 @@ def plan_entries(
     if blocks is None:
         return None
     determinants: list[int] = []
+    straight = LARGEST_CLOSED_FORM if turn is None else LARGEST_PIVOTED
     for block in blocks:
-        is_large = len(block.rows) > LARGEST_PIVOTED
-        solve = _eliminate_block if is_straight and is_large else _solve_block
-        determinants += solve(graph, block, matrix, right, solution)
+        if is_straight and len(block.rows) > straight:
+            determinants += _eliminate_block(graph, block, matrix, right, solution)
+        else:
+            determinants += _solve_block(graph, block, matrix, right, solution, straight)
         for item in rotations:
             if not item.is_finished and solution.keys() >= set(item.turns):
                 item.finish(matrix, solution)
@@ -162,6 +167,7 @@ def plan_entries(
         tuple(determinants),
         tuple(solution[column] for column in range(column_count)),
         tuple(item.columns[0] for item in rotations),
+        straight,
     )
 
 
@@ -268,18 +274,23 @@ def _cheapest(graph: Graph, matrix: Matrix, any_pivot: bool) -> Pivot | None:
 
 
 def _solve_block(
-    graph: Graph, block: Block, matrix: Matrix, right: dict[int, int], solution: dict[int, int]
+    graph: Graph,
+    block: Block,
+    matrix: Matrix,
+    right: dict[int, int],
+    solution: dict[int, int],
+    straight: int,
 ) -> list[int]:
     """Add the solution of a block to what is known; return the node of its determinant."""
     zero = graph.const(0)
     size = len(block.rows)
     a = [[matrix[row].get(column, zero) for column in block.columns] for row in block.rows]
     b = [_remainder(graph, matrix[row], block.columns, right[row], solution) for row in block.rows]
-    if LARGEST_CLOSED_FORM < size <= LARGEST_PIVOTED:
+    if LARGEST_CLOSED_FORM < size <= straight:
         x, pivots = _pivoted(graph, a, b)
         solution |= zip(block.columns, x, strict=True)
         return [pivots]
-    if size > LARGEST_PIVOTED:
+    if size > straight:
         entries = [node for row in a for node in row]
         for k, column in enumerate(block.columns):
             solution[column] = graph.linear("solve", size, k, (*entries, *b))
@@ -342,7 +353,8 @@ SAFE = 1e-3
 LARGEST_CLOSED_FORM = 3
 """Blocks up to this size are solved by their adjugate, as Cramer's rule does."""
 LARGEST_PIVOTED = 6
-"""Blocks up to this size are eliminated in straight-line code, larger ones by LAPACK."""
+"""Blocks up to this size are eliminated in straight-line code in space, where six unknowns a body
+are the rule; larger ones by LAPACK."""
 
 
 def _adjugate(graph: Graph, a: list[list[int]]) -> tuple[list[list[int]], int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from kincompile import criteria, quantities
-from kincompile.ir.elimination import LARGEST_PIVOTED, plan_solve
+from kincompile.ir.elimination import plan_solve
 from kincompile.quantities import nonzeros_of
 from kincompile.targets.c.dialect import C
 from kincompile.targets.c.functions import WRITE, evaluator, solve_functions
@@ -229,7 +229,8 @@ def _strip(
     largest = 0
     if listing is not None:
         lines = [*lines, "", *solve_functions(code, listing)]
-        largest = max((len(block.rows) for block in listing.plan.blocks), default=0)
+        sizes = (len(block.rows) for block in listing.plan.blocks)
+        largest = max((size for size in sizes if size > listing.plan.straight), default=0)
     data = {
         "is_planned": listing is not None,
         "elementary": _elementary(code.program, called, largest),
@@ -251,7 +252,7 @@ def _elementary(program: Program, called: Collection[str], largest: int) -> str:
         "order": max(
             (len(row) for item in program.tables.values() for row in item.coefficients), default=0
         ),
-        "largest_block": largest if largest > LARGEST_PIVOTED else 0,
+        "largest_block": largest,
     }
     return fill("c/elementary.c.jinja", data)
 
