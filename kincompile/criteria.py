@@ -88,6 +88,9 @@ ASSEMBLED = RESIDUAL_FACTOR * TOLERANCE
 AGREEMENT = 1e-6
 """Part of the terms by which redundant equations may contradict each other in the rates."""
 
+RANK = 1e-9
+"""Singular value of Phi_q in scales, relative to the largest, that is zero."""
+
 # Near singular. Sensitivity: movement, in scales, for an error of one scale in the equations
 
 SINGULAR_SENSITIVITY = 1e7

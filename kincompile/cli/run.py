@@ -10,10 +10,9 @@ import kincompile as kc
 from kincompile.cli.motion import motion_options, motion_times, set_values, sweep_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
-    NOT_CONVERGED,
     deg_option,
+    give_motion,
     output_option,
-    print_data,
     read_model,
     require_output,
 )
@@ -76,16 +75,4 @@ def command(
     with progress_bar() as progress:
         options: dict[str, Any] = {"through": through, "assembly": assembly, "product": product}
         solution = kc.solve(module, times, numbers | sweeps, progress=progress, **options)
-    text = summary(solution, angle_unit)
-    written = solution
-    if has_forces:
-        found = kc.forces(solution)
-        text, written = f"{text}\n\n{found.summary()}", found.motion
-    if output is None:
-        print_data(text + "\n")
-    else:
-        kc.write(written, output, angle_unit=angle_unit)
-        click.echo(f"{text}\nWrote {output}", err=True)
-    if not solution.success:
-        click.echo(f"Error: {solution.message}", err=True)
-        context.exit(NOT_CONVERGED)
+    give_motion(context, solution, summary(solution, angle_unit), output, angle_unit, has_forces)

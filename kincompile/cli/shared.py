@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.results.solution import Solution
 
     Command = Callable[..., None]
 
@@ -84,3 +85,29 @@ def print_data(text: str) -> None:
         click.echo(text, nl=False)
     except OSError as error:
         raise InputError(f"cannot write to stdout: {error.strerror}") from error
+
+
+def give_motion(
+    context: click.Context,
+    solution: Solution,
+    text: str,
+    output: str | None,
+    angle_unit: str,
+    has_forces: bool,
+) -> None:
+    """Print the summary of a motion, write it where a file is asked for, and exit by its success.
+
+    With `has_forces` both have the forces along it.
+    """
+    written = solution
+    if has_forces:
+        found = kc.forces(solution)
+        text, written = f"{text}\n\n{found.summary()}", found.motion
+    if output is None:
+        print_data(text + "\n")
+    else:
+        kc.write(written, output, angle_unit=angle_unit)
+        click.echo(f"{text}\nWrote {output}", err=True)
+    if not solution.success:
+        click.echo(f"Error: {solution.message}", err=True)
+        context.exit(NOT_CONVERGED)

@@ -8,10 +8,9 @@ import kincompile as kc
 from kincompile.cli.motion import motion_times, set_values, time_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
-    NOT_CONVERGED,
     deg_option,
+    give_motion,
     output_option,
-    print_data,
     read_model,
     require_output,
 )
@@ -98,15 +97,4 @@ def command(
             progress=progress,
         )
     text = f"{summary(solution, angle_unit)}\n{solution.message}"
-    written = solution
-    if has_forces:
-        found = kc.forces(solution)
-        text, written = f"{text}\n\n{found.summary()}", found.motion
-    if output is None:
-        print_data(text + "\n")
-    else:
-        kc.write(written, output, angle_unit=angle_unit)
-        click.echo(f"{text}\nWrote {output}", err=True)
-    if not solution.success:
-        click.echo(f"Error: {solution.message}", err=True)
-        context.exit(NOT_CONVERGED)
+    give_motion(context, solution, text, output, angle_unit, has_forces)

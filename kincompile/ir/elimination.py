@@ -31,6 +31,13 @@ Matrix = dict[int, dict[int, int]]
 """Nodes of the entries by row and column."""
 
 
+LARGEST_CLOSED_FORM = 3
+"""Blocks up to this size are solved by their adjugate, as Cramer's rule does."""
+LARGEST_PIVOTED = 6
+"""Blocks up to this size are eliminated in straight-line code in space, where six unknowns a body
+are the rule; larger ones by LAPACK."""
+
+
 @dataclass(frozen=True, slots=True)
 class Pivot:
     """An elimination step: an equation used to express one coordinate by the others."""
@@ -74,7 +81,7 @@ class SolvePlan:
     determinants: tuple[int, ...]
     solution: tuple[int, ...]
     turned: tuple[int, ...] = ()
-    straight: int = 3
+    straight: int = LARGEST_CLOSED_FORM
 
     @property
     def has_choices(self) -> bool:
@@ -350,11 +357,6 @@ def _eliminate_block(
 
 SAFE = 1e-3
 """Size of a plain number, relative to the largest of its row, from which on it is a pivot."""
-LARGEST_CLOSED_FORM = 3
-"""Blocks up to this size are solved by their adjugate, as Cramer's rule does."""
-LARGEST_PIVOTED = 6
-"""Blocks up to this size are eliminated in straight-line code in space, where six unknowns a body
-are the rule; larger ones by LAPACK."""
 
 
 def _adjugate(graph: Graph, a: list[list[int]]) -> tuple[list[list[int]], int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -119,16 +119,24 @@ def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
         iterations=motion.iterations,
         success=success,
         message=_verdict(inputs, motion, outcome) + motion.note,
-        name=code.name,
-        coordinates=code.coordinates,
-        equations=code.equations,
-        units=dict(code.units),
-        parameters=dict(zip(code.parameters, inputs.p.tolist(), strict=True)),
-        sweep={},
         statistics=motion.statistics,
         events=motion.events,
-        module=code.module,
+        **about(inputs),
     )
+
+
+def about(inputs: Inputs) -> dict[str, Any]:
+    """Return what a solution of one parameter set says of its mechanism, by field."""
+    code = inputs.code
+    return {
+        "name": code.name,
+        "coordinates": code.coordinates,
+        "equations": code.equations,
+        "units": dict(code.units),
+        "parameters": dict(zip(code.parameters, inputs.p.tolist(), strict=True)),
+        "sweep": {},
+        "module": code.module,
+    }
 
 
 def _nearly(inputs: Inputs, near: list[int]) -> str:

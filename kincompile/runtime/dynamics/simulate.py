@@ -31,6 +31,7 @@ from kincompile.runtime.dynamics.start import (
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.status import Status
+from kincompile.runtime.verdict import about
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -192,15 +193,9 @@ def _solution(inputs: Inputs, found: Integration) -> Solution:
         iterations=found.steps,
         success=bool((found.status == Status.CONVERGED).all()),
         message=found.message,
-        name=code.name,
-        coordinates=code.coordinates,
-        equations=code.equations,
-        units=dict(code.units),
-        parameters=dict(zip(code.parameters, inputs.p.tolist(), strict=True)),
-        sweep={},
         statistics=found.statistics,
         events=found.events,
-        module=code.module,
+        **about(inputs),
     )
     energy = _energy_unit(code.units, code.bodies, code.coordinates)
     units = dict(zip(ADDED, (energy, energy, energy, ""), strict=True))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
+from kincompile.criteria import MAX_ITERATIONS, RANK, TOLERANCE
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, rate, suggestion
 from kincompile.runtime.engine.code import JOINT_POINTS
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.engine.engine import Point
     from kincompile.runtime.inputs import Values
-
-RANK = 1e-9
-"""Singular value, relative to the largest, that is zero."""
 
 AGREE = 1e-8
 """Part of the velocities up to which those given agree with the constraints."""

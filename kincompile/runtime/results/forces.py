@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import probe_of
+from kincompile.criteria import RANK, probe_of
 from kincompile.errors import InputError, SingularConfigurationWarning, UnsupportedError
 from kincompile.html import Shown
 from kincompile.names import listed, multiplier
@@ -33,9 +33,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array, Code, ForceModules
-
-RANK = 1e-9
-"""Singular value of Phi_q, relative to the largest, that is zero."""
 
 BALANCED = 1e-7
 """Part of the largest force up to which the equations may be out of balance."""

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import RESIDUAL_FACTOR, TOLERANCE
+from kincompile.criteria import RANK, RESIDUAL_FACTOR, TOLERANCE
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.problem import problem
-from kincompile.runtime.results.forces import RANK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,6 +20,7 @@ from kincompile.runtime.statics.balance import Balance
 from kincompile.runtime.statics.path import follow
 from kincompile.runtime.statics.settle import settle
 from kincompile.runtime.status import Status
+from kincompile.runtime.verdict import about
 from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:
@@ -379,10 +380,8 @@ def _equilibrium(
     motion = Solution(
         t=inputs.t, q=q, q_dot=rates, q_ddot=rates.copy(), status=status, residual=residual,
         iterations=iterations, success=len(good) == count,
-        message=_message(inputs, balance, found, events), name=code.name,
-        coordinates=code.coordinates, equations=code.equations, units=dict(code.units),
-        parameters=dict(zip(code.parameters, inputs.p.tolist(), strict=True)), sweep={},
-        statistics={}, events=events, module=code.module,
+        message=_message(inputs, balance, found, events), statistics={}, events=events,
+        **about(inputs),
     )  # fmt: skip
     kinds = tuple(map(_kind, good)) + ("",) * (count - len(good))
     return Equilibrium(motion, eigenvalues, kinds, tuple(good), balance)
