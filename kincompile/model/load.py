@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from kincompile.calculus.expressions import ZERO, Symbol, VectorSymbol
 from kincompile.derive.loads import LoadTemplate
+from kincompile.derive.rules import along
 from kincompile.model.arguments import Kind
 from kincompile.model.constraint import Element
 
 if TYPE_CHECKING:
-    from kincompile.calculus.expressions import Scalar
+    from kincompile.calculus.expressions import Scalar, Vector
     from kincompile.derive.loads import Leaf, Work
+    from kincompile.derive.rules import Direction
+
+    Rated = TypeVar("Rated", Scalar, Vector)
 
 
 @dataclass(frozen=True, repr=False)
@@ -26,15 +30,35 @@ class Load(Element):
 
     is_load: ClassVar[bool] = True
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return forces and displacements, whose products are the virtual work."""
         return ()
 
-    @staticmethod
-    def kinetic_energy() -> Scalar:
+    @classmethod
+    def kinetic_energy(cls) -> Scalar:
         """Return the kinetic energy."""
         return ZERO
+
+    @classmethod
+    def vector(cls, name: str) -> VectorSymbol:
+        """Return a vector of as many components as points of its bodies have."""
+        return VectorSymbol(name, len(cls.bodies.axes))
+
+    @classmethod
+    def points(cls) -> tuple[Vector, ...]:
+        """Return the points on its bodies: r_i + A_i s_i, and that of body j."""
+        return tuple(frame.point(cls.vector(f"s_{frame.index}")) for frame in cls.frames())
+
+    @classmethod
+    def rate_of(cls, expression: Rated) -> Rated:
+        """Return the rate of an expression of the coordinates of its bodies along the motion."""
+        motion: Direction = {
+            coordinate: rate
+            for frame in cls.frames()
+            for coordinate, rate in zip(frame.coordinates, frame.rates, strict=True)
+        }
+        return along(expression, motion)
 
     @classmethod
     @cache
@@ -43,11 +67,7 @@ class Load(Element):
         given = cls.arguments().values()
         values: tuple[Leaf, ...] = (
             *(Symbol(item.symbol) for item in given if item.kind is Kind.LOAD),
-            *(
-                VectorSymbol(item.symbol, len(cls.bodies.axes))
-                for item in given
-                if item.kind is Kind.LOADS
-            ),
+            *(cls.vector(item.symbol) for item in given if item.kind is Kind.LOADS),
         )
         return LoadTemplate(
             cls.__name__, cls.frames(), (), (), cls.kinetic_energy(), cls.work(), values

@@ -18,8 +18,7 @@ from kincompile.calculus.expressions import (
     VectorSymbol,
     dot,
 )
-from kincompile.calculus.symbols import i, j, s_i, v_i
-from kincompile.derive.rules import along
+from kincompile.calculus.symbols import i, j, v_i
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from kincompile.derive.loads import Work
-    from kincompile.derive.rules import Direction
     from kincompile.model.constraint import Numbers
 
 __all__ = (  # noqa: RUF022 - in the order of the tables, simple ones first
@@ -41,19 +39,7 @@ __all__ = (  # noqa: RUF022 - in the order of the tables, simple ones first
 F, k, c, length_0, angle_0 = (Symbol(name) for name in ("F", "k", "c", "l_0", "phi_0"))
 v_0, g, s_c = Symbol("v_0"), VectorSymbol("g"), VectorSymbol("s_C")
 m, J = Symbol("m"), Symbol("J")
-f = VectorSymbol("f")
 HALF = Number(Fraction(1, 2))
-
-_ALONG_MOTION: Direction = {
-    coordinate: rate
-    for frame in (i, j)
-    for coordinate, rate in zip(frame.coordinates, frame.rates, strict=True)
-}
-
-
-def rate_of(expression: Scalar) -> Scalar:
-    """Return the rate of an expression of the coordinates of bodies i and j along the motion."""
-    return along(expression, _ALONG_MOTION)
 
 
 @constraint_type
@@ -64,10 +50,11 @@ class Force(Load):
     point: PointLike = argument.point("s_i", on="i")
     force: PointLike = argument.loads("f", "(F_x, F_y) [force] along the fixed axes")
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the force and the point."""
-        return ((f, i.point(s_i)),)
+        (point,) = cls.points()
+        return ((cls.vector("f"), point),)
 
 
 @constraint_type
@@ -78,10 +65,11 @@ class FollowerForce(Load):
     point: PointLike = argument.point("s_i", on="i")
     force: PointLike = argument.loads("f", "(F_xi, F_eta) [force] along the body's axes")
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the turned force and the point."""
-        return ((i.A(f), i.point(s_i)),)
+        (frame,), (point,) = cls.frames(), cls.points()
+        return ((frame.A(cls.vector("f")), point),)
 
 
 @constraint_type
@@ -91,8 +79,8 @@ class Torque(Load):
     body: BodyLike = argument.body("i")
     torque: ValueLike = argument.load("F", "Torque [force times length], counterclockwise")
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the torque and the angle of the body."""
         return ((F, i.phi),)
 
@@ -117,11 +105,12 @@ class Spring(Load):
     damping: ValueLike = argument.attribute("c", "Damping [force per velocity]", default=0)
     force: ValueLike = argument.load("F", "What it pulls with beyond that [force]", default=0)
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the force that pulls, against the distance."""
-        length = Norm(separation())
-        return ((-(k * (length - length_0) + c * rate_of(length) + F), length),)
+        first, second = cls.points()
+        length = Norm(second - first)
+        return ((-(k * (length - length_0) + c * cls.rate_of(length) + F), length),)
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
@@ -150,11 +139,11 @@ class TorsionSpring(Load):
     damping: ValueLike = argument.attribute("c", "Damping [torque per rad/s]", default=0)
     torque: ValueLike = argument.load("F", "What it turns back with beyond that", default=0)
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the torque that turns back, against the angle."""
         angle = j.phi - i.phi
-        return ((-(k * (angle - angle_0) + c * rate_of(angle) + F), angle),)
+        return ((-(k * (angle - angle_0) + c * cls.rate_of(angle) + F), angle),)
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
@@ -177,11 +166,11 @@ class HingeFriction(Load):
         "v_0", "Angular velocity [rad/s] below which the law is smooth", default=0.01
     )
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the torque against the sliding, and the angle."""
         angle = j.phi - i.phi
-        return ((_against(rate_of(angle)), angle),)
+        return ((_against(cls.rate_of(angle)), angle),)
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
@@ -207,11 +196,11 @@ class SliderFriction(Load):
         "v_0", "Velocity [length per s] below which the law is smooth", default=0.001
     )
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the force against the sliding, and the way along the axis."""
         way = dot(i.A(v_i), separation()) / Norm(v_i)
-        return ((_against(rate_of(way)), way),)
+        return ((_against(cls.rate_of(way)), way),)
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
@@ -249,14 +238,14 @@ class Mass(Load):
     centre: PointLike = argument.point("s_C", on="i", what="Centre of mass")
     gravity: PointLike = argument.point("g", on="ground", what="Acceleration of gravity")
 
-    @staticmethod
-    def kinetic_energy() -> Scalar:
+    @classmethod
+    def kinetic_energy(cls) -> Scalar:
         """Return m v^T v / 2 + J w^2 / 2, with the velocity of the centre of mass."""
-        v = along(i.point(s_c), _ALONG_MOTION)
-        return HALF * m * dot(v, v) + HALF * J * rate_of(i.phi) ** 2
+        v = cls.rate_of(i.point(s_c))
+        return HALF * m * dot(v, v) + HALF * J * cls.rate_of(i.phi) ** 2
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the weight and the centre of mass."""
         return ((m * g, i.point(s_c)),)
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.calculus.expressions import (
-    Norm,
     Number,
     Scalar,
     Symbol,
@@ -22,66 +21,58 @@ from kincompile.calculus.expressions import (
     dot,
     vector_sum,
 )
-from kincompile.derive.rules import along
 from kincompile.model import arguments as argument
+from kincompile.model import loads
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
 from kincompile.model.load import Load
-from kincompile.model.loads import Spring as PlanarSpring
 from kincompile.space.bodies import SPATIAL
-from kincompile.space.symbols import AXES, i, j, s_i, separation
+from kincompile.space.symbols import AXES, i
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from kincompile.derive.loads import Work
-    from kincompile.derive.rules import Direction
     from kincompile.model.constraint import Numbers
 
-F, k, c, length_0, m = (Symbol(name) for name in ("F", "k", "c", "l_0", "m"))
+m = Symbol("m")
 f, g, s_c = (VectorSymbol(name, 3) for name in ("f", "g", "s_C"))
 J = tuple(VectorSymbol(f"J_{row}", 3) for row in "123")
 HALF = Number(Fraction(1, 2))
 
-_ALONG_MOTION: Direction = {
-    coordinate: rate
-    for frame in (i, j)
-    for coordinate, rate in zip(frame.coordinates, frame.rates, strict=True)
-}
-
 
 class SpatialLoad(Load):
-    """A load of bodies in space; every type is a subclass."""
+    """A load of bodies in space; every type is a subclass, or one of a planar type."""
 
     bodies = SPATIAL
 
 
 @constraint_type
-class Force(SpatialLoad):
+class Force(loads.Force):
     """A force on a point of a body, whose components are along the fixed axes."""
 
-    body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
+    bodies = SPATIAL
     force: PointLike = argument.loads("f", "(F_x, F_y, F_z) [force] along the fixed axes")
-
-    @staticmethod
-    def work() -> tuple[Work, ...]:
-        """Return the force and the point."""
-        return ((f, i.point(s_i)),)
 
 
 @constraint_type
-class FollowerForce(SpatialLoad):
+class FollowerForce(loads.FollowerForce):
     """A force on a point of a body, whose components are along the axes of the body."""
 
-    body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
+    bodies = SPATIAL
     force: PointLike = argument.loads("f", "(F_xi, F_eta, F_zeta) [force] along the body's axes")
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
-        """Return the turned force and the point."""
-        return ((i.A(f), i.point(s_i)),)
+
+@constraint_type
+class Spring(loads.Spring):
+    """A spring, a damper and an actuator between two points, along the line between them.
+
+    It pulls with stiffness (l - free_length) + damping l_dot + force, with l the distance of the
+    points.
+    """
+
+    source = SpatialLoad.source
+    bodies = SPATIAL
 
 
 def _couples(components: tuple[Scalar, ...]) -> tuple[Work, ...]:
@@ -101,8 +92,8 @@ class Torque(SpatialLoad):
     body: BodyLike = argument.body("i")
     torque: PointLike = argument.loads("f", "(T_x, T_y, T_z) [force times length], fixed axes")
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return couples about the axes of the body."""
         return _couples(tuple(dot(f, i.A(axis)) for axis in AXES))
 
@@ -114,42 +105,10 @@ class FollowerTorque(SpatialLoad):
     body: BodyLike = argument.body("i")
     torque: PointLike = argument.loads("f", "(T_xi, T_eta, T_zeta) [force times length]")
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return couples about the axes of the body."""
         return _couples(tuple(dot(f, axis) for axis in AXES))
-
-
-@constraint_type
-class Spring(SpatialLoad):
-    """A spring, a damper and an actuator between two points, along the line between them.
-
-    It pulls with stiffness (l - free_length) + damping l_dot + force, with l the distance of the
-    points.
-    """
-
-    i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
-    j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
-    stiffness: ValueLike = argument.attribute("k", "Stiffness [force per length]", default=0)
-    free_length: ValueLike = argument.attribute(
-        "l_0", "Length without force [length]", "length", default=0
-    )
-    damping: ValueLike = argument.attribute("c", "Damping [force per velocity]", default=0)
-    force: ValueLike = argument.load("F", "What it pulls with beyond that [force]", default=0)
-
-    @staticmethod
-    def work() -> tuple[Work, ...]:
-        """Return the force that pulls, against the distance."""
-        length = Norm(separation())
-        speed = along(length, _ALONG_MOTION)
-        return ((-(k * (length - length_0) + c * speed + F), length),)
-
-    @staticmethod
-    def problem(numbers: Numbers) -> str | None:
-        """Refuse a negative length, and a spring that is none."""
-        return PlanarSpring.problem(numbers)
 
 
 @constraint_type
@@ -164,16 +123,16 @@ class Mass(SpatialLoad):
     centre: PointLike = argument.point("s_C", on="i", what="Centre of mass")
     gravity: PointLike = argument.point("g", on="ground", what="Acceleration of gravity")
 
-    @staticmethod
-    def kinetic_energy() -> Scalar:
+    @classmethod
+    def kinetic_energy(cls) -> Scalar:
         """Return m v^T v/2 + omega'^T J omega'/2 with omega' = 2 G p_dot (Haug 9.3)."""
-        v = along(i.point(s_c), _ALONG_MOTION)
+        v = cls.rate_of(i.point(s_c))
         omega: Vector = 2 * TimesG(i.p, i.rates[1])  # type: ignore[arg-type]  # p_dot, a vector
         turned = vector_sum(tuple(dot(row, omega) * e for row, e in zip(J, AXES, strict=True)))
         return HALF * m * dot(v, v) + HALF * dot(omega, turned)
 
-    @staticmethod
-    def work() -> tuple[Work, ...]:
+    @classmethod
+    def work(cls) -> tuple[Work, ...]:
         """Return the weight and the centre of mass."""
         return ((m * g, i.point(s_c)),)
 
