@@ -74,8 +74,6 @@ def multiple(
         A column that is NaN in `generated` belongs to the ground and is not compared.
     group
         The set of parameters of each state, shape (N,).
-    may_scale
-        Whether the factor may differ from 1.
     """
     checked = ~np.isnan(generated).any(axis=0)
     w, s, g = (array[:, None, checked] for array in (written, sizes, generated))

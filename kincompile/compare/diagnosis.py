@@ -50,15 +50,7 @@ Given = tuple[Array, Array]
 
 
 class Diagnostician:
-    """Explains differences in the formulas of one system; keeps the catalogues that it has made.
-
-    Parameters
-    ----------
-    reference
-        The system.
-    states
-        Where formulas are compared.
-    """
+    """Explains differences in the formulas of one system; keeps the catalogues that it has made."""
 
     def __init__(self, reference: Reference, states: States) -> None:
         self._reference = reference
@@ -78,10 +70,6 @@ class Diagnostician:
 
         Parameters
         ----------
-        block
-            The constraint.
-        quantity
-            Phi, Phi_q, nu or gamma.
         written
             By row and column of the system, with the author's conventions taken out: comparable to
             the generated values as they are.

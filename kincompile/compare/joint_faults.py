@@ -90,12 +90,6 @@ class JointFaults:
     ----------
     joint
         The joint, as its author sees the roles of its bodies.
-    quantity
-        Phi, Phi_q, nu or gamma.
-    reference
-        The system it belongs to.
-    states
-        Where to evaluate.
     """
 
     def __init__(self, joint: Joint, quantity: str, reference: Reference, states: States) -> None:

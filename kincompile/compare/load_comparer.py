@@ -37,12 +37,6 @@ class LoadComparer:
 
     Attributes
     ----------
-    reference
-        The generated side.
-    written
-        M, Q or both.
-    states
-        Where they are compared.
     strict
         Whether what is right by a convention alone is not accepted.
     """

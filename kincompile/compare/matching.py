@@ -107,17 +107,7 @@ class _Candidate:
 
 
 class Matcher:
-    """Finds the matching that explains the most, the plain one first.
-
-    Parameters
-    ----------
-    subject
-        What is compared.
-    written
-        The formulas by quantity.
-    signs
-        The signs of whole vectors that their author states.
-    """
+    """Finds the matching that explains the most, the plain one first."""
 
     def __init__(
         self, subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float]

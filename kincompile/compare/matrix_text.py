@@ -44,8 +44,6 @@ def split_matrix(text: str, place: TextPlace) -> Rows:
     ----------
     text
         For instance ``[[1, 0], [0, cos(phi)]]``, ``[1 0; 0 cos(phi)]`` or one expression.
-    place
-        Where the text begins in the file.
 
     Raises
     ------

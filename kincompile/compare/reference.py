@@ -81,11 +81,6 @@ class ConstraintBlock:
 class Reference:
     """The formulas that the compiler derives from a model, ready to be evaluated anywhere.
 
-    Parameters
-    ----------
-    model
-        A mechanism or a system of free equations.
-
     Raises
     ------
     ModelError
@@ -97,8 +92,6 @@ class Reference:
         What comparisons at the random states have found out about the system, for the next ones.
     base
         The formulas by the coordinates of the system; itself, except in another form.
-    body_columns
-        The columns of Phi_q of each body.
     """
 
     convention: Convention | None = None

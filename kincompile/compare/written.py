@@ -179,8 +179,6 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
 
     Parameters
     ----------
-    reference
-        The system.
     aliases
         Further names, each with its expression: a text, a `Cell` or SymPy. An alias may use those
         before it.
@@ -277,16 +275,10 @@ def read_written(
 
     Parameters
     ----------
-    quantity
-        Phi, Phi_q, nu, gamma, M or Q.
     given
         Text, rows of `Cell`, nested lists of numbers, texts and SymPy expressions, a SymPy matrix,
         a NumPy array, or a function ``f(q, t)`` (of gamma and Q: ``f(q, q_dot, t)``), which
         may also take the parameters as a last argument.
-    words
-        The names that formulas may use.
-    reference
-        The system that the quantity belongs to.
     at_states
         Whether an array holds values at given states.
     shape_problems

@@ -56,14 +56,8 @@ class Steps(ABC, Generic[Derived]):
 
     Attributes
     ----------
-    evaluation
-        The emitted module, for formulas and numbers.
     rows
         The rows of the constraint in the emitted program.
-    name
-        Name of the constraint.
-    columns
-        Names of its coordinates.
     derivatives
         What follows from Phi, for each row block of a joint or each expression of an equation.
     level

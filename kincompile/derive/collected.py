@@ -49,8 +49,6 @@ def collected(expression: ex.Expression, names: Mapping[ex.Expression, object]) 
 
     Parameters
     ----------
-    expression
-        What was derived.
     names
         What is printed as one symbol, and so not multiplied out.
 
@@ -72,13 +70,7 @@ def collected(expression: ex.Expression, names: Mapping[ex.Expression, object]) 
 def like_terms(
     expression: ex.Expression, names: Mapping[ex.Expression, object]
 ) -> list[tuple[Monomial, Core, Polynomial]]:
-    """Return an expression multiplied out: scalars, vector, and the rates that stand with them.
-
-    Parameters
-    ----------
-    expression, names
-        As for `collected`.
-    """
+    """Return an expression multiplied out: scalars, vector, and the rates that stand with them."""
     found: dict[tuple[Monomial, Core], Polynomial] = {}
     for number, monomial, core in _terms(expression, _Atoms(names)):
         rates = tuple(item for item in monomial if is_rate(item[0]))

@@ -83,8 +83,6 @@ def derive_load(template: LoadTemplate, others: int, *, varies: bool) -> LoadDer
 
     Parameters
     ----------
-    template
-        Its kinetic energy and its work.
     others
         How many coordinates of others its values depend on.
     varies

@@ -83,8 +83,6 @@ def derive_reactions(
 
     Parameters
     ----------
-    template
-        Its Phi.
     points
         The symbol of the joint's point on each of its bodies.
     axis

@@ -65,13 +65,6 @@ class AnalysisSettings:
 def read_adm(path: Path, content: bytes) -> Mechanism:
     """Read a model of simEngine2D.
 
-    Parameters
-    ----------
-    path
-        The file, for messages.
-    content
-        What the file holds.
-
     Returns
     -------
     Mechanism
@@ -100,8 +93,6 @@ def read_acf(path: Path, content: bytes) -> AnalysisSettings:
 
     Parameters
     ----------
-    path
-        The file, for messages.
     content
         What the file holds: simulation, tend, stepSize, outputSteps.
 

@@ -43,13 +43,7 @@ def json_lines(text: str) -> Iterator[tuple[Address, int]]:
 
 
 class _Outline:
-    """Follows brackets, keys and commas through one value.
-
-    Parameters
-    ----------
-    base
-        Address of the value.
-    """
+    """Follows brackets, keys and commas through one value."""
 
     def __init__(self, base: Address) -> None:
         self._stack: list[list[str | int | None]] = []

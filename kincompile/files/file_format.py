@@ -30,15 +30,7 @@ SMOOTHNESS = 4
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a table.
-
-    Attributes
-    ----------
-    schema
-        JSON Schema of its value.
-    is_required
-        Whether it must be there.
-    """
+    """A field of a table."""
 
     schema: Mapping[str, Any]
     is_required: bool = True

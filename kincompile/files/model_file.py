@@ -60,13 +60,6 @@ Row = dict[str, Any]
 def read_data_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
     """Read a model from TOML or JSON.
 
-    Parameters
-    ----------
-    path
-        The file: its suffix, and its name in messages.
-    content
-        Its content.
-
     Returns
     -------
     Mechanism or ConstraintSystem

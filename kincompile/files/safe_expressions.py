@@ -114,8 +114,6 @@ def parse_expression(
         ``**`` are both powers.
     names
         What each name stands for.
-    place
-        Where the text begins in its file, for messages.
     refused
         Names that exist and are not allowed here, each with the reason.
 

@@ -59,14 +59,10 @@ class ResolvedOutput(Observed):
 
     Attributes
     ----------
-    name, unit
-        As in the columns of a solution.
     value
         In plain symbols of coordinates, rates, parameters and t, with `rate` and points in it.
     columns
         The coordinates on which it depends, or on whose rates.
-    written
-        As it was written, for files.
     """
 
     name: str

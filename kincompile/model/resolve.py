@@ -48,17 +48,11 @@ class Joint:
 
     Attributes
     ----------
-    template
-        Phi of the type.
-    bodies
-        Body i, or i and j.
     scalars, points, profiles
         Attributes by their symbol in the template. The value C(t) is among the scalars; a profile
         is an expression of `alpha`.
     columns
         Names of the coordinates in the order of the template, None for those of the ground.
-    written
-        The constraint as the user wrote it.
     """
 
     written: Constraint

@@ -50,12 +50,6 @@ class AppliedLoad:
 
     Attributes
     ----------
-    written
-        As the user wrote it.
-    template
-        Virtual work and kinetic energy of the type.
-    bodies
-        Body i, or i and j.
     scalars, points
         Attributes and values by their symbol in the template, in plain symbols.
     columns

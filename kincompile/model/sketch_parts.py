@@ -25,8 +25,6 @@ class Link:
 
     Attributes
     ----------
-    body
-        Its body.
     places
         Its joints in the frame of the body.
     angle

@@ -48,8 +48,6 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
 
     Parameters
     ----------
-    drawn
-        Its shapes.
     q : ndarray, shape (n,)
         The position.
     length_unit

@@ -107,8 +107,6 @@ class AssemblyGallery:
 
     Attributes
     ----------
-    module
-        What the mechanism was compiled to.
     positions : ndarray, shape (k, n)
         The assemblies, in the order of `kc.assemblies`.
     html

@@ -60,8 +60,6 @@ def as_glb(
 
     Parameters
     ----------
-    drawn
-        Its shapes, in space.
     t : ndarray, shape (N,)
         Times of the keyframes [s]; they rise, from any start.
     q : ndarray, shape (N, n)
@@ -189,13 +187,7 @@ def _continuous(turns: Array) -> Array:
 
 @dataclass
 class _File:
-    """The parts of a glTF file, as it grows.
-
-    Attributes
-    ----------
-    times : ndarray of float32, shape (N,)
-        Times of the keyframes.
-    """
+    """The parts of a glTF file, as it grows."""
 
     times: Any
     nodes: list[dict[str, Any]] = field(default_factory=list)

@@ -95,8 +95,6 @@ class Arrow:
     ----------
     name
         Name of its symbol, such as ``"s_i"``.
-    start, end
-        Where it begins and ends.
     frame
         The frame whose colour it has.
     is_vector
@@ -132,8 +130,6 @@ def picture(
 
     Parameters
     ----------
-    drawn
-        Its shapes.
     q : ndarray, shape (n,)
         The position.
     title

@@ -42,8 +42,6 @@ def svg_in_space(
 
     Parameters
     ----------
-    drawn
-        Its shapes.
     q : ndarray, shape (F, n)
         Positions.
     description

@@ -92,8 +92,6 @@ class _Pattern:
     ----------
     rows, columns
         Names, from top to bottom and from left to right.
-    entries : ndarray of int, shape (nnz, 2)
-        Row and column of each entry.
     is_unknown : ndarray of bool, shape (nnz,)
         Whether the coordinate is solved for in the step of the equation.
     """

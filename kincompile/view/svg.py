@@ -131,8 +131,6 @@ def as_svg(
 
     Parameters
     ----------
-    drawn
-        Its shapes.
     q : ndarray, shape (F, n)
         Positions; of several the first is shown where nothing moves.
     description
