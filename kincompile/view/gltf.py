@@ -16,8 +16,8 @@ import numpy as np
 from kincompile.view.dxf import LENGTHS
 from kincompile.view.marks import GROUND_FRAME, FramePoint, Span, moves_with, shape_of
 from kincompile.view.picture import colour_of
-from kincompile.view.shapes import HUES
-from kincompile.view.solid_picture import PLATE, mixed
+from kincompile.view.shapes import HUES, mixed
+from kincompile.view.solid_picture import PLATE
 from kincompile.view.solids import InFrame, facets_of, solids
 
 if TYPE_CHECKING:

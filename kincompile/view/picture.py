@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.view.marks import GROUND_FRAME, moves_with
-from kincompile.view.polylines import Polyline, of_mark
+from kincompile.view.polylines import Polyline, of_mark, pieces
 from kincompile.view.shapes import DASHES, FILL, GROUND_COLOUR, HUES
-from kincompile.view.worlds import solid_pictures
+from kincompile.view.worlds import in_space
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -140,7 +140,7 @@ def picture(
         Frames that the picture is about; what moves with others is faint. All by default.
     """
     if drawn.is_spatial:
-        seen: Picture = solid_pictures().picture_in_space(drawn, q, title, arrows, focus)
+        seen: Picture = in_space("solid_picture").picture_in_space(drawn, q, title, arrows, focus)
         return seen
     left, right, low, high = drawn.extent(q)
     ends = [np.stack((arrow.start, arrow.end)) for arrow in arrows]
@@ -219,11 +219,8 @@ def _paths(polyline: Polyline, q: Array, scale: Scale, opacity: float) -> Iterab
         fill = look.area or colour
         yield PicturePath(points, colour, fill, look.width, opacity, is_pale=not look.area)
         return
-    gaps = np.flatnonzero(np.isnan(points).any(axis=1))
-    for piece in np.split(points, gaps):
-        kept = piece[~np.isnan(piece).any(axis=1)]
-        if len(kept) > 1:
-            yield PicturePath(kept, colour, "", look.width, opacity, dash=look.dash)
+    for piece in pieces(points):
+        yield PicturePath(piece, colour, "", look.width, opacity, dash=look.dash)
 
 
 def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, PicturePath]:
