@@ -99,7 +99,6 @@ def _share(equal: Array, generated: Array) -> float:
 
 
 def _ratios(written: Array, generated: Array, group: Array) -> list[Array]:
-    """Return the ratios of entries that do not vary within a group of states."""
     if np.min(np.bincount(group)[group]) < 2:
         return []  # one state says nothing about a factor: any two numbers have one
     usable = (np.abs(generated) > ABSOLUTE) & (np.abs(written) > ABSOLUTE) & np.isfinite(written)

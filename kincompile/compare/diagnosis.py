@@ -172,7 +172,6 @@ class Diagnostician:
                 yield Fault(Kind.OTHER_FORM, f"it belongs to {text}, and not to your Phi", result)
 
     def _right(self, quantity: str, form: Form | None) -> Array:
-        """Return the right values by row and column of the system."""
         right = self._generated.of(quantity)
         if form is not None:
             right = right.copy()
@@ -180,7 +179,6 @@ class Diagnostician:
         return right
 
     def _typed(self, quantity: str, place: Index, form: Form | None) -> list[NumericFault]:
-        """Return the faults of one entry as it is typed."""
         key = (quantity, place, form)
         if key not in self._entries:
             reference, row = self._reference, place[0]

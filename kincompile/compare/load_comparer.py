@@ -63,7 +63,6 @@ class LoadComparer:
 
     @cached_property
     def _equal(self) -> dict[str, Array]:
-        """Which entries agree at all states, (rows, columns)."""
         expected = self.reference.values(self.states)
         return {
             name: np.all(agrees(*self._values[name], expected.of(name)), axis=0)
@@ -92,7 +91,6 @@ class LoadComparer:
                 )
 
     def _difference(self, name: str, place: tuple[int, ...]) -> Difference:
-        """Return the state at which an entry differs the most."""
         values, right_values = self._values[name][0], self.reference.values(self.states).of(name)
         row, column = place
         written, right = (item[:, row, column] for item in (values, right_values))
@@ -120,7 +118,6 @@ class LoadComparer:
             yield from self._faults_of(name, load, total)
 
     def _faults_of(self, name: str, load: AppliedLoad, total: Array) -> Iterator[Fault[Array]]:
-        """Yield the slips with one load."""
         own = self._added(name, load, self.states)
         if not np.any(np.abs(own) > ABSOLUTE):
             return

@@ -158,12 +158,10 @@ class Reference:
 
     @cached_property
     def _rows(self) -> list[EquationRow]:
-        """The rows as SymPy expressions, which people read."""
         return assemble(self.system)
 
     @cached_property
     def _of_loads(self) -> dict[str, sympy.ImmutableDenseMatrix]:
-        """M and Q, which people read."""
         return {"M": self.system.M, "Q": self.system.Q}
 
     def expression(self, quantity: str, row: int, column: int) -> sympy.Expr:

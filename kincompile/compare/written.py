@@ -242,7 +242,6 @@ def _numbered(reference: Reference) -> Iterator[tuple[str, str]]:
 
 
 def _help(reference: Reference) -> str:
-    """Return in words which names there are."""
     system = reference.system
     names = [*reference.coordinates, *(item.name for item in system.parameters), "t"]
     text = f"the names are: {listed(names, 60)}, and rates such as {rate(names[0])}"
@@ -306,7 +305,6 @@ def read_written(
 
 
 def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> list[sympy.Expr]:
-    """Return the entries as expressions, row by row."""
     expressions: list[sympy.Expr] = []
     problems: list[str | None] = []
     for r, row in enumerate(rows, 1):

@@ -479,7 +479,6 @@ class Notation:
 
 
 def _is_slope(term: Any) -> bool:
-    """Return whether a term is a row of the derivative of a rotation."""
     return isinstance(term.vector if isinstance(term, ex.Scaled) else term, ex.RowOfSlope)
 
 

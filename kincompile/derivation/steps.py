@@ -150,7 +150,6 @@ class Steps(ABC, Generic[Derived]):
         return self.step(9, "In numbers", *blocks, *self._results(), level="numeric")
 
     def _state(self) -> Block:
-        """Return coordinates and rates at the state."""
         evaluation = self.evaluation
         rows: list[tuple[Run | Runs, ...]] = []
         for name in self.columns:

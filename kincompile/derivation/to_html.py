@@ -65,8 +65,6 @@ def as_html(
 
 
 class _HtmlRenderer(Renderer):
-    """Prints elements of HTML."""
-
     def __init__(self, document: Manuscript) -> None:
         self._printer = MathMLPrinter(document.abbreviations)
 

@@ -122,7 +122,6 @@ class _Atoms:
 
 
 def _terms(expression: ex.Expression, atoms: _Atoms) -> list[Term]:
-    """Return the terms of an expression, multiplied out."""
     if expression in atoms.whole:
         return [_atom(expression)]
     match expression:
@@ -182,7 +181,6 @@ def _multiplied(parts: list[list[Term]]) -> list[Term]:
 
 
 def _times(first: Term, second: Term) -> Term:
-    """Return the product of two terms, of which one at most is a vector."""
     core = first[2] if second[2] is None else second[2]
     return first[0] * second[0], _joined(first[1], second[1]), core
 

@@ -117,7 +117,6 @@ def _columns(symbols: tuple[Leaf, ...]) -> list[Direction]:
 
 
 def _work(template: LoadTemplate, direction: Direction) -> tuple[ex.Scalar, ...]:
-    """Return the work of each force for a displacement."""
     return tuple(inner(force, along(moved, direction)) for force, moved in template.work)
 
 

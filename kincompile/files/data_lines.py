@@ -142,12 +142,10 @@ class _TomlScan:
 
 
 def _key(tokens: list[str]) -> list[str]:
-    """Return the parts of a dotted key."""
     return [_unquoted(token) for token in tokens if token != "."]
 
 
 def _unquoted(token: str) -> str:
-    """Return a key without its quotes."""
     if token[0] == '"':
         try:
             return str(json.loads(token))

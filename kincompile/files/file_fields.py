@@ -197,7 +197,6 @@ class FieldReader:
 
 
 def _is_number(text: str) -> bool:
-    """Return whether a text is nothing but a number."""
     try:
         float(text)
     except ValueError:

@@ -382,12 +382,10 @@ def model_schema() -> dict[str, Any]:
 
 
 def _loads(count: int) -> list[dict[str, Any]]:
-    """Return the schemas of all loads in the plane, or in space."""
     return [_object(load_fields(item)) for item in dimensions(count).loads().values()]
 
 
 def _constraints(count: int) -> list[dict[str, Any]]:
-    """Return the schemas of all constraints in the plane, or in space."""
     kinds = dimensions(count).constraints.values()
     return [*(_object(constraint_fields(item)) for item in kinds), _object(FIELDS["Equation"])]
 

@@ -450,7 +450,6 @@ class _Reader:
 
 
 def _fits(value: sympy.Number) -> bool:
-    """Return whether a double can hold the number."""
     if isinstance(value, sympy.Rational):
         return max(abs(int(value.p)), int(value.q)).bit_length() <= MAX_BITS
     try:

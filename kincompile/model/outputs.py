@@ -197,7 +197,6 @@ def coordinates(place: AnyPoint) -> tuple[sympy.Expr, ...]:
 
 
 def _scalar(value: object) -> sympy.Expr:
-    """Return a number or an expression; text is refused."""
     try:
         return as_sympy(as_expression(value))
     except NotAnExpressionError as error:
@@ -205,7 +204,6 @@ def _scalar(value: object) -> sympy.Expr:
 
 
 def _moving(point: object) -> tuple[sympy.Expr, ...]:
-    """Return the coordinates of a point of a body."""
     if isinstance(point, BodyPoint):
         return point.coordinates
     raise ModelError(f"{point!r} is no point of a body: give one, as m.point(...) returns it")
@@ -245,7 +243,6 @@ def resolved_point(point: BodyPoint, scope: Scope, length_unit: str) -> PlacedPo
 
 
 def _resolved(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput | None:
-    """Check an output against the names that exist."""
     where, before = f"output {output.name!r}", len(scope.problems)
     unit = length_unit if output.unit is None else output.unit
     scope.problems += filter(None, [unit_problem(unit, where)])

@@ -221,7 +221,6 @@ def title_of(constraint: Element) -> str:
 
 
 def _corners(given: Any, title: str, scope: Scope) -> bool:
-    """Return whether corners are allowed."""
     if not isinstance(given, bool):
         scope.problems.append(f"{title}, corners: {given!r} is neither True nor False")
     return given is True

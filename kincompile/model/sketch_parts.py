@@ -200,7 +200,6 @@ class Drawn:
         return lengths, places
 
     def _length(self, given: Any, what: str) -> Scalar:
-        """Return a length, which is positive."""
         value = self._scalar(given, what)
         size = number(value, self.values)
         if size > 0:

@@ -170,7 +170,6 @@ class Sketch(Drawing[SpatialBody]):
         return list(filter(None, made))
 
     def _connect(self, link: Link, other: Link, joints: Sequence[str]) -> Line | None:
-        """Connect two links by the joints that they share."""
         first, *others = joints
         if len(others) > 1:
             self._drawn.problems.append(

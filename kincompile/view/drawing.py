@@ -196,7 +196,6 @@ def drawing(
 def _labels(
     system: ConstraintSystem, places: Mapping[str, FramePoint | None], geometry: Geometry
 ) -> tuple[JointLabel, ...]:
-    """Return the labels of the constraints, in order."""
     return tuple(
         JointLabel(
             item.name,

@@ -87,7 +87,6 @@ def as_glb(
 
 
 def _groups(drawn: Drawing) -> dict[BodyFrame, list[Solid]]:
-    """Return the solids that are fixed in each frame."""
     found: dict[BodyFrame, list[Solid]] = {}
     for solid in solids(drawn):
         mark = solid.mark

@@ -217,7 +217,6 @@ def write_name(ax: Axes, name: str, place: Sequence[float]) -> Callable[[Sequenc
 
 
 def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
-    """Return the artist of a polyline."""
     look, points = polyline.look, polyline.at(q)
     is_ground = polyline.frame == GROUND_FRAME
     colour = look.colour or (GROUND_COLOUR if is_ground else f"C{polyline.frame.index % 10}")

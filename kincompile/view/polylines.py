@@ -116,7 +116,6 @@ def owner(mark: Mark, on: str) -> BodyFrame:
 
 
 def _left_of(direction: Array) -> Array:
-    """Return a vector turned by a right angle, counterclockwise."""
     return np.array((-direction[1], direction[0]))
 
 

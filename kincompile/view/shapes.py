@@ -169,12 +169,10 @@ _FEET = tuple(
 
 
 def _mirrored(corners: tuple[Corner, ...]) -> tuple[Corner, ...]:
-    """Return corners on the other side of the line."""
     return tuple(corner and (corner[0], corner[1], -corner[2]) for corner in corners)
 
 
 def _shifted(corners: tuple[Corner, ...], left: float) -> tuple[Corner, ...]:
-    """Return corners farther to the left of the line."""
     return tuple(corner and (corner[0], corner[1], corner[2] + left) for corner in corners)
 
 

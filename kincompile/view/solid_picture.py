@@ -141,7 +141,6 @@ def is_gap(solid: Solid, part: Part) -> bool:
 
 
 def _path(solid: Solid, part: Part, camera: Camera, points: Array, opacity: float) -> PicturePath:
-    """Return a part as it is seen."""
     look, line = solid.look, solid.look.colour or colour_of(solid.frame)
     if part.radius:
         face = look.area or mixed(line, FILL)

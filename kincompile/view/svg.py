@@ -223,7 +223,6 @@ def _group(motion: _Motion | None, clock: str) -> str:
 
 
 def _shown(drawn: Drawing, q: Array) -> list[Polyline]:
-    """Return the strokes from back to front, without the gaps of joints that are closed."""
     return [
         item
         for item in polylines(drawn)
