@@ -20,12 +20,12 @@
 const cam_by_table = (() => {
     "use strict";
 
-    const NAME = "cam_by_table", FORMAT = 3;
+    const NAME = "cam_by_table";
+    const FORMAT = 3;
     const FINGERPRINT = "fc5b7a69973968d964191eadf6c68e9b";
     const N_COORDINATES = 7, N_EQUATIONS = 7;
-    // REDUNDANT: equations that repeat others at every assembled position, which a solve leaves out;
-    // BODIES: name, first column and number of columns; CORNERS: whether velocities of drivers may
-    // jump; PATTERN: row, column of the entries of Phi_q that are not identically zero
+    // BODIES: name, first column and number of columns; PATTERN: row, column of the entries of Phi_q
+    // that are not identically zero; CORNERS: whether velocities of drivers may jump
     const COORDINATES = [
         "x_cam", "y_cam", "phi_cam", "x_follower", "y_follower", "phi_follower", "alpha_contact",
     ];

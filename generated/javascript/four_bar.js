@@ -21,12 +21,12 @@
 const four_bar = (() => {
     "use strict";
 
-    const NAME = "four_bar", FORMAT = 3;
+    const NAME = "four_bar";
+    const FORMAT = 3;
     const FINGERPRINT = "026fefbfb06f3b341fb7723f8ec67fcb";
     const N_COORDINATES = 9, N_EQUATIONS = 9;
-    // REDUNDANT: equations that repeat others at every assembled position, which a solve leaves out;
-    // BODIES: name, first column and number of columns; CORNERS: whether velocities of drivers may
-    // jump; PATTERN: row, column of the entries of Phi_q that are not identically zero
+    // BODIES: name, first column and number of columns; PATTERN: row, column of the entries of Phi_q
+    // that are not identically zero; CORNERS: whether velocities of drivers may jump
     const COORDINATES = [
         "x_crank", "y_crank", "phi_crank", "x_coupler", "y_coupler", "phi_coupler", "x_rocker",
         "y_rocker", "phi_rocker",

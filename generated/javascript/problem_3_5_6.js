@@ -17,12 +17,12 @@
 const problem_3_5_6 = (() => {
     "use strict";
 
-    const NAME = "problem_3_5_6", FORMAT = 3;
+    const NAME = "problem_3_5_6";
+    const FORMAT = 3;
     const FINGERPRINT = "fa7adf382924fd70db26c5bd35276fee";
     const N_COORDINATES = 3, N_EQUATIONS = 3;
-    // REDUNDANT: equations that repeat others at every assembled position, which a solve leaves out;
-    // BODIES: name, first column and number of columns; CORNERS: whether velocities of drivers may
-    // jump; PATTERN: row, column of the entries of Phi_q that are not identically zero
+    // BODIES: name, first column and number of columns; PATTERN: row, column of the entries of Phi_q
+    // that are not identically zero; CORNERS: whether velocities of drivers may jump
     const COORDINATES = [
         "x2", "y2", "phi3",
     ];

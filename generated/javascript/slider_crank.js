@@ -21,12 +21,12 @@
 const slider_crank = (() => {
     "use strict";
 
-    const NAME = "slider_crank", FORMAT = 3;
+    const NAME = "slider_crank";
+    const FORMAT = 3;
     const FINGERPRINT = "367a7ab757cf5203ac73fe4edd6c86ae";
     const N_COORDINATES = 9, N_EQUATIONS = 9;
-    // REDUNDANT: equations that repeat others at every assembled position, which a solve leaves out;
-    // BODIES: name, first column and number of columns; CORNERS: whether velocities of drivers may
-    // jump; PATTERN: row, column of the entries of Phi_q that are not identically zero
+    // BODIES: name, first column and number of columns; PATTERN: row, column of the entries of Phi_q
+    // that are not identically zero; CORNERS: whether velocities of drivers may jump
     const COORDINATES = [
         "x_crank", "y_crank", "phi_crank", "x_rod", "y_rod", "phi_rod", "x_slider", "y_slider",
         "phi_slider",
