@@ -13,7 +13,6 @@ from kincompile.compare.comparison import (
     ComparedEntry,
     Convention,
     Diagnosis,
-    Difference,
     Verdict,
 )
 from kincompile.compare.conventions import OPPOSITE, conventions_found
@@ -376,6 +375,7 @@ class Comparer:
     def _entry(self, spot: Spot, diagnoses: tuple[Diagnosis, ...]) -> ComparedEntry:
         name, row, column = spot
         system_row, system_column = self._index(spot)
+        values = self._written[name][0][:, row, column], self._expected[name][:, row, column]
         is_accepted = self._is_accepted(spot)
         reference, form_row = self._reference, system_row
         form = self._matching.form(system_row)
@@ -390,16 +390,8 @@ class Comparer:
             self._verdicts[spot],
             is_accepted,
             diagnoses,
-            None if is_accepted else self._difference(spot),
+            None if is_accepted else self._reference.difference(self._subject.states, *values),
         )
-
-    def _difference(self, spot: Spot) -> Difference:
-        name, row, column = spot
-        written = self._written[name][0][:, row, column]
-        expected = self._expected[name][:, row, column]
-        k = int(np.argmax(np.nan_to_num(np.abs(written - expected), nan=np.inf, posinf=np.inf)))
-        state = self._reference.named(self._subject.states, k)
-        return Difference(state, float(expected[k]), float(written[k]))
 
 
 def _same_space(where: str, Phi: str) -> Diagnosis:

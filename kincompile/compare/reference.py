@@ -12,6 +12,7 @@ import numpy as np
 import sympy
 
 from kincompile import quantities
+from kincompile.compare.comparison import Difference
 from kincompile.compare.states import (
     SEED,
     Array,
@@ -285,9 +286,11 @@ class Reference:
                     known[item][0] += results[node]
                     known[item][1] += np.abs(results[node])
 
-    def named(self, states: States, k: int) -> dict[str, float]:
-        """Return one of the states as numbers by name."""
-        return {name: float(value[k]) for name, value in self.inputs(states).items()}
+    def difference(self, states: States, written: Array, right: Array) -> Difference:
+        """Return the state at which an entry differs the most, of values of shape (N,)."""
+        k = int(np.argmax(np.nan_to_num(np.abs(written - right), nan=np.inf, posinf=np.inf)))
+        state = {name: float(value[k]) for name, value in self.inputs(states).items()}
+        return Difference(state, float(right[k]), float(written[k]))
 
     def inputs(self, states: States) -> dict[str, Array]:
         """Return the values of coordinates, rates, parameters and t by name, (N,) each.
