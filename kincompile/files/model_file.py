@@ -157,7 +157,9 @@ class _ModelReader(BodyReader):
         model = self.words.mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
         model.constraints, model.outputs = content["constraints"], content["outputs"]
-        model.loads, model.gravity = content["loads"], content["gravity"]
+        model.gravity = content["gravity"]
+        for load in content["loads"]:
+            model.add(load)
         free = content["coordinates"]
         if self.problems and not (model.constraints and (model.bodies or free)):
             return None

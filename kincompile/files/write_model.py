@@ -164,7 +164,9 @@ def _load(item: AppliedLoad) -> dict[str, Any]:
     for name, argument in written.arguments().items():
         if argument.kind is Kind.BODY:
             row[name] = next(bodies).name
-        elif argument.symbol in item.points:
+        elif argument.kind in (Kind.POINT, Kind.AXIS):
+            row[name] = [value(number) for number in getattr(written, name)]
+        elif argument.kind is Kind.LOADS:
             row[name] = [_scalar(number) for number in item.points[argument.symbol]]
         else:
             row[name] = _scalar(item.scalars[argument.symbol])
