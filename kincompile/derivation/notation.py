@@ -24,6 +24,7 @@ from kincompile.calculus.expressions import (
     Power,
     Product,
     ProfileFunction,
+    Root,
     Rotated,
     RotationSlope,
     RowOfSlope,
@@ -255,6 +256,9 @@ class Notation:
 
     def _print_Norm(self, expr: Norm) -> Printed:
         return self._row([self._operator("|"), self._short(expr.vector), self._operator("|")])
+
+    def _print_Root(self, expr: Root) -> Printed:
+        return self._root(self._print(expr.square))
 
     def _print_Dot(self, expr: Dot) -> Printed:
         return self._row([self._transposed(expr.left), self._factor(expr.right)])

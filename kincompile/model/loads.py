@@ -125,13 +125,18 @@ class Turning(Load):
 
     @classmethod
     def turned(cls) -> Scalar:
-        """Return the angle of body j from body i, along which the load does its work."""
+        """Return the angle of body j from body i, over whole turns."""
         return j.phi - i.phi
 
     @classmethod
-    def measured(cls) -> Scalar:
-        """Return the same angle over whole turns."""
-        return cls.turned()
+    def turning(cls) -> Scalar:
+        """Return its rate."""
+        return cls.rate_of(j.phi - i.phi)
+
+    @classmethod
+    def couple(cls, torque: Scalar) -> tuple[Work, ...]:
+        """Return the work of a torque on body j, and its opposite on body i."""
+        return ((torque, j.phi - i.phi),)
 
 
 @constraint_type
@@ -155,8 +160,7 @@ class TorsionSpring(Turning):
     @classmethod
     def work(cls) -> tuple[Work, ...]:
         """Return the torque that turns back, against the angle."""
-        angle = cls.turned()
-        return ((-(k * (cls.measured() - angle_0) + c * cls.rate_of(angle) + F), angle),)
+        return cls.couple(-(k * (cls.turned() - angle_0) + c * cls.turning() + F))
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
@@ -182,8 +186,7 @@ class HingeFriction(Turning):
     @classmethod
     def work(cls) -> tuple[Work, ...]:
         """Return the torque against the sliding, and the angle."""
-        angle = cls.turned()
-        return ((_against(cls.rate_of(angle)), angle),)
+        return cls.couple(_against(cls.turning()))
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:

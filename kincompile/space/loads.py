@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.calculus.expressions import (
-    Angle,
     Number,
     Scalar,
     Symbol,
@@ -31,7 +30,7 @@ from kincompile.model.load import Load
 from kincompile.space.bodies import SPATIAL
 from kincompile.space.constraint import SpatialConstraint
 from kincompile.space.joints import JointAngle
-from kincompile.space.symbols import AXES, f_i, f_j, g_i, i, j
+from kincompile.space.symbols import AXES, f_i, f_j, g_i, g_j, i, j
 from kincompile.space.triads import with_triads
 
 if TYPE_CHECKING:
@@ -87,9 +86,17 @@ class Turning(loads.Turning):
     completed = staticmethod(with_triads)
 
     @classmethod
-    def turned(cls) -> Scalar:
-        """Return the angle of f_j from f_i about h_i, whose turn does not matter."""
-        return Angle(dot(i.A(g_i), j.A(f_j)), dot(i.A(f_i), j.A(f_j)))
+    def turning(cls) -> Scalar:
+        """Return h_j^T omega_j - h_i^T omega_i, as the rate of f along g on either body."""
+        return dot(j.A(g_j), cls.rate_of(j.A(f_j))) - dot(i.A(g_i), cls.rate_of(i.A(f_i)))
+
+    @classmethod
+    def couple(cls, torque: Scalar) -> tuple[Work, ...]:
+        """Return the work of a torque about the hinge on body j, and its opposite on body i.
+
+        It is that of a force along g at the tip of f.
+        """
+        return (torque * j.A(g_j), j.A(f_j)), (torque * i.A(g_i), -i.A(f_i))
 
 
 @constraint_type
@@ -121,7 +128,7 @@ class TorsionSpring(loads.TorsionSpring, Crosses):
     )
 
     @classmethod
-    def measured(cls) -> Scalar:
+    def turned(cls) -> Scalar:
         """Return the coordinate that counts whole turns."""
         return Symbol("theta")
 
