@@ -122,7 +122,7 @@ def agree(matrix: Array, rates: Array, sides: Array) -> Any:
     return np.max(missing, axis=-1) <= AGREEMENT * np.max(terms, axis=-1)
 
 
-def rates_agree(code: Code, t: Array, p: Array, states: Sequence[Array]) -> Any:
+def rates_agree(code: Code, t: Any, p: Any, states: Sequence[Array]) -> Any:
     """Say at which points redundant equations are all met by rates that solve the others.
 
     `states` are position, velocity and acceleration, shape (n, N) each; `p` is (k,) or (k, N).
