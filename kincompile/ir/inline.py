@@ -134,11 +134,11 @@ def inline(program: Program) -> InlineProgram:
                 hints.setdefault(node, name)
         entries = _entries(program, instance, new, graph, shared)
         sections.append(ConstraintRows(instance, entries))
-    for quantity, entries in _sums(program, graph, shared).items():
+    for quantity, complete in _sums(program, graph, shared).items():
         # A sum is complete where the last has contributed.
         giving = [k for k, x in enumerate(sections) if quantity in x.instance.kernel.outputs]
         last = giving[-1] if giving else -1
-        own = {**sections[last].entries, quantity: entries}
+        own = {**sections[last].entries, quantity: complete}
         sections[last] = replace(sections[last], entries=own)
     frames = tuple(sorted(body.entries for body in program.bodies))
     return InlineProgram(program, tuple(graph.nodes), tuple(sections), hints, frames)

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_ivp  # type: ignore[attr-defined]  # a star there
 
 import kincompile as kc
 from kincompile import spatial
@@ -25,12 +25,12 @@ def mixed():
     """A crank with a motor that carries a pendulum, whose length is a parameter."""
     m = kc.Mechanism("mixed", end=1.5, points=4)
     m.gravity = (0, -9.81)
-    L = m.parameter("L", 0.4, unit="m")
+    length = m.parameter("L", 0.4, unit="m")
     crank = m.body("crank", mass=2, inertia=0.1)
     bob = m.body("bob", (0.5, -0.4, -np.pi / 2), mass=0.7, inertia=0.02, centre=(0.05, 0.02))
     m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
     m.add(kc.AbsoluteAngle("motor", crank, 0.3 * kc.t + 2 * kc.t**2))
-    m.add(kc.Revolute("A", crank, (0.5, 0), bob, (-L, 0)))
+    m.add(kc.Revolute("A", crank, (0.5, 0), bob, (-length, 0)))
     m.add(kc.TorsionSpring("damper", crank, bob, 0.2, 0.0, 0.05))
     return m
 
