@@ -64,31 +64,20 @@ class Start:
 
 @dataclass(slots=True, eq=False)
 class Search:
-    """Scores many sets of parameters.
+    """Scores many sets of parameters."""
 
-    Attributes
-    ----------
-    module, demands, names, fixed
-        As of a `Workbench`.
-    bounds : ndarray, shape (k, 2)
-        Of the parameters.
-    guesses : ndarray, shape (g, n)
-        Positions from which the mechanism is assembled.
-    tried, moved
-        How many sets were tried, each from all guesses, and how many times one got through.
-    farthest
-        The latest time that a set has reached.
-    """
-
+    # module, demands, names, fixed: as of a `Workbench`
     module: ModuleType
     demands: Demands
     names: tuple[str, ...]
     fixed: dict[str, float]
-    bounds: Array
-    guesses: Array
+    bounds: Array  # (k, 2): of the parameters
+    guesses: Array  # (g, n): positions from which the mechanism is assembled
+    # tried, moved: how many sets were tried, each from all guesses, and how many times one got
+    # through
     tried: int = 0
     moved: int = 0
-    farthest: float = -np.inf
+    farthest: float = -np.inf  # the latest time that a set has reached
     best: list[Start] = field(default_factory=list)
     _times: Array = field(default_factory=lambda: np.empty(0))
 

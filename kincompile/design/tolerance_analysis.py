@@ -32,21 +32,11 @@ TITLES = ("from", "sensitivity", "least", "greatest", "worst %", "RSS %")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawn:
-    """Motions of B samples that were solved exactly.
+    """Motions of B samples that were solved exactly."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (B, N, columns)
-        Of each column over time.
-    parameters : dict
-        Value of each parameter in each sample, shape (B,).
-    failed : int
-        Samples whose mechanism did not move through all times; they are left out.
-    """
-
-    values: Array
-    parameters: dict[str, Array]
-    failed: int
+    values: Array  # (B, N, columns): of each column over time
+    parameters: dict[str, Array]  # value of each parameter in each sample, shape (B,)
+    failed: int  # samples whose mechanism did not move through all times; they are left out
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

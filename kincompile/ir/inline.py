@@ -45,39 +45,24 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class ConstraintRows:
-    """The rows of one constraint, of one output or of one load.
-
-    Attributes
-    ----------
-    entries
-        Entries by quantity, row by row; of a matrix those that are not identically zero. The last
-        constraint has those to which several contribute.
-    """
+    """The rows of one constraint, of one output or of one load."""
 
     instance: Instance
+    # Entries by quantity, row by row; of a matrix those that are not identically zero. The last
+    # constraint has those to which several contribute.
     entries: Mapping[str, tuple[Entry, ...]]
 
 
 @dataclass(frozen=True, slots=True)
 class InlineProgram:
-    """One graph for the whole mechanism.
-
-    Attributes
-    ----------
-    nodes
-        The code.
-    sections
-        One a constraint, in order of rows, then one an output, then one a load.
-    hints
-        Speaking names of nodes.
-    frames
-        What the frames of bodies give, a tuple of nodes a body.
-    """
+    """One graph for the whole mechanism."""
 
     program: Program
     nodes: tuple[Node, ...]
+    # One a constraint, in order of rows, then one an output, then one a load.
     sections: tuple[ConstraintRows, ...]
     hints: Mapping[int, str]
+    # What the frames of bodies give, a tuple of nodes a body.
     frames: tuple[tuple[int, ...], ...] = ()
 
     @property

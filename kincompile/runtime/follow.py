@@ -42,38 +42,25 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True, eq=False)
 class Motion:
-    """The arrays of a solution while they are being filled, N points and n coordinates.
+    """The arrays of a solution while they are being filled, N points and n coordinates."""
 
-    Attributes
-    ----------
-    q, q_dot, q_ddot : ndarray, shape (N, n)
-        The motion; NaN where nothing was found, and unknown after the last point reached.
-    status, residual, iterations : ndarray, shape (N,)
-        What became of each point.
-    statistics : dict
-        How many points were found in which way.
-    events, passed : list of Event
-        What happened on the way, and those of it that the motion went through.
-    near : list of int
-        Points so near to a singular configuration that their rates are uncertain.
-    note : str
-        A remark for the message of the solution.
-    is_folded : bool
-        Whether the guess shows no branch.
-    """
-
+    # q, q_dot, q_ddot (N, n): the motion; NaN where nothing was found, and unknown after the last
+    # point reached
     q: Array
     q_dot: Array
     q_ddot: Array
+    # status, residual, iterations (N,): what became of each point
     status: NDArray[np.int64]
     residual: Array
     iterations: NDArray[np.int64]
-    statistics: dict[str, int]
+    statistics: dict[str, int]  # how many points were found in which way
+    # events, passed: what happened on the way, and those of it that the motion went through
     events: list[Event] = field(default_factory=list)
     passed: list[Event] = field(default_factory=list)
+    # Points so near to a singular configuration that their rates are uncertain.
     near: list[int] = field(default_factory=list)
-    note: str = ""
-    is_folded: bool = False
+    note: str = ""  # a remark for the message of the solution
+    is_folded: bool = False  # whether the guess shows no branch
 
     @classmethod
     def over(cls, inputs: Inputs) -> Motion:

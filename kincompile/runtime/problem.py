@@ -58,48 +58,24 @@ LARGEST_POWER = 700.0
 
 @dataclass(slots=True, eq=False)
 class Problem:
-    """A module with its parameters set, and its scales.
-
-    Attributes
-    ----------
-    code
-        The module.
-    engine
-        What solves its equations.
-    p : ndarray, shape (k,)
-        Parameters.
-    angular : ndarray of bool, shape (n,)
-        Which coordinates are angles.
-    size : float
-        The size of the mechanism.
-    reference : ndarray, shape (n,)
-        Scale of each coordinate: 1 rad for angles, the size of the mechanism for the others.
-    place : ndarray, shape (n,)
-        How far from zero each coordinate is at a guess, or in the assembled mechanism.
-    floor : float
-        Correction, in scales, below which there are only rounding errors of so far a place.
-    probe : ndarray, shape (m,)
-        Numbers of size 1/2 to 1 and either sign without a pattern.
-    magnitude : ndarray, shape (m,)
-        What the terms of each equation contribute at a generic position.
-    noise : ndarray, shape (m,)
-        What rounding errors of so large coordinates leave of each equation.
-    limit : ndarray, shape (m,)
-        What they contribute at most, wherever they are.
-    """
+    """A module with its parameters set, and its scales."""
 
     code: Code
-    engine: Engine
-    p: Array
-    angular: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    size: float
+    engine: Engine  # what solves its equations
+    p: Array  # (k,): parameters
+    angular: np.ndarray[tuple[int], np.dtype[np.bool_]]  # (n,), bool: which coordinates are angles
+    size: float  # the size of the mechanism
+    # (n,): scale of each coordinate: 1 rad for angles, the size of the mechanism for the others
     reference: Array
+    # (n,): how far from zero each coordinate is at a guess, or in the assembled mechanism
     place: Array
+    # Correction, in scales, below which there are only rounding errors of so far a place.
     floor: float
-    probe: Array
-    magnitude: Array
+    probe: Array  # (m,): numbers of size 1/2 to 1 and either sign without a pattern
+    magnitude: Array  # (m,): what the terms of each equation contribute at a generic position
+    # (m,): what rounding errors of so large coordinates leave of each equation
     noise: Array | float = 0.0
-    limit: Array | float = np.inf
+    limit: Array | float = np.inf  # (m,): what they contribute at most, wherever they are
 
     def at(self, q: Array, t: float) -> Point | None:
         """Evaluate the equations, or give None where they have no finite value."""

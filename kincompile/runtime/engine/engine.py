@@ -25,48 +25,28 @@ Array = NDArray[np.float64]
 
 @dataclass(slots=True, eq=False)
 class Point:
-    """A position, or a batch of N, at which the equations were evaluated. The batch is last.
+    """A position, or a batch of N, at which the equations were evaluated. The batch is last."""
 
-    Attributes
-    ----------
-    q : ndarray, shape (n,) or (n, N)
-        The position.
-    t : float or ndarray, shape (N,)
-        The time.
-    Phi : ndarray, shape (m,) or (m, N)
-        The constraint vector, of a batch also as a row each; m > n where redundant equations agree.
-    Phi_q
-        The Jacobian, as its engine has it: a matrix (m, n), the entries of its pattern, or those of
-        them that vary.
-    factors
-        What the engine keeps of Phi_q once it was factored.
-    """
-
-    q: Array
-    t: Any
+    q: Array  # (n,) or (n, N): the position
+    t: Any  # float or (N,): the time
+    # (m,) or (m, N): the constraint vector, of a batch also as a row each; m > n where redundant
+    # equations agree
     Phi: Any
+    # The Jacobian, as its engine has it: a matrix (m, n), the entries of its pattern, or those of
+    # them that vary.
     Phi_q: Any
-    factors: Any = None
+    factors: Any = None  # what the engine keeps of Phi_q once it was factored
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rates:
-    """Velocity and acceleration at a position.
+    """Velocity and acceleration at a position."""
 
-    Attributes
-    ----------
-    q_dot, q_ddot : ndarray, shape of q
-        The rates; not finite where they cannot be had.
-    movement : ndarray, shape of q
-        The solution for the right side that was asked for besides.
-    agree : bool
-        Whether redundant equations are all met by the rates.
-    """
-
+    # q_dot, q_ddot shape of q: the rates; not finite where they cannot be had
     q_dot: Array
     q_ddot: Array
-    movement: Array
-    agree: bool = True
+    movement: Array  # shape of q: the solution for the right side that was asked for besides
+    agree: bool = True  # whether redundant equations are all met by the rates
 
 
 class Engine(Protocol):

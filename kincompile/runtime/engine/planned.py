@@ -21,21 +21,12 @@ Lanes = Sequence[Any] | NDArray[np.float64]
 
 @dataclass(slots=True, eq=False)
 class Planned:
-    """An engine whose linear systems go by the elimination that was planned at compile time.
+    """An engine whose linear systems go by the elimination that was planned at compile time."""
 
-    Attributes
-    ----------
-    code
-        A module with a planned solve.
-    p : ndarray, shape (k,) or (k, N), or sequence of float
-        Parameters, of all points or a set for each.
-    functions
-        The module's elementary functions of floats, where positions are lists of floats: one of
-        them then takes as long as a few calls of NumPy. None for those of arrays.
-    """
-
-    code: Code
-    p: Lanes
+    code: Code  # a module with a planned solve
+    p: Lanes  # (k,) or (k, N), or sequence of float: parameters, of all points or a set for each
+    # The module's elementary functions of floats, where positions are lists of floats: one of them
+    # then takes as long as a few calls of NumPy. None for those of arrays.
     functions: Any = None
 
     @property

@@ -56,8 +56,8 @@ CALLED = (
     *NAMES.values(), "abs", "all", "any", "circshift", "deal", "det", "diag", "double", "either",
     "eps", "error", "eye", "false", "find", "in_reals", "Inf", "isempty", "isfinite", "isnan",
     "isreal", "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell", "numel",
-    "ode45", "odeset", "pi", "pinv", "polyval", "rcond", "round", "sign", "single", "size", "sortrows",
-    "sqrt", "sum", "svd", "true", "zeros",
+    "ode45", "odeset", "pi", "pinv", "polyval", "rcond", "round", "sign", "single", "size",
+    "sortrows", "sqrt", "sum", "svd", "true", "zeros",
 )  # fmt: skip
 """Functions that the files call; a script of such a name would be called in their place."""
 
