@@ -10,13 +10,13 @@ import numpy as np
 
 from kincompile.criteria import OTHER_SIZE, RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
 from kincompile.names import listed
-from kincompile.runtime.engine.engine import Point
+from kincompile.runtime.engine.engine import Point, rates_agree
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.march import March, Outcome, State, distance
 from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
-from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem, rates_agree
+from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
 from kincompile.runtime.singular.events import (
     DOUBTS,
     branch_switch,

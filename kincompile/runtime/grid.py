@@ -28,9 +28,9 @@ from kincompile.criteria import (
     SMALLEST_DETERMINANT,
     SMOOTH_UNSEEN,
 )
+from kincompile.runtime.engine.engine import rates_agree
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, largest
-from kincompile.runtime.problem import rates_agree
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
