@@ -14,7 +14,6 @@ from kincompile.runtime.engine.engine import Point
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.march import March, Outcome, State, distance
-from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem, rates_agree
 from kincompile.runtime.singular.events import (
@@ -80,9 +79,9 @@ class Motion:
         """Make the arrays for a time grid, with nothing reached."""
         points = inputs.t.size
         if inputs.code.stages:
-            q, q_dot, q_ddot = empty((3, points, inputs.guess.size))
+            q, q_dot, q_ddot = np.empty((3, points, inputs.guess.size))
         else:  # each coordinate contiguous in memory, as the code of a grid wants it
-            q, q_dot, q_ddot = empty((3, inputs.guess.size, points)).transpose(0, 2, 1)
+            q, q_dot, q_ddot = np.empty((3, inputs.guess.size, points)).transpose(0, 2, 1)
         return cls(
             q,
             q_dot,
@@ -209,7 +208,7 @@ class _Way:
                 outcome = self._take_up(rest.size if rest.all() else int(np.argmin(rest)))
             else:
                 outcome = self._advance(state)
-            self._progress(self._index, len(self._times))
+            self._alive()
         return outcome
 
     def explain(self, outcome: Outcome) -> Passage | None:
@@ -296,26 +295,28 @@ class _Way:
         """Return the march of the mechanism, whose scales are those at a position."""
         inputs, time = self._inputs, float(self._times[0]) if t is None else t
         equations = problem(inputs.code.module, inputs.p, q, time, staged=True, engine=engine)
-        march = March(equations, equations.engine, inputs.tolerance)
-        march.alive = lambda: self._progress(self._index, len(self._times))
-        return march
+        return March(equations, equations.engine, inputs.tolerance)
 
     def _leave_stages(self, q: NDArray[np.float64]) -> None:
         """Solve dense matrices from here on: they have the last word."""
         self._count_pivoted()
         self._march = self._march_at(q, Dense(self._inputs.code, self._inputs.p))
 
+    def _alive(self) -> None:
+        self._progress(self._index, len(self._times))
+
     def _put(self, outcome: Outcome) -> None:
         self._motion.put(self._index, outcome)
         self._index += 1
         if self._index == 1:
-            self._progress(1, len(self._times))
+            self._alive()
 
     def _advance(self, state: State) -> Outcome:
         """Go to the next time point by point."""
         march, most = self._march, self._inputs.max_iterations
         t = float(self._times[self._index])
-        outcome = march.advance(state, t, most)
+        # A march that kept this call would keep the motion: both would wait to be collected.
+        outcome = march.advance(state, t, most, self._alive)
         doubtful = outcome.state is None or outcome.state.sensitivity > TOO_NEAR
         doubtful = doubtful or outcome.status is not Status.CONVERGED
         if doubtful and not outcome.exhausted and self._measure_again(state):

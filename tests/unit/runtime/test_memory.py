@@ -1,6 +1,8 @@
 """Memory of large results is used again when nobody holds them, and never before."""
 
+import gc
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -149,3 +151,17 @@ def test_a_file_that_is_loaded_uses_memory_again(tmp_path):
     module = kc.load(tmp_path / "rod.py")
     module.Phi(np.zeros((50_000, 3)), 0.0)
     assert memory.free
+
+
+@pytest.mark.parametrize("points", [9, 99])
+def test_a_solution_goes_when_nobody_holds_it(four_bar, points):
+    """Not when cycles are collected: until then every call would fetch new memory."""
+    gc.collect()
+    gc.disable()
+    try:
+        found = kc.solve(four_bar, np.linspace(0, 1, points))
+        arrays = weakref.ref(found.q.base)
+        del found
+        assert arrays() is None
+    finally:
+        gc.enable()
