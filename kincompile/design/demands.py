@@ -40,27 +40,15 @@ GRID = 73
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Demands:
-    """Targets with their columns, for a module.
+    """Targets with their columns, for a module."""
 
-    Attributes
-    ----------
-    passing
-        Each target with its columns.
-    free
-        The passing targets whose times are found, each with the first and last time allowed.
-    limits
-        Each limit with its column, and whether it depends on parameters alone.
-    ratios
-        Each time ratio with its column.
-    grid : ndarray
-        Times for what concerns the whole motion; empty where nothing does.
-    """
-
-    passing: tuple[tuple[Passing, tuple[Column, ...]], ...]
+    passing: tuple[tuple[Passing, tuple[Column, ...]], ...]  # each target with its columns
+    # The passing targets whose times are found, each with the first and last time allowed.
     free: tuple[tuple[float, float], ...]
+    # Each limit with its column, and whether it depends on parameters alone.
     limits: tuple[tuple[Limit, Column, bool], ...]
-    ratios: tuple[tuple[TimeRatio, Column], ...]
-    grid: Array
+    ratios: tuple[tuple[TimeRatio, Column], ...]  # each time ratio with its column
+    grid: Array  # times for what concerns the whole motion; empty where nothing does
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -185,21 +173,11 @@ def limit_gaps(item: Limit, got: Array) -> list[tuple[Array, float]]:
 
 @dataclass(frozen=True, slots=True)
 class Turning:
-    """A zero of a rate between two points of a grid, and how it depends on the values there.
-
-    Attributes
-    ----------
-    t
-        Its time.
-    weights
-        Derivatives of it by the rate at both points, and by the second rate at both.
-    cell
-        The number of the point before it.
-    """
+    """A zero of a rate between two points of a grid, and how it depends on the values there."""
 
     t: float
-    weights: Array
-    cell: int
+    weights: Array  # derivatives of it by the rate at both points, and by the second rate at both
+    cell: int  # the number of the point before it
 
 
 def turning(t: Array, rate: Array, second: Array, sign: float) -> list[Turning]:

@@ -28,9 +28,9 @@ from kincompile.criteria import (
     SMALLEST_DETERMINANT,
     SMOOTH_UNSEEN,
 )
+from kincompile.runtime.engine.engine import rates_agree
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, largest
-from kincompile.runtime.problem import rates_agree
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,23 +76,15 @@ h^2 q_ddot at the left end, then at the right end."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GridResult:
-    """What was found on a grid.
+    """What was found on a grid."""
 
-    Attributes
-    ----------
-    q, q_dot, q_ddot : ndarray, shape (n, N)
-        The motion; each coordinate is a row.
-    residual : ndarray, shape (N,)
-        Largest absolute value of Phi at the last position but one, a rounding error away.
-    good : ndarray of bool, shape (N,)
-        Which points can be trusted.
-    """
-
+    # q, q_dot, q_ddot (n, N): the motion; each coordinate is a row
     q: Array
     q_dot: Array
     q_ddot: Array
+    # (N,): largest absolute value of Phi at the last position but one, a rounding error away
     residual: Array
-    good: NDArray[np.bool_]
+    good: NDArray[np.bool_]  # (N,), bool: which points can be trusted
 
 
 def solve_grid(march: March, times: Array, first: State, result: GridResult) -> int:

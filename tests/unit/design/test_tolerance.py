@@ -36,6 +36,26 @@ def test_worst_case_rss_and_contributions_are_those_of_the_closed_form(slider_cr
     assert found.sources == tuple(LIMITS)
 
 
+def test_second_derivatives_shift_the_mean_by_the_closed_form(slider_crank):
+    found = kc.tolerance(slider_crank, LIMITS, of="slider.x", t=0.0)
+    assert found.mean_shift("slider.x")[0] == pytest.approx(-8.30608735156842e-9, rel=1e-11)
+    bend = -(math.sin(1.1) ** 2) / (0.3 * math.cos(slider()[1]) ** 3)  # d2x/dr2
+    assert found.shift[0, 0, 0] == pytest.approx(bend * (1e-4 / 3) ** 2 / 2, rel=1e-11)
+    assert "mean shifted by -8.31e-09 m (second order)" in str(found)
+
+
+def test_mean_shift_is_that_of_samples(slider_crank):
+    # Large, one-sided and with a clearance, of an acceleration: all terms matter.
+    given = {"r": (-5e-3, 15e-3), "L": kc.Deviation(-1e-2, 3e-2, "uniform")}
+    found = kc.tolerance(
+        slider_crank, given, of="slider.x_ddot", t=0.0, clearances={"B": 4e-3}, samples=4096
+    )
+    first, drawn = found.rss("slider.x_ddot")[0][0], found.samples("slider.x_ddot").mean()
+    shift = found.mean_shift("slider.x_ddot")[0]
+    assert drawn - first == pytest.approx(shift, rel=0.1)
+    assert abs(shift) > 0.02 * abs(first)
+
+
 def test_samples_are_exact_motions_and_agree_with_rss(slider_crank):
     found = kc.tolerance(slider_crank, LIMITS, of="slider.x", t=0.0, samples=2048)
     drawn = found.drawn
