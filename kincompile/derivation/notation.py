@@ -51,8 +51,13 @@ CONNECTIVES = {"&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}"}
 LONGEST_NUMERATOR = 24
 """Most nodes above a fraction bar, since no line can be broken within a fraction."""
 
-BODY_FIXED = ("s", "v", "omega", "pi")
-"""Letters of vectors given in the frame of a body, which have a prime."""
+BODY_FIXED, OF_BODIES = ("s", "v", "omega", "pi"), ("a", "f", "g", "h")
+"""Letters of vectors given in the frame of a body, the last with the index of a body."""
+
+
+def has_prime(letter: str, index: str) -> bool:
+    """Return whether a vector is given in the frame of a body."""
+    return letter in BODY_FIXED or (letter in OF_BODIES and bool(index))
 
 
 def split_name(name: str) -> tuple[str, str, int]:
@@ -111,7 +116,7 @@ class Notation:
 
     def _named(self, name: str, *, is_vector: bool, is_skew: bool = False) -> Printed:
         letter, index, dots = split_name(name)
-        prime = self._operator("\N{PRIME}") if is_vector and letter in BODY_FIXED else None
+        prime = self._operator("\N{PRIME}") if is_vector and has_prime(letter, index) else None
         base = self._letter(letter, bold=is_vector)
         base = self._dotted(base, dots) if dots else base
         base = self._tilded(base) if is_skew else base
@@ -211,6 +216,9 @@ class Notation:
 
     def _print_Norm(self, expr: ex.Norm) -> Printed:
         return self._row([self._operator("|"), self._short(expr.vector), self._operator("|")])
+
+    def _print_Root(self, expr: ex.Root) -> Printed:
+        return self._root(self._print(expr.square))
 
     def _print_Dot(self, expr: ex.Dot) -> Printed:
         return self._row([self._transposed(expr.left), self._factor(expr.right)])
