@@ -11,24 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from kincompile.calculus.expressions import (
-    Dot,
-    Expression,
-    Number,
-    Power,
-    Product,
-    Rotated,
-    Scalar,
-    Sum,
-    Symbol,
-    Vector,
-    dot,
-    perpendicular,
-    product_of,
-    scaled,
-    split_coefficient,
-    sum_of,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.rotations import PlaneRotation, turned
 from kincompile.derive.collected import factored, like_terms, power, rates_term
 
@@ -40,35 +23,37 @@ if TYPE_CHECKING:
 class CollectedTerm:
     """A product, or a vector with its scalars, times a polynomial in the rates."""
 
-    product: Expression
+    product: ex.Expression
     rates: Polynomial
 
     @property
-    def factors(self) -> tuple[Scalar, ...]:
+    def factors(self) -> tuple[ex.Scalar, ...]:
         """The terms of the polynomial: numbers with rates."""
         return tuple(rates_term(item, number) for item, number in self.rates.items())
 
     @property
-    def expression(self) -> Expression:
+    def expression(self) -> ex.Expression:
         """The term as a formula."""
-        return times_product(sum_of(self.factors), self.product)
+        return times_product(ex.sum_of(self.factors), self.product)
 
 
-def times_product(factor: Scalar, product: Expression) -> Expression:
+def times_product(factor: ex.Scalar, product: ex.Expression) -> ex.Expression:
     """Return a multiple of a scalar or of a vector."""
-    if isinstance(product, Vector):
-        return scaled(factor, product)
-    assert isinstance(product, Scalar)
+    if isinstance(product, ex.Vector):
+        return ex.scaled(factor, product)
+    assert isinstance(product, ex.Scalar)
     return product * factor
 
 
-def collected(expression: Expression) -> tuple[CollectedTerm, ...]:
+def collected(expression: ex.Expression) -> tuple[CollectedTerm, ...]:
     """Return the terms whose sum is the expression."""
-    found: dict[Expression, Polynomial] = {}
+    found: dict[ex.Expression, Polynomial] = {}
     for others, core, rates in like_terms(expression, {}):
-        factors = (power(_paired(base) if isinstance(base, Dot) else base, n) for base, n in others)
-        number, kept = split_coefficient(product_of(tuple(factors)))
-        product = product_of(kept) if core is None else scaled(product_of(kept), core)
+        factors = (
+            power(_paired(base) if isinstance(base, ex.Dot) else base, n) for base, n in others
+        )
+        number, kept = ex.split_coefficient(ex.product_of(tuple(factors)))
+        product = ex.product_of(kept) if core is None else ex.scaled(ex.product_of(kept), core)
         polynomial = found.setdefault(product, {})
         for item, n in rates.items():
             polynomial[item] = polynomial.get(item, Fraction(0)) + number * n
@@ -76,32 +61,32 @@ def collected(expression: Expression) -> tuple[CollectedTerm, ...]:
     return tuple(CollectedTerm(key, rates) for key, rates in kept_rates.items() if rates)
 
 
-def _paired(product: Dot) -> Scalar:
+def _paired(product: ex.Dot) -> ex.Scalar:
     """Return (R^a A_i u)^T R^b A_j v as u^T R^(b-a) A_ij v: the rotations drawn together."""
     left, right = sorted((product.left, product.right), key=_order)
     match left, right:
-        case (Rotated(PlaneRotation(first), u), Rotated(PlaneRotation(second), v)):
+        case (ex.Rotated(PlaneRotation(first), u), ex.Rotated(PlaneRotation(second), v)):
             quarters = (right.order - left.order) % 4
             if first != second:
-                return dot(u, turned(second - first, v, quarters))
+                return ex.dot(u, turned(second - first, v, quarters))
             for _ in range(quarters):
-                v = perpendicular(v)
-            return dot(u, v)
-    return dot(left, right)
+                v = ex.perpendicular(v)
+            return ex.dot(u, v)
+    return ex.dot(left, right)
 
 
-def _order(vector: Vector) -> tuple[int, str]:
+def _order(vector: ex.Vector) -> tuple[int, str]:
     """Return a key: vectors without a rotation first, then by angle, so that like products meet."""
-    if not isinstance(vector, Rotated):
+    if not isinstance(vector, ex.Rotated):
         return 0, repr(vector)
     (angle,) = vector.rotation.coordinates
-    name = angle.name if isinstance(angle, Symbol) else "~"
+    name = angle.name if isinstance(angle, ex.Symbol) else "~"
     return 1, f"{name} {vector!r}"
 
 
-def perfect_square(rates: Polynomial) -> tuple[Scalar, Scalar, Fraction] | None:
+def perfect_square(rates: Polynomial) -> tuple[ex.Scalar, ex.Scalar, Fraction] | None:
     """Return (a, b, c) where a polynomial is c (a - b)^2 with rates a and b, else None."""
     match factored(rates):
-        case (number, (Power(Sum((a, Product((Number(sign), b)))), 2),)) if sign == -1:
+        case (number, (ex.Power(ex.Sum((a, ex.Product((ex.Number(sign), b)))), 2),)) if sign == -1:
             return a, b, number
     return None

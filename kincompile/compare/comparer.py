@@ -19,14 +19,7 @@ from kincompile.compare.comparison import (
 from kincompile.compare.conventions import OPPOSITE, conventions_found
 from kincompile.compare.dependence import Dependence
 from kincompile.compare.diagnosis import Diagnostician
-from kincompile.compare.fault import (
-    OFFSET,
-    REVERSED,
-    SAME_SPACE,
-    WHOLE_SIGN,
-    WHOLE_TRANSPOSED,
-    WITH_RATES,
-)
+from kincompile.compare.fault import Kind
 from kincompile.compare.forms import OTHER, is_same_space
 from kincompile.compare.matching import Matcher, Matching
 from kincompile.compare.report import Report
@@ -295,9 +288,11 @@ class Comparer:
             plain = self._reference.values(self._subject.states)[name]
             turned = np.swapaxes(plain, -1, -2)
             if values.shape == turned.shape and agrees(values, sizes, turned).all():
-                return Diagnosis(WHOLE_TRANSPOSED, "rows and columns of the matrix are exchanged.")
+                return Diagnosis(
+                    Kind.WHOLE_TRANSPOSED, "rows and columns of the matrix are exchanged."
+                )
             return None
-        kind = {"nu": REVERSED, "gamma": WHOLE_SIGN}.get(name)
+        kind = {"nu": Kind.REVERSED, "gamma": Kind.WHOLE_SIGN}.get(name)
         if kind and np.any(np.abs(right) > ABSOLUTE) and agrees(*written, -right).all():
             text = (
                 f"{name} has the opposite sign throughout; if that is how you define it, state "
@@ -308,7 +303,7 @@ class Comparer:
             for here, there in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[:, :-1], np.s_[:, 1:])):
                 shows = np.any(np.abs(right[there]) > ABSOLUTE)
                 if shows and agrees(values[here], sizes[here], right[there]).all():
-                    return Diagnosis(OFFSET, "each row stands one place from its own.")
+                    return Diagnosis(Kind.OFFSET, "each row stands one place from its own.")
         return None
 
     def _combined(self, block: ConstraintBlock, name: str) -> Diagnosis | None:
@@ -332,7 +327,7 @@ class Comparer:
             sizes = sizes + np.abs(combination) @ np.abs(right)
             if agrees(values, sizes, combination @ right).all():
                 text = "it belongs to the rows of your Phi_q, combinations of the right ones."
-                return Diagnosis(SAME_SPACE, text)
+                return Diagnosis(Kind.SAME_SPACE, text)
         elif name == "Phi_q" and self._quantities[name].takes_states:
             near = self._subject.near(block.rows)
             if near is not None and self._combination(block, near) is not None:
@@ -361,7 +356,7 @@ class Comparer:
     def _unexplained(self, spot: Spot) -> Diagnosis:
         if self._has_rates(spot):
             text = f"rates stand in it; {spot[0]} depends on positions and time alone."
-            return Diagnosis(WITH_RATES, text)
+            return Diagnosis(Kind.WITH_RATES, text)
         if self._verdicts[spot] is Verdict.MANIFOLD:
             text = "right only where the constraints hold; Newton's method needs it elsewhere too."
             return Diagnosis(UNEXPLAINED, text)
@@ -419,4 +414,4 @@ def _same_space(where: str, Phi: str) -> Diagnosis:
         f"only the row spaces agree{where}: the rows are combinations of the right ones, and not "
         f"the derivative of {Phi}, which Newton's method needs."
     )
-    return Diagnosis(SAME_SPACE, text)
+    return Diagnosis(Kind.SAME_SPACE, text)

@@ -15,16 +15,7 @@ import numpy as np
 from kincompile.compare.agreement import ABSOLUTE
 from kincompile.compare.comparison import Diagnosis
 from kincompile.compare.entry_faults import entry_faults
-from kincompile.compare.fault import (
-    LEFT_ZERO,
-    MISSING_TERM,
-    OMISSIONS,
-    OTHER_FORM,
-    SIGN,
-    TERM_SIGN,
-    TRANSPOSED,
-    Fault,
-)
+from kincompile.compare.fault import OMISSIONS, TERM_SIGN, Fault, Kind
 from kincompile.compare.forms import known_forms
 from kincompile.compare.joint_faults import PARTS_OF_GAMMA, Index, JointFaults, NumericFault
 from kincompile.compare.reference import Subject
@@ -119,7 +110,7 @@ class Diagnostician:
         The sign of a whole row is none: that is a way to write it.
         """
         return any(
-            fault.kind != SIGN and len(fault.result) == len(written) and _fits(fault, written)
+            fault.kind != Kind.SIGN and len(fault.result) == len(written) and _fits(fault, written)
             for fault in self._catalogue(block, "Phi_q", form)
         )
 
@@ -190,7 +181,7 @@ class Diagnostician:
                 if not _close(values[:, k, column], right[:, row, column])
             }
             if result and quantity != "Phi":
-                yield Fault(OTHER_FORM, f"it belongs to {text}, and not to your Phi", result)
+                yield Fault(Kind.OTHER_FORM, f"it belongs to {text}, and not to your Phi", result)
 
     def _right(self, quantity: str, form: Form | None) -> Array:
         """Return the right values by row and column of the system."""
@@ -269,17 +260,18 @@ def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
     by_kind: dict[str, NumericFault] = {}
     for fault in faults:
         by_kind.setdefault(fault.kind, fault)
-    if LEFT_ZERO in by_kind and not any(map(np.any, by_kind[LEFT_ZERO].result.values())):
+    if Kind.LEFT_ZERO in by_kind and not any(map(np.any, by_kind[Kind.LEFT_ZERO].result.values())):
         # Zero was written. That a missing term would also give zero is no further explanation.
-        by_kind = {LEFT_ZERO: by_kind[LEFT_ZERO]}
-    if MISSING_TERM in by_kind and OMISSIONS.intersection(by_kind):
-        by_kind[MISSING_TERM] = by_kind.pop(MISSING_TERM)  # last: it says less of the same
-    signs = [fault for fault in faults if fault.kind == SIGN]
-    if TRANSPOSED in by_kind and [fault.text for fault in signs] == [TERM_SIGN]:
+        by_kind = {Kind.LEFT_ZERO: by_kind[Kind.LEFT_ZERO]}
+    if Kind.MISSING_TERM in by_kind and OMISSIONS.intersection(by_kind):
+        # Last: it says less of the same.
+        by_kind[Kind.MISSING_TERM] = by_kind.pop(Kind.MISSING_TERM)
+    signs = [fault for fault in faults if fault.kind == Kind.SIGN]
+    if Kind.TRANSPOSED in by_kind and [fault.text for fault in signs] == [TERM_SIGN]:
         # What a transposed rotation is in one entry: told in one sentence.
-        cause, shown = by_kind[TRANSPOSED], by_kind.pop(SIGN)
+        cause, shown = by_kind[Kind.TRANSPOSED], by_kind.pop(Kind.SIGN)
         text = f"{shown.text}, as where {cause.text}"
-        by_kind[TRANSPOSED] = replace(cause, text=text, detail=shown.detail)
+        by_kind[Kind.TRANSPOSED] = replace(cause, text=text, detail=shown.detail)
     return tuple(
         Diagnosis(fault.kind, f"{fault.text}.", fault.detail)
         for fault in list(by_kind.values())[:MOST_NAMED]

@@ -10,17 +10,7 @@ import numpy as np
 import sympy
 
 from kincompile.compare.agreement import agrees
-from kincompile.compare.fault import (
-    A_TERM,
-    MISSING_FACTOR,
-    MISSING_RATE,
-    MISSING_SQUARE,
-    MIXED_ANGLES,
-    SINE_COSINE,
-    Fault,
-    term_faults,
-    whole_faults,
-)
+from kincompile.compare.fault import A_TERM, Fault, Kind, term_faults, whole_faults
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -60,7 +50,7 @@ def entry_faults(
     ]
     faults = [*whole_faults(quantity, "the entry", lambda factor: factor * entry, printed)]
     text = "sine and cosine are swapped throughout"
-    faults.append(Fault(SINE_COSINE, text, _sine_cosine(entry), printed))
+    faults.append(Fault(Kind.SINE_COSINE, text, _sine_cosine(entry), printed))
     terms = sympy.Add.make_args(entry)
     parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
     replaced = [0] * len(faults)  # number of the part in whose place the result stands
@@ -96,17 +86,17 @@ def _faults_of_term(
     full = str(term)
     yield from term_faults(A_TERM, lambda factor: factor * term, full)
     functions = sorted(term.atoms(sympy.sin, sympy.cos), key=str)
-    yield Fault(SINE_COSINE, "sine and cosine are swapped in a term", _sine_cosine(term), full)
+    yield Fault(Kind.SINE_COSINE, "sine and cosine are swapped in a term", _sine_cosine(term), full)
     for function in functions if len(functions) > 1 else ():
         text = f"sine and cosine of {function.args[0]} are swapped in a term"
         swapped = term.xreplace({function: _sine_cosine(function)})
-        yield Fault(SINE_COSINE, text, swapped, full)
+        yield Fault(Kind.SINE_COSINE, text, swapped, full)
     for angle in angles:
         for other in angles if term.has(angle) else ():
             if other != angle:
                 text = f"{other} stands where {angle} belongs, in a term"
                 mixed = {item: item.xreplace({angle: other}) for item in functions}
-                yield Fault(MIXED_ANGLES, text, term.xreplace(mixed), full)
+                yield Fault(Kind.MIXED_ANGLES, text, term.xreplace(mixed), full)
     yield from _missing_factors(term, full)
 
 
@@ -123,11 +113,11 @@ def _missing_factors(term: sympy.Expr, full: str) -> Iterator[Fault[sympy.Expr]]
     number, _ = term.as_coeff_Mul()
     if abs(number) not in (0, 1, 2):
         text = "a constant factor of a term is missing"
-        yield Fault(MISSING_FACTOR, text, term / abs(number), full)
+        yield Fault(Kind.MISSING_FACTOR, text, term / abs(number), full)
     for factor in sympy.Mul.make_args(term):
         base, exponent = factor.as_base_exp()
         if isinstance(base, sympy.Symbol) and base.name.endswith(rate("")):
-            kind, text = MISSING_RATE, f"a factor {base} is missing in a term"
+            kind, text = Kind.MISSING_RATE, f"a factor {base} is missing in a term"
             if exponent == 2:
-                kind, text = MISSING_SQUARE, f"{base} stands where {base}^2 belongs, in a term"
+                kind, text = Kind.MISSING_SQUARE, f"{base} stands where {base}^2 belongs, in a term"
             yield Fault(kind, text, term / base, full)

@@ -3,57 +3,64 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-SIGN = "sign"
-WHOLE_SIGN = "whole sign"
-REVERSED = "driver's rate reversed"
-LEFT_ZERO = "left zero"
-FACTOR = "factor 2 or 1/2"
-MISSING_TERM = "missing term"
-SINE_COSINE = "sine and cosine swapped"
-TRANSPOSED = "rotation transposed"
-A_FOR_B = "A where B belongs, or B where A"
-MIXED_ANGLES = "phi_i and phi_j mixed"
-MIXED_POINTS = "s_i and s_j mixed"
-XI_ETA = "xi and eta swapped"
-MISSING_FACTOR = "chain-rule factor missing"
-MISSING_SQUARE = "velocity square missing"
-MISSING_RATE = "velocity factor missing"
-MIXED_RATES = "position and velocity mixed"
-MIXED_ORDERS = "derivatives of a function mixed"
-DRIVER_DEGREES = "driver in degrees"
-SECOND_DERIVATIVE = "driver's second derivative forgotten"
-DRIVER_RATE = "driver's rate forgotten"
-BLOCKS = "body blocks swapped"
-ROWS = "rows swapped"
-OFFSET = "rows offset by one"
-WHOLE_TRANSPOSED = "matrix transposed"
-X_AND_Y = "x and y columns swapped"
-E0_LAST = "e0 misplaced"
-TILDE = "sign of the tilde"
-GLOBAL_OMEGA = "global for local omega"
-CROSS_TERM = "cross term 2 Phi_qt q_dot missing"
-QUADRATIC_TERM = "(Phi_q q_dot)_q q_dot missing"
-PHI_TT = "Phi_tt missing"
-WITH_RATES = "rates where none belong"
-SAME_SPACE = "row spaces agree"
-OTHER_FORM = "follows from another Phi"
-WITHOUT = "counted as zero"
-COUPLING = "coupling 2 w (r_j_dot - r_i_dot) missing"
-SQUARES = "w_j^2 - w_i^2 for (w_j - w_i)^2"
+
+class Kind(StrEnum):
+    """The kinds of faults, in a few words."""
+
+    SIGN = "sign"
+    WHOLE_SIGN = "whole sign"
+    REVERSED = "driver's rate reversed"
+    LEFT_ZERO = "left zero"
+    FACTOR = "factor 2 or 1/2"
+    MISSING_TERM = "missing term"
+    SINE_COSINE = "sine and cosine swapped"
+    TRANSPOSED = "rotation transposed"
+    A_FOR_B = "A where B belongs, or B where A"
+    MIXED_ANGLES = "phi_i and phi_j mixed"
+    MIXED_POINTS = "s_i and s_j mixed"
+    XI_ETA = "xi and eta swapped"
+    MISSING_FACTOR = "chain-rule factor missing"
+    MISSING_SQUARE = "velocity square missing"
+    MISSING_RATE = "velocity factor missing"
+    MIXED_RATES = "position and velocity mixed"
+    MIXED_ORDERS = "derivatives of a function mixed"
+    DRIVER_DEGREES = "driver in degrees"
+    SECOND_DERIVATIVE = "driver's second derivative forgotten"
+    DRIVER_RATE = "driver's rate forgotten"
+    BLOCKS = "body blocks swapped"
+    ROWS = "rows swapped"
+    OFFSET = "rows offset by one"
+    WHOLE_TRANSPOSED = "matrix transposed"
+    X_AND_Y = "x and y columns swapped"
+    E0_LAST = "e0 misplaced"
+    TILDE = "sign of the tilde"
+    GLOBAL_OMEGA = "global for local omega"
+    CROSS_TERM = "cross term 2 Phi_qt q_dot missing"
+    QUADRATIC_TERM = "(Phi_q q_dot)_q q_dot missing"
+    PHI_TT = "Phi_tt missing"
+    WITH_RATES = "rates where none belong"
+    SAME_SPACE = "row spaces agree"
+    OTHER_FORM = "follows from another Phi"
+    WITHOUT = "counted as zero"
+    COUPLING = "coupling 2 w (r_j_dot - r_i_dot) missing"
+    SQUARES = "w_j^2 - w_i^2 for (w_j - w_i)^2"
+
 
 A_TERM = "a term"
 """A term of an entry as it is typed; in vectors a term has its name."""
 TERM_SIGN = f"{A_TERM} has the wrong sign"
 
-OMISSIONS = frozenset(
-    {CROSS_TERM, QUADRATIC_TERM, PHI_TT, COUPLING, SECOND_DERIVATIVE, DRIVER_RATE}
-)
+OMISSIONS = frozenset({
+    Kind.CROSS_TERM, Kind.QUADRATIC_TERM, Kind.PHI_TT, Kind.COUPLING, Kind.SECOND_DERIVATIVE,
+    Kind.DRIVER_RATE,
+})  # fmt: skip
 """What a missing term may be called by its place in the derivation."""
 
 Result = TypeVar("Result")
@@ -85,18 +92,18 @@ def whole_faults(
     quantity: str, name: str, multiple: Callable[[Fraction], Result], detail: str = ""
 ) -> Iterator[Fault[Result]]:
     """Yield the faults of a formula as a whole; `multiple` gives it times a factor."""
-    sign = {"nu": REVERSED, "gamma": WHOLE_SIGN}.get(quantity, SIGN)
+    sign = {"nu": Kind.REVERSED, "gamma": Kind.WHOLE_SIGN}.get(quantity, Kind.SIGN)
     yield Fault(sign, f"{name} has the wrong sign", multiple(Fraction(-1)), detail)
-    yield Fault(LEFT_ZERO, f"{name} is left zero", multiple(Fraction(0)), detail)
+    yield Fault(Kind.LEFT_ZERO, f"{name} is left zero", multiple(Fraction(0)), detail)
     for word, factor in (("twice", Fraction(2)), ("half", Fraction(1, 2))):
-        yield Fault(FACTOR, f"{name} is {word} what it should be", multiple(factor), detail)
+        yield Fault(Kind.FACTOR, f"{name} is {word} what it should be", multiple(factor), detail)
 
 
 def term_faults(
     name: str, multiple: Callable[[Fraction], Result], detail: str = ""
 ) -> Iterator[Fault[Result]]:
     """Yield the faults of a term; `multiple` gives the formula with the term times a factor."""
-    yield Fault(MISSING_TERM, f"{name} is missing", multiple(Fraction(0)), detail)
-    yield Fault(SIGN, f"{name} has the wrong sign", multiple(Fraction(-1)), detail)
+    yield Fault(Kind.MISSING_TERM, f"{name} is missing", multiple(Fraction(0)), detail)
+    yield Fault(Kind.SIGN, f"{name} has the wrong sign", multiple(Fraction(-1)), detail)
     for word, factor in (("twice", Fraction(2)), ("half", Fraction(1, 2))):
-        yield Fault(FACTOR, f"{name} is counted {word}", multiple(factor), detail)
+        yield Fault(Kind.FACTOR, f"{name} is counted {word}", multiple(factor), detail)

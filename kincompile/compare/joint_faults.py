@@ -17,27 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.calculus.expressions import (
-    ONE,
-    ZERO,
-    ZERO_VECTOR,
-    Expression,
-    Number,
-    Pi,
-    Power,
-    Product,
-    Rotated,
-    RotationSlope,
-    Scalar,
-    Sum,
-    Symbol,
-    TimeFunction,
-    Vector,
-    VectorSum,
-    VectorSymbol,
-    product_of,
-    split_coefficient,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.calculus.space import EulerRotation, TurnedFrame
 from kincompile.calculus.symbols import PlaneFrame
@@ -48,32 +28,7 @@ from kincompile.compare.collected import (
     perfect_square,
     times_product,
 )
-from kincompile.compare.fault import (
-    A_FOR_B,
-    BLOCKS,
-    COUPLING,
-    CROSS_TERM,
-    DRIVER_DEGREES,
-    E0_LAST,
-    FACTOR,
-    GLOBAL_OMEGA,
-    MISSING_SQUARE,
-    MIXED_ANGLES,
-    MIXED_POINTS,
-    MIXED_RATES,
-    PHI_TT,
-    QUADRATIC_TERM,
-    ROWS,
-    SIGN,
-    SINE_COSINE,
-    SQUARES,
-    TILDE,
-    TRANSPOSED,
-    X_AND_Y,
-    Fault,
-    term_faults,
-    whole_faults,
-)
+from kincompile.compare.fault import Fault, Kind, term_faults, whole_faults
 from kincompile.compare.formula_faults import (
     Symbols,
     everywhere,
@@ -99,18 +54,18 @@ if TYPE_CHECKING:
 
 HALF = Fraction(1, 2)
 PARTS_OF_GAMMA = (
-    (QUADRATIC_TERM, "-(Phi_q q_dot)_q q_dot is missing"),
-    (CROSS_TERM, "-2 Phi_qt q_dot is missing"),
-    (PHI_TT, "-Phi_tt is missing"),
+    (Kind.QUADRATIC_TERM, "-(Phi_q q_dot)_q q_dot is missing"),
+    (Kind.CROSS_TERM, "-2 Phi_qt q_dot is missing"),
+    (Kind.PHI_TT, "-Phi_tt is missing"),
 )
 """The parts of gamma in order, and the faults of leaving them out."""
-_ANY = VectorSymbol("any")
+_ANY = ex.VectorSymbol("any")
 """Stands for the vector that a rotation turns, whichever it is."""
 
 Index = tuple[int, int]
 """Row and column of an entry; the column of a vector is 0."""
 
-Parts = Mapping[Index, Expression]
+Parts = Mapping[Index, ex.Expression]
 """Formulas by number of the row block and of the coordinate."""
 
 NumericFault = Fault[Mapping[Index, "Array"]]
@@ -118,12 +73,12 @@ NumericFault = Fault[Mapping[Index, "Array"]]
 
 
 _ORDERS = {
-    2: [(X_AND_Y, "x and y are swapped in the columns", [1, 0])],
+    2: [(Kind.X_AND_Y, "x and y are swapped in the columns", [1, 0])],
     3: [
-        (X_AND_Y, f"{'xyz'[a]} and {'xyz'[b]} are swapped in the columns", order)
+        (Kind.X_AND_Y, f"{'xyz'[a]} and {'xyz'[b]} are swapped in the columns", order)
         for a, b, order in ((0, 1, [1, 0, 2]), (0, 2, [2, 1, 0]), (1, 2, [0, 2, 1]))
     ],
-    4: [(E0_LAST, "e0 stands last in the columns", [1, 2, 3, 0])],
+    4: [(Kind.E0_LAST, "e0 stands last in the columns", [1, 2, 3, 0])],
 }
 """Wrong orders of the columns of a vector coordinate, by the number of its components."""
 
@@ -195,7 +150,7 @@ class JointFaults:
             for k, item in enumerate(entries)
         }
 
-    def _values(self, place: Index, expression: Expression) -> Array:
+    def _values(self, place: Index, expression: ex.Expression) -> Array:
         """Return the values of a part, shape (N, rows, columns)."""
         b, k = place
         with np.errstate(all="ignore"):
@@ -210,7 +165,7 @@ class JointFaults:
         """Return row and column of the first entry of a part."""
         b, k = place
         size = self._joint.template.dimension
-        rows = sum(size if isinstance(block.Phi, Vector) else 1 for block in self._blocks[:b])
+        rows = sum(size if isinstance(block.Phi, ex.Vector) else 1 for block in self._blocks[:b])
         coordinates = self._joint.template.coordinates[:k] if self._quantity == "Phi_q" else ()
         return rows, sum(item.size for item in coordinates)
 
@@ -232,17 +187,19 @@ class JointFaults:
         if isinstance(self._joint.written, AbsoluteAngle | RelativeAngle):
             yield from _in_degrees(self._parts)
 
-    def _faults_of_part(self, place: Index, expression: Expression) -> Iterator[Fault[Expression]]:
+    def _faults_of_part(
+        self, place: Index, expression: ex.Expression
+    ) -> Iterator[Fault[ex.Expression]]:
         name = self._quantity
         if name == "Phi_q":
             name = f"the derivative by {described(self._joint.template.coordinates[place[1]])}"
-        zero = ZERO_VECTOR if isinstance(expression, Vector) else ZERO
+        zero = ex.ZERO_VECTOR if isinstance(expression, ex.Vector) else ex.ZERO
         yield from whole_faults(
             self._quantity, name, lambda factor: times(factor, expression) if factor else zero
         )
         yield from one_place(_joined(expression), self._symbols)
         terms = collected(expression)
-        if isinstance(expression, Scalar) and sum(len(term.rates) for term in terms) > 1:
+        if isinstance(expression, ex.Scalar) and sum(len(term.rates) for term in terms) > 1:
             yield from one_place(_sum(tuple(term.expression for term in terms)), self._symbols)
         if self._quantity == "gamma":
             yield from _wrong_velocities(terms)
@@ -254,11 +211,13 @@ class JointFaults:
         other = {0: 2, 1: 3, 2: 0, 3: 1}
         swapped = {(b, k): self._parts[b, other[k]] for b, k in self._parts if k in other}
         text = "the blocks of bodies i and j are exchanged"
-        yield Fault(BLOCKS, text, swapped)
+        yield Fault(Kind.BLOCKS, text, swapped)
         for b in range(len(self._blocks)):
-            yield Fault(BLOCKS, text, {place: swapped[place] for place in swapped if place[0] == b})
+            yield Fault(
+                Kind.BLOCKS, text, {place: swapped[place] for place in swapped if place[0] == b}
+            )
             angles = {place: swapped[place] for place in ((b, 1), (b, 3))}
-            yield Fault(BLOCKS, "the derivatives by phi_i and phi_j are swapped", angles)
+            yield Fault(Kind.BLOCKS, "the derivatives by phi_i and phi_j are swapped", angles)
 
     def _opposite_rows(self) -> Iterator[NumericFault]:
         """Yield the Jacobians with a row that has another sign than Phi."""
@@ -268,7 +227,7 @@ class JointFaults:
             for signs in (*(1 - 2 * np.eye(count)), -np.ones(count))[count == 1 :]:
                 values = {place: item * signs[:, None] for place, item in own.items()}
                 text = "all its entries have the wrong sign"
-                yield from self._if_different(SIGN, text, values)
+                yield from self._if_different(Kind.SIGN, text, values)
 
     def _exchanged_rows(self) -> Iterator[NumericFault]:
         """Yield a vector with two of its rows in each other's place."""
@@ -279,12 +238,12 @@ class JointFaults:
             swapped[:, [a, b]] = rows[:, [b, a]]
             values = dict(zip(self._right, np.split(swapped, starts, axis=1), strict=True))
             text = f"its rows {a + 1} and {b + 1} are swapped"
-            yield from self._if_different(ROWS, text, values)
+            yield from self._if_different(Kind.ROWS, text, values)
 
     def _exchanged_columns(self) -> Iterator[NumericFault]:
         """Yield the Jacobians with the columns of x and y in each other's place."""
         for k, coordinate in enumerate(self._joint.template.coordinates):
-            if not isinstance(coordinate, VectorSymbol):
+            if not isinstance(coordinate, ex.VectorSymbol):
                 continue
             places = [(b, k) for b in range(len(self._blocks))]
             for kind, text, order in _ORDERS[coordinate.size]:
@@ -305,20 +264,20 @@ class JointFaults:
         text = "the small rotations are about the global axes, not about those of the body"
         for chosen in (*([place] for place in turned), list(turned)):
             values = {place: turned[place] for place in chosen}
-            yield from self._if_different(GLOBAL_OMEGA, text, values)
+            yield from self._if_different(Kind.GLOBAL_OMEGA, text, values)
 
 
 def _faults_everywhere(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
     """Yield the formulas with one symbol mistaken for another wherever it occurs."""
-    leaves: dict[Expression, None] = {}
+    leaves: dict[ex.Expression, None] = {}
 
-    def collect(node: Expression) -> None:
+    def collect(node: ex.Expression) -> None:
         match node:
-            case VectorSymbol():
+            case ex.VectorSymbol():
                 leaves[node] = None
-            case Rotated(PlaneRotation(Symbol())):
+            case ex.Rotated(PlaneRotation(ex.Symbol())):
                 leaves[replace(node, vector=_ANY)] = None
-            case Rotated(EulerRotation(), _, ()):
+            case ex.Rotated(EulerRotation(), _, ()):
                 leaves[replace(node, vector=_ANY)] = None
 
     _changed(parts, collect)
@@ -332,73 +291,76 @@ def _faults_everywhere(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]
 def _same_slips(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
     """Yield the formulas with the same slip for every body."""
 
-    def slip(kind: str, node: Expression) -> Expression | None:
-        if kind == MISSING_SQUARE:
-            is_square = isinstance(node, Power) and node.exponent == 2 and is_rate(node)
-            return node.base if isinstance(node, Power) and is_square else None
-        if not isinstance(node, Rotated | RotationSlope | VectorSymbol):
+    def slip(kind: str, node: ex.Expression) -> ex.Expression | None:
+        if kind == Kind.MISSING_SQUARE:
+            is_square = isinstance(node, ex.Power) and node.exponent == 2 and is_rate(node)
+            return node.base if isinstance(node, ex.Power) and is_square else None
+        if not isinstance(node, ex.Rotated | ex.RotationSlope | ex.VectorSymbol):
             return None
         return next((item.result for item in swaps(node, symbols) if item.kind == kind), None)
 
     texts = {
-        A_FOR_B: "A stands where B belongs, or B where A, for every body",
-        TRANSPOSED: "the rotations of all bodies are transposed",
-        SINE_COSINE: "sine and cosine are swapped for every body",
-        TILDE: "the sign of the tilde is wrong for every body",
-        GLOBAL_OMEGA: "the global omega stands where the body's own omega' belongs, for every body",
-        MISSING_SQUARE: "w stands where w^2 belongs, for every body",
+        Kind.A_FOR_B: "A stands where B belongs, or B where A, for every body",
+        Kind.TRANSPOSED: "the rotations of all bodies are transposed",
+        Kind.SINE_COSINE: "sine and cosine are swapped for every body",
+        Kind.TILDE: "the sign of the tilde is wrong for every body",
+        Kind.GLOBAL_OMEGA: "the global omega stands where the body's own omega' belongs, "
+        "for every body",
+        Kind.MISSING_SQUARE: "w stands where w^2 belongs, for every body",
     }
     for kind, text in texts.items():
         yield Fault(kind, text, _changed(parts, partial(slip, kind)))
     for belongs, stands in (("positions", "velocities"), ("velocities", "positions")):
         text = f"{stands} stand where {belongs} belong, for every body"
-        yield Fault(MIXED_RATES, text, _changed(parts, partial(_instead, belongs)))
+        yield Fault(Kind.MIXED_RATES, text, _changed(parts, partial(_instead, belongs)))
 
 
-def _instead(belongs: str, node: Expression) -> Expression | None:
+def _instead(belongs: str, node: ex.Expression) -> ex.Expression | None:
     """Return the velocity of a position, or the position of a velocity that belongs there."""
     other = rate_or_position(node)
-    is_velocity = isinstance(node, VectorSymbol) and node.name.endswith(rate(""))
+    is_velocity = isinstance(node, ex.VectorSymbol) and node.name.endswith(rate(""))
     return other if is_velocity == (belongs == "velocities") else None
 
 
 def _in_degrees(parts: Parts) -> Iterator[Fault[Parts]]:
     """Yield the formulas of a driven angle whose author mixes degrees and radians."""
-    per_degree = (Number(Fraction(1, 180)), Pi())
+    per_degree = (ex.Number(Fraction(1, 180)), ex.Pi())
     for text, factors in (
         (
             "the driver is in degrees, and the angle in radians",
-            (Number(Fraction(180)), Power(Pi(), -1)),
+            (ex.Number(Fraction(180)), ex.Power(ex.Pi(), -1)),
         ),
         ("the driver is in radians already: pi/180 is too much", per_degree),
     ):
 
-        def change(node: Expression, factors: tuple[Scalar, ...] = factors) -> Expression | None:
-            return Product((*factors, node)) if isinstance(node, TimeFunction) else None
+        def change(
+            node: ex.Expression, factors: tuple[ex.Scalar, ...] = factors
+        ) -> ex.Expression | None:
+            return ex.Product((*factors, node)) if isinstance(node, ex.TimeFunction) else None
 
-        yield Fault(DRIVER_DEGREES, text, _changed(parts, change))
+        yield Fault(Kind.DRIVER_DEGREES, text, _changed(parts, change))
 
 
-def _joined(expression: Expression) -> Expression:
+def _joined(expression: ex.Expression) -> ex.Expression:
     """Return a sum with equal terms joined, as it is written: one slip is in both of them."""
-    if not isinstance(expression, Sum):
+    if not isinstance(expression, ex.Sum):
         return expression
-    numbers: dict[tuple[Scalar, ...], Fraction] = {}
+    numbers: dict[tuple[ex.Scalar, ...], Fraction] = {}
     for term in expression.terms:
-        number, factors = split_coefficient(term)
+        number, factors = ex.split_coefficient(term)
         numbers[tuple(factors)] = numbers.get(tuple(factors), Fraction(0)) + number
-    return Sum(tuple(product_of((Number(n), *rest)) for rest, n in numbers.items() if n))
+    return ex.Sum(tuple(ex.product_of((ex.Number(n), *rest)) for rest, n in numbers.items() if n))
 
 
-def _changed(parts: Parts, change: Callable[[Expression], Expression | None]) -> Parts:
+def _changed(parts: Parts, change: Callable[[ex.Expression], ex.Expression | None]) -> Parts:
     return {place: everywhere(item, change) for place, item in parts.items()}
 
 
-def _replaced(leaf: Expression, new: Expression, node: Expression) -> Expression | None:
+def _replaced(leaf: ex.Expression, new: ex.Expression, node: ex.Expression) -> ex.Expression | None:
     """Return the replacement of a vector, or of a rotation whichever vector it turns."""
-    if not isinstance(leaf, Rotated):
+    if not isinstance(leaf, ex.Rotated):
         return new if node == leaf else None
-    if isinstance(node, Rotated) and replace(node, vector=_ANY) == leaf:
+    if isinstance(node, ex.Rotated) and replace(node, vector=_ANY) == leaf:
         return everywhere(new, lambda inner: node.vector if inner == _ANY else None)
     return None
 
@@ -406,77 +368,83 @@ def _replaced(leaf: Expression, new: Expression, node: Expression) -> Expression
 def _exchanged_names(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
     """Yield the formulas with two names exchanged wherever they occur."""
 
-    def angles(node: Expression) -> Expression | None:
+    def angles(node: ex.Expression) -> ex.Expression | None:
         match node:
-            case Rotated(PlaneRotation(Symbol(name))) if other := symbols.other_angle(name):
-                return replace(node, rotation=PlaneRotation(Symbol(other)))
+            case ex.Rotated(PlaneRotation(ex.Symbol(name))) if other := symbols.other_angle(name):
+                return replace(node, rotation=PlaneRotation(ex.Symbol(other)))
         return None
 
-    def points(node: Expression) -> Expression | None:
-        if isinstance(node, VectorSymbol) and (partner := symbols.partners.get(node.name)):
-            return VectorSymbol(partner, node.size)
+    def points(node: ex.Expression) -> ex.Expression | None:
+        if isinstance(node, ex.VectorSymbol) and (partner := symbols.partners.get(node.name)):
+            return ex.VectorSymbol(partner, node.size)
         return None
 
     if symbols.angles == {"phi_i", "phi_j"}:
         text = "phi_i and phi_j are exchanged throughout"
-        yield Fault(MIXED_ANGLES, text, _changed(parts, angles))
+        yield Fault(Kind.MIXED_ANGLES, text, _changed(parts, angles))
     text = "the points of bodies i and j are exchanged throughout"
-    yield Fault(MIXED_POINTS, text, _changed(parts, points))
+    yield Fault(Kind.MIXED_POINTS, text, _changed(parts, points))
 
 
-def _missing_parts_of_gamma(block: RowBlock) -> Iterator[Fault[Expression]]:
+def _missing_parts_of_gamma(block: RowBlock) -> Iterator[Fault[ex.Expression]]:
     """Yield gamma without one of its three parts, or with the cross term taken once."""
     for k, (kind, text) in enumerate(PARTS_OF_GAMMA):
         rest = (*block.gamma_terms[:k], *block.gamma_terms[k + 1 :])
         # Without its only term gamma is left zero, which has a name already.
-        if any(term not in (ZERO, ZERO_VECTOR) for term in rest):
+        if any(term not in (ex.ZERO, ex.ZERO_VECTOR) for term in rest):
             yield Fault(kind, text, _sum(rest))
     quadratic, cross, second = block.gamma_terms
     once = _sum((quadratic, times(HALF, cross), second))
-    yield Fault(FACTOR, "the 2 of 2 Phi_qt q_dot is missing", once)
+    yield Fault(Kind.FACTOR, "the 2 of 2 Phi_qt q_dot is missing", once)
 
 
-def _sum(terms: tuple[Expression, ...]) -> Expression:
+def _sum(terms: tuple[ex.Expression, ...]) -> ex.Expression:
     """Return a sum as it stands, of vectors or of scalars."""
-    vectors = tuple(item for item in terms if isinstance(item, Vector))
+    vectors = tuple(item for item in terms if isinstance(item, ex.Vector))
     return (
-        VectorSum(vectors)
+        ex.VectorSum(vectors)
         if vectors
-        else Sum(tuple(item for item in terms if isinstance(item, Scalar)))
+        else ex.Sum(tuple(item for item in terms if isinstance(item, ex.Scalar)))
     )
 
 
-def _wrong_velocities(terms: tuple[CollectedTerm, ...]) -> Iterator[Fault[Expression]]:
+def _wrong_velocities(terms: tuple[CollectedTerm, ...]) -> Iterator[Fault[ex.Expression]]:
     """Yield gamma with faults in its velocities, as it is printed."""
     names = ("r_i_dot", "r_j_dot")
     coupled = [term for term in terms if any(name in repr(term.product) for name in names)]
     rest = tuple(term.expression for term in terms if term not in coupled)
     if coupled and rest:
         text = "the terms with w and r_j_dot - r_i_dot are missing"
-        yield Fault(COUPLING, text, _sum(rest))
+        yield Fault(Kind.COUPLING, text, _sum(rest))
         halves = (times(HALF, term.expression) for term in coupled)
-        yield Fault(FACTOR, "the 2 of 2 w (r_j_dot - r_i_dot) is missing", _sum((*rest, *halves)))
+        yield Fault(
+            Kind.FACTOR, "the 2 of 2 w (r_j_dot - r_i_dot) is missing", _sum((*rest, *halves))
+        )
     for term in terms:
         if square := perfect_square(term.rates):
             others = tuple(item.expression for item in terms if item is not term)
             yield from _wrong_squares(others, term, square)
-    parts: dict[Scalar, list[Expression]] = {}
+    parts: dict[ex.Scalar, list[ex.Expression]] = {}
     for product, factor in ((term.product, factor) for term in terms for factor in term.factors):
         parts.setdefault(_velocities(factor), []).append(times_product(factor, product))
     for velocity, own in parts.items() if len(parts) > 1 else ():
-        if velocity != ONE:
+        if velocity != ex.ONE:
             kept = [item for other, items in parts.items() if other != velocity for item in items]
             multiple = partial(_plus_multiple, tuple(kept), _sum(tuple(own)))
             yield from term_faults(f"the part with {described(velocity)}", multiple)
 
 
-def _plus_multiple(kept: tuple[Expression, ...], own: Expression, factor: Fraction) -> Expression:
+def _plus_multiple(
+    kept: tuple[ex.Expression, ...], own: ex.Expression, factor: Fraction
+) -> ex.Expression:
     return _sum((*kept, times(factor, own)) if factor else kept)
 
 
 def _wrong_squares(
-    others: tuple[Expression, ...], term: CollectedTerm, square: tuple[Scalar, Scalar, Fraction]
-) -> Iterator[Fault[Expression]]:
+    others: tuple[ex.Expression, ...],
+    term: CollectedTerm,
+    square: tuple[ex.Scalar, ex.Scalar, Fraction],
+) -> Iterator[Fault[ex.Expression]]:
     """Yield gamma with a wrong square of the difference of two velocities a and b."""
     a, b, c = square
     one, other = described(a), described(b)
@@ -487,10 +455,10 @@ def _wrong_squares(
         ("the mixed term of {} is missing", a**2 + b**2),
     ):
         result = _sum((*others, times_product(c * wrong, term.product)))
-        yield Fault(SQUARES, text.format(f"({one} - {other})^2"), result)
+        yield Fault(Kind.SQUARES, text.format(f"({one} - {other})^2"), result)
 
 
-def _velocities(term: Scalar) -> Scalar:
+def _velocities(term: ex.Scalar) -> ex.Scalar:
     """Return the product of the angular velocities in a term."""
-    _, factors = split_coefficient(term)
-    return product_of(tuple(factor for factor in factors if is_rate(factor)))
+    _, factors = ex.split_coefficient(term)
+    return ex.product_of(tuple(factor for factor in factors if is_rate(factor)))

@@ -14,7 +14,7 @@ import numpy as np
 
 from kincompile.compare.agreement import ABSOLUTE, OF_TERMS, agrees
 from kincompile.compare.comparison import ComparedEntry, Diagnosis, Difference, Verdict
-from kincompile.compare.fault import MISSING_RATE, SIGN, WITHOUT, Fault, term_faults, whole_faults
+from kincompile.compare.fault import Fault, Kind, term_faults, whole_faults
 from kincompile.model.matrices import load_entries
 from kincompile.model.resolve import title_of
 from kincompile.quantities import quantity_named
@@ -138,13 +138,13 @@ class LoadComparer:
         yield from term_faults(f"what {title} adds to {name}", with_factor)
         still = replace(self.states, q_dot=0 * self.states.q_dot)
         text = f"terms with rates of {title} are missing in {name}"
-        yield Fault(MISSING_RATE, text, total - own + self._added(name, load, still))
+        yield Fault(Kind.MISSING_RATE, text, total - own + self._added(name, load, still))
         for argument, zero, reverse in _changes(load):
             without, opposite = (self._added(name, item, self.states) for item in (zero, reverse))
             text = f"{title}: {argument} is counted as zero in {name}"
-            yield Fault(WITHOUT, text, total - own + without)
+            yield Fault(Kind.WITHOUT, text, total - own + without)
             text = f"{title}: {argument} has the wrong sign in {name}"
-            yield Fault(SIGN, text, total - own + opposite)
+            yield Fault(Kind.SIGN, text, total - own + opposite)
 
     def _added(self, name: str, load: AppliedLoad, states: States) -> Array:
         """Return what a load adds at states, (N, rows, columns)."""

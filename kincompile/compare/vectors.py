@@ -11,23 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.expand import Expansion, cross_product
-from kincompile.calculus.expressions import (
-    Angle,
-    Circular,
-    Cross,
-    Dot,
-    Norm,
-    Perpendicular,
-    Power,
-    Product,
-    Rotated,
-    Scaled,
-    Sum,
-    TimesG,
-    VectorSum,
-    VectorSymbol,
-)
 from kincompile.calculus.space import EulerRotation
 from kincompile.compare.reference import Values
 from kincompile.derive.derivation import derive
@@ -40,39 +25,28 @@ if TYPE_CHECKING:
 
     import sympy
 
-    from kincompile.calculus.expressions import (
-        Components,
-        Expression,
-        ProfileFunction,
-        Rotation,
-        Scalar,
-        Symbol,
-        TimeFunction,
-        Value,
-        Vector,
-    )
     from kincompile.compare.reference import Reference
     from kincompile.compare.states import Array, States
     from kincompile.model.resolve import Joint
 
 _COMPOUND = (
-    Angle,
-    Circular,
-    Cross,
-    Dot,
-    Norm,
-    Perpendicular,
-    Power,
-    Product,
-    Rotated,
-    Scaled,
-    Sum,
-    TimesG,
-    VectorSum,
+    ex.Angle,
+    ex.Circular,
+    ex.Cross,
+    ex.Dot,
+    ex.Norm,
+    ex.Perpendicular,
+    ex.Power,
+    ex.Product,
+    ex.Rotated,
+    ex.Scaled,
+    ex.Sum,
+    ex.TimesG,
+    ex.VectorSum,
 )
 
 
-class Exchanged(VectorSymbol):
+class Exchanged(ex.VectorSymbol):
     """A body-fixed vector whose components xi and eta are exchanged: a fault."""
 
     __slots__ = ()
@@ -87,11 +61,11 @@ class WrongTilde(EulerRotation):
 
     def components(
         self,
-        entries: Components,
-        vector: Components,
-        along: tuple[Components, ...],
-        expand: Callable[[Expression], Components],
-    ) -> Components:
+        entries: ex.Components,
+        vector: ex.Components,
+        along: tuple[ex.Components, ...],
+        expand: Callable[[ex.Expression], ex.Components],
+    ) -> ex.Components:
         """Return A v as it is, of B(p, v) w the wrong one."""
         right = EulerRotation.components(self, entries, vector, along, expand)
         if not along:
@@ -110,41 +84,41 @@ class NumericEnvironment:
         self._reference = reference
         self._states = states
 
-    def _number(self, expression: sympy.Expr) -> Value:
+    def _number(self, expression: sympy.Expr) -> ex.Value:
         values, _ = self._reference.evaluate([expression], self._states)
         return values[:, 0]
 
-    def number(self, value: Fraction) -> Value:
+    def number(self, value: Fraction) -> ex.Value:
         """Return an exact number."""
         return np.full(len(self._states), float(value))
 
-    def pi(self) -> Value:
+    def pi(self) -> ex.Value:
         """Return pi."""
         return np.full(len(self._states), np.pi)
 
-    def symbol(self, symbol: Symbol) -> Value:
+    def symbol(self, symbol: ex.Symbol) -> ex.Value:
         """Return a coordinate, a rate or a scalar attribute."""
         return self._number(self._symbolic.symbol(symbol))
 
-    def vector(self, symbol: VectorSymbol) -> Components:
+    def vector(self, symbol: ex.VectorSymbol) -> ex.Components:
         """Return a position, a velocity or a body-fixed vector; its components may be exchanged."""
-        plain = VectorSymbol(symbol.name, symbol.size)
+        plain = ex.VectorSymbol(symbol.name, symbol.size)
         components = tuple(self._number(item) for item in self._symbolic.vector(plain))
         return components[::-1] if isinstance(symbol, Exchanged) else components
 
-    def time_function(self, function: TimeFunction) -> Value:
+    def time_function(self, function: ex.TimeFunction) -> ex.Value:
         """Return C(t) or one of its derivatives."""
         return self._number(self._symbolic.time_function(function))
 
-    def profile(self, profile: ProfileFunction) -> Value:
+    def profile(self, profile: ex.ProfileFunction) -> ex.Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
         return self._number(self._symbolic.profile(profile))
 
-    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
+    def entries(self, rotation: ex.Rotation, expand: Expansion) -> ex.Components:
         """Return the numbers of a rotation that all vectors share."""
         return expand.entries(rotation)
 
-    def call(self, function: str, *values: Value) -> Value:
+    def call(self, function: str, *values: ex.Value) -> ex.Value:
         """Return an elementary function."""
         return getattr(np, {"atan2": "arctan2"}.get(function, function))(*values)
 
@@ -158,18 +132,18 @@ class NumericExpansion(Expansion):
 
     def __init__(self, joint: Joint, reference: Reference, states: States) -> None:
         super().__init__(NumericEnvironment(joint, reference, states), joint.template.dimension)
-        self._known: dict[int, tuple[Expression, Any]] = {}
+        self._known: dict[int, tuple[ex.Expression, Any]] = {}
 
-    def scalar(self, expression: Scalar) -> Value:
+    def scalar(self, expression: ex.Scalar) -> ex.Value:
         """Return the value of a scalar expression."""
         if isinstance(expression, _COMPOUND):
             return self._kept(expression, self._scalar)
         return super().scalar(expression)
 
-    def vector(self, expression: Vector) -> Components:
+    def vector(self, expression: ex.Vector) -> ex.Components:
         """Return the components of a vector expression."""
         if isinstance(expression, _COMPOUND):
-            components: Components = self._kept(expression, self._vector)
+            components: ex.Components = self._kept(expression, self._vector)
             return components
         return super().vector(expression)
 
@@ -179,12 +153,12 @@ class NumericExpansion(Expansion):
         return self._known[id(expression)][1]
 
 
-def component_values(expression: Expression, expansion: Expansion) -> Array:
+def component_values(expression: ex.Expression, expansion: Expansion) -> Array:
     """Return the values of an expression, shape (N, components)."""
     return np.stack(expansion.components(expression), axis=-1)
 
 
-def column_values(columns: Iterable[Expression], expansion: Expansion) -> Array:
+def column_values(columns: Iterable[ex.Expression], expansion: Expansion) -> Array:
     """Return columns of Phi_q side by side, shape (N, rows, columns)."""
     return np.stack([component_values(column, expansion) for column in columns], axis=-1)
 

@@ -5,29 +5,7 @@ from __future__ import annotations
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any
 
-from kincompile.calculus.expressions import (
-    ONE,
-    ZERO,
-    ZERO_VECTOR,
-    Angle,
-    Basis,
-    Circular,
-    Cross,
-    Dot,
-    Expression,
-    Number,
-    Power,
-    Product,
-    Rotated,
-    RotationSlope,
-    Scalar,
-    Scaled,
-    Sum,
-    Symbol,
-    Vector,
-    VectorSum,
-    VectorSymbol,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.calculus.space import EulerRotation, TurnedFrame
 from kincompile.derivation.document import Math
@@ -51,10 +29,10 @@ if TYPE_CHECKING:
     from kincompile.derivation.formulas import Formula
     from kincompile.derive.rules import Step
 
-_PHI = Symbol("phi")
+_PHI = ex.Symbol("phi")
 _A, _B = Glyph("A"), Glyph("B")
-_TURNING = RotationSlope(
-    EulerRotation(VectorSymbol("p", 4)), VectorSymbol("omega", 3), is_small=True
+_TURNING = ex.RotationSlope(
+    EulerRotation(ex.VectorSymbol("p", 4)), ex.VectorSymbol("omega", 3), is_small=True
 )
 """A omega'~."""
 
@@ -68,23 +46,28 @@ RULES: Mapping[Rule, Runs] = {
     Rule.SLOPE: ("d(B(p, s) w) = B(w, s) dp",),
     Rule.TURN: (Math(Equated((Glyph("A", dots=1), _TURNING))),),
     Rule.ANGLE: ("d atan2(s, c) = (c ds - s dc)/(s² + c²)",),
-    Rule.DRIVER: ("driver, a function of ", Math(Symbol("t"))),
+    Rule.DRIVER: ("driver, a function of ", Math(ex.Symbol("t"))),
     Rule.PROFILE: ("profile, chain rule",),
 }
 """The rules worth a line; that a constant has no derivative is not."""
 
 
-def parts(expression: Any) -> Iterator[Expression]:
+def parts(expression: Any) -> Iterator[ex.Expression]:
     """Yield an expression and everything it is made of, outside in."""
     yield expression
     match expression:
-        case Sum(items) | VectorSum(items) | Product(items):
-            inner: tuple[Expression, ...] = items
-        case Dot(left, right) | Scaled(left, right) | Angle(left, right) | Cross(left, right):
+        case ex.Sum(items) | ex.VectorSum(items) | ex.Product(items):
+            inner: tuple[ex.Expression, ...] = items
+        case (
+            ex.Dot(left, right)
+            | ex.Scaled(left, right)
+            | ex.Angle(left, right)
+            | ex.Cross(left, right)
+        ):
             inner = (left, right)
-        case Power(base, _) | Circular(_, base):
+        case ex.Power(base, _) | ex.Circular(_, base):
             inner = (base,)
-        case Rotated(rotation, vector):
+        case ex.Rotated(rotation, vector):
             inner = (*rotation.coordinates, vector)
         case other:
             inner = (other.vector,) if hasattr(other, "vector") else ()
@@ -92,57 +75,57 @@ def parts(expression: Any) -> Iterator[Expression]:
         yield from parts(item)
 
 
-def abbreviations(template: Template) -> dict[Expression, Glyph]:
+def abbreviations(template: Template) -> dict[ex.Expression, Glyph]:
     """Name what occurs again and again: the distance vector d, the angle of a gear, their rates."""
     found = [item for Phi in template.Phi for item in parts(Phi)]
     separations = list(dict.fromkeys(v for item in found for v in _separations(item)))
     q_dot = template.motion
-    names: dict[Expression, Glyph] = {}
+    names: dict[ex.Expression, Glyph] = {}
     for k, vector in enumerate(separations, 1):
         index = str(k) if len(separations) > 1 else ""
         names[vector] = Glyph("d", index)
         names[along(vector, q_dot)] = Glyph("d", index, dots=1)
     for item in found:
         match item:
-            case Rotated(PlaneRotation(angle), Basis()) if not isinstance(angle, Symbol):
+            case ex.Rotated(PlaneRotation(angle), ex.Basis()) if not isinstance(angle, ex.Symbol):
                 names[angle] = Glyph("vartheta", bold=False)
                 names[along(angle, q_dot)] = Glyph("vartheta", dots=1, bold=False)
     return names
 
 
-def _separations(expression: Expression) -> Iterator[VectorSum]:
+def _separations(expression: ex.Expression) -> Iterator[ex.VectorSum]:
     """Yield the sums with a position in them that a scalar product has as a factor."""
-    if isinstance(expression, Dot):
+    if isinstance(expression, ex.Dot):
         for side in (expression.left, expression.right):
-            if isinstance(side, VectorSum) and _has_position(side):
+            if isinstance(side, ex.VectorSum) and _has_position(side):
                 yield side
 
 
-def _has_position(vector: VectorSum) -> bool:
-    return any(isinstance(term, VectorSymbol) for term in vector.terms)
+def _has_position(vector: ex.VectorSum) -> bool:
+    return any(isinstance(term, ex.VectorSymbol) for term in vector.terms)
 
 
-def is_zero(entry: Expression) -> bool:
+def is_zero(entry: ex.Expression) -> bool:
     """Return whether an expression is zero as it stands."""
-    return entry in (ZERO, ZERO_VECTOR)
+    return entry in (ex.ZERO, ex.ZERO_VECTOR)
 
 
-def block_entry(entry: Expression, coordinate: Expression, Phi: Expression) -> Formula:
+def block_entry(entry: ex.Expression, coordinate: ex.Expression, Phi: ex.Expression) -> Formula:
     """Return an entry of Phi_q as the textbook writes it: k I, a row u^T, or the entry itself."""
     if is_zero(entry):
-        return ZERO_BLOCK if isinstance(coordinate, Vector) else entry
-    if isinstance(coordinate, Symbol):
+        return ZERO_BLOCK if isinstance(coordinate, ex.Vector) else entry
+    if isinstance(coordinate, ex.Symbol):
         return entry
-    if isinstance(Phi, Vector):
-        return _times_identity(entry) if isinstance(entry, Scalar) else entry
-    assert isinstance(entry, Vector)
+    if isinstance(Phi, ex.Vector):
+        return _times_identity(entry) if isinstance(entry, ex.Scalar) else entry
+    assert isinstance(entry, ex.Vector)
     return Transposed(entry)
 
 
-def _times_identity(factor: Scalar) -> Formula:
-    if factor == ONE:
+def _times_identity(factor: ex.Scalar) -> Formula:
+    if factor == ex.ONE:
         return IDENTITY
-    return Joined(("-", IDENTITY)) if factor == -ONE else Joined((factor, IDENTITY))
+    return Joined(("-", IDENTITY)) if factor == -ex.ONE else Joined((factor, IDENTITY))
 
 
 def block_columns(template: Template) -> list[tuple[Formula, slice]]:
@@ -176,23 +159,23 @@ def telling(steps: Sequence[Step]) -> list[Step]:
     return list(dict.fromkeys(kept))
 
 
-def _is_multiple(expression: Expression) -> bool:
+def _is_multiple(expression: ex.Expression) -> bool:
     """Return whether an expression is a number times something: no rule worth a line."""
     match expression:
-        case Scaled(Number(), _) | Product((Number(), _)):
+        case ex.Scaled(ex.Number(), _) | ex.Product((ex.Number(), _)):
             return True
     return False
 
 
-def known_vectors(template: Template) -> list[Vector]:
+def known_vectors(template: Template) -> list[ex.Vector]:
     """Return the turned points and directions that occur, A_i s_i before B_i s_i."""
-    found: dict[Rotated, None] = {}
+    found: dict[ex.Rotated, None] = {}
     for Phi, row in zip(template.Phi, partials(template), strict=True):
         for expression in (Phi, *(partial.entry for partial in row)):
             for item in parts(expression):
                 match item:
-                    case Rotated(PlaneRotation(Symbol()), VectorSymbol()):
+                    case ex.Rotated(PlaneRotation(ex.Symbol()), ex.VectorSymbol()):
                         found[item] = None
-                    case Rotated(EulerRotation(), VectorSymbol(), ()):
+                    case ex.Rotated(EulerRotation(), ex.VectorSymbol(), ()):
                         found[item] = None
     return [*sorted(found, key=lambda item: item.order)]

@@ -11,30 +11,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from kincompile.calculus.expressions import (
-    ONE,
-    Angle,
-    Basis,
-    Circular,
-    Cross,
-    Dot,
-    Norm,
-    Number,
-    Perpendicular,
-    Power,
-    Product,
-    ProfileFunction,
-    Rotated,
-    RotationSlope,
-    RowOfSlope,
-    Scaled,
-    Sum,
-    Symbol,
-    TimeFunction,
-    TimesG,
-    VectorSum,
-    VectorSymbol,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.space import EulerRotation
 from kincompile.derivation.formulas import (
     Call,
@@ -74,8 +51,13 @@ CONNECTIVES = {"&": "\N{LOGICAL AND}", "|": "\N{LOGICAL OR}"}
 LONGEST_NUMERATOR = 24
 """Most nodes above a fraction bar, since no line can be broken within a fraction."""
 
-BODY_FIXED = ("s", "v", "omega", "pi")
-"""Letters of vectors given in the frame of a body, which have a prime."""
+BODY_FIXED, OF_BODIES = ("s", "v", "omega", "pi"), ("a", "f", "g", "h")
+"""Letters of vectors given in the frame of a body, the last with the index of a body."""
+
+
+def has_prime(letter: str, index: str) -> bool:
+    """Return whether a vector is given in the frame of a body."""
+    return letter in BODY_FIXED or (letter in OF_BODIES and bool(index))
 
 
 def split_name(name: str) -> tuple[str, str, int]:
@@ -155,7 +137,7 @@ class Notation:
 
     def _named(self, name: str, *, is_vector: bool, is_skew: bool = False) -> Printed:
         letter, index, dots = split_name(name)
-        prime = self._operator("\N{PRIME}") if is_vector and letter in BODY_FIXED else None
+        prime = self._operator("\N{PRIME}") if is_vector and has_prime(letter, index) else None
         base = self._letter(letter, bold=is_vector)
         base = self._dotted(base, dots) if dots else base
         base = self._tilded(base) if is_skew else base
@@ -168,14 +150,14 @@ class Notation:
         del style
         return self._named(expr.name, is_vector=False)
 
-    def _print_VectorSymbol(self, expr: VectorSymbol) -> Printed:
+    def _print_VectorSymbol(self, expr: ex.VectorSymbol) -> Printed:
         return self._named(expr.name, is_vector=True)
 
-    def _print_TimeFunction(self, expr: TimeFunction) -> Printed:
+    def _print_TimeFunction(self, expr: ex.TimeFunction) -> Printed:
         base = self._letter(expr.name)
         return self._dotted(base, expr.order) if expr.order else base
 
-    def _print_ProfileFunction(self, expr: ProfileFunction) -> Printed:
+    def _print_ProfileFunction(self, expr: ex.ProfileFunction) -> Printed:
         letter, index, _ = split_name(expr.name)
         return self._primed(self._letter(letter), self._index_text(index), expr.order)
 
@@ -183,28 +165,28 @@ class Notation:
         del expr
         return self._letter("pi")
 
-    def _print_Basis(self, expr: Basis) -> Printed:
+    def _print_Basis(self, expr: ex.Basis) -> Printed:
         return self._unit("xyz"[expr.axis] if expr.size < 4 else str(expr.axis))
 
-    def _print_Circular(self, expr: Circular) -> Printed:
+    def _print_Circular(self, expr: ex.Circular) -> Printed:
         return self._row([self._function(expr.name), self._fenced(self._short(expr.argument))])
 
-    def _print_Angle(self, expr: Angle) -> Printed:
+    def _print_Angle(self, expr: ex.Angle) -> Printed:
         parts = [self._short(expr.sine), self._operator(","), self._short(expr.cosine)]
         return self._row([self._function("atan2"), self._fenced(self._row(parts))])
 
     def _unit(self, axis: str) -> Printed:
         return self._scripts(self._letter("e", bold=True), self._index_text(axis), None)
 
-    def _print_Perpendicular(self, expr: Perpendicular) -> Printed:
-        if isinstance(expr.vector, Basis):
+    def _print_Perpendicular(self, expr: ex.Perpendicular) -> Printed:
+        if isinstance(expr.vector, ex.Basis):
             return self._unit("y")
         turn = self._letter("R", bold=True)
         return self._row([turn, self._factor(expr.vector)])
 
-    def _print_RotationSlope(self, expr: RotationSlope) -> Printed:
+    def _print_RotationSlope(self, expr: ex.RotationSlope) -> Printed:
         (p,) = expr.rotation.coordinates
-        if expr.is_small and isinstance(p, VectorSymbol):
+        if expr.is_small and isinstance(p, ex.VectorSymbol):
             return self._row([self._matrix("A", p.name), self._skew(expr.vector)])
         return self._slope(p, expr.vector)
 
@@ -216,22 +198,22 @@ class Notation:
 
     def _skew(self, vector: Any) -> Printed:
         """Return v~."""
-        if isinstance(vector, VectorSymbol):
+        if isinstance(vector, ex.VectorSymbol):
             return self._named(vector.name, is_vector=True, is_skew=True)
         return self._tilded(self._factor(vector))
 
-    def _print_Cross(self, expr: Cross) -> Printed:
+    def _print_Cross(self, expr: ex.Cross) -> Printed:
         return self._row([self._skew(expr.left), self._factor(expr.right)])
 
-    def _print_TimesG(self, expr: TimesG) -> Printed:
-        name = expr.p.name if isinstance(expr.p, VectorSymbol) else ""
+    def _print_TimesG(self, expr: ex.TimesG) -> Printed:
+        name = expr.p.name if isinstance(expr.p, ex.VectorSymbol) else ""
         matrix = self._matrix("G", name)
         if expr.is_transposed:
             index = self._index_text(split_name(name)[1])
             matrix = self._scripts(self._letter("G", bold=True), index, self._letter("T"))
         return self._row([matrix, self._factor(expr.vector)])
 
-    def _print_RowOfSlope(self, expr: RowOfSlope) -> Printed:
+    def _print_RowOfSlope(self, expr: ex.RowOfSlope) -> Printed:
         return self._row([self._transposed(expr.left), self._short(expr.slope)])
 
     def _slope(self, p: Any, vector: Any) -> Printed:
@@ -239,28 +221,31 @@ class Notation:
         arguments = [self._short(p), self._operator(","), self._short(vector)]
         return self._row([self._letter("B", bold=True), self._fenced(self._row(arguments))])
 
-    def _print_Rotated(self, expr: Rotated) -> Printed:
+    def _print_Rotated(self, expr: ex.Rotated) -> Printed:
         (angle,) = expr.rotation.coordinates
         if isinstance(expr.rotation, EulerRotation) and expr.along:
             first, *others = (angle, *expr.along)[-2:]
             return self._row([self._slope(first, expr.vector), self._factor(others[0])])
-        if isinstance(expr.vector, Basis):
+        if isinstance(expr.vector, ex.Basis):
             unit = self._row([self._letter("u", bold=True), self._fenced(self._short(angle))])
             turn = [self._letter("R", bold=True)] if expr.along else []
             return self._row([*turn, unit])
-        index = split_name(angle.name)[1] if isinstance(angle, Symbol | VectorSymbol) else ""
+        index = split_name(angle.name)[1] if isinstance(angle, ex.Symbol | ex.VectorSymbol) else ""
         base = self._letter(expr.rotation.letters[expr.order], bold=True)
         matrix = self._scripts(base, self._index_text(index), None)
         return self._row([matrix, self._factor(expr.vector)])
 
-    def _print_Norm(self, expr: Norm) -> Printed:
+    def _print_Norm(self, expr: ex.Norm) -> Printed:
         return self._row([self._operator("|"), self._short(expr.vector), self._operator("|")])
 
-    def _print_Dot(self, expr: Dot) -> Printed:
+    def _print_Root(self, expr: ex.Root) -> Printed:
+        return self._root(self._print(expr.square))
+
+    def _print_Dot(self, expr: ex.Dot) -> Printed:
         return self._row([self._transposed(expr.left), self._factor(expr.right)])
 
     def _print_Transposed(self, expr: Transposed) -> Printed:
-        if isinstance(expr.vector, VectorSum) and any(map(_is_slope, expr.vector.terms)):
+        if isinstance(expr.vector, ex.VectorSum) and any(map(_is_slope, expr.vector.terms)):
             return self._row_of(expr.vector.terms)
         if _is_slope(expr.vector):
             return self._print(expr.vector)
@@ -279,7 +264,7 @@ class Notation:
         return self._row(parts)
 
     def _transposed(self, vector: Any) -> Printed:
-        if isinstance(vector, RowOfSlope):
+        if isinstance(vector, ex.RowOfSlope):
             return self._short(vector)
         return self._raised(vector, self._letter("T"))
 
@@ -291,8 +276,8 @@ class Notation:
 
     def _is_atom(self, expr: Any) -> bool:
         """Return whether something needs no brackets under an exponent."""
-        is_unit = isinstance(expr, Perpendicular) and isinstance(expr.vector, Basis)
-        atoms = Symbol | VectorSymbol | TimeFunction | Basis | Call | ProfileFunction
+        is_unit = isinstance(expr, ex.Perpendicular) and isinstance(expr.vector, ex.Basis)
+        atoms = ex.Symbol | ex.VectorSymbol | ex.TimeFunction | ex.Basis | Call | ex.ProfileFunction
         return is_unit or isinstance(expr, atoms) or expr in self.abbreviations
 
     def _short(self, expr: Any) -> Printed:
@@ -302,7 +287,7 @@ class Notation:
 
     def _factor(self, expr: Any) -> Printed:
         """Return a formula as a factor of a product."""
-        is_sum = isinstance(expr, Sum | VectorSum) and expr not in self.abbreviations
+        is_sum = isinstance(expr, ex.Sum | ex.VectorSum) and expr not in self.abbreviations
         printed = self._short(expr)
         return self._fenced(printed) if is_sum else printed
 
@@ -349,11 +334,11 @@ class Notation:
             return self._row([self._operator("-"), self._factor(magnitude)])
         return self._product(expr.factors)
 
-    def _print_Scaled(self, expr: Scaled) -> Printed:
+    def _print_Scaled(self, expr: ex.Scaled) -> Printed:
         is_negative, magnitude = _signed(expr)
         if is_negative:
             return self._row([self._operator("-"), self._factor(magnitude)])
-        factors = expr.factor.factors if isinstance(expr.factor, Product) else (expr.factor,)
+        factors = expr.factor.factors if isinstance(expr.factor, ex.Product) else (expr.factor,)
         return self._product((*factors, expr.vector))
 
     def _product(self, factors: Sequence[Any]) -> Printed:
@@ -376,7 +361,7 @@ class Notation:
             return self._short(factors[0])
         parts: list[Printed] = []
         for k, item in enumerate(factors):
-            if k and isinstance(item, Number | Decimal):
+            if k and isinstance(item, ex.Number | Decimal):
                 parts.append(self._operator("\N{DOT OPERATOR}"))
             elif k:
                 parts.append(self._thin_space())
@@ -402,7 +387,7 @@ class Notation:
         return self._row([self._function(expr.function), self._arguments(expr)])
 
     def _arguments(self, expr: Call) -> Printed:
-        simple = len(expr.arguments) == 1 and isinstance(expr.arguments[0], Symbol)
+        simple = len(expr.arguments) == 1 and isinstance(expr.arguments[0], ex.Symbol)
         if simple and expr.function in ("sin", "cos", "tan"):
             return self._print(expr.arguments[0])
         return self._listed(expr.arguments)
@@ -486,7 +471,7 @@ class Notation:
 
     def _terms(self, part: Any) -> list[tuple[str, Printed]]:
         """Return sign and magnitude of the terms of a sum; anything else is one term."""
-        if isinstance(part, Sum | VectorSum) and part.terms:
+        if isinstance(part, ex.Sum | ex.VectorSum) and part.terms:
             terms: Sequence[Any] = part.terms
         else:
             return [("", self._print(part))]
@@ -503,31 +488,31 @@ class Notation:
 
 def _is_slope(term: Any) -> bool:
     """Return whether a term is a row of the derivative of a rotation."""
-    return isinstance(term.vector if isinstance(term, Scaled) else term, RowOfSlope)
+    return isinstance(term.vector if isinstance(term, ex.Scaled) else term, ex.RowOfSlope)
 
 
 def _signed(term: Any) -> tuple[bool, Any]:
     """Return whether a term has a minus in front, and the term without it."""
     match term:
-        case Number(value) if value < 0:
-            return True, Number(-value)
+        case ex.Number(value) if value < 0:
+            return True, ex.Number(-value)
         case Decimal(value, digits) if value < 0:
             return True, Decimal(-value, digits)
-        case Product((Number(value), *rest)) if value < 0:
-            factors = rest if value == -1 else [Number(-value), *rest]
-            return True, factors[0] if len(factors) == 1 else Product(tuple(factors))
-        case Scaled(factor, vector):
+        case ex.Product((ex.Number(value), *rest)) if value < 0:
+            factors = rest if value == -1 else [ex.Number(-value), *rest]
+            return True, factors[0] if len(factors) == 1 else ex.Product(tuple(factors))
+        case ex.Scaled(factor, vector):
             is_negative, magnitude = _signed(factor)
-            return is_negative, vector if magnitude == ONE else Scaled(magnitude, vector)
+            return is_negative, vector if magnitude == ex.ONE else ex.Scaled(magnitude, vector)
     return False, term
 
 
 def _is_reciprocal(factor: Any) -> bool:
-    return isinstance(factor, Power) and factor.exponent == -1
+    return isinstance(factor, ex.Power) and factor.exponent == -1
 
 
 def _place(factor: Any) -> int:
     """Return where a factor stands: numbers first, rates last."""
-    if isinstance(factor, Number | Decimal):
+    if isinstance(factor, ex.Number | Decimal):
         return 0
     return 2 if is_rate(factor) else 1

@@ -17,49 +17,22 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias
 from zlib import crc32
 
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.expressions import (
-    ONE,
-    Basis,
-    Dot,
-    Expression,
-    Number,
-    Perpendicular,
-    Power,
-    Product,
-    Rotated,
-    Scalar,
-    Scaled,
-    Sum,
-    Symbol,
-    Vector,
-    VectorSum,
-    product_of,
-    scaled,
-    split_coefficient,
-    split_factor,
-    vector_sum,
-)
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.errors import InternalError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from kincompile.calculus.expressions import (
-        ProfileFunction,
-        Rotation,
-        TimeFunction,
-        VectorSymbol,
-    )
 
 RATES = ("_dot", "_ddot")
 """Ends of the names of rates."""
 
-Monomial: TypeAlias = tuple[tuple[Scalar, int], ...]
+Monomial: TypeAlias = tuple[tuple[ex.Scalar, int], ...]
 """Scalars with their exponents."""
 
-Core: TypeAlias = Vector | None
+Core: TypeAlias = ex.Vector | None
 """A vector that cannot be multiplied out; None in a scalar term."""
 
 Term: TypeAlias = tuple[Fraction, Monomial, Core]
@@ -71,7 +44,7 @@ AGREEMENT = 1e-9
 """Difference, relative to the terms, up to which two forms are equal at random numbers."""
 
 
-def collected(expression: Expression, names: Mapping[Expression, object]) -> Expression:
+def collected(expression: ex.Expression, names: Mapping[ex.Expression, object]) -> ex.Expression:
     """Return gamma with like terms joined, equal to it at random numbers.
 
     Parameters
@@ -87,9 +60,9 @@ def collected(expression: Expression, names: Mapping[Expression, object]) -> Exp
         If the two differ in numbers: the line is never printed.
     """
     parts = like_terms(expression, names)
-    result: Expression
-    if isinstance(expression, Vector):
-        result = vector_sum(tuple(_vector(_part(*part)) for part in parts))
+    result: ex.Expression
+    if isinstance(expression, ex.Vector):
+        result = ex.vector_sum(tuple(_vector(_part(*part)) for part in parts))
     else:
         result = _over_divisors(parts)
     _require_equal(expression, result)
@@ -97,7 +70,7 @@ def collected(expression: Expression, names: Mapping[Expression, object]) -> Exp
 
 
 def like_terms(
-    expression: Expression, names: Mapping[Expression, object]
+    expression: ex.Expression, names: Mapping[ex.Expression, object]
 ) -> list[tuple[Monomial, Core, Polynomial]]:
     """Return an expression multiplied out: scalars, vector, and the rates that stand with them.
 
@@ -116,31 +89,31 @@ def like_terms(
     return [(others, core, item) for (others, core), item in kept if item]
 
 
-def _over_divisors(parts: list[tuple[Monomial, Core, Polynomial]]) -> Scalar:
+def _over_divisors(parts: list[tuple[Monomial, Core, Polynomial]]) -> ex.Scalar:
     """Return a sum of scalars; those with the same divisor are over it together."""
-    found: dict[Monomial, list[Scalar]] = {}
+    found: dict[Monomial, list[ex.Scalar]] = {}
     for others, core, rates in parts:
         below = tuple(factor for factor in others if factor[1] < 0)
         above = tuple(factor for factor in others if factor[1] > 0)
         found.setdefault(below, []).append(_scalar(_part(above, core, rates)))
-    terms: list[Scalar] = []
+    terms: list[ex.Scalar] = []
     for below, items in found.items():
-        divisors = tuple(Power(base, exponent) for base, exponent in below)
-        terms += [product_of((*divisors, _sum(items)))] if below else items
+        divisors = tuple(ex.Power(base, exponent) for base, exponent in below)
+        terms += [ex.product_of((*divisors, _sum(items)))] if below else items
     return _sum(terms)
 
 
 class _Atoms:
     """What is not multiplied out: the abbreviations, and products of scalars that are one."""
 
-    def __init__(self, names: Mapping[Expression, object]) -> None:
+    def __init__(self, names: Mapping[ex.Expression, object]) -> None:
         self.whole = frozenset(names)
-        self.products = [item for item in names if isinstance(item, Product)]
+        self.products = [item for item in names if isinstance(item, ex.Product)]
 
-    def folded(self, factors: tuple[Scalar, ...]) -> list[Scalar]:
+    def folded(self, factors: tuple[ex.Scalar, ...]) -> list[ex.Scalar]:
         """Return factors with those that make an abbreviation as that abbreviation."""
         rest = Counter(dict(self._powers(factors)))
-        found: list[Scalar] = []
+        found: list[ex.Scalar] = []
         for item in self.products:
             wanted = Counter(dict(self._powers(item.factors)))
             while all(
@@ -151,61 +124,63 @@ class _Atoms:
         return [*found, *(power(base, n) for base, n in rest.items() if n)]
 
     @staticmethod
-    def _powers(factors: Iterable[Scalar]) -> Iterable[tuple[Scalar, int]]:
+    def _powers(factors: Iterable[ex.Scalar]) -> Iterable[tuple[ex.Scalar, int]]:
         for item in factors:
-            yield (item.base, item.exponent) if isinstance(item, Power) else (item, 1)
+            yield (item.base, item.exponent) if isinstance(item, ex.Power) else (item, 1)
 
 
-def _terms(expression: Expression, atoms: _Atoms) -> list[Term]:
+def _terms(expression: ex.Expression, atoms: _Atoms) -> list[Term]:
     """Return the terms of an expression, multiplied out."""
     if expression in atoms.whole:
         return [_atom(expression)]
     match expression:
-        case Number(value):
+        case ex.Number(value):
             return [(value, (), None)]
-        case VectorSum(items) if (term := _difference(items)) is not None:
+        case ex.VectorSum(items) if (term := _difference(items)) is not None:
             return [term]
-        case Sum(items) | VectorSum(items):
+        case ex.Sum(items) | ex.VectorSum(items):
             return [term for item in items for term in _terms(item, atoms)]
-        case Product():
-            number, rest = split_coefficient(expression)
+        case ex.Product():
+            number, rest = ex.split_coefficient(expression)
             parts = [_terms(item, atoms) for item in atoms.folded(rest)]
             return _multiplied([[(number, (), None)], *parts])
-        case Power(base, exponent) if exponent > 1 and isinstance(base, Sum):
+        case ex.Power(base, exponent) if exponent > 1 and isinstance(base, ex.Sum):
             return _multiplied([_terms(base, atoms)] * exponent)
-        case Scaled(factor, vector):
+        case ex.Scaled(factor, vector):
             return _multiplied([_terms(factor, atoms), _terms(vector, atoms)])
-        case Dot(left, right):
+        case ex.Dot(left, right):
             return [_dotted(a, b) for a, b in product(_terms(left, atoms), _terms(right, atoms))]
-        case Rotated() | Perpendicular():
+        case ex.Rotated() | ex.Perpendicular():
             return [_turned(expression)]
     return [_atom(expression)]
 
 
-def _difference(items: tuple[Vector, ...]) -> Term | None:
+def _difference(items: tuple[ex.Vector, ...]) -> Term | None:
     """Return the difference of two points of a body as one turned vector: A (s_Q - s_P)."""
     if len(items) != 2:
         return None
-    (factor, first), (other, second) = map(split_factor, items)
-    if not (isinstance(first, Rotated) and isinstance(second, Rotated) and factor == -other):
+    (factor, first), (other, second) = map(ex.split_factor, items)
+    if not (isinstance(first, ex.Rotated) and isinstance(second, ex.Rotated) and factor == -other):
         return None
     if (first.rotation, first.along) != (second.rotation, second.along):
         return None
-    number, factors = split_coefficient(factor)
+    number, factors = ex.split_coefficient(factor)
     if repr(first.vector) < repr(second.vector):  # s_Q - s_P wherever it stands
         number, first, second = -number, second, first
-    (sign, _, core) = _turned(Rotated(first.rotation, first.vector - second.vector, first.along))
+    (sign, _, core) = _turned(ex.Rotated(first.rotation, first.vector - second.vector, first.along))
     monomial: Monomial = ()
     for item in factors:
         monomial = _joined(monomial, _atom(item)[1])
     return sign * number, monomial, core
 
 
-def _atom(expression: Expression) -> Term:
-    if isinstance(expression, Vector):
+def _atom(expression: ex.Expression) -> Term:
+    if isinstance(expression, ex.Vector):
         return Fraction(1), (), expression
     base, exponent = (
-        (expression.base, expression.exponent) if isinstance(expression, Power) else (expression, 1)
+        (expression.base, expression.exponent)
+        if isinstance(expression, ex.Power)
+        else (expression, 1)
     )
     return Fraction(1), ((base, exponent),), None
 
@@ -220,46 +195,48 @@ def _times(first: Term, second: Term) -> Term:
     return first[0] * second[0], _joined(first[1], second[1]), core
 
 
-def _scalar(item: Expression) -> Scalar:
-    assert isinstance(item, Scalar)
+def _scalar(item: ex.Expression) -> ex.Scalar:
+    assert isinstance(item, ex.Scalar)
     return item
 
 
 def _joined(first: Monomial, second: Monomial) -> Monomial:
     """Return the product of two monomials, in an order that does not depend on theirs."""
-    exponents: dict[Scalar, int] = {}
+    exponents: dict[ex.Scalar, int] = {}
     for base, exponent in (*first, *second):
         exponents[base] = exponents.get(base, 0) + exponent
     kept = ((base, exponent) for base, exponent in exponents.items() if exponent)
     return tuple(sorted(kept, key=lambda item: repr(item[0])))
 
 
-def _quarter_turns(vector: Vector) -> tuple[Vector, int]:
+def _quarter_turns(vector: ex.Vector) -> tuple[ex.Vector, int]:
     """Return a turned vector without its quarter turns, and how many there were.
 
     In the plane all turns commute: R A = A R = B.
     """
     match vector:
-        case Rotated(PlaneRotation() as rotation, inner, along) if all(x == ONE for x in along):
+        case ex.Rotated(PlaneRotation() as rotation, inner, along) if all(
+            x == ex.ONE for x in along
+        ):
             core, turns = _quarter_turns(inner)
-            return Rotated(rotation, core), turns + len(along)
-        case Perpendicular(inner) if not isinstance(inner, Basis):
+            return ex.Rotated(rotation, core), turns + len(along)
+        case ex.Perpendicular(inner) if not isinstance(inner, ex.Basis):
             core, turns = _quarter_turns(inner)
             return core, turns + 1
     return vector, 0
 
 
-def _with_turns(vector: Vector, turns: int) -> tuple[int, Vector]:
+def _with_turns(vector: ex.Vector, turns: int) -> tuple[int, ex.Vector]:
     """Return a sign and a vector with at most one quarter turn, which its outer rotation has."""
     sign = -1 if turns % 4 > 1 else 1
     if turns % 2 == 0:
         return sign, vector
-    if isinstance(vector, Rotated):
-        return sign, Rotated(vector.rotation, vector.vector, (ONE,))
-    return sign, Perpendicular(vector)
+    if isinstance(vector, ex.Rotated):
+        return sign, ex.Rotated(vector.rotation, vector.vector, (ex.ONE,))
+    return sign, ex.Perpendicular(vector)
 
 
-def _turned(vector: Vector) -> Term:
+def _turned(vector: ex.Vector) -> Term:
     sign, core = _with_turns(*_quarter_turns(vector))
     return Fraction(sign), (), core
 
@@ -267,40 +244,40 @@ def _turned(vector: Vector) -> Term:
 def _dotted(first: Term, second: Term) -> Term:
     """Return the scalar product of two terms; of two turned vectors the left has the turn."""
     (left, turns), (right, more) = (_quarter_turns(_vector(term[2])) for term in (first, second))
-    if isinstance(left, Rotated) and isinstance(right, Rotated):
+    if isinstance(left, ex.Rotated) and isinstance(right, ex.Rotated):
         turns, more = (turns - more) % 4, 0
     (sign, left), (other, right) = _with_turns(left, turns), _with_turns(right, more)
-    monomial = _joined(_joined(first[1], second[1]), ((Dot(left, right), 1),))
+    monomial = _joined(_joined(first[1], second[1]), ((ex.Dot(left, right), 1),))
     return sign * other * first[0] * second[0], monomial, None
 
 
-def _vector(item: Expression | None) -> Vector:
-    assert isinstance(item, Vector)
+def _vector(item: ex.Expression | None) -> ex.Vector:
+    assert isinstance(item, ex.Vector)
     return item
 
 
-def power(base: Scalar, exponent: int) -> Scalar:
+def power(base: ex.Scalar, exponent: int) -> ex.Scalar:
     """Return a power as it is written."""
-    return base if exponent == 1 else Power(base, exponent)
+    return base if exponent == 1 else ex.Power(base, exponent)
 
 
-def _part(others: Monomial, core: Core, rates: Polynomial) -> Expression:
+def _part(others: Monomial, core: Core, rates: Polynomial) -> ex.Expression:
     """Return number, scalars, scalar products, vector, with the polynomial in the rates."""
     number, factors = factored(rates)
-    scalars = [power(*item) for item in sorted(others, key=lambda x: isinstance(x[0], Dot))]
+    scalars = [power(*item) for item in sorted(others, key=lambda x: isinstance(x[0], ex.Dot))]
     scalar = _product(number, (*scalars, *factors))
-    return scalar if core is None else scaled(scalar, core)
+    return scalar if core is None else ex.scaled(scalar, core)
 
 
-def _product(number: Fraction, factors: tuple[Scalar, ...]) -> Scalar:
+def _product(number: Fraction, factors: tuple[ex.Scalar, ...]) -> ex.Scalar:
     if not factors:
-        return Number(number)
+        return ex.Number(number)
     if number == 1:
-        return factors[0] if len(factors) == 1 else Product(factors)
-    return Product((Number(number), *factors))
+        return factors[0] if len(factors) == 1 else ex.Product(factors)
+    return ex.Product((ex.Number(number), *factors))
 
 
-def factored(polynomial: Polynomial) -> tuple[Fraction, tuple[Scalar, ...]]:
+def factored(polynomial: Polynomial) -> tuple[Fraction, tuple[ex.Scalar, ...]]:
     """Return a polynomial in the rates as a number and factors: what all terms share, the rest."""
     first = next(iter(polynomial))
     common = tuple(
@@ -318,7 +295,7 @@ def factored(polynomial: Polynomial) -> tuple[Fraction, tuple[Scalar, ...]]:
     square = _square(rest)
     if square is not None:
         return number, (*shared, square)
-    return number, (*shared, Sum(tuple(rates_term(item, value) for item, value in rest.items())))
+    return number, (*shared, ex.Sum(tuple(rates_term(item, value) for item, value in rest.items())))
 
 
 def _content(numbers: list[Fraction]) -> Fraction:
@@ -328,12 +305,12 @@ def _content(numbers: list[Fraction]) -> Fraction:
     return Fraction(above if numbers[0] > 0 else -above, below)
 
 
-def rates_term(monomial: Monomial, number: Fraction) -> Scalar:
+def rates_term(monomial: Monomial, number: Fraction) -> ex.Scalar:
     """Return a number times rates."""
     return _product(number, tuple(power(base, exponent) for base, exponent in monomial))
 
 
-def _square(polynomial: Polynomial) -> Scalar | None:
+def _square(polynomial: Polynomial) -> ex.Scalar | None:
     """Return (a + b - c)^2 where a polynomial is the square of such a sum."""
     bases = list(dict.fromkeys(base for monomial in polynomial for base, _ in monomial))
     first = bases[0]
@@ -349,24 +326,24 @@ def _square(polynomial: Polynomial) -> Scalar | None:
         return None
     if signs[bases[-1]] < 0:  # phi_j - phi_i, as in the book
         signs = {base: -signs[base] for base in reversed(bases)}
-    return Power(Sum(tuple(_product(sign, (base,)) for base, sign in signs.items())), 2)
+    return ex.Power(ex.Sum(tuple(_product(sign, (base,)) for base, sign in signs.items())), 2)
 
 
-def _sum(terms: list[Scalar]) -> Scalar:
+def _sum(terms: list[ex.Scalar]) -> ex.Scalar:
     """Return a sum, flat; unlike `sum_of` it leaves numbers before brackets."""
     flat = tuple(part for item in terms for part in getattr(item, "terms", (item,)))
-    return Sum(flat) if len(flat) != 1 else flat[0]
+    return ex.Sum(flat) if len(flat) != 1 else flat[0]
 
 
 def is_rate(factor: Any) -> bool:
     """Return whether a factor is the rate of a scalar, a power or a sum of such."""
     match factor:
-        case Symbol(name):
+        case ex.Symbol(name):
             return name.endswith(RATES)
-        case Power(base, _):
+        case ex.Power(base, _):
             return is_rate(base)
-        case Sum(terms):
-            parts = map(split_coefficient, terms)
+        case ex.Sum(terms):
+            parts = map(ex.split_coefficient, terms)
             return all(
                 abs(number) == 1 and list(map(is_rate, rest)) == [True] for number, rest in parts
             )
@@ -382,26 +359,26 @@ class _AtRandom:
     def pi(self) -> Any:
         return math.pi
 
-    def symbol(self, symbol: Symbol) -> Any:
+    def symbol(self, symbol: ex.Symbol) -> Any:
         return 0.5 + crc32(symbol.name.encode()) / 2**32
 
-    def vector(self, symbol: VectorSymbol) -> Any:
-        return tuple(self.symbol(Symbol(f"{symbol.name} {k}")) for k in range(symbol.size))
+    def vector(self, symbol: ex.VectorSymbol) -> Any:
+        return tuple(self.symbol(ex.Symbol(f"{symbol.name} {k}")) for k in range(symbol.size))
 
-    def time_function(self, function: TimeFunction) -> Any:
-        return self.symbol(Symbol(f"{function.name} {function.order}"))
+    def time_function(self, function: ex.TimeFunction) -> Any:
+        return self.symbol(ex.Symbol(f"{function.name} {function.order}"))
 
-    def profile(self, profile: ProfileFunction) -> Any:
-        return self.symbol(Symbol(f"{profile.name} {profile.order}"))
+    def profile(self, profile: ex.ProfileFunction) -> Any:
+        return self.symbol(ex.Symbol(f"{profile.name} {profile.order}"))
 
-    def entries(self, rotation: Rotation, expand: Expansion) -> Any:
+    def entries(self, rotation: ex.Rotation, expand: Expansion) -> Any:
         return expand.entries(rotation)
 
     def call(self, function: str, *values: Any) -> Any:
         return getattr(math, function)(*values)
 
 
-def _require_equal(first: Expression, second: Expression) -> None:
+def _require_equal(first: ex.Expression, second: ex.Expression) -> None:
     """Check that two forms of an expression have the same numbers."""
     values = [Expansion(_AtRandom()).components(item) for item in (first, second)]
     for a, b in zip(*values, strict=True):

@@ -6,19 +6,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-from kincompile.calculus.expressions import (
-    ONE,
-    Basis,
-    Scalar,
-    Vector,
-    VectorSymbol,
-    sum_of,
-    vector_sum,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.derive.rules import TIME, Direction, Step, along
 
 if TYPE_CHECKING:
-    from kincompile.calculus.expressions import Expression
     from kincompile.calculus.symbols import CoordinateSymbol
     from kincompile.calculus.template import Template
 
@@ -46,12 +37,12 @@ class RowBlock:
         The rules that fired for Phi_t and for each of the three terms, innermost first.
     """
 
-    Phi: Expression
-    Phi_q: tuple[Expression, ...]
-    velocity: Expression
-    nu: Expression
-    gamma_terms: tuple[Expression, Expression, Expression]
-    gamma: Expression
+    Phi: ex.Expression
+    Phi_q: tuple[ex.Expression, ...]
+    velocity: ex.Expression
+    nu: ex.Expression
+    gamma_terms: tuple[ex.Expression, ex.Expression, ex.Expression]
+    gamma: ex.Expression
     Phi_t_steps: tuple[Step, ...]
     gamma_steps: tuple[tuple[Step, ...], ...]
 
@@ -62,9 +53,9 @@ def derive(template: Template) -> tuple[RowBlock, ...]:
     return tuple(_row_block(template, Phi) for Phi in template.Phi)
 
 
-def _row_block(template: Template, Phi: Expression) -> RowBlock:
+def _row_block(template: Template, Phi: ex.Expression) -> RowBlock:
     along_q_dot: Direction = template.motion
-    along_t: Direction = {TIME: ONE}
+    along_t: Direction = {TIME: ex.ONE}
     Phi_t, Phi_t_steps = recorded(Phi, along_t)
     velocity = along(Phi, along_q_dot)
     second = (
@@ -90,21 +81,23 @@ def _row_block(template: Template, Phi: Expression) -> RowBlock:
     )
 
 
-def units(coordinate: CoordinateSymbol) -> tuple[Expression, ...]:
+def units(coordinate: CoordinateSymbol) -> tuple[ex.Expression, ...]:
     """Return the unit rates of a coordinate: 1 of a scalar, e_x, e_y, ... of a vector."""
-    if isinstance(coordinate, VectorSymbol):
-        return tuple(Basis(axis, coordinate.size) for axis in range(coordinate.size))
-    return (ONE,)
+    if isinstance(coordinate, ex.VectorSymbol):
+        return tuple(ex.Basis(axis, coordinate.size) for axis in range(coordinate.size))
+    return (ex.ONE,)
 
 
-def recorded(expression: Expression, direction: Direction) -> tuple[Expression, tuple[Step, ...]]:
+def recorded(
+    expression: ex.Expression, direction: Direction
+) -> tuple[ex.Expression, tuple[Step, ...]]:
     """Differentiate along a direction, and return the steps too."""
     record: list[Step] = []
     return along(expression, direction, record), tuple(record)
 
 
-def _total(terms: tuple[Expression, ...]) -> Expression:
-    vectors = tuple(term for term in terms if isinstance(term, Vector))
+def _total(terms: tuple[ex.Expression, ...]) -> ex.Expression:
+    vectors = tuple(term for term in terms if isinstance(term, ex.Vector))
     if vectors:
-        return vector_sum(vectors)
-    return sum_of(tuple(term for term in terms if isinstance(term, Scalar)))
+        return ex.vector_sum(vectors)
+    return ex.sum_of(tuple(term for term in terms if isinstance(term, ex.Scalar)))

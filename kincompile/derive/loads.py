@@ -12,38 +12,19 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-from kincompile.calculus.expressions import (
-    ONE,
-    ZERO,
-    Basis,
-    Dot,
-    Power,
-    Product,
-    Rotated,
-    Scalar,
-    Sum,
-    Symbol,
-    Vector,
-    VectorSymbol,
-    dot,
-    perpendicular,
-    power_of,
-    product_of,
-    sum_of,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.calculus.template import Template
 from kincompile.derive.derivation import units
 from kincompile.derive.rules import along
 
 if TYPE_CHECKING:
-    from kincompile.calculus.expressions import Expression
     from kincompile.derive.rules import Direction
 
-Work = tuple["Expression", "Expression"]
+Work = tuple["ex.Expression", "ex.Expression"]
 """A force and the displacement of what it acts on, both vectors or both scalars."""
 
-Leaf = Symbol | VectorSymbol
+Leaf = ex.Symbol | ex.VectorSymbol
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +41,7 @@ class LoadTemplate(Template):
         Forces that may depend on any coordinates and rates, leaves of `work`.
     """
 
-    energy: Scalar
+    energy: ex.Scalar
     work: tuple[Work, ...]
     values: tuple[Leaf, ...]
 
@@ -84,16 +65,16 @@ class LoadDerivatives:
         then of the others on which its values depend.
     """
 
-    M: tuple[tuple[Scalar, ...], ...]
-    Q: tuple[Scalar, ...]
-    Q_q: tuple[tuple[Scalar, ...], ...]
-    Q_q_dot: tuple[tuple[Scalar, ...], ...]
+    M: tuple[tuple[ex.Scalar, ...], ...]
+    Q: tuple[ex.Scalar, ...]
+    Q_q: tuple[tuple[ex.Scalar, ...], ...]
+    Q_q_dot: tuple[tuple[ex.Scalar, ...], ...]
 
 
 def slope_of(leaf: Leaf, column: int, *, by_rate: bool) -> Leaf:
     """Return the symbol of the derivative of a value by a coordinate, or by its rate."""
     name = f"{leaf.name}_by_{'rate' if by_rate else 'q'}_{column}"
-    return Symbol(name) if isinstance(leaf, Symbol) else VectorSymbol(name, leaf.size)
+    return ex.Symbol(name) if isinstance(leaf, ex.Symbol) else ex.VectorSymbol(name, leaf.size)
 
 
 @cache
@@ -114,11 +95,11 @@ def derive_load(template: LoadTemplate, others: int, *, varies: bool) -> LoadDer
     momenta = [along(template.energy, direction) for direction in by_rate]
     M = tuple(tuple(simplified(along(p, direction)) for direction in by_rate) for p in momenta)
     Q = tuple(
-        simplified(sum_of((along(template.energy, by), -along(p, motion), *_work(template, by))))
+        simplified(ex.sum_of((along(template.energy, by), -along(p, motion), *_work(template, by))))
         for p, by in zip(momenta, by_q, strict=True)
     )
 
-    def jacobian(columns: list[Direction], *, by_rate: bool) -> tuple[tuple[Scalar, ...], ...]:
+    def jacobian(columns: list[Direction], *, by_rate: bool) -> tuple[tuple[ex.Scalar, ...], ...]:
         directions: list[Direction] = [*columns, *({} for _ in range(others))]
         if varies:
             directions = [
@@ -137,45 +118,47 @@ def _columns(symbols: tuple[Leaf, ...]) -> list[Direction]:
     return [{item: unit} for item in symbols for unit in units(item)]
 
 
-def _work(template: LoadTemplate, direction: Direction) -> tuple[Scalar, ...]:
+def _work(template: LoadTemplate, direction: Direction) -> tuple[ex.Scalar, ...]:
     """Return the work of each force for a displacement."""
     return tuple(inner(force, along(moved, direction)) for force, moved in template.work)
 
 
-def inner(force: Expression, displacement: Expression) -> Scalar:
+def inner(force: ex.Expression, displacement: ex.Expression) -> ex.Scalar:
     """Return the product of a force and a displacement, of vectors the scalar product."""
-    if isinstance(force, Vector):
-        assert isinstance(displacement, Vector)
-        return dot(force, displacement)
-    assert isinstance(displacement, Scalar)
+    if isinstance(force, ex.Vector):
+        assert isinstance(displacement, ex.Vector)
+        return ex.dot(force, displacement)
+    assert isinstance(displacement, ex.Scalar)
     return force * displacement
 
 
-def simplified(expression: Scalar) -> Scalar:
+def simplified(expression: ex.Scalar) -> ex.Scalar:
     """Return an expression whose products of vectors of one frame are formed in that frame.
 
     :math:`(A u)^T A v = u^T v`, and in the plane :math:`(A u)^T B v = u^T R v`, which is zero where
     both are the same. The axes are unit vectors across each other.
     """
     match expression:
-        case Sum(terms):
-            return sum_of(tuple(map(simplified, terms)))
-        case Product(factors):
-            return product_of(tuple(map(simplified, factors)))
-        case Power(base, exponent):
-            return power_of(simplified(base), exponent)
-        case Dot(Basis(axis), Basis(other_axis)):
-            return ONE if axis == other_axis else ZERO
-        case Dot(Rotated(PlaneRotation() as rotation, u, first), Rotated(other, v, second)):
+        case ex.Sum(terms):
+            return ex.sum_of(tuple(map(simplified, terms)))
+        case ex.Product(factors):
+            return ex.product_of(tuple(map(simplified, factors)))
+        case ex.Power(base, exponent):
+            return ex.power_of(simplified(base), exponent)
+        case ex.Dot(ex.Basis(axis), ex.Basis(other_axis)):
+            return ex.ONE if axis == other_axis else ex.ZERO
+        case ex.Dot(
+            ex.Rotated(PlaneRotation() as rotation, u, first), ex.Rotated(other, v, second)
+        ):
             if rotation == other:
                 return _in_frame(u, v, len(second) - len(first))
     return expression
 
 
-def _in_frame(u: Vector, v: Vector, quarters: int) -> Scalar:
+def _in_frame(u: ex.Vector, v: ex.Vector, quarters: int) -> ex.Scalar:
     """Return u^T R^quarters v; a vector has no component across itself."""
     if quarters == 0:
-        return dot(u, v)
+        return ex.dot(u, v)
     if u == v:
-        return ZERO
-    return quarters * dot(u, perpendicular(v))
+        return ex.ZERO
+    return quarters * ex.dot(u, ex.perpendicular(v))

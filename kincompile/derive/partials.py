@@ -12,32 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-from kincompile.calculus.expressions import (
-    ONE,
-    ZERO,
-    ZERO_VECTOR,
-    Cross,
-    Dot,
-    Expression,
-    Product,
-    Rotated,
-    RotationSlope,
-    RowOfSlope,
-    Scalar,
-    Scaled,
-    Sum,
-    TimesG,
-    Vector,
-    VectorSum,
-    VectorSymbol,
-    cross,
-    dot,
-    product_of,
-    rotated,
-    scaled,
-    split_factor,
-    vector_sum,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.derive.derivation import recorded, units
 from kincompile.derive.rules import Step, along
 from kincompile.errors import InternalError
@@ -64,10 +39,10 @@ class PartialDerivative:
     """
 
     coordinate: CoordinateSymbol
-    entry: Expression
+    entry: ex.Expression
     steps: tuple[Step, ...]
 
-    def columns(self, entry: Expression) -> tuple[Expression, ...]:
+    def columns(self, entry: ex.Expression) -> tuple[ex.Expression, ...]:
         """Return the columns that an entry stands for, this one or another in its place."""
         return tuple(_applied(entry, unit) for unit in units(self.coordinate))
 
@@ -83,10 +58,10 @@ def partials(template: Template) -> tuple[tuple[PartialDerivative, ...], ...]:
 
 
 def _partial(
-    template: Template, Phi: Expression, coordinate: CoordinateSymbol, rate: CoordinateSymbol
+    template: Template, Phi: ex.Expression, coordinate: CoordinateSymbol, rate: CoordinateSymbol
 ) -> PartialDerivative:
-    if not isinstance(rate, VectorSymbol):
-        return PartialDerivative(coordinate, *recorded(Phi, {coordinate: ONE}))
+    if not isinstance(rate, ex.VectorSymbol):
+        return PartialDerivative(coordinate, *recorded(Phi, {coordinate: ex.ONE}))
     direction = template.direction({coordinate: rate})
     entry, steps = recorded(Phi, direction)
     leaves = direction.keys() - {coordinate}  # p, whose change is no multiple of pi'
@@ -98,88 +73,88 @@ def _partial(
     return PartialDerivative(coordinate, coefficient(entry, rate), read_off)
 
 
-def _applied(entry: Expression, change: Expression) -> Expression:
+def _applied(entry: ex.Expression, change: ex.Expression) -> ex.Expression:
     """Return what an entry gives for a change of its coordinate."""
-    if isinstance(change, Scalar):
+    if isinstance(change, ex.Scalar):
         return change * entry
-    if isinstance(entry, Scalar):
-        return scaled(entry, change)
+    if isinstance(entry, ex.Scalar):
+        return ex.scaled(entry, change)
     match entry:
-        case VectorSum(terms) if _has_slopes(entry):
+        case ex.VectorSum(terms) if _has_slopes(entry):
             parts = [_applied(term, change) for term in terms]
             return sum(parts[1:], start=parts[0])
-        case Scaled(factor, vector) if _has_slopes(vector):
+        case ex.Scaled(factor, vector) if _has_slopes(vector):
             return factor * _applied(vector, change)
-        case RotationSlope(rotation, vector, is_small):
+        case ex.RotationSlope(rotation, vector, is_small):
             if is_small:
-                return rotated(rotation, cross(vector, change))
-            return rotated(rotation, vector, (change,))
-        case RowOfSlope(left, slope):
+                return ex.rotated(rotation, ex.cross(vector, change))
+            return ex.rotated(rotation, vector, (change,))
+        case ex.RowOfSlope(left, slope):
             moved = _applied(slope, change)
-            assert isinstance(moved, Vector)
-            return dot(left, moved)
-    return dot(entry, change)
+            assert isinstance(moved, ex.Vector)
+            return ex.dot(left, moved)
+    return ex.dot(entry, change)
 
 
-def _has_slopes(vector: Vector) -> bool:
+def _has_slopes(vector: ex.Vector) -> bool:
     """Return whether there is a slope, or a row of one, in a vector."""
     match vector:
-        case VectorSum(terms):
+        case ex.VectorSum(terms):
             return any(map(_has_slopes, terms))
-        case Scaled(_, inner):
+        case ex.Scaled(_, inner):
             return _has_slopes(inner)
-    return isinstance(vector, RotationSlope | RowOfSlope)
+    return isinstance(vector, ex.RotationSlope | ex.RowOfSlope)
 
 
-def _slope(vector: Vector, rate: VectorSymbol) -> Vector | None:
+def _slope(vector: ex.Vector, rate: ex.VectorSymbol) -> ex.Vector | None:
     """Return B(p, v) of B(p, v) p_dot, -A v~ of A omega'~ v; None for anything else."""
     match vector:
-        case Rotated(rotation, Cross(turn, inner), ()) if turn == rate:
-            return -RotationSlope(rotation, inner, is_small=True)
-        case Rotated(rotation, inner, (along_rate,)) if along_rate == rate:
-            return RotationSlope(rotation, inner)
+        case ex.Rotated(rotation, ex.Cross(turn, inner), ()) if turn == rate:
+            return -ex.RotationSlope(rotation, inner, is_small=True)
+        case ex.Rotated(rotation, inner, (along_rate,)) if along_rate == rate:
+            return ex.RotationSlope(rotation, inner)
     return None
 
 
-def coefficient(expression: Expression, rate: VectorSymbol) -> Expression:
+def coefficient(expression: ex.Expression, rate: ex.VectorSymbol) -> ex.Expression:
     """Return k of a vector k r_dot, u of a scalar u^T r_dot; of p_dot the slopes."""
-    if isinstance(expression, Scalar):
+    if isinstance(expression, ex.Scalar):
         return _row(expression, rate)
-    if expression == ZERO_VECTOR:
-        return ZERO
-    if isinstance(expression, VectorSum):
+    if expression == ex.ZERO_VECTOR:
+        return ex.ZERO
+    if isinstance(expression, ex.VectorSum):
         terms = [coefficient(term, rate) for term in expression.terms]
-        return vector_sum(tuple(term for term in terms if isinstance(term, Vector)))
-    factor, vector = split_factor(expression)
+        return ex.vector_sum(tuple(term for term in terms if isinstance(term, ex.Vector)))
+    factor, vector = ex.split_factor(expression)
     slope = _slope(vector, rate)
     if slope is not None:
-        return scaled(factor, slope)
+        return ex.scaled(factor, slope)
     if vector != rate:
         raise InternalError(f"{expression} is no multiple of {rate}")
     return factor
 
 
-def _row(expression: Scalar, rate: VectorSymbol) -> Vector:
+def _row(expression: ex.Scalar, rate: ex.VectorSymbol) -> ex.Vector:
     match expression:
-        case Sum(terms):
-            return vector_sum(tuple(_row(term, rate) for term in terms))
-        case Product(factors):
+        case ex.Sum(terms):
+            return ex.vector_sum(tuple(_row(term, rate) for term in terms))
+        case ex.Product(factors):
             rows = (
-                scaled(product_of((*factors[:k], *factors[k + 1 :])), _row(factor, rate))
+                ex.scaled(ex.product_of((*factors[:k], *factors[k + 1 :])), _row(factor, rate))
                 for k, factor in enumerate(factors)
             )
-            return vector_sum(tuple(rows))
-        case Dot(left, right) if rate in (left, right):
+            return ex.vector_sum(tuple(rows))
+        case ex.Dot(left, right) if rate in (left, right):
             return right if left == rate else left
-        case Dot(left, TimesG(p, turn, True)) if turn == rate:
-            return TimesG(p, left)
-        case Dot(left, right):
+        case ex.Dot(left, ex.TimesG(p, turn, True)) if turn == rate:
+            return ex.TimesG(p, left)
+        case ex.Dot(left, right):
             for one, other in ((left, right), (right, left)):
                 slope = _slope(one, rate)
                 if slope is not None:
-                    factor, matrix = split_factor(slope)
-                    assert isinstance(matrix, RotationSlope)
-                    return scaled(factor, RowOfSlope(other, matrix))
-    if along(expression, {rate: rate}) != ZERO:
+                    factor, matrix = ex.split_factor(slope)
+                    assert isinstance(matrix, ex.RotationSlope)
+                    return ex.scaled(factor, ex.RowOfSlope(other, matrix))
+    if along(expression, {rate: rate}) != ex.ZERO:
         raise InternalError(f"{expression} is not a multiple of {rate}")
-    return ZERO_VECTOR
+    return ex.ZERO_VECTOR

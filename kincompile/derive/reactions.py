@@ -12,21 +12,7 @@ from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING
 
-from kincompile.calculus.expressions import (
-    ONE,
-    ZERO,
-    Basis,
-    Norm,
-    Number,
-    Scalar,
-    Symbol,
-    TimesG,
-    Vector,
-    VectorSymbol,
-    dot,
-    perpendicular,
-    sum_of,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.symbols import C
 from kincompile.derive.derivation import units
 from kincompile.derive.rules import along
@@ -56,8 +42,8 @@ class Reaction:
         along the fixed axes.
     """
 
-    force: tuple[Scalar, ...]
-    moment: tuple[Scalar, ...]
+    force: tuple[ex.Scalar, ...]
+    moment: tuple[ex.Scalar, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +61,16 @@ class Reactions:
     """
 
     bodies: tuple[Reaction, ...]
-    drive: Scalar
-    along_axis: tuple[Scalar, ...]
+    drive: ex.Scalar
+    along_axis: tuple[ex.Scalar, ...]
 
 
-def multipliers(template: Template, size: int) -> tuple[Symbol | VectorSymbol, ...]:
+def multipliers(template: Template, size: int) -> tuple[ex.Symbol | ex.VectorSymbol, ...]:
     """Return the multipliers of the row blocks of a type whose vectors have so many components."""
     return tuple(
-        VectorSymbol(f"lambda_{k}", size) if isinstance(Phi, Vector) else Symbol(f"lambda_{k}")
+        ex.VectorSymbol(f"lambda_{k}", size)
+        if isinstance(Phi, ex.Vector)
+        else ex.Symbol(f"lambda_{k}")
         for k, Phi in enumerate(template.Phi)
     )
 
@@ -106,41 +94,41 @@ def derive_reactions(
         _reaction(template, frame, point)
         for frame, point in zip(template.frames, points, strict=True)
     )
-    return Reactions(bodies, -_work(template, {C: ONE}), _along_axis(template, axis))
+    return Reactions(bodies, -_work(template, {C: ex.ONE}), _along_axis(template, axis))
 
 
-def _along_axis(template: Template, axis: tuple[str, str] | None) -> tuple[Scalar, ...]:
+def _along_axis(template: Template, axis: tuple[str, str] | None) -> tuple[ex.Scalar, ...]:
     """Return the work for displacements of the last body along the axis, and across it."""
     if axis is None:
         return ()
     symbol, index = axis
     (frame,) = (item for item in template.frames if item.index == index)
-    v, last = VectorSymbol(symbol, frame.size), template.frames[-1]
-    unit = Norm(v) ** -1 * frame.A(v)
+    v, last = ex.VectorSymbol(symbol, frame.size), template.frames[-1]
+    unit = ex.Norm(v) ** -1 * frame.A(v)
     if frame.size == SPACE:
         return (_work(template, {last.r: unit}),)
-    return tuple(_work(template, {last.r: way}) for way in (unit, perpendicular(unit)))
+    return tuple(_work(template, {last.r: way}) for way in (unit, ex.perpendicular(unit)))
 
 
 def _reaction(template: Template, frame: Frame, point: str | None) -> Reaction:
-    force = (_work(template, {frame.r: Basis(k, frame.size)}) for k in range(frame.size))
+    force = (_work(template, {frame.r: ex.Basis(k, frame.size)}) for k in range(frame.size))
     moment = []
     for turn in _turns(frame):
         direction = dict(turn)
         if point is not None:
-            direction[frame.r] = -along(frame.A(VectorSymbol(point, frame.size)), turn)
+            direction[frame.r] = -along(frame.A(ex.VectorSymbol(point, frame.size)), turn)
         moment.append(_work(template, direction))
     if frame.size == SPACE:
         moment = _along_fixed_axes(frame, moment)
     return Reaction(tuple(force), tuple(moment))
 
 
-def _along_fixed_axes(frame: Frame, components: list[Scalar]) -> list[Scalar]:
+def _along_fixed_axes(frame: Frame, components: list[ex.Scalar]) -> list[ex.Scalar]:
     """Return the components along the fixed axes of a vector given along a body's axes."""
-    axes = [Basis(k, SPACE) for k in range(SPACE)]
+    axes = [ex.Basis(k, SPACE) for k in range(SPACE)]
     turned = [frame.A(axis) for axis in axes]
     return [
-        sum_of(tuple(dot(axis, a) * x for a, x in zip(turned, components, strict=True)))
+        ex.sum_of(tuple(ex.dot(axis, a) * x for a, x in zip(turned, components, strict=True)))
         for axis in axes
     ]
 
@@ -150,8 +138,8 @@ def _turns(frame: Frame) -> Iterator[Direction]:
     if frame.size == SPACE:
         (p,) = (item for item in frame.coordinates if item != frame.r)
         for k in range(SPACE):  # p_dot = G^T omega'/2
-            turn = TimesG(p, Basis(k, SPACE), is_transposed=True)  # type: ignore[arg-type]
-            yield {p: Number(Fraction(1, 2)) * turn}
+            turn = ex.TimesG(p, ex.Basis(k, SPACE), is_transposed=True)  # type: ignore[arg-type]
+            yield {p: ex.Number(Fraction(1, 2)) * turn}
         return
     for coordinate in frame.coordinates:
         if coordinate != frame.r:
@@ -159,16 +147,16 @@ def _turns(frame: Frame) -> Iterator[Direction]:
                 yield {coordinate: unit}
 
 
-def _work(template: Template, direction: Direction) -> Scalar:
+def _work(template: Template, direction: Direction) -> ex.Scalar:
     """Return the work of the constraint forces for a displacement."""
     size = template.frames[0].size
-    terms: list[Scalar] = [ZERO]
+    terms: list[ex.Scalar] = [ex.ZERO]
     for Phi, factor in zip(template.Phi, multipliers(template, size), strict=True):
         change = along(Phi, direction)
-        if isinstance(change, Vector):
-            assert isinstance(factor, Vector)
-            terms.append(-dot(factor, change))
+        if isinstance(change, ex.Vector):
+            assert isinstance(factor, ex.Vector)
+            terms.append(-ex.dot(factor, change))
         else:
-            assert isinstance(factor, Scalar)
+            assert isinstance(factor, ex.Scalar)
             terms.append(-(factor * change))
-    return sum_of(tuple(terms))
+    return ex.sum_of(tuple(terms))

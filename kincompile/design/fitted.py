@@ -35,22 +35,11 @@ DIMENSIONS = ("parameter", "value", "unit", "before")
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What a fit took.
+    """What a fit took."""
 
-    Attributes
-    ----------
-    sampled
-        Sets of parameters that the search tried.
-    starts
-        Of them, those that were followed.
-    motions, gradients
-        Motions and derivatives that were evaluated one by one.
-    seconds
-        Time.
-    """
-
-    sampled: int
-    starts: int
+    sampled: int  # sets of parameters that the search tried
+    starts: int  # of them, those that were followed
+    # motions, gradients: motions and derivatives that were evaluated one by one
     motions: int
     gradients: int
     seconds: float

@@ -1,7 +1,8 @@
 """One trial of a fit: the motion at some variables, its deviations, and their derivatives.
 
 The motion goes through all times of the targets without a break, so that no branch is left between
-them. From one trial to the next the branch is that of the first, by the signs of determinants.
+them. From one trial to the next the branch is that of the first, by the signs of determinants;
+redundant equations have none, and Newton's method starts near the position before.
 """
 
 from __future__ import annotations
@@ -42,24 +43,12 @@ SLACK = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """A motion that was tried.
+    """A motion that was tried."""
 
-    Attributes
-    ----------
-    x : ndarray, shape (nx,)
-        The variables.
-    motion : Solution
-        Through all times that are asked for.
-    residuals : ndarray, shape (R,)
-        Weighted deviations of the targets.
-    gaps : ndarray, shape (G,)
-        What is left to the limits, negative where they are exceeded.
-    """
-
-    x: Array
-    motion: Solution
-    residuals: Array
-    gaps: Array
+    x: Array  # (nx,): the variables
+    motion: Solution  # through all times that are asked for
+    residuals: Array  # (R,): weighted deviations of the targets
+    gaps: Array  # (G,): what is left to the limits, negative where they are exceeded
 
     @property
     def error(self) -> float:
@@ -74,24 +63,14 @@ class Trial:
 
 @dataclass(slots=True, eq=False)
 class Workbench:
-    """Evaluates trials of one mechanism.
+    """Evaluates trials of one mechanism."""
 
-    Attributes
-    ----------
-    module, demands
-        The mechanism, and what is asked of it.
-    names
-        The parameters that are varied.
-    fixed
-        Values of the others.
-    motions, gradients
-        How many of each were evaluated.
-    """
-
+    # module, demands: the mechanism, and what is asked of it
     module: ModuleType
     demands: Demands
-    names: tuple[str, ...]
-    fixed: dict[str, float]
+    names: tuple[str, ...]  # the parameters that are varied
+    fixed: dict[str, float]  # values of the others
+    # motions, gradients: how many of each were evaluated
     motions: int = 0
     gradients: int = 0
     _found: Sensitivities | None = field(default=None, init=False)

@@ -24,27 +24,13 @@ MOST_OPERATIONS = 60
 
 @dataclass(frozen=True, slots=True)
 class Blank:
-    """An entry to be filled.
+    """An entry to be filled."""
 
-    Attributes
-    ----------
-    name
-        What it is called in the hand-in file, ``"B1"``.
-    constraint
-        Name of the constraint.
-    quantity
-        ``"Phi_q"`` or ``"gamma"``.
-    row
-        Index of the equation in the system.
-    column
-        Index of the coordinate; None of gamma.
-    """
-
-    name: str
-    constraint: str
-    quantity: str
-    row: int
-    column: int | None
+    name: str  # what it is called in the hand-in file, ``"B1"``
+    constraint: str  # name of the constraint
+    quantity: str  # ``"Phi_q"`` or ``"gamma"``
+    row: int  # index of the equation in the system
+    column: int | None  # index of the coordinate; None of gamma
 
     def label(self, system: ConstraintSystem) -> str:
         """Return the entry by the names of its equation and coordinate."""

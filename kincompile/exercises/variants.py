@@ -41,18 +41,12 @@ LARGEST_CONDITION = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What differs from student to student besides the values of parameters.
+    """What differs from student to student besides the values of parameters."""
 
-    Attributes
-    ----------
-    signs
-        Whether the frames of some bodies are turned by half a turn, so that signs in them change.
-    lengths
-        Whether points and distances that are given as numbers change too; they do in any case where
-        a model has no parameters.
-    """
-
+    # Whether the frames of some bodies are turned by half a turn, so that signs in them change.
     signs: bool = False
+    # Whether points and distances that are given as numbers change too; they do in any case where a
+    # model has no parameters.
     lengths: bool = False
 
 

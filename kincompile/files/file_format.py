@@ -74,6 +74,9 @@ SEARCHES = ("sobol", "differential evolution")
 MINIMIZERS = ("SLSQP", "trust-constr")
 """What tolerances may be distributed by, and how a fit may search and end."""
 
+TASKS = ("tolerance", "fit", "sweep")
+"""Tables that commands of these names read; to a model they belong as data."""
+
 
 def _list(name: str) -> dict[str, Any]:
     return {"type": "array", "items": {"$ref": f"#/$defs/{name}"}}

@@ -30,6 +30,7 @@ from kincompile.files.file_format import (
     FIELDS,
     MOST_POINTS,
     SMOOTHNESS,
+    TASKS,
     VERSION,
     Field,
     constraint_fields,
@@ -124,6 +125,7 @@ class _ModelReader(BodyReader):
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
             "gravity": self.place(data, (), "gravity"),
+            "tasks": {key: data[key] for key in TASKS if key in data},
         }
         return self._checked(name, content, options)
 
@@ -157,7 +159,9 @@ class _ModelReader(BodyReader):
         model = self.words.mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
         model.constraints, model.outputs = content["constraints"], content["outputs"]
-        model.loads, model.gravity = content["loads"], content["gravity"]
+        model.gravity, model.tasks = content["gravity"], content["tasks"]
+        for load in content["loads"]:
+            model.add(load)
         free = content["coordinates"]
         if self.problems and not (model.constraints and (model.bodies or free)):
             return None
@@ -176,6 +180,7 @@ class _ModelReader(BodyReader):
                 loads=model.loads,
                 gravity=model.gravity,
                 ground=model.ground,
+                tasks=model.tasks,
                 **options,
             )
         except ModelError as error:

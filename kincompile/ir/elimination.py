@@ -48,39 +48,20 @@ class Pivot:
 
 @dataclass(frozen=True, slots=True)
 class SolvePlan:
-    """Straight-line code that solves Phi_q x = b.
-
-    Attributes
-    ----------
-    nodes
-        The code.
-    entries
-        ``(row, column, node)`` of the entries of Phi_q that vary, row by row: inputs of the code.
-    right
-        Node of each component of b: inputs of the code.
-    pivots
-        Elimination steps in order.
-    blocks
-        What is left, in the order of solution.
-    determinants
-        Node of each block's determinant.
-    solution
-        Node of each coordinate.
-    turned
-        Column of e0 of each body whose stretch s and small rotation pi' have four columns after
-        those of Phi_q.
-    straight
-        Size up to which blocks are straight-line code; LAPACK solves larger ones.
-    """
+    """Straight-line code that solves Phi_q x = b."""
 
     nodes: tuple[Node, ...]
+    # ``(row, column, node)`` of the entries of Phi_q that vary, row by row: inputs of the code.
     entries: tuple[tuple[int, int, int], ...]
-    right: tuple[int, ...]
-    pivots: tuple[Pivot, ...]
-    blocks: tuple[Block, ...]
-    determinants: tuple[int, ...]
-    solution: tuple[int, ...]
+    right: tuple[int, ...]  # node of each component of b: inputs of the code
+    pivots: tuple[Pivot, ...]  # elimination steps in order
+    blocks: tuple[Block, ...]  # what is left, in the order of solution
+    determinants: tuple[int, ...]  # node of each block's determinant
+    solution: tuple[int, ...]  # node of each coordinate
+    # Column of e0 of each body whose stretch s and small rotation pi' have four columns after those
+    # of Phi_q.
     turned: tuple[int, ...] = ()
+    # Size up to which blocks are straight-line code; LAPACK solves larger ones.
     straight: int = LARGEST_CLOSED_FORM
 
     @property

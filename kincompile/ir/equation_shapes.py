@@ -30,19 +30,12 @@ _COMMUTATIVE = (sympy.Add, sympy.Mul)
 
 @dataclass(frozen=True, slots=True)
 class SharedEquation:
-    """A free equation as an instance of the kernel of its structure.
-
-    Attributes
-    ----------
-    columns
-        Name of the coordinate of each of the kernel's columns.
-    values
-        The name of a coordinate, a rate, a parameter or of time, or the number, that each of the
-        kernel's inputs stands for.
-    """
+    """A free equation as an instance of the kernel of its structure."""
 
     kernel: Kernel
-    columns: tuple[str, ...]
+    columns: tuple[str, ...]  # name of the coordinate of each of the kernel's columns
+    # The name of a coordinate, a rate, a parameter or of time, or the number, that each of the
+    # kernel's inputs stands for.
     values: Mapping[str, str | sympy.Number]
 
 

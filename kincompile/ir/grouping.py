@@ -8,6 +8,7 @@ constraints.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -32,51 +33,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where an input of a group comes from.
+    """Where an input of a group comes from."""
 
-    Attributes
-    ----------
-    kind
-        ``"q"``, ``"q_dot"``, ``"q_ddot"``, ``"number"`` (an attribute), ``"value"`` (computed from
-        t, p and coordinates), ``"moving"`` (computed from rates too), or an entry of the frames of
-        bodies, as ``"frame_1.c"``.
-    index
-        Index for each constraint, into the vector of that kind.
-    """
-
+    # ``"q"``, ``"q_dot"``, ``"q_ddot"``, ``"number"`` (an attribute), ``"value"`` (computed from t,
+    # p and coordinates), ``"moving"`` (computed from rates too), or an entry of the frames of
+    # bodies, as ``"frame_1.c"``.
     kind: str
-    index: Index
+    index: Index  # index for each constraint, into the vector of that kind
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Constraints that run together.
+    """Constraints that run together."""
 
-    Attributes
-    ----------
-    name
-        Name of the code, for instance ``Revolute_2``.
-    sample
-        The first of them.
-    nodes
-        Its code, folded for the shape of the group.
-    inputs
-        Where each input that is left comes from.
-    outputs
-        By quantity ``(row, column, node)``, as in the kernel, without what is on the ground or
-        zero.
-    placed
-        Where their entries stand.
-    hints
-        Speaking names of nodes.
-    """
-
-    name: str
-    sample: Instance
-    nodes: tuple[Node, ...]
-    inputs: Mapping[str, Source]
+    name: str  # name of the code, for instance ``Revolute_2``
+    sample: Instance  # the first of them
+    nodes: tuple[Node, ...]  # its code, folded for the shape of the group
+    inputs: Mapping[str, Source]  # where each input that is left comes from
+    # By quantity ``(row, column, node)``, as in the kernel, without what is on the ground or zero.
     outputs: Mapping[str, tuple[tuple[int, int, int], ...]]
-    placed: Placed
+    placed: Placed  # where their entries stand
     hints: Mapping[int, str]
 
     @property
@@ -91,21 +67,11 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class FrameGroup:
-    """Bodies of one kind, whose frames are computed together.
+    """Bodies of one kind, whose frames are computed together."""
 
-    Attributes
-    ----------
-    name
-        Name of the code, for instance ``frame_1``.
-    kernel
-        Its code.
-    columns
-        Columns of each body's coordinates, shape (coordinates, L).
-    """
-
-    name: str
+    name: str  # name of the code, for instance ``frame_1``
     kernel: FrameKernel
-    columns: Index
+    columns: Index  # columns of each body's coordinates, shape (coordinates, L)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -115,28 +81,14 @@ class FrameGroup:
 
 @dataclass(frozen=True, slots=True)
 class GroupedProgram:
-    """A program by groups.
-
-    Attributes
-    ----------
-    groups
-        The groups, in the order of their first constraint.
-    numbers
-        Attributes that are plain numbers, shape (K,).
-    values
-        Nodes of `program.values` that depend on t, p or coordinates.
-    moving
-        Those that depend on rates too.
-    frames
-        The bodies, by kind.
-    """
+    """A program by groups."""
 
     program: Program
-    groups: tuple[Group, ...]
-    numbers: NDArray[np.float64]
-    values: tuple[int, ...]
-    moving: tuple[int, ...]
-    frames: tuple[FrameGroup, ...]
+    groups: tuple[Group, ...]  # the groups, in the order of their first constraint
+    numbers: NDArray[np.float64]  # attributes that are plain numbers, shape (K,)
+    values: tuple[int, ...]  # nodes of `program.values` that depend on t, p or coordinates
+    moving: tuple[int, ...]  # those that depend on rates too
+    frames: tuple[FrameGroup, ...]  # the bodies, by kind
 
     def pattern(self) -> NDArray[np.intp]:
         """Return row and column of every entry of Phi_q, shape (nnz, 2), group by group."""
@@ -164,26 +116,15 @@ Q_DOT, NUMBER, VALUE, MOVING = 1, 3, 4, 5
 
 @dataclass(frozen=True, slots=True)
 class _Nodes:
-    """Kind and index of every node of `program.values`, and its number where it is a plain one.
+    """Kind and index of every node of `program.values`, and its number where it is a plain one."""
 
-    Attributes
-    ----------
-    kinds
-        Kinds of sources.
-    kind : ndarray of int, shape (nodes,)
-        Position in `kinds`.
-    index : ndarray of int, shape (nodes,)
-        Index into the vector of that kind; for computed values the node itself.
-    number : ndarray, shape (nodes,)
-        NaN where a node is not a plain number.
-    structure : ndarray of int, shape (nodes,)
-        Equal where nodes are computed by the same operations, whatever the names and numbers.
-    """
-
-    kinds: tuple[str, ...]
-    kind: Index
+    kinds: tuple[str, ...]  # kinds of sources
+    kind: Index  # (nodes,): position in `kinds`
+    # (nodes,): index into the vector of that kind; for computed values the node itself
     index: Index
-    number: NDArray[np.float64]
+    number: NDArray[np.float64]  # (nodes,): NaN where a node is not a plain number
+    # (nodes,): equal where nodes are computed by the same operations, whatever the names and
+    # numbers
     structure: Index
 
 
@@ -200,26 +141,30 @@ def _classify(program: Program, groups: Sequence[FrameGroup]) -> _Nodes:
             frames |= {node: (first + entry, k) for entry, node in enumerate(body.entries)}
         first += len(item.kinds)
     nodes = program.values
-    kind = np.full(len(nodes), VALUE)
-    index = np.arange(len(nodes))
-    number = np.full(len(nodes), np.nan)
+    # Lists, since single entries of arrays cost ten times as much.
+    kinds_of = [VALUE] * len(nodes)
+    index = list(range(len(nodes)))
+    number = [math.nan] * len(nodes)
 
     def is_moving(node: int) -> bool:
-        return any(kind[k] in (Q_DOT, MOVING) for k in operands_of(nodes[node]))
+        return any(kinds_of[k] in (Q_DOT, MOVING) for k in operands_of(nodes[node]))
 
-    for node, (operation, *operands) in enumerate(nodes):
-        if operation == "input" and operands[0] in places:
-            kind[node], index[node] = places[operands[0]]
+    for node, content in enumerate(nodes):
+        operation = content[0]
+        if operation == "input" and content[1] in places:
+            kinds_of[node], index[node] = places[content[1]]
         elif operation == "const":
-            number[node] = operands[0]
+            number[node] = content[1]
         elif operation == "neg":
-            number[node] = -number[operands[0]]
+            number[node] = -number[content[1]]
         elif node in frames:
-            kind[node], index[node] = frames[node]
-        if program.loads and kind[node] == VALUE and is_moving(node):
-            kind[node] = MOVING
-    kind[~np.isnan(number)] = NUMBER
-    return _Nodes(kinds, kind, index, number, _structures(nodes, kind, len(kinds)))
+            kinds_of[node], index[node] = frames[node]
+        if program.loads and kinds_of[node] == VALUE and is_moving(node):
+            kinds_of[node] = MOVING
+    kind, numbers = np.array(kinds_of), np.array(number)
+    kind[~np.isnan(numbers)] = NUMBER
+    structure = _structures(nodes, kind, len(kinds))
+    return _Nodes(kinds, kind, np.array(index), numbers, structure)
 
 
 def _structures(nodes: Sequence[Node], kind: Index, first: int) -> Index:
@@ -268,17 +213,10 @@ def _frame_groups(program: Program) -> tuple[FrameGroup, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Sources:
-    """The inputs of a group while its code is made.
+    """The inputs of a group while its code is made."""
 
-    Attributes
-    ----------
-    by_name
-        Where each comes from.
-    known
-        Node in the group's code by the values that it stands for, as bytes.
-    """
-
-    by_name: dict[str, Source] = field(default_factory=dict)
+    by_name: dict[str, Source] = field(default_factory=dict)  # where each comes from
+    # Node in the group's code by the values that it stands for, as bytes.
     known: dict[bytes, int] = field(default_factory=dict)
 
 

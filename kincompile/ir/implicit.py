@@ -123,18 +123,10 @@ def _titles(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Slopes:
-    """The partial derivatives of one number.
+    """The partial derivatives of one number."""
 
-    Attributes
-    ----------
-    by
-        Those by q, q_dot and q_ddot, by column.
-    by_parameter
-        Those by each parameter.
-    """
-
-    by: tuple[Entries, Entries, Entries]
-    by_parameter: tuple[int, ...]
+    by: tuple[Entries, Entries, Entries]  # those by q, q_dot and q_ddot, by column
+    by_parameter: tuple[int, ...]  # those by each parameter
 
 
 class _Linearized:

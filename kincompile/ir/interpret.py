@@ -109,18 +109,11 @@ def inputs_of(program: Program, states: Sequence[Array], t: Any, p: Any) -> dict
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """Where the entries of constraints of one kernel stand.
+    """Where the entries of constraints of one kernel stand."""
 
-    Attributes
-    ----------
-    rows
-        First row of each constraint, shape (L,), in the equations and in the outputs.
-    columns
-        Column of each of the type's coordinates, shape (L, c), -1 on the ground.
-    """
-
+    # First row of each constraint, shape (L,), in the equations and in the outputs.
     rows: Mapping[str, Array]
-    columns: Array
+    columns: Array  # column of each of the type's coordinates, shape (L, c), -1 on the ground
 
     @classmethod
     def of(cls, instances: Sequence[Instance]) -> Placed:

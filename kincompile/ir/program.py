@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kincompile.model.resolve import FreeEquation
     from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.model.spline import SplineTable
-    from kincompile.quantities import Columns, Quantity, Rows
+    from kincompile.quantities import Columns, Part, Quantity, Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,64 +72,34 @@ Input = StateEntry | FrameEntry | Attribute | Function
 
 @dataclass(frozen=True, slots=True)
 class Hint:
-    """What a node is in the textbook's formula: a component of A_i s_i, of d, of u(alpha_i).
-
-    Attributes
-    ----------
-    owner
-        Number of the body that is named in it, None if none is.
-    stem
-        Its name, ``{}`` for that of the body.
-    name
-        Its name in the type's own symbols.
-    """
+    """What a node is in the textbook's formula: a component of A_i s_i, of d, of u(alpha_i)."""
 
     node: int
-    owner: int | None
-    stem: str
-    name: str
+    owner: int | None  # number of the body that is named in it, None if none is
+    stem: str  # its name, ``{}`` for that of the body
+    name: str  # its name in the type's own symbols
 
 
 @dataclass(frozen=True, slots=True)
 class FrameKernel:
-    """The code of a frame: cosine and sine of the angle in the plane.
+    """The code of a frame: cosine and sine of the angle in the plane."""
 
-    Attributes
-    ----------
-    nodes
-        The code, whose inputs are the numbers of the coordinates.
-    entries
-        Nodes of what it gives.
-    letters, symbols
-        Letters of the coordinates, and symbols of the entries: ``c`` and ``s``.
-    formula
-        The matrix A, for a comment.
-    """
-
-    nodes: tuple[Node, ...]
-    entries: tuple[int, ...]
+    nodes: tuple[Node, ...]  # the code, whose inputs are the numbers of the coordinates
+    entries: tuple[int, ...]  # nodes of what it gives
+    # letters, symbols: letters of the coordinates, and symbols of the entries: ``c`` and ``s``
     letters: tuple[str, ...]
     symbols: tuple[str, ...]
-    formula: str
+    formula: str  # the matrix A, for a comment
 
 
 @dataclass(frozen=True, slots=True)
 class BodyFrame:
-    """A body: the frame kernel of its kind bound to its coordinates.
-
-    Attributes
-    ----------
-    name
-        Name of the body.
-    columns
-        Columns of its coordinates.
-    entries
-        Nodes of `Program.values` that its frame gives: cosine and sine of its angle.
-    """
+    """A body: the frame kernel of its kind bound to its coordinates."""
 
     name: str
     kernel: FrameKernel
     columns: range
+    # Nodes of `Program.values` that its frame gives: cosine and sine of its angle.
     entries: tuple[int, ...]
 
     @property
@@ -140,27 +110,16 @@ class BodyFrame:
 
 @dataclass(frozen=True, repr=False)
 class Kernel:
-    """Straight-line code for the quantities of one constraint type.
-
-    Attributes
-    ----------
-    inputs
-        What it reads; of a free equation the names that occur.
-    nodes
-        The code.
-    outputs
-        By quantity ``(row, column, node)`` of each entry: of a matrix those that can differ from
-        zero, of a vector all, with column 0. Rows and columns count the type's own equations and
-        coordinates; parameters are those of the mechanism.
-    hints
-        What some nodes are in the textbook's formula, for speaking names.
-    """
+    """Straight-line code for the quantities of one constraint type."""
 
     name: str
-    inputs: tuple[Input | str, ...]
+    inputs: tuple[Input | str, ...]  # what it reads; of a free equation the names that occur
     nodes: tuple[Node, ...]
+    # By quantity ``(row, column, node)`` of each entry: of a matrix those that can differ from
+    # zero, of a vector all, with column 0. Rows and columns count the type's own equations and
+    # coordinates; parameters are those of the mechanism.
     outputs: Mapping[str, tuple[tuple[int, int, int], ...]]
-    hints: tuple[Hint, ...]
+    hints: tuple[Hint, ...]  # what some nodes are in the textbook's formula, for speaking names
 
     def __repr__(self) -> str:
         return self._text
@@ -184,30 +143,18 @@ class OutputDerivatives(Observed):
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """One constraint, output or load: a kernel bound to rows, columns and attribute values.
-
-    Attributes
-    ----------
-    constraint
-        The constraint, output or load, for names and comments.
-    first_row
-        Row offset in the system.
-    columns
-        Column of each of the kernel's coordinates, None on the ground.
-    bindings
-        Node of `Program.values` for each of the kernel's inputs.
-    first_output
-        Row offset in the outputs of the mechanism.
-    """
+    """One constraint, output or load: a kernel bound to rows, columns and attribute values."""
 
     kernel: Kernel
+    # The constraint, output or load, for names and comments.
     constraint: (
         Joint | FreeEquation | ResolvedOutput | PlacedPoint | OutputDerivatives | AppliedLoad
     )
-    first_row: int
+    first_row: int  # row offset in the system
+    # Column of each of the kernel's coordinates, None on the ground.
     columns: tuple[int | None, ...]
-    bindings: tuple[int, ...]
-    first_output: int = 0
+    bindings: tuple[int, ...]  # node of `Program.values` for each of the kernel's inputs
+    first_output: int = 0  # row offset in the outputs of the mechanism
 
     def place(self, quantity: Quantity, row: int, column: int) -> tuple[int, int] | None:
         """Return where an entry of the kernel stands in the system, None on the ground."""
@@ -238,6 +185,11 @@ class Instance:
         return "M" in self.kernel.outputs
 
     @property
+    def is_motion(self) -> bool:
+        """Whether it is the solved equations of motion."""
+        return "accelerations" in self.kernel.outputs
+
+    @property
     def rows(self) -> tuple[OutputColumn, ...]:
         """The outputs that it gives."""
         return self.constraint.rows if isinstance(self.constraint, Observed) else ()
@@ -245,51 +197,34 @@ class Instance:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Everything an emitter needs.
-
-    Attributes
-    ----------
-    bodies
-        The bodies; what a frame gives is computed once a body.
-    values
-        Shared code in coordinates, rates, parameters and t that feeds the instances: attributes,
-        drivers, profiles, frames.
-    tables
-        Splines by name.
-    fingerprint
-        Digest of all the above: two systems with the same code and data have the same.
-    redundant
-        Names of equations that repeat others at every assembled position, and agree with them.
-    unsolvable
-        Why the equations cannot determine the coordinates; "" where they can.
-    observers
-        The outputs, an instance each; those of a point are one.
-    loads
-        The masses of bodies and the loads, an instance each.
-    end, points
-        The mechanism's own time grid, for a target that solves too.
-    """
+    """Everything an emitter needs."""
 
     name: str
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Parameter, ...]
     equations: tuple[str, ...]
-    bodies: tuple[BodyFrame, ...]
+    bodies: tuple[BodyFrame, ...]  # the bodies; what a frame gives is computed once a body
+    # Shared code in coordinates, rates, parameters and t that feeds the instances: attributes,
+    # drivers, profiles, frames.
     values: tuple[Node, ...]
     instances: tuple[Instance, ...]
-    tables: Mapping[str, SplineTable]
+    tables: Mapping[str, SplineTable]  # splines by name
+    # Digest of all the above: two systems with the same code and data have the same.
     fingerprint: str
+    # end, points: the mechanism's own time grid, for a target that solves too
     end: float
     points: int
+    # Names of equations that repeat others at every assembled position, and agree with them.
     redundant: tuple[str, ...] = ()
-    unsolvable: str = ""
-    observers: tuple[Instance, ...] = ()
-    loads: tuple[Instance, ...] = ()
+    unsolvable: str = ""  # why the equations cannot determine the coordinates; "" where they can
+    observers: tuple[Instance, ...] = ()  # the outputs, an instance each; those of a point are one
+    loads: tuple[Instance, ...] = ()  # the masses of bodies and the loads, an instance each
+    motion: tuple[Instance, ...] = ()  # the equations of motion, one, where they were asked for
 
     @property
     def parts(self) -> tuple[Instance, ...]:
-        """Everything that gives entries of quantities: constraints, outputs and loads."""
-        return *self.instances, *self.observers, *self.loads
+        """Everything that gives entries of quantities."""
+        return *self.instances, *self.observers, *self.loads, *self.motion
 
     @property
     def outputs(self) -> tuple[OutputColumn, ...]:
@@ -298,8 +233,13 @@ class Program:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The quantities that there are: those of outputs and of loads only where there are any."""
-        return quantities_of(has_outputs=bool(self.observers), has_loads=bool(self.loads))
+        """The quantities that there are: of outputs, loads and motion only where there are any."""
+        parts: dict[Part, tuple[Instance, ...]] = {
+            "outputs": self.observers,
+            "loads": self.loads,
+            "motion": self.motion,
+        }
+        return quantities_of([part for part, found in parts.items() if found])
 
     @property
     def corners(self) -> bool:

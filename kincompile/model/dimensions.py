@@ -36,7 +36,8 @@ WORDS: Mapping[Dimension, str] = {
 }  # fmt: skip
 
 EXPECTED: Mapping[tuple[str, str], Dimension] = {
-    ("Mass", "m"): MASS, ("Mass", "J"): (1, 2, 0), ("Torque", "F"): TORQUE,
+    ("Mass", "m"): MASS, **{("Mass", f"J{row}"): (1, 2, 0) for row in ("", "_1", "_2", "_3")},
+    ("Torque", "F"): TORQUE, ("Torque", "f"): TORQUE, ("FollowerTorque", "f"): TORQUE,
     ("Spring", "k"): (1, 0, -2), ("Spring", "l_0"): (0, 1, 0), ("Spring", "c"): (1, 0, -1),
     ("Spring", "F"): FORCE, ("TorsionSpring", "k"): TORQUE, ("TorsionSpring", "phi_0"): (0, 0, 0),
     ("TorsionSpring", "c"): (1, 2, -1), ("TorsionSpring", "F"): TORQUE,

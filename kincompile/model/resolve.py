@@ -347,7 +347,7 @@ def text_of(constraint: Element) -> str:
         elif item.kind is Kind.PROFILE:
             parts.append("profile table" if isinstance(given, tuple | list) else "profile")
         elif item.kind is Kind.LOADS:
-            parts.append("({}, {})".format(*given))
+            parts.append(f"({', '.join(map(str, given))})")
         elif not constraint.is_load or given != 0:  # most springs have no damper
             parts.append(f"{name} {given}")
     return " ".join(parts)

@@ -169,6 +169,7 @@ def _resolved(load: Any, scope: Scope) -> AppliedLoad | None:
     own = tuple(name for body in known for name in scope.columns[body.name])
     others = sorted(occurring.difference(own), key=scope.places.__getitem__)
     columns = (*own, *others)
+    points = dict(load.completed(points, scope.defaults))
     return AppliedLoad(
         load, load.template(), tuple(known), scalars, points, columns, bool(occurring)
     )

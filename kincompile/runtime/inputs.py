@@ -30,73 +30,38 @@ SMALLEST_GRID = 32
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inputs:
-    """What the solver works with, checked.
+    """What the solver works with, checked."""
 
-    Attributes
-    ----------
-    code
-        A module with as many equations as coordinates, or more that agree.
-    t : ndarray, shape (N,)
-        The time grid, finite and monotone.
-    p : ndarray, shape (k,)
-        A value for each parameter; of several sets the first.
-    guess : ndarray, shape (n,)
-        Where Newton starts.
-    tolerance : float
-        Bound for the last correction, in scales of the coordinates.
-    max_iterations : int
-        Newton iterations after which an attempt is given up.
-    method : str or None
-        How a grid is solved: ``"grid"``, ``"march"``, or the faster.
-    on_grid : bool
-        Whether the points of a grid are solved together, rather than one after the other.
-    smooth : bool
-        Whether to go on past a bifurcation.
-    sets : ndarray, shape (B, k), or None
-        Values of the parameters in each of several sets.
-    sweep
-        The arrays that were given of them, by name.
-    without_guess
-        Bodies that have no guess.
-    """
-
-    code: Code
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
-    guess: NDArray[np.float64]
-    tolerance: float
-    max_iterations: int
-    method: str | None = None
+    code: Code  # a module with as many equations as coordinates, or more that agree
+    t: NDArray[np.float64]  # (N,): the time grid, finite and monotone
+    p: NDArray[np.float64]  # (k,): a value for each parameter; of several sets the first
+    guess: NDArray[np.float64]  # (n,): where Newton starts
+    tolerance: float  # bound for the last correction, in scales of the coordinates
+    max_iterations: int  # Newton iterations after which an attempt is given up
+    method: str | None = None  # how a grid is solved: ``"grid"``, ``"march"``, or the faster
+    # Whether the points of a grid are solved together, rather than one after the other.
     on_grid: bool = False
-    smooth: bool = False
+    smooth: bool = False  # whether to go on past a bifurcation
+    # (B, k), or None: values of the parameters in each of several sets
     sets: NDArray[np.float64] | None = None
+    # The arrays that were given of them, by name.
     sweep: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    without_guess: tuple[str, ...] = ()
+    without_guess: tuple[str, ...] = ()  # bodies that have no guess
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variants:
-    """Parameter sets as they were given.
+    """Parameter sets as they were given."""
 
-    Attributes
-    ----------
-    common
-        Parameters of all sets, as `solve` takes those of one; of the first set, where they differ.
-    sets : ndarray, shape (B, k), or None
-        The sets, where an array of them was given.
-    sweep
-        Arrays of values by the names of their parameters.
-    is_product
-        Whether every value of one goes with every value of the others; else they go in pairs.
-    problems
-        What is wrong with them.
-    """
-
+    # Parameters of all sets, as `solve` takes those of one; of the first set, where they differ.
     common: Values = None
+    # (B, k), or None: the sets, where an array of them was given
     sets: NDArray[np.float64] | None = None
+    # Arrays of values by the names of their parameters.
     sweep: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    # Whether every value of one goes with every value of the others; else they go in pairs.
     is_product: bool = False
-    problems: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()  # what is wrong with them
 
     def parameters(
         self, names: Sequence[str], common: NDArray[np.float64]

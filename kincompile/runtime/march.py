@@ -52,90 +52,47 @@ SAME_DETERMINANT = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """A point of the motion, complete; or a batch of them, which is the last axis.
-
-    Attributes
-    ----------
-    t : float
-        Time.
-    point : Point
-        The position with Phi and Phi_q.
-    q_dot, q_ddot : ndarray, shape (n,) or (n, N)
-        Velocity and acceleration.
-    determinants : ndarray, shape (blocks,) or (blocks, N)
-        Those of the blocks of Phi_q.
-    sensitivity : float or ndarray, shape (N,)
-        Movement, in scales of the coordinates, for an error of one scale in the equations.
-    probed : ndarray, shape of determinants
-        Sizes of the determinants where that was found.
-    """
+    """A point of the motion, complete; or a batch of them, which is the last axis."""
 
     t: float
-    point: Point
+    point: Point  # the position with Phi and Phi_q
+    # q_dot, q_ddot (n,) or (n, N): velocity and acceleration
     q_dot: Array
     q_ddot: Array
-    determinants: Array
+    determinants: Array  # (blocks,) or (blocks, N): those of the blocks of Phi_q
+    # float or (N,): movement, in scales of the coordinates, for an error of one scale in the
+    # equations
     sensitivity: Any = 0.0
+    # shape of determinants: sizes of the determinants where that was found
     probed: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What became of the way to a point in time.
+    """What became of the way to a point in time."""
 
-    Attributes
-    ----------
-    status : Status
-        CONVERGED, or why the point failed.
-    iterations : int
-        Newton iterations spent.
-    state : State or None
-        The point when converged; on failure the last good one on the way, if there is one.
-    position : Point or None
-        Where the mechanism is at that time, also when only velocity or acceleration failed.
-    nearest : Point or None
-        Where the motion does not lead to that time: where Newton's method ends there.
-    jumps : bool
-        Whether the mechanism is assembled there: it could only jump to it.
-    exhausted : bool
-        Whether the sub-steps on the way were too many.
-    strays : bool
-        Whether it was assembled on another branch than its guess shows.
-    is_folded : bool
-        Whether the guess that it was assembled from shows no branch.
-    other : Point or None
-        Another assembly that is as near to that guess.
-    """
-
-    status: Status
-    iterations: int
+    status: Status  # CONVERGED, or why the point failed
+    iterations: int  # Newton iterations spent
+    # The point when converged; on failure the last good one on the way, if there is one.
     state: State | None
+    # Where the mechanism is at that time, also when only velocity or acceleration failed.
     position: Point | None = None
+    # Where the motion does not lead to that time: where Newton's method ends there.
     nearest: Point | None = None
-    jumps: bool = False
-    exhausted: bool = False
-    strays: bool = False
-    is_folded: bool = False
-    other: Point | None = None
+    jumps: bool = False  # whether the mechanism is assembled there: it could only jump to it
+    exhausted: bool = False  # whether the sub-steps on the way were too many
+    strays: bool = False  # whether it was assembled on another branch than its guess shows
+    is_folded: bool = False  # whether the guess that it was assembled from shows no branch
+    other: Point | None = None  # another assembly that is as near to that guess
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corrected:
-    """What Newton's method made of a prediction.
+    """What Newton's method made of a prediction."""
 
-    Attributes
-    ----------
-    point : Point
-        The position. Phi and Phi_q may be those of a position a rounding error away.
-    good : bool or ndarray of bool, shape (N,)
-        Where it converged.
-    iterations : int or ndarray of int, shape (N,)
-        How many corrections were applied.
-    """
-
-    point: Point
-    good: Any
-    iterations: Any
+    point: Point  # the position. Phi and Phi_q may be those of a position a rounding error away.
+    good: Any  # bool or (N,), bool: where it converged
+    iterations: Any  # int or (N,): how many corrections were applied
 
 
 class March:

@@ -102,30 +102,14 @@ class NewtonResult(Shown):
 
 @dataclass(slots=True, eq=False)
 class Attempt:
-    """The record of one run of Newton's method.
-
-    Attributes
-    ----------
-    equations : Problem
-        What evaluated its points.
-    status : Status
-        How it ended.
-    points : list of Point
-        The guess and every position reached.
-    corrections : list of float
-        Euclidean norm of each correction.
-    turned : Point or None
-        The last position with angles turned back, where they were.
-    other : Point or None
-        Another assembly that is as near to the guess, where one was met.
-    """
+    """The record of one run of Newton's method."""
 
     equations: Problem
-    status: Status = Status.NOT_CONVERGED
-    points: list[Point] = field(default_factory=list)
-    corrections: list[float] = field(default_factory=list)
-    turned: Point | None = None
-    other: Point | None = None
+    status: Status = Status.NOT_CONVERGED  # how it ended
+    points: list[Point] = field(default_factory=list)  # the guess and every position reached
+    corrections: list[float] = field(default_factory=list)  # Euclidean norm of each correction
+    turned: Point | None = None  # the last position with angles turned back, where they were
+    other: Point | None = None  # another assembly that is as near to the guess, where one was met
 
     @property
     def last(self) -> Point:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import (
-    AGREEMENT,
     ASTRAY,
     FAR,
     FOLDED,
@@ -33,7 +32,7 @@ from kincompile.criteria import (
     size_of,
 )
 from kincompile.runtime.engine.code import Array, Code, code_of
-from kincompile.runtime.engine.engine import Point, Rates
+from kincompile.runtime.engine.engine import Point, Rates, agree
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.engine.stages import StagedSolver
@@ -58,48 +57,24 @@ LARGEST_POWER = 700.0
 
 @dataclass(slots=True, eq=False)
 class Problem:
-    """A module with its parameters set, and its scales.
-
-    Attributes
-    ----------
-    code
-        The module.
-    engine
-        What solves its equations.
-    p : ndarray, shape (k,)
-        Parameters.
-    angular : ndarray of bool, shape (n,)
-        Which coordinates are angles.
-    size : float
-        The size of the mechanism.
-    reference : ndarray, shape (n,)
-        Scale of each coordinate: 1 rad for angles, the size of the mechanism for the others.
-    place : ndarray, shape (n,)
-        How far from zero each coordinate is at a guess, or in the assembled mechanism.
-    floor : float
-        Correction, in scales, below which there are only rounding errors of so far a place.
-    probe : ndarray, shape (m,)
-        Numbers of size 1/2 to 1 and either sign without a pattern.
-    magnitude : ndarray, shape (m,)
-        What the terms of each equation contribute at a generic position.
-    noise : ndarray, shape (m,)
-        What rounding errors of so large coordinates leave of each equation.
-    limit : ndarray, shape (m,)
-        What they contribute at most, wherever they are.
-    """
+    """A module with its parameters set, and its scales."""
 
     code: Code
-    engine: Engine
-    p: Array
-    angular: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    size: float
+    engine: Engine  # what solves its equations
+    p: Array  # (k,): parameters
+    angular: np.ndarray[tuple[int], np.dtype[np.bool_]]  # (n,), bool: which coordinates are angles
+    size: float  # the size of the mechanism
+    # (n,): scale of each coordinate: 1 rad for angles, the size of the mechanism for the others
     reference: Array
+    # (n,): how far from zero each coordinate is at a guess, or in the assembled mechanism
     place: Array
+    # Correction, in scales, below which there are only rounding errors of so far a place.
     floor: float
-    probe: Array
-    magnitude: Array
+    probe: Array  # (m,): numbers of size 1/2 to 1 and either sign without a pattern
+    magnitude: Array  # (m,): what the terms of each equation contribute at a generic position
+    # (m,): what rounding errors of so large coordinates leave of each equation
     noise: Array | float = 0.0
-    limit: Array | float = np.inf
+    limit: Array | float = np.inf  # (m,): what they contribute at most, wherever they are
 
     def at(self, q: Array, t: float) -> Point | None:
         """Evaluate the equations, or give None where they have no finite value."""
@@ -361,8 +336,8 @@ class Dense:
         except (ArithmeticError, ValueError):
             return Rates(q_dot, nothing, movement)
         q_ddot = self.solve(point, gamma)
-        agree = _agree(point.Phi_q, q_dot, sides[:, 0]) and _agree(point.Phi_q, q_ddot, gamma)
-        return Rates(q_dot, q_ddot, movement, bool(agree))
+        holds = agree(point.Phi_q, q_dot, sides[:, 0]) and agree(point.Phi_q, q_ddot, gamma)
+        return Rates(q_dot, q_ddot, movement, bool(holds))
 
     def determinants(self, point: Point, before: Point) -> Array:
         """Return the determinants of the blocks; without any, one relative to the point before."""
@@ -408,29 +383,6 @@ class Dense:
             batch = Planned(self.code, self._p)
             return batch.determinants(batch.evaluate(q[:, np.newaxis], t))[:, 0]
         return np.array(found, dtype=np.float64)
-
-
-def _agree(matrix: Array, rates: Array, sides: Array) -> Any:
-    """Say whether redundant equations are all met by the rates: at a point (n,), or at each (N, n).
-
-    `matrix` and `sides` have one axis more and as many.
-    """
-    if matrix.shape[-2] == matrix.shape[-1]:
-        return True
-    rates = rates[..., np.newaxis]
-    terms = (np.abs(matrix) @ np.abs(rates))[..., 0] + np.abs(sides)
-    missing = np.abs((matrix @ rates)[..., 0] - sides)
-    return np.max(missing, axis=-1) <= AGREEMENT * np.max(terms, axis=-1)
-
-
-def rates_agree(code: Code, t: Array, p: Array, states: Sequence[Array]) -> Any:
-    """Say at which points redundant equations are all met by rates that solve the others.
-
-    `states` are position, velocity and acceleration, shape (n, N) each.
-    """
-    q, q_dot, q_ddot = (state.T for state in states)
-    Phi_q, nu, gamma = code.Phi_q(q, t, p), code.nu(q, t, p), code.gamma(q, q_dot, t, p)
-    return _agree(Phi_q, q_dot, nu) & _agree(Phi_q, q_ddot, gamma)
 
 
 def solve_linear(matrix: Array, sides: Array) -> Array:

@@ -35,21 +35,15 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Rows and columns of Phi_q by what the pattern alone says of them.
+    """Rows and columns of Phi_q by what the pattern alone says of them."""
 
-    Attributes
-    ----------
-    too_many_rows, too_many_columns
-        Equations of which there are more than coordinates in them, and those coordinates.
-    blocks
-        The square part, in the order of solution.
-    too_few_rows, too_few_columns
-        Coordinates of which there are more than equations for them, and those equations.
-    """
-
+    # too_many_rows, too_many_columns: equations of which there are more than coordinates in them,
+    # and those coordinates
     too_many_rows: tuple[int, ...]
     too_many_columns: tuple[int, ...]
-    blocks: tuple[Block, ...]
+    blocks: tuple[Block, ...]  # the square part, in the order of solution
+    # too_few_rows, too_few_columns: coordinates of which there are more than equations for them,
+    # and those equations
     too_few_rows: tuple[int, ...]
     too_few_columns: tuple[int, ...]
 
@@ -185,18 +179,12 @@ def order_of_solution(needs: Index, labels: Iterable[int]) -> list[int]:
 
 @dataclass(frozen=True, slots=True)
 class BlockForm:
-    """The block triangular form of a square matrix given by its entries.
+    """The block triangular form of a square matrix given by its entries."""
 
-    Attributes
-    ----------
-    rows, columns : ndarray of int, shape (nnz,)
-        Place of each entry.
-    of_row, of_column : ndarray of int, shape (size,)
-        Block of each equation and of each coordinate.
-    """
-
+    # rows, columns (nnz,): place of each entry
     rows: Index
     columns: Index
+    # of_row, of_column (size,): block of each equation and of each coordinate
     of_row: Index
     of_column: Index
 

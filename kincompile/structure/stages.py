@@ -27,61 +27,38 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Blocks of equal structure, solved side by side.
+    """Blocks of equal structure, solved side by side."""
 
-    Attributes
-    ----------
-    rows, columns : ndarray of int, shape (size, L)
-        Equations and coordinates of each block.
-    inner : ndarray of int, shape (entries, L)
-        Numbers of the entries within the blocks.
-    places : tuple of (row, column)
-        Their place in a block.
-    outer : ndarray of int, shape (others, L)
-        Numbers of the entries in columns of other blocks: of earlier stages, or of the same chain.
-    outer_rows : tuple of int
-        Their row in a block.
-    """
-
+    # rows, columns (size, L): equations and coordinates of each block
     rows: Index
     columns: Index
-    inner: Index
-    places: tuple[tuple[int, int], ...]
+    inner: Index  # (entries, L): numbers of the entries within the blocks
+    places: tuple[tuple[int, int], ...]  # their place in a block
+    # (others, L): numbers of the entries in columns of other blocks: of earlier stages, or of the
+    # same chain
     outer: Index
-    outer_rows: tuple[int, ...]
+    outer_rows: tuple[int, ...]  # their row in a block
 
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """Blocks that need each other, none of them in a circle.
+    """Blocks that need each other, none of them in a circle."""
 
-    Attributes
-    ----------
-    batches
-        The classes of its blocks.
-    interface : ndarray of int, shape (count,)
-        Equations with entries in columns of other blocks of the chain, in an order in which none
-        needs a later one; those columns are the interface variables.
-    """
-
-    batches: tuple[Batch, ...]
+    batches: tuple[Batch, ...]  # the classes of its blocks
+    # (count,): equations with entries in columns of other blocks of the chain, in an order in which
+    # none needs a later one; those columns are the interface variables
     interface: Index
 
 
 @dataclass(frozen=True, slots=True)
 class Sparse:
-    """Equations that are solved together by a sparse factorization.
+    """Equations that are solved together by a sparse factorization."""
 
-    Attributes
-    ----------
-    rows, columns : ndarray of int, shape (size,)
-        Its equations and coordinates, in an order in which the matrix is nearly lower triangular.
-    inner, outer : ndarray of int
-        Numbers of its entries within, and in columns of earlier stages.
-    """
-
+    # rows, columns (size,): its equations and coordinates, in an order in which the matrix is
+    # nearly lower triangular
     rows: Index
     columns: Index
+    # inner, outer: numbers of its entries within, and in columns of earlier stages
     inner: Index
     outer: Index
 

@@ -61,21 +61,11 @@ class Variable:
 
 @dataclass(frozen=True)
 class Form:
-    """The arrays of the results, without values: so much a worker has to know.
+    """The arrays of the results, without values: so much a worker has to know."""
 
-    Attributes
-    ----------
-    grid
-        Their dimensions without time, in chunks.
-    layout
-        What is kept.
-    times
-        Number of times.
-    """
-
-    grid: Grid
-    layout: Layout
-    times: int
+    grid: Grid  # their dimensions without time, in chunks
+    layout: Layout  # what is kept
+    times: int  # number of times
 
     @cached_property
     def variables(self) -> dict[str, Variable]:
@@ -123,27 +113,15 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """What the results of a sweep consist of.
+    """What the results of a sweep consist of."""
 
-    Attributes
-    ----------
-    name
-        Of the mechanism.
-    plan, layout
-        Its variants, and what is kept of each.
-    t : ndarray, shape (N,)
-        The times.
-    units
-        Of the parameters, by name.
-    marks
-        What decides the numbers, each by its digest: a store with other ones is of another sweep.
-    """
-
-    name: str
+    name: str  # of the mechanism
+    # plan, layout: its variants, and what is kept of each
     plan: Plan
     layout: Layout
-    t: Array
-    units: Mapping[str, str]
+    t: Array  # (N,): the times
+    units: Mapping[str, str]  # of the parameters, by name
+    # What decides the numbers, each by its digest: a store with other ones is of another sweep.
     marks: Mapping[str, str]
 
     @cached_property

@@ -82,27 +82,13 @@ class Found:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overview:
-    """What a sweep found.
-
-    Attributes
-    ----------
-    sweep
-        The sweep.
-    found
-        Of each column and measure extremes, mean and band.
-    samples : ndarray, shape (S, k)
-        The swept parameters of some variants.
-    measured
-        Of those, the measures by name, shape (S,).
-    is_good : ndarray of bool, shape (S,)
-        Which of them were found throughout.
-    """
+    """What a sweep found."""
 
     sweep: Sweep
-    found: tuple[Found, ...]
-    samples: Array
-    measured: dict[str, Array]
-    is_good: NDArray[np.bool_]
+    found: tuple[Found, ...]  # of each column and measure extremes, mean and band
+    samples: Array  # (S, k): the swept parameters of some variants
+    measured: dict[str, Array]  # of those, the measures by name, shape (S,)
+    is_good: NDArray[np.bool_]  # (S,), bool: which of them were found throughout
 
     def rows(self, angle_unit: str = "rad") -> list[list[str]]:
         """Return a row of text for each column and measure, as `HEADER` says."""

@@ -35,25 +35,14 @@ ABOUT = "_about.json"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParquetWriter:
-    """Writes chunks as files of a folder, in the process of a worker too.
+    """Writes chunks as files of a folder, in the process of a worker too."""
 
-    Attributes
-    ----------
-    path, form
-        The folder, and the arrays of the results.
-    swept
-        The places of the swept parameters in a set, by name.
-    t : ndarray, shape (N,)
-        The times.
-    unit_of
-        Units by the names of columns.
-    """
-
+    # path, form: the folder, and the arrays of the results
     path: Path
     form: Form
-    swept: Mapping[str, int]
-    t: Array
-    unit_of: Mapping[str, str]
+    swept: Mapping[str, int]  # the places of the swept parameters in a set, by name
+    t: Array  # (N,): the times
+    unit_of: Mapping[str, str]  # units by the names of columns
 
     def file(self, number: int) -> Path:
         """Return the file of a chunk."""

@@ -26,18 +26,10 @@ VARIANT = "variant"
 
 @dataclass(frozen=True)
 class Grid:
-    """The dimensions of a sweep, cut into chunks; it knows no values.
+    """The dimensions of a sweep, cut into chunks; it knows no values."""
 
-    Attributes
-    ----------
-    sizes
-        How long each dimension is, by name; time is none of them.
-    most
-        Largest number of variants in a chunk.
-    """
-
-    sizes: dict[str, int]
-    most: int
+    sizes: dict[str, int]  # how long each dimension is, by name; time is none of them
+    most: int  # largest number of variants in a chunk
 
     @cached_property
     def block(self) -> tuple[int, ...]:
@@ -88,27 +80,14 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The variants of a sweep, in chunks.
+    """The variants of a sweep, in chunks."""
 
-    Attributes
-    ----------
-    parameters
-        Names of the k parameters of the module.
-    common : ndarray, shape (k,)
-        Values of those that are not swept.
-    sweep
-        Arrays of values, by the names of the parameters that are swept.
-    is_product
-        Whether every value of one goes with every value of the others; else they go in pairs.
-    most
-        Largest number of variants in a chunk.
-    """
-
-    parameters: tuple[str, ...]
-    common: Array
-    sweep: Mapping[str, Array]
+    parameters: tuple[str, ...]  # names of the k parameters of the module
+    common: Array  # (k,): values of those that are not swept
+    sweep: Mapping[str, Array]  # arrays of values, by the names of the parameters that are swept
+    # Whether every value of one goes with every value of the others; else they go in pairs.
     is_product: bool
-    most: int
+    most: int  # largest number of variants in a chunk
 
     @cached_property
     def grid(self) -> Grid:

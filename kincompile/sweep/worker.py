@@ -40,27 +40,13 @@ class Writer(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sources:
-    """The emitted source of a mechanism, from which a worker makes its module.
+    """The emitted source of a mechanism, from which a worker makes its module."""
 
-    Attributes
-    ----------
-    name
-        Of the mechanism.
-    numpy
-        Text of the NumPy module.
-    arrays
-        What that would read from a companion file.
-    native
-        Text of the C files by name; none where C is not used.
-    digest
-        Of all of them: a worker compiles what has one digest once.
-    """
-
-    name: str
-    numpy: str
-    arrays: Mapping[str, NDArray[Any]]
-    native: Mapping[str, str]
-    digest: str = field(init=False)
+    name: str  # of the mechanism
+    numpy: str  # text of the NumPy module
+    arrays: Mapping[str, NDArray[Any]]  # what that would read from a companion file
+    native: Mapping[str, str]  # text of the C files by name; none where C is not used
+    digest: str = field(init=False)  # of all of them: a worker compiles what has one digest once
 
     def __post_init__(self) -> None:
         """Compute the digest."""
@@ -92,27 +78,13 @@ def _module(sources: Sources) -> ModuleType:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What all chunks of a sweep have in common.
+    """What all chunks of a sweep have in common."""
 
-    Attributes
-    ----------
-    sources
-        The emitted source.
-    t : ndarray, shape (N,)
-        The times.
-    guess : ndarray, shape (n,)
-        Where every chunk starts.
-    layout
-        What is kept.
-    writer
-        What a worker writes a chunk with; None where it hands the values back.
-    """
-
-    sources: Sources
-    t: Array
-    guess: Array
-    layout: Layout
-    writer: Writer | None
+    sources: Sources  # the emitted source
+    t: Array  # (N,): the times
+    guess: Array  # (n,): where every chunk starts
+    layout: Layout  # what is kept
+    writer: Writer | None  # what a worker writes a chunk with; None where it hands the values back
 
     def written_by(self, writer: Writer | None) -> Job:
         """Return the job of workers that write what they have solved."""

@@ -34,33 +34,17 @@ def frames_title(frames: Sequence[UsedFrame]) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """A function as straight-line code.
+    """A function as straight-line code."""
 
-    Attributes
-    ----------
-    frames
-        Body frames, first of all.
-    steps
-        Values that are used more than once, by the section that needs them first.
-    results
-        Quantity by quantity: the entries of each section, in order.
-    inputs
-        Names of the inputs that are read, in the model.
-    input_names
-        Names of all inputs in the target, by those in the model.
-    functions
-        Names of the elementary functions that are called.
-    names
-        Names of all named nodes, inputs included.
-    """
-
-    frames: tuple[UsedFrame, ...]
+    frames: tuple[UsedFrame, ...]  # body frames, first of all
+    # Values that are used more than once, by the section that needs them first.
     steps: tuple[tuple[ConstraintRows, tuple[Assignment, ...]], ...]
+    # Quantity by quantity: the entries of each section, in order.
     results: tuple[tuple[str, tuple[tuple[ConstraintRows, tuple[Entry, ...]], ...]], ...]
-    inputs: frozenset[str]
-    input_names: Mapping[str, str]
-    functions: tuple[str, ...]
-    names: Mapping[int, str]
+    inputs: frozenset[str]  # names of the inputs that are read, in the model
+    input_names: Mapping[str, str]  # names of all inputs in the target, by those in the model
+    functions: tuple[str, ...]  # names of the elementary functions that are called
+    names: Mapping[int, str]  # names of all named nodes, inputs included
 
 
 def varying(inline: InlineProgram, section: ConstraintRows, quantity: str) -> tuple[Entry, ...]:

@@ -86,6 +86,8 @@ def title(section: ConstraintRows, first: int = 0) -> str:
     """
     if section.instance.is_load:
         return "sums over masses and loads"
+    if section.instance.is_motion:
+        return "M, Phi_q, Q and gamma together"
     return f"{short_title(section, first)}: {section.instance.constraint.text}"
 
 
@@ -95,7 +97,7 @@ def entry_titles(quantity: str, code: InlineProgram) -> Callable[[Entry], str]:
     rows, columns = (code.program.names_of(kind) for kind in (found.rows, found.columns))
     if found.is_matrix:
         return lambda entry: f"{rows[entry.row]} by {columns[entry.column]}"
-    return lambda entry: "" if found.rows == "equations" else rows[entry.row]
+    return lambda entry: "" if found.is_by_constraint else rows[entry.row]
 
 
 def _unit(unit: str) -> str:

@@ -19,43 +19,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class BlockCall:
-    """The call that solves a block too large for a closed form, or takes its determinant.
+    """The call that solves a block too large for a closed form, or takes its determinant."""
 
-    Attributes
-    ----------
-    names
-        Names of the unknowns in order, or of the determinant.
-    size
-        Number of equations.
-    matrix, right
-        Nodes of the matrix row by row, and of the right side, empty for a determinant.
-    """
-
-    names: tuple[str, ...]
-    size: int
+    names: tuple[str, ...]  # names of the unknowns in order, or of the determinant
+    size: int  # number of equations
+    # matrix, right: nodes of the matrix row by row, and of the right side, empty for a determinant
     matrix: tuple[int, ...]
     right: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class SolveListing:
-    """The planned solve with names.
-
-    Attributes
-    ----------
-    factors
-        Nodes that the solution reads from the factorization.
-    factor_steps, solve_steps
-        What is computed one after the other, in each function.
-    names
-        Names of all nodes that have one.
-    """
+    """The planned solve with names."""
 
     plan: SolvePlan
-    factors: tuple[int, ...]
+    factors: tuple[int, ...]  # nodes that the solution reads from the factorization
+    # factor_steps, solve_steps: what is computed one after the other, in each function
     factor_steps: tuple[Assignment | BlockCall, ...]
     solve_steps: tuple[Assignment | BlockCall, ...]
-    names: Mapping[int, str]
+    names: Mapping[int, str]  # names of all nodes that have one
 
 
 def schedule_solve(code: InlineProgram, plan: SolvePlan, table: NameTable) -> SolveListing:

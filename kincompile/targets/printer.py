@@ -38,35 +38,23 @@ ARITHMETIC: Mapping[str, Operation] = {
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """How a language writes expressions.
+    """How a language writes expressions."""
 
-    Attributes
-    ----------
-    language
-        Its name, for messages.
-    functions
-        Text of each elementary function, with ``{}`` for the arguments.
-    pi, nan, square
-        The number pi; the number that is none; a square, which is a power or a function.
-    select
-        Text of a choice: condition, value where it holds, value elsewhere.
-    table
-        Text of a tabulated function: name of the table, order of the derivative, argument; with
-        ``{mechanism}`` for the mechanism's name.
-    signs
-        Relations and connectives that differ from those of NumPy.
-    number
-        Text of a whole or a floating-point number that is not negative.
-    """
-
-    language: str
-    functions: Mapping[str, str]
+    language: str  # its name, for messages
+    functions: Mapping[str, str]  # text of each elementary function, with ``{}`` for the arguments
+    # pi, nan, square: the number pi; the number that is none; a square, which is a power or a
+    # function
     pi: str = "pi"
     nan: str = "NaN"
     square: Operation = ("square({})", (SUM,), ATOM)
+    # Text of a choice: condition, value where it holds, value elsewhere.
     select: str = "({} ? {} : {})"
+    # Text of a tabulated function: name of the table, order of the derivative, argument; with
+    # ``{mechanism}`` for the mechanism's name.
     table: str = "spline({}, {}, {})"
+    # Relations and connectives that differ from those of NumPy.
     signs: Mapping[str, str] = field(default_factory=dict)
+    # Text of a whole or a floating-point number that is not negative.
     number: Callable[[float], str] = repr
 
 

@@ -15,25 +15,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A line of the table.
+    """A line of the table."""
 
-    Attributes
-    ----------
-    folder
-        Package whose module `target` is the `Target`, and whose module `grouped` has
-        `emit_grouped` where there is a grouped form.
-    endings
-        Endings of its files, that of the main one first.
-    is_loadable
-        Whether this process can call its code.
-    has_grouped_form
-        Whether it has a form for large mechanisms.
-    """
-
+    # Package whose module `target` is the `Target`, and whose module `grouped` has `emit_grouped`
+    # where there is a grouped form.
     folder: str
-    endings: tuple[str, ...]
-    is_loadable: bool = False
-    has_grouped_form: bool = False
+    endings: tuple[str, ...]  # endings of its files, that of the main one first
+    is_loadable: bool = False  # whether this process can call its code
+    has_grouped_form: bool = False  # whether it has a form for large mechanisms
 
 
 TARGETS = {

@@ -19,30 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Statements:
-    """How a language writes statements.
+    """How a language writes statements."""
 
-    Attributes
-    ----------
-    comment
-        How a comment begins.
-    value
-        Left side of the statement that computes a value, with ``{}`` for its name.
-    element, entry
-        A vector's element and a matrix's entry: name, and an index each.
-    plane
-        How it writes the matrix A of a frame in the plane.
-    first
-        Number of the first row.
-    continued, ending
-        What ends a line of a statement that goes on, and its last line.
-    """
-
-    comment: str
-    value: str
+    comment: str  # how a comment begins
+    value: str  # left side of the statement that computes a value, with ``{}`` for its name
+    # element, entry: a vector's element and a matrix's entry: name, and an index each
     element: str
     entry: str
-    plane: str = "[[c, -s], [s, c]]"
-    first: int = 0
+    plane: str = "[[c, -s], [s, c]]"  # how it writes the matrix A of a frame in the plane
+    first: int = 0  # number of the first row
+    # continued, ending: what ends a line of a statement that goes on, and its last line
     continued: str = ""
     ending: str = ";"
 

@@ -37,30 +37,16 @@ away a coordinate has no digits left for a difference."""
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """States of a module.
-
-    Attributes
-    ----------
-    module
-        The module.
-    q, q_dot : ndarray, shape (S, n)
-        Positions and rates.
-    t : ndarray, shape (S,)
-        Times.
-    p : ndarray, shape (S, k)
-        Parameters.
-    reference : ndarray, shape (n,)
-        Scale of each coordinate.
-    assembled
-        How many of the states, the last ones, are assembled; their parameters are the defaults.
-    """
+    """States of a module."""
 
     module: ModuleType
+    # q, q_dot (S, n): positions and rates
     q: Array
     q_dot: Array
-    t: Array
-    p: Array
-    reference: Array
+    t: Array  # (S,): times
+    p: Array  # (S, k): parameters
+    reference: Array  # (n,): scale of each coordinate
+    # How many of the states, the last ones, are assembled; their parameters are the defaults.
     assembled: int
 
     def only(self, chosen: Array) -> Samples:

@@ -88,8 +88,11 @@ class Geometry:
         return tuple(map(self.number, vector))
 
     def frame_of(self, joint: Joint, symbol: str) -> BodyFrame:
-        """Return the frame in which a point of a joint is fixed."""
-        owner = joint.written.owners()[symbol]
+        """Return the frame in which a point or a direction of a joint is fixed.
+
+        What completes a triad, and is no argument, has the index of its body.
+        """
+        owner = joint.written.owners().get(symbol, symbol[-1])
         if owner == GROUND.name:
             return GROUND_FRAME
         arguments = joint.written.arguments().values()

@@ -14,7 +14,7 @@ import numpy as np
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, of_mark
 from kincompile.view.shapes import DASHES, FILL, GROUND_COLOUR, HUES
-from kincompile.view.worlds import solid_pictures
+from kincompile.view.worlds import PLANE, solid_pictures
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -101,6 +101,8 @@ class Arrow:
         The frame whose colour it has.
     is_vector
         Whether its symbol is bold; an axis of a frame is not.
+    is_direction
+        Whether it is drawn at a length of its own.
     """
 
     name: str
@@ -108,6 +110,7 @@ class Arrow:
     end: Array
     frame: BodyFrame
     is_vector: bool = True
+    is_direction: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +144,8 @@ def picture(
     arrows
         Vectors over it.
     focus
-        Frames that the picture is about; what moves with others is faint. All by default.
+        Frames that the picture is about; what moves with others is faint, in space left out. All
+        by default.
     """
     if drawn.is_spatial:
         seen: Picture = solid_pictures().picture_in_space(drawn, q, title, arrows, focus)
@@ -189,18 +193,21 @@ class Scale:
     """
 
     def __init__(
-        self, shown: Sequence[Array], most: tuple[float, float] = (WIDTH, TALLEST)
+        self,
+        shown: Sequence[Array],
+        most: tuple[float, float] = (WIDTH, TALLEST),
+        margin: float = MARGIN,
     ) -> None:
         points = np.concatenate(shown)
-        self._low = np.nanmin(points, axis=0)
+        self._margin, self._low = margin, np.nanmin(points, axis=0)
         wide, tall = np.nanmax(points, axis=0) - self._low
-        self.factor = min((most[0] - 2 * MARGIN) / wide, (most[1] - 2 * MARGIN) / tall)
-        self.width = self.factor * float(wide) + 2 * MARGIN
-        self.height = self.factor * float(tall) + 2 * MARGIN
+        self.factor = min((most[0] - 2 * margin) / wide, (most[1] - 2 * margin) / tall)
+        self.width = self.factor * float(wide) + 2 * margin
+        self.height = self.factor * float(tall) + 2 * margin
 
     def at(self, points: Array) -> Array:
         """Return where points are on the picture."""
-        return np.asarray(MARGIN + self.factor * (points - self._low), dtype=np.float64)
+        return np.asarray(self._margin + self.factor * (points - self._low), dtype=np.float64)
 
 
 def opacity_of(mark: Mark, shown: set[BodyFrame] | None) -> float:
@@ -243,10 +250,13 @@ def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, Picture
 
 
 def _places(arrow: Arrow, start: Array, end: Array) -> list[Array]:
-    """Return where the label of a vector may stand; that of an axis is at its end."""
+    """Return where the label of a vector may stand; that of an axis is at its end.
+
+    So is that of a direction in space, where six of them may begin at one point.
+    """
     along = (end - start) / float(np.hypot(*(end - start)))
     aside = ASIDE * np.array((-along[1], along[0]))
-    if not arrow.is_vector:
+    if not arrow.is_vector or (arrow.is_direction and len(arrow.start) > PLANE):
         return [end + ASIDE * along, end + aside, end - aside]
     return [start + part * (end - start) + side for part in ALONG for side in (aside, -aside)]
 

@@ -27,15 +27,9 @@ FAILED = "the step that its tolerances ask for has become too small for floating
 
 
 class Stepper(Protocol):
-    """An integrator that goes from step to step.
+    """An integrator that goes from step to step."""
 
-    Attributes
-    ----------
-    problem
-        Why it can go no further; "" as long as it can.
-    """
-
-    problem: str
+    problem: str  # why it can go no further; "" as long as it can
 
     @property
     def t(self) -> float:

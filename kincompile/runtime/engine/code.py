@@ -42,160 +42,104 @@ DRIVERS = "_drivers"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LaneFunctions:
-    """The code of a module itself, on numbers of any kind; see docs/contract.md.
+    """The code of a module itself, on numbers of any kind; see docs/contract.md."""
 
-    Attributes
-    ----------
-    position, nu, gamma, factor, solve
-        The functions of ``LANES``, of ``(f, q, [q_dot,] t, p)`` and of ``(f, ...)``.
-    floats, arrays
-        What serves as `f`: elementary functions of floats, and of arrays.
-    """
-
+    # position, nu, gamma, factor, solve: the functions of ``LANES``, of ``(f, q, [q_dot,] t, p)``
+    # and of ``(f, ...)``
     position: Callable[..., Sequence[Any]]
     nu: Callable[..., Sequence[Any]]
     gamma: Callable[..., Sequence[Any]]
     factor: Callable[..., tuple[Sequence[Any], Sequence[Any]]]
     solve: Callable[..., Sequence[Any]]
+    # floats, arrays: what serves as `f`: elementary functions of floats, and of arrays
     floats: Any
     arrays: Any
 
 
 @dataclass(frozen=True, slots=True)
 class SensitiveModules:
-    """What compiles a mechanism's sensitivities to parameters on request, and keeps them.
+    """What compiles a mechanism's sensitivities to parameters on request, and keeps them."""
 
-    Attributes
-    ----------
-    observing
-        Takes names of parameters and of columns, and whether second derivatives are wanted, to a
-        module without equations whose outputs are the determinants of the blocks of Phi_q, then by
-        parameter, and by pair of them, the derivatives of the columns; None where there is no
-        planned elimination.
-    larger
-        Takes names of parameters to the module of the mechanism with its sensitivities.
-    """
-
+    # Takes names of parameters and of columns, and whether second derivatives are wanted, to a
+    # module without equations whose outputs are the determinants of the blocks of Phi_q, then by
+    # parameter, and by pair of them, the derivatives of the columns; None where there is no planned
+    # elimination.
     observing: Callable[[tuple[str, ...], tuple[str, ...], bool], ModuleType | None]
+    # Takes names of parameters to the module of the mechanism with its sensitivities.
     larger: Callable[[tuple[str, ...]], ModuleType]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceModules:
-    """What compiles the forces of a mechanism on request, and keeps them.
+    """What compiles the forces of a mechanism on request, and keeps them."""
 
-    Attributes
-    ----------
-    compiled
-        Takes whether multipliers are to be solved for to a module without equations whose outputs
-        are the determinants of the blocks of Phi_q and the multipliers, then the forces, without
-        rates; None where there is no planned elimination. Else it gives the forces alone, and
-        multipliers are its last parameters.
-    joints
-        The bodies of each constraint, by name; none of a free equation.
-    """
-
+    # Takes whether multipliers are to be solved for to a module without equations whose outputs are
+    # the determinants of the blocks of Phi_q and the multipliers, then the forces, without rates;
+    # None where there is no planned elimination. Else it gives the forces alone, and multipliers
+    # are its last parameters.
     compiled: Callable[[bool], ModuleType | None]
+    # The bodies of each constraint, by name; none of a free equation.
     joints: Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DynamicModules:
-    """The equations of motion of a mechanism, compiled.
+    """The equations of motion of a mechanism, compiled."""
 
-    Attributes
-    ----------
-    accelerations
-        A module without equations whose outputs are the accelerations, then the power of loads and
-        drivers.
-    corrections
-        The same, of changes of the coordinates and then of the rates that lead a state back to its
-        constraints.
-    redundant
-        Names of equations that repeat others and are left out.
-    free
-        Coordinates that may be given, as many as there are degrees of freedom.
-    """
-
+    # A module without equations whose outputs are the accelerations, then the power of loads and
+    # drivers.
     accelerations: ModuleType
+    # The same, of changes of the coordinates and then of the rates that lead a state back to its
+    # constraints.
     corrections: ModuleType
-    redundant: tuple[str, ...]
-    free: tuple[str, ...]
+    redundant: tuple[str, ...]  # names of equations that repeat others and are left out
+    free: tuple[str, ...]  # coordinates that may be given, as many as there are degrees of freedom
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Code:
-    """An emitted module.
+    """An emitted module."""
 
-    Attributes
-    ----------
-    module
-        The module itself, for messages and for users.
-    name, coordinates, equations, parameters, units
-        Names and units, as in the contract.
-    guess : ndarray, shape (n,)
-        Where Newton starts.
-    pattern : ndarray of int, shape (nnz, 2)
-        Rows and columns of Phi_q's entries.
-    bodies
-        Of each body its name, the number of its first coordinate, and how many it has.
-    without_guess
-        Bodies whose guess is zero throughout, as it is where none is given.
-    angular : ndarray of bool, shape (n,)
-        Which coordinates have the scale of angles: these, and Euler parameters.
-    may_turn : ndarray of bool, shape (n,)
-        Which are angles, or may be: a free coordinate has no unit that says so.
-    position, nu, gamma, Phi_q, nonzeros
-        Functions of the contract; `nonzeros` is ``Phi_q_nonzeros``.
-    written
-        `position` as it was emitted in Python, where compiled code has taken its place.
-    redundant
-        Names of the equations that repeat others, and agree with them.
-    unsolvable
-        Why the equations cannot determine the coordinates; "" where they can, or nobody says.
-    corners
-        Whether its drivers may have corners.
-    lanes : LaneFunctions or None
-        With the planned solve, where the module has one.
-    stages
-        The staged solve of a module in grouped form, or nothing.
-    evaluate : callable or None
-        Of a module in grouped form: Phi and the entries of Phi_q at one point.
-    arrays
-        Elementary functions of arrays, for the code of stages.
-    march, march_variants : callable or None
-        Of a compiled module: its own march over times, and of many parameter sets.
-    observe_into : callable or None
-        Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
-    """
-
-    module: ModuleType
+    module: ModuleType  # the module itself, for messages and for users
+    # name, coordinates, equations, parameters, units: names and units, as in the contract
     name: str
     coordinates: tuple[str, ...]
     equations: tuple[str, ...]
     parameters: tuple[str, ...]
     units: Mapping[str, str]
-    guess: Array
-    pattern: NDArray[np.signedinteger[Any]]
+    guess: Array  # (n,): where Newton starts
+    pattern: NDArray[np.signedinteger[Any]]  # (nnz, 2): rows and columns of Phi_q's entries
+    # Of each body its name, the number of its first coordinate, and how many it has.
     bodies: tuple[tuple[str, int, int], ...]
+    # Bodies whose guess is zero throughout, as it is where none is given.
     without_guess: tuple[str, ...]
+    # (n,), bool: which coordinates have the scale of angles: these, and Euler parameters
     angular: NDArray[np.bool_]
+    # (n,), bool: which are angles, or may be: a free coordinate has no unit that says so
     may_turn: NDArray[np.bool_]
+    # position, nu, gamma, Phi_q, nonzeros: functions of the contract; `nonzeros` is
+    # ``Phi_q_nonzeros``
     position: Callable[..., tuple[Array, Array]]
     nu: Callable[..., Array]
     gamma: Callable[..., Array]
     Phi_q: Callable[..., Array]
     nonzeros: Callable[..., Array]
+    # `position` as it was emitted in Python, where compiled code has taken its place.
     written: Callable[..., tuple[Array, Array]]
-    redundant: tuple[str, ...]
+    redundant: tuple[str, ...]  # names of the equations that repeat others, and agree with them
+    # Why the equations cannot determine the coordinates; "" where they can, or nobody says.
     unsolvable: str
-    corners: bool
-    lanes: LaneFunctions | None
-    stages: tuple[Any, ...]
+    corners: bool  # whether its drivers may have corners
+    lanes: LaneFunctions | None  # with the planned solve, where the module has one
+    stages: tuple[Any, ...]  # the staged solve of a module in grouped form, or nothing
+    # Of a module in grouped form: Phi and the entries of Phi_q at one point.
     evaluate: Callable[..., tuple[Array, Array]] | None
-    arrays: Any
+    arrays: Any  # elementary functions of arrays, for the code of stages
+    # march, march_variants: of a compiled module: its own march over times, and of many parameter
+    # sets
     march: Callable[..., int] | None
     march_variants: Callable[..., int] | None
+    # Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
     observe_into: Callable[..., None] | None
 
     def covers(self) -> list[slice]:

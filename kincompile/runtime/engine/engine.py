@@ -17,7 +17,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.criteria import AGREEMENT
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from kincompile.runtime.engine.code import Code
 
 Array = NDArray[np.float64]
@@ -25,48 +29,28 @@ Array = NDArray[np.float64]
 
 @dataclass(slots=True, eq=False)
 class Point:
-    """A position, or a batch of N, at which the equations were evaluated. The batch is last.
+    """A position, or a batch of N, at which the equations were evaluated. The batch is last."""
 
-    Attributes
-    ----------
-    q : ndarray, shape (n,) or (n, N)
-        The position.
-    t : float or ndarray, shape (N,)
-        The time.
-    Phi : ndarray, shape (m,) or (m, N)
-        The constraint vector, of a batch also as a row each; m > n where redundant equations agree.
-    Phi_q
-        The Jacobian, as its engine has it: a matrix (m, n), the entries of its pattern, or those of
-        them that vary.
-    factors
-        What the engine keeps of Phi_q once it was factored.
-    """
-
-    q: Array
-    t: Any
+    q: Array  # (n,) or (n, N): the position
+    t: Any  # float or (N,): the time
+    # (m,) or (m, N): the constraint vector, of a batch also as a row each; m > n where redundant
+    # equations agree
     Phi: Any
+    # The Jacobian, as its engine has it: a matrix (m, n), the entries of its pattern, or those of
+    # them that vary.
     Phi_q: Any
-    factors: Any = None
+    factors: Any = None  # what the engine keeps of Phi_q once it was factored
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rates:
-    """Velocity and acceleration at a position.
+    """Velocity and acceleration at a position."""
 
-    Attributes
-    ----------
-    q_dot, q_ddot : ndarray, shape of q
-        The rates; not finite where they cannot be had.
-    movement : ndarray, shape of q
-        The solution for the right side that was asked for besides.
-    agree : bool
-        Whether redundant equations are all met by the rates.
-    """
-
+    # q_dot, q_ddot shape of q: the rates; not finite where they cannot be had
     q_dot: Array
     q_ddot: Array
-    movement: Array
-    agree: bool = True
+    movement: Array  # shape of q: the solution for the right side that was asked for besides
+    agree: Any = True  # whether redundant equations are all met by the rates, shape (N,) or one
 
 
 class Engine(Protocol):
@@ -103,3 +87,28 @@ class Engine(Protocol):
 
     def signs(self, point: Point) -> tuple[float, ...]:
         """Return their signs at one point; none where redundant equations forbid a determinant."""
+
+
+def agree(matrix: Array, rates: Array, sides: Array) -> Any:
+    """Say whether redundant equations are all met by the rates: at a point (n,), or at each (N, n).
+
+    `matrix` and `sides` have one axis more and as many.
+    """
+    if matrix.shape[-2] == matrix.shape[-1]:
+        return True
+    rates = rates[..., np.newaxis]
+    terms = (np.abs(matrix) @ np.abs(rates))[..., 0] + np.abs(sides)
+    missing = np.abs((matrix @ rates)[..., 0] - sides)
+    return np.max(missing, axis=-1) <= AGREEMENT * np.max(terms, axis=-1)
+
+
+def rates_agree(code: Code, t: Any, p: Any, states: Sequence[Array]) -> Any:
+    """Say at which points redundant equations are all met by rates that solve the others.
+
+    `states` are position, velocity and acceleration, shape (n, N) each; `p` is (k,) or (k, N).
+    """
+    finite = np.isfinite(sum(states)).all(axis=0)
+    q, q_dot, q_ddot = (np.where(finite, state, 0.0).T for state in states)
+    t, p = np.broadcast_to(t, len(q)), np.asarray(p).T
+    Phi_q, nu, gamma = code.Phi_q(q, t, p), code.nu(q, t, p), code.gamma(q, q_dot, t, p)
+    return finite & agree(Phi_q, q_dot, nu) & agree(Phi_q, q_ddot, gamma)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kincompile.criteria import SMALLEST_DETERMINANT
-from kincompile.runtime.engine.engine import Point, Rates
+from kincompile.runtime.engine.engine import Point, Rates, rates_agree
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array, Code, LaneFunctions
@@ -21,21 +21,12 @@ Lanes = Sequence[Any] | NDArray[np.float64]
 
 @dataclass(slots=True, eq=False)
 class Planned:
-    """An engine whose linear systems go by the elimination that was planned at compile time.
+    """An engine whose linear systems go by the elimination that was planned at compile time."""
 
-    Attributes
-    ----------
-    code
-        A module with a planned solve.
-    p : ndarray, shape (k,) or (k, N), or sequence of float
-        Parameters, of all points or a set for each.
-    functions
-        The module's elementary functions of floats, where positions are lists of floats: one of
-        them then takes as long as a few calls of NumPy. None for those of arrays.
-    """
-
-    code: Code
-    p: Lanes
+    code: Code  # a module with a planned solve
+    p: Lanes  # (k,) or (k, N), or sequence of float: parameters, of all points or a set for each
+    # The module's elementary functions of floats, where positions are lists of floats: one of them
+    # then takes as long as a few calls of NumPy. None for those of arrays.
     functions: Any = None
 
     @property
@@ -83,7 +74,11 @@ class Planned:
         q_dot, q_ddot = self.velocity_and_acceleration(point)
         movement = () if besides is None else self.solve(point, besides)
         points = point.q.shape[1]
-        return Rates(stacked(q_dot, points), stacked(q_ddot, points), stacked(movement, points))
+        found = Rates(*(stacked(part, points) for part in (q_dot, q_ddot, movement)))
+        if self.code.redundant:  # the elimination leaves them out
+            states = point.q, found.q_dot, found.q_ddot
+            return replace(found, agree=rates_agree(self.code, point.t, self.p, states))
+        return found
 
     def determinants(self, point: Point, before: Point | None = None) -> Array:
         """Return the determinants of the blocks, shape (blocks, N)."""

@@ -31,17 +31,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StagedFactors:
-    """Phi_q, factored.
+    """Phi_q, factored."""
 
-    Attributes
-    ----------
-    nonzeros : ndarray, shape (nnz,)
-        Its entries.
-    parts
-        What each stage keeps: the lanes of the planned solve, or a sparse factorization.
-    """
-
-    nonzeros: Array
+    nonzeros: Array  # (nnz,): its entries
+    # What each stage keeps: the lanes of the planned solve, or a sparse factorization.
     parts: list[Any]
 
 

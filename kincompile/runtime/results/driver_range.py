@@ -39,25 +39,14 @@ SIZES = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """A driver at one time, as the compiler describes it.
+    """A driver at one time, as the compiler describes it."""
 
-    Attributes
-    ----------
-    name, unit
-        Its name, and the unit of its value.
-    row
-        Its row in Phi.
-    value
-        C at that time.
-    is_squared
-        Whether the row is that of C^2, as of a distance.
-    """
-
+    # name, unit: its name, and the unit of its value
     name: str
     unit: str
-    row: int
-    value: float
-    is_squared: bool
+    row: int  # its row in Phi
+    value: float  # C at that time
+    is_squared: bool  # whether the row is that of C^2, as of a distance
 
     def moved(self, value: float) -> float:
         """Return what its row of Phi has where the driver has another value; none below zero."""

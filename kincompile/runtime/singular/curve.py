@@ -46,47 +46,27 @@ ROUGHLY = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CurvePoint:
-    """A point of the curve.
+    """A point of the curve."""
 
-    Attributes
-    ----------
-    q : ndarray, shape (n,)
-        The position.
-    t : float
-        The time.
-    point
-        The equations there.
-    matrix : ndarray, shape (m, n + 1)
-        Derivatives of Phi with respect to q and t, in scales of the equations and coordinates.
-    tangent : ndarray, shape (n + 1,)
-        Unit vector along the curve, in scales of the coordinates and of time.
-    """
-
-    q: Vector
+    q: Vector  # (n,): the position
     t: float
     point: Point
+    # (m, n + 1): derivatives of Phi with respect to q and t, in scales of the equations and
+    # coordinates
     matrix: Vector
+    # (n + 1,): unit vector along the curve, in scales of the coordinates and of time
     tangent: Vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bracket:
-    """Two points of the curve with a singular configuration between them.
+    """Two points of the curve with a singular configuration between them."""
 
-    Attributes
-    ----------
-    first, second : CurvePoint
-        The points, in the direction of the motion.
-    length : float
-        The step from one to the other.
-    turns : bool
-        Whether the curve turns back in time.
-    """
-
+    # first, second: the points, in the direction of the motion
     first: CurvePoint
     second: CurvePoint
-    length: float
-    turns: bool
+    length: float  # the step from one to the other
+    turns: bool  # whether the curve turns back in time
 
 
 class Curve:

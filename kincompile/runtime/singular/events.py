@@ -110,14 +110,9 @@ class Event(Shown):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Passage:
-    """The motion on both sides of a bifurcation, on the smooth branch.
+    """The motion on both sides of a bifurcation, on the smooth branch."""
 
-    Attributes
-    ----------
-    before, after : State
-        Points of the motion so far from the bifurcation that their rates are accurate.
-    """
-
+    # before, after: points of the motion so far from the bifurcation that their rates are accurate
     before: State
     after: State
 

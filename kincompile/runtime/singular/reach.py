@@ -51,21 +51,13 @@ MOST_NAMED = 3
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """How the number that an equation is about follows from its row of Phi.
-
-    Attributes
-    ----------
-    unit
-        Its unit.
-    offset
-        What is added to Phi; to its square where the equation is one of squares. None where the
-        number itself is not known, and only differences are.
-    is_square
-        Whether Phi is the square of a distance, less that of the one that is asked for.
-    """
+    """How the number that an equation is about follows from its row of Phi."""
 
     unit: str
+    # What is added to Phi; to its square where the equation is one of squares. None where the
+    # number itself is not known, and only differences are.
     offset: float | None
+    # Whether Phi is the square of a distance, less that of the one that is asked for.
     is_square: bool = False
 
     def value(self, residual: float) -> float:

@@ -38,27 +38,13 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """A position at which the joints hold, and what acts there.
+    """A position at which the joints hold, and what acts there."""
 
-    Attributes
-    ----------
-    point
-        Position, time and equations.
-    free : ndarray, shape (n, f)
-        Movements that the joints allow, orthonormal in scales of the coordinates.
-    multipliers : ndarray, shape (m,)
-        lambda; of redundant equations the shortest.
-    force : ndarray, shape (f,)
-        Work of the loads for each of the movements.
-    nothing : float
-        Force, or stiffness, that is nothing beside what loads and joints do.
-    """
-
-    point: Point
-    free: Array
-    multipliers: Array
-    force: Array
-    nothing: float
+    point: Point  # position, time and equations
+    free: Array  # (n, f): movements that the joints allow, orthonormal in scales of the coordinates
+    multipliers: Array  # (m,): lambda; of redundant equations the shortest
+    force: Array  # (f,): work of the loads for each of the movements
+    nothing: float  # force, or stiffness, that is nothing beside what loads and joints do
 
     @property
     def q(self) -> Array:

@@ -73,24 +73,12 @@ def follow(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Way:
-    """Going from one equilibrium to the next.
-
-    Attributes
-    ----------
-    balance
-        The mechanism.
-    span
-        The whole time.
-    snaps
-        Whether it goes on past critical points, to where the mechanism comes to rest.
-    events
-        Critical points that were met.
-    """
+    """Going from one equilibrium to the next."""
 
     balance: Balance
     span: float
-    snaps: bool
-    events: list[Event]
+    snaps: bool  # whether it goes on past critical points, to where the mechanism comes to rest
+    events: list[Event]  # critical points that were met
 
     def continued(self, rest: Rest, latest: float) -> Rest | None:
         """Return the equilibrium that continues one at a later time; None where there is none."""

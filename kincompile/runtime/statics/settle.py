@@ -29,24 +29,12 @@ OVERSHOT = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rest:
-    """Where a mechanism came to rest, or did not.
+    """Where a mechanism came to rest, or did not."""
 
-    Attributes
-    ----------
-    place : Place
-        The last position.
-    stiffness : ndarray, shape (f, f)
-        The reduced stiffness there.
-    is_balanced : bool
-        Whether it is an equilibrium.
-    steps : int
-        How many it took.
-    """
-
-    place: Place
-    stiffness: Array
-    is_balanced: bool
-    steps: int
+    place: Place  # the last position
+    stiffness: Array  # (f, f): the reduced stiffness there
+    is_balanced: bool  # whether it is an equilibrium
+    steps: int  # how many it took
 
     @property
     def eigenvalues(self) -> Array:

@@ -26,19 +26,12 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class PlannedBatch:
-    """Equal blocks with the elimination that solves one of them.
+    """Equal blocks with the elimination that solves one of them."""
 
-    Attributes
-    ----------
-    key
-        Name of their arrays, and stem of their functions.
-    varying : ndarray of int, shape (entries, L)
-        Numbers of the entries within the blocks that the factorization reads.
-    """
-
-    key: str
+    key: str  # name of their arrays, and stem of their functions
     batch: Batch
     plan: SolvePlan
+    # (entries, L): numbers of the entries within the blocks that the factorization reads
     varying: Index
 
 

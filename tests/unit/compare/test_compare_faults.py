@@ -11,15 +11,7 @@ from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Components, Vector, VectorSymbol
 from kincompile.compare.compare import compare
 from kincompile.compare.comparison import Verdict
-from kincompile.compare.fault import (
-    A_FOR_B,
-    MISSING_SQUARE,
-    SECOND_DERIVATIVE,
-    SINE_COSINE,
-    SQUARES,
-    TRANSPOSED,
-    X_AND_Y,
-)
+from kincompile.compare.fault import Kind
 from kincompile.compare.joint_faults import JointFaults
 from kincompile.compare.reference import Reference
 from kincompile.compare.report import Report
@@ -95,34 +87,35 @@ def pair(places: list[tuple[str, str]], x: str, y: str) -> dict[Any, str]:
     ("quantity", "entries", "kind"),
     [
         # B_i s_i is (-a S - b C, a C - b S)
-        ("Phi_q", pair(BY_I, f"a*{C_I} - b*{S_I}", f"a*{S_I} + b*{C_I}"), A_FOR_B),
-        ("Phi_q", pair(BY_I, f"a*{S_I} - b*{C_I}", f"a*{C_I} + b*{S_I}"), TRANSPOSED),
-        ("Phi_q", pair(BY_I, f"-a*{C_I} - b*{S_I}", f"a*{S_I} - b*{C_I}"), SINE_COSINE),
+        ("Phi_q", pair(BY_I, f"a*{C_I} - b*{S_I}", f"a*{S_I} + b*{C_I}"), Kind.A_FOR_B),
+        ("Phi_q", pair(BY_I, f"a*{S_I} - b*{C_I}", f"a*{C_I} + b*{S_I}"), Kind.TRANSPOSED),
+        ("Phi_q", pair(BY_I, f"-a*{C_I} - b*{S_I}", f"a*{S_I} - b*{C_I}"), Kind.SINE_COSINE),
         ("Phi_q", pair(BY_I, f"-a*{S_J} - b*{C_J}", f"a*{C_J} - b*{S_J}"), "phi_i and phi_j mixed"),
         ("Phi_q", pair(BY_I, f"-c*{S_I} - d*{C_I}", f"c*{C_I} - d*{S_I}"), "s_i and s_j mixed"),
         ("Phi_q", pair(BY_I, f"-b*{S_I} - a*{C_I}", f"b*{C_I} - a*{S_I}"), "xi and eta swapped"),
-        ("Phi_q", pair(BY_I, f"-a*{S_I} + b*{C_I}", f"-a*{C_I} - b*{S_I}"), TRANSPOSED),
+        ("Phi_q", pair(BY_I, f"-a*{S_I} + b*{C_I}", f"-a*{C_I} - b*{S_I}"), Kind.TRANSPOSED),
         ("Phi_q", pair(BY_J, f"-c*{S_J} - d*{C_J}", f"c*{C_J} - d*{S_J}"), "sign"),
         ("Phi_q", {("R.x", "phi_i"): f"-a*{S_I} + b*{C_I}"}, "sign"),
         ("Phi_q", {("R.x", "phi_i"): f"-a*{S_I}"}, "missing term"),
-        ("Phi_q", {("R.x", "phi_i"): f"-a*{C_I} - b*{C_I}"}, SINE_COSINE),
+        ("Phi_q", {("R.x", "phi_i"): f"-a*{C_I} - b*{C_I}"}, Kind.SINE_COSINE),
         ("Phi_q", {("R.x", "phi_i"): "0", ("R.y", "phi_i"): "0"}, "left zero"),
         ("Phi_q", {("D", "phi_i"): "0"}, "left zero"),
         ("Phi_q", {("D", "x_i"): str(RIGHT["Phi_q"][ROW["D"], 0] / 2)}, "factor 2 or 1/2"),
         ("Phi_q", {("T.normal", "x_j"): str(RIGHT["Phi_q"][ROW["T.normal"], 4]),
-                   ("T.normal", "y_j"): str(RIGHT["Phi_q"][ROW["T.normal"], 3])}, X_AND_Y),
+                   ("T.normal", "y_j"): str(RIGHT["Phi_q"][ROW["T.normal"], 3])}, Kind.X_AND_Y),
         ("Phi_q", {("D", name): str(RIGHT["Phi_q"][ROW["D"], (k + 3) % 6])
                    for k, name in enumerate(REFERENCE.coordinates)}, "body blocks swapped"),
         ("nu", {"D": str(-RIGHT["nu"][ROW["D"]])}, "driver's rate reversed"),
         ("nu", {"D": "0"}, "left zero"),
         ("gamma", {"R.x": f"(a*{C_I} - b*{S_I})*w_i - (c*{C_J} - d*{S_J})*w_j^2",
                    "R.y": f"(a*{S_I} + b*{C_I})*w_i - (c*{S_J} + d*{C_J})*w_j^2"},
-         MISSING_SQUARE),
+         Kind.MISSING_SQUARE),
         ("gamma", {"R.x": f"-(a*{C_I} - b*{S_I})*w_i^2 + (c*{C_J} - d*{S_J})*w_j^2",
                    "R.y": f"-(a*{S_I} + b*{C_I})*w_i^2 + (c*{S_J} + d*{C_J})*w_j^2"}, "whole sign"),
         ("gamma", {"R.x": "0", "R.y": "0"}, "left zero"),
-        ("gamma", {"D": f"{RIGHT['gamma'][ROW['D']]} - 2*{ROD}*{ROD_DDOT}"}, SECOND_DERIVATIVE),
-        ("gamma", {"T.parallel": f"-({TURNED})*(w_j^2 - w_i^2)"}, SQUARES),
+        ("gamma", {"D": f"{RIGHT['gamma'][ROW['D']]} - 2*{ROD}*{ROD_DDOT}"},
+         Kind.SECOND_DERIVATIVE),
+        ("gamma", {"T.parallel": f"-({TURNED})*(w_j^2 - w_i^2)"}, Kind.SQUARES),
     ],
 )  # fmt: skip
 def test_that_a_fault_typed_by_hand_is_named(
