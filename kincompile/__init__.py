@@ -22,7 +22,7 @@ _HOME = {
     name: module for module, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.MULTILINE)
 }
 _CATALOGUE = "kincompile.model.catalogue"
-_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "exp", "log", "sqrt")
+_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "sqrt")
 _WITHOUT_SYMPY = ("kincompile.runtime", "kincompile.errors")
 
 __version__ = "0.1.0"
