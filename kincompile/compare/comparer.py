@@ -385,7 +385,7 @@ class Comparer:
             name,
             self._reference.equations[system_row],
             self._reference.coordinates[system_column] if name == "Phi_q" else None,
-            reference.text(name, form_row, system_column),
+            reference.later(name, form_row, system_column),
             self._quantities[name].texts[row][column],
             self._verdicts[spot],
             is_accepted,

@@ -84,7 +84,7 @@ class LoadComparer:
                     name,
                     self.reference.coordinates[row],
                     self.reference.coordinates[column] if name == "M" else None,
-                    self.reference.text(name, row, column),
+                    self.reference.later(name, row, column),
                     item.texts[row][column],
                     verdict,
                     is_accepted,

@@ -181,6 +181,10 @@ class Reference:
         """Return an entry as people type it."""
         return self.printed(self.expression(quantity, row, column))
 
+    def later(self, quantity: str, row: int, column: int) -> Callable[[], str]:
+        """Return what gives an entry as people type it: few are read, and SymPy takes long."""
+        return lambda: self.text(quantity, row, column)
+
     def printed(self, expression: object) -> str:
         """Return an expression, or a number, as text; SymPy takes long over it."""
         key = ("text", type(expression), expression)
