@@ -145,4 +145,4 @@ def example(request: pytest.FixtureRequest) -> Example:
 @pytest.fixture(scope="session")
 def example_named() -> Callable[[str], Example]:
     """Return the function that gives an example by name."""
-    return lambda name: load_example(EXAMPLES[0].with_name(f"{name}.py"))
+    return lambda name: load_example(next(EXAMPLES[0].parent.rglob(f"{name}.py")))
