@@ -28,13 +28,7 @@ class Column:
 
 
 def column_of(module: ModuleType, name: str) -> Column:
-    """Return the column that a name means.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the column that a name means; refuse another name."""
     known = (*module.COORDINATES, *getattr(module, "OUTPUTS", ()))
     wanted = column_name(str(name))
     for of in known:
@@ -49,13 +43,7 @@ def column_of(module: ModuleType, name: str) -> Column:
 
 
 def columns_of(module: ModuleType, names: Iterable[str] | str | None) -> list[Column]:
-    """Return the columns that are named; without names the outputs, or else the coordinates.
-
-    Raises
-    ------
-    InputError
-        With every name that is none.
-    """
+    """Return the columns that are named; without names the outputs, or else the coordinates."""
     if names is None:
         names = getattr(module, "OUTPUTS", ()) or module.COORDINATES
     found: list[Column] = []

@@ -43,14 +43,8 @@ def _load(item: Instance) -> tuple[str, str, str]:
 def constants(code: InlineProgram, level: int, pair: str) -> dict[str, object]:
     """Return names, numbers and the pattern of Phi_q, by the slot of a template.
 
-    Parameters
-    ----------
-    code
-        The program.
-    level
-        Indentation of the lines of an array.
-    pair
-        Text of a row and a column, with ``{}`` for each.
+    `level` indents the lines of an array, `pair` is the text of a row and a column, ``{}`` for
+    each.
     """
     program = code.program
 

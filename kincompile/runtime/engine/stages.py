@@ -313,7 +313,7 @@ class StagedSolver:
         self._size = size
 
     def factor(self, nonzeros: Array) -> StagedFactors:
-        """Factor Phi_q, given by its entries in the order of PATTERN; a sparse stage may refuse it."""
+        """Factor Phi_q, given by its entries in the order of PATTERN."""
         return StagedFactors(nonzeros, [stage.factor(nonzeros) for stage in self._stages])
 
     def determinants(self, factors: StagedFactors) -> Array:

@@ -170,7 +170,7 @@ def locate(march: March, state: State, latest: float) -> tuple[Event, Passage | 
 
 
 def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
-    """Tell what an assembled position is from which no motion is known: a lock-up or a bifurcation."""
+    """Tell what a position is from which no motion is known: a lock-up or a bifurcation."""
     try:
         nu = equations.code.nu(point.q, t, equations.p)
     except (ArithmeticError, ValueError):

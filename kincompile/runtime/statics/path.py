@@ -123,7 +123,7 @@ class _Way:
 
 
 class Path:
-    """The equilibria near one, over time, as the curve of a mechanism; a duration is long for it."""
+    """The equilibria near one, over time, as the curve of a mechanism."""
 
     def __init__(self, balance: Balance, place: Place, duration: float) -> None:
         self.balance, self._duration = balance, duration
