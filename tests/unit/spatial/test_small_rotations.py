@@ -64,8 +64,18 @@ def by_turns(golden: dict[str, Any]) -> Any:
 STATE = {"q": Q, "q_dot": Q_DOT, "t": GIVEN["t"]}
 
 
-# A screw has the angle as a coordinate, and its rows are not the golden ones one by one.
-@pytest.mark.parametrize("name", [name for name in CASES if name not in ("norm", "screw")])
+QUICK = {"absolute_orientation", "dot2", "distance", "spherical", "revolute", "constant_velocity"}
+"""The others are made of the same equations."""
+
+
+def checked() -> list[Any]:
+    """Return the constraints that are compared; most of them in the exhaustive run alone."""
+    # A screw has the angle as a coordinate, and its rows are not the golden ones one by one.
+    names = [name for name in CASES if name not in ("norm", "screw")]
+    return [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow]) for name in names]
+
+
+@pytest.mark.parametrize("name", checked())
 def test_that_the_checker_accepts_the_golden_rows(name: str) -> None:
     golden = ROWS[name]
     given = {"nu": np.array(golden["nu"]), "gamma": np.array(golden["gamma_omega"])}
