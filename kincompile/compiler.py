@@ -69,6 +69,7 @@ def emit(
     form: str | None = None,
     *,
     sensitivities: Sequence[str] = (),
+    dynamics: bool = False,
 ) -> Emitted:
     """Compile a mechanism to source files.
 
@@ -87,6 +88,10 @@ def emit(
         Names of parameters: the files are then those of the mechanism together with the derivatives
         by them, coordinates and outputs of their own, ``phi_rod_by_a``, whose rates are the
         derivatives of the rates.
+    dynamics
+        Whether the files have the right side of the equations of motion too, for any integrator:
+        ``accelerations(q, q_dot, t, p)`` and ``multipliers``, of a mechanism whose bodies have
+        masses, with as many degrees of freedom as it likes.
 
     Returns
     -------
@@ -99,16 +104,19 @@ def emit(
     ModelError
         If the model cannot be used as written; every problem is listed.
     InputError
-        If it has no parameter of a name.
+        If it has no parameter of a name, or with `dynamics` no masses.
+    StructuralError
+        With `dynamics`, if a body has no mass, or constraints contradict each other.
     UnsupportedError
         If there is no such target, or it cannot print the mechanism: only ``"numpy"`` has the
-        grouped form, and that has no sensitivities.
+        grouped form, and that has neither sensitivities nor equations of motion.
     """
     _check_target(target, form)
     with _without_collector():
         system = system_of(model)
-        if form == "grouped" and sensitivities:
-            raise UnsupportedError("the grouped form has no sensitivities; use form='inline'")
+        if form == "grouped" and (sensitivities or dynamics):
+            what = "sensitivities" if sensitivities else "equations of motion"
+            raise UnsupportedError(f"the grouped form has no {what}; use form='inline'")
         if _is_grouped(system, form) and not TARGETS[target].has_grouped_form:
             raise UnsupportedError(
                 f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
@@ -116,6 +124,8 @@ def emit(
         code = _lowered(system, form)
         if sensitivities:
             code = _sensitive(code.program, sensitivities)
+        if dynamics:
+            code = _moving(code, system)
         return emit_program(target, code)
 
 
@@ -298,12 +308,26 @@ def _sensitive(program: Program, names: Sequence[str]) -> InlineProgram:
     """Return the program of a mechanism with its sensitivities, written out."""
     from kincompile.ir.sensitive import with_sensitivities
 
+    _require_small(program, "sensitivities", "differentiate")
+    return inline(with_sensitivities(program, names))
+
+
+def _require_small(program: Program, what: str, do: str) -> None:
+    """Refuse a mechanism that is too large for what is written out whole."""
     if len(program.coordinates) > LARGEST_INLINE:
         raise UnsupportedError(
-            f"{program.name!r} has {len(program.coordinates)} coordinates, and sensitivities are "
-            f"compiled for up to {LARGEST_INLINE}: differentiate a part of the mechanism."
+            f"{program.name!r} has {len(program.coordinates)} coordinates, and {what} are "
+            f"compiled for up to {LARGEST_INLINE}: {do} a part of the mechanism."
         )
-    return inline(with_sensitivities(program, names))
+
+
+def _moving(code: InlineProgram | GroupedProgram, system: ConstraintSystem) -> InlineProgram:
+    """Return the program of a mechanism with its equations of motion, written out."""
+    from kincompile.ir.accelerations import with_motion
+
+    _require_small(code.program, "equations of motion", "simulate")
+    assert isinstance(code, InlineProgram)
+    return inline(with_motion(code, _dependent(code, system)[0]))
 
 
 def _sensitive_module(program: Program, names: tuple[str, ...]) -> ModuleType:
@@ -333,20 +357,25 @@ def _forces_module(code: InlineProgram, target: str, is_planned: bool) -> Module
 
 def _dynamic_modules(code: InlineProgram, system: ConstraintSystem, target: str) -> DynamicModules:
     """Return the compiled equations of motion, for `kc.simulate`."""
-    from kincompile.ir.accelerations import (
-        observing_accelerations,
-        observing_corrections,
-        require_masses,
-    )
-    from kincompile.ir.redundancy import independence
+    from kincompile.ir.accelerations import observing_accelerations, observing_corrections
     from kincompile.runtime.engine.code import DynamicModules
 
-    require_masses(code)
-    redundant, free = independence(system, code.program)
-    left_out = {system.equations.index(name) for name in redundant}
+    left_out, redundant, free = _dependent(code, system)
     accelerations = _observing(observing_accelerations(code, left_out), target)
     corrections = _observing(observing_corrections(code, left_out), target)
     return DynamicModules(accelerations, corrections, redundant, free)
+
+
+def _dependent(
+    code: InlineProgram, system: ConstraintSystem
+) -> tuple[set[int], tuple[str, ...], tuple[str, ...]]:
+    """Return rows and names of equations that repeat others, and the coordinates that are free."""
+    from kincompile.ir.accelerations import require_masses
+    from kincompile.ir.redundancy import independence
+
+    require_masses(code)
+    redundant, free = independence(system, code.program)
+    return {system.equations.index(name) for name in redundant}, redundant, free
 
 
 def forces_program(system: ConstraintSystem) -> Program | None:

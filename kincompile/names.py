@@ -179,6 +179,14 @@ def correction(name: str, order: int) -> str:
     return f"{('correction', 'rate_correction')[order]}_{name}"
 
 
+def without_loads(mechanism: str) -> str:
+    """Return what is said of a mechanism without masses that is to move from forces."""
+    return (
+        f"{mechanism} has no masses and no forces, from which a motion would follow: give its "
+        "bodies masses, m.body(..., mass=..., inertia=...), and set m.gravity."
+    )
+
+
 def force_units(length: str) -> tuple[str, str, str]:
     """Return the units of forces, torques and power where lengths have a unit, and masses kg."""
     if length == "m":

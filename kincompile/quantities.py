@@ -11,13 +11,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Container, Iterable, Mapping, Sequence
 
 FORMAT = 3
 """The format of emitted modules, as docs/contract.md has it."""
 
 Rows = Literal["equations", "coordinates", "outputs"]
 Columns = Literal["none", "coordinates", "parameters"]
+Part = Literal["", "outputs", "loads", "motion"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +40,9 @@ class Quantity:
         otherwise an entry belongs to one constraint.
     about
         A sentence for the comments of emitted code.
-    of_loads
-        Whether only a mechanism with masses or forces has it.
+    of
+        What a mechanism must have for it beside constraints: ``"outputs"``, ``"loads"``, masses or
+        forces, or ``"motion"``, equations of motion that were asked for.
     """
 
     name: str
@@ -49,7 +51,7 @@ class Quantity:
     reads: tuple[str, ...]
     adds: bool
     about: str
-    of_loads: bool = False
+    of: Part = ""
 
     @property
     def is_matrix(self) -> bool:
@@ -60,6 +62,11 @@ class Quantity:
     def states(self) -> tuple[str, ...]:
         """What it reads of q, q_dot and q_ddot."""
         return self.reads[:-2]
+
+    @property
+    def is_by_constraint(self) -> bool:
+        """Whether it is a vector whose rows are those of a constraint, under whose title it is."""
+        return self.rows == "equations" and not self.is_matrix and not self.of
 
 
 AT_POSITION = ("q", "t", "p")
@@ -77,26 +84,35 @@ QUANTITIES: tuple[Quantity, ...] = (
         "gamma", "equations", "none", MOVING, False,
         "Right side of the acceleration equation Phi_q q_ddot = gamma.",
     ),
-    Quantity("outputs", "outputs", "none", ACCELERATED, False, "Outputs y."),
+    Quantity("outputs", "outputs", "none", ACCELERATED, False, "Outputs y.", "outputs"),
     Quantity(
         "outputs_dot", "outputs", "none", ACCELERATED, False,
-        "Time derivatives of the outputs, y_dot = y_q q_dot + y_t.",
+        "Time derivatives of the outputs, y_dot = y_q q_dot + y_t.", "outputs",
     ),
     Quantity(
         "outputs_ddot", "outputs", "none", ACCELERATED, False,
-        "Second time derivatives of the outputs; NaN of those that depend on rates.",
+        "Second time derivatives of the outputs; NaN of those that depend on rates.", "outputs",
     ),
     Quantity(
-        "outputs_q", "outputs", "coordinates", ACCELERATED, False, "Jacobian of the outputs by q."
+        "outputs_q", "outputs", "coordinates", ACCELERATED, False,
+        "Jacobian of the outputs by q.", "outputs",
     ),
-    Quantity("M", "coordinates", "coordinates", AT_POSITION, True, "Mass matrix M(q).", True),
+    Quantity("M", "coordinates", "coordinates", AT_POSITION, True, "Mass matrix M(q).", "loads"),
     Quantity(
         "Q", "coordinates", "none", MOVING, True,
-        "Generalised forces: M q_ddot + Phi_q^T lambda = Q(q, q_dot, t).", True,
+        "Generalised forces: M q_ddot + Phi_q^T lambda = Q(q, q_dot, t).", "loads",
     ),
-    Quantity("Q_q", "coordinates", "coordinates", MOVING, True, "Jacobian of Q by q.", True),
+    Quantity("Q_q", "coordinates", "coordinates", MOVING, True, "Jacobian of Q by q.", "loads"),
     Quantity(
-        "Q_q_dot", "coordinates", "coordinates", MOVING, True, "Jacobian of Q by q_dot.", True
+        "Q_q_dot", "coordinates", "coordinates", MOVING, True, "Jacobian of Q by q_dot.", "loads"
+    ),
+    Quantity(
+        "accelerations", "coordinates", "none", MOVING, False,
+        "q_ddot of M q_ddot + Phi_q^T lambda = Q and Phi_q q_ddot = gamma.", "motion",
+    ),
+    Quantity(
+        "multipliers", "equations", "none", MOVING, False,
+        "lambda of M q_ddot + Phi_q^T lambda = Q and Phi_q q_ddot = gamma.", "motion",
     ),
 )  # fmt: skip
 """All quantities, in the order in which they are computed."""
@@ -107,23 +123,20 @@ TOGETHER: Mapping[str, tuple[str, ...]] = {
     "acceleration": ("Phi_q", "gamma"),
     "kinematics": ("Phi", "Phi_q", "nu", "gamma"),
     "observe": ("outputs", "outputs_dot", "outputs_ddot"),
+    "forward_dynamics": ("accelerations", "multipliers"),
 }
 """Functions that give several quantities at once: the steps of an analysis."""
 
-WHOLE = ("position", "observe")
+WHOLE = ("position", "observe", "forward_dynamics")
 """Those of them that are code of their own, in place of code for each of their quantities."""
 
 
-def quantities_of(*, has_outputs: bool, has_loads: bool = False) -> tuple[Quantity, ...]:
-    """Return the quantities of a mechanism, in order: those of outputs and loads if it has any."""
-    return tuple(
-        item
-        for item in QUANTITIES
-        if (has_outputs or item.rows != "outputs") and (has_loads or not item.of_loads)
-    )
+def quantities_of(parts: Container[Part]) -> tuple[Quantity, ...]:
+    """Return the quantities of a mechanism that has these parts beside constraints, in order."""
+    return tuple(item for item in QUANTITIES if not item.of or item.of in parts)
 
 
-OF_EQUATIONS = tuple(item for item in QUANTITIES if item.rows == "equations")
+OF_EQUATIONS = quantities_of(())
 """Those whose rows are the equations, which a hand-derived formula is compared with."""
 
 
@@ -147,7 +160,7 @@ def kernels(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     """Return the pieces of code that are emitted, and the quantities that each computes.
 
     They are ``position``, one for each quantity that is in none of the others, ``kinematics``,
-    since most of the work of a batch is shared, and ``observe`` where there are outputs.
+    since most of the work of a batch is shared, and the others of `WHOLE` as far as they are there.
     """
     whole = {name: TOGETHER[name] for name in WHOLE if name in functions(given)}
     covered = {name for own in whole.values() for name in own}

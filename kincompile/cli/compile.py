@@ -30,15 +30,17 @@ ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.end
     metavar="NAME",
     help=f"What to emit: {listed(TARGETS)}.",
 )
-def command(model: str, output: str, target: str) -> None:
+@click.option("--dynamics", is_flag=True, help="The accelerations that follow from forces too.")
+def command(model: str, output: str, target: str, dynamics: bool) -> None:
     """Write Phi, Phi_q, nu and gamma of MODEL as a module.
 
     The module imports NumPy and nothing else: it runs where kincompile is not installed. Where a
     target has several files, the others are written beside the one named. A model whose motion
-    cannot be solved, because a driver is missing, has a module too, and a warning.
+    cannot be solved, because a driver is missing, has a module too, and a warning; with --dynamics
+    it has the right side for an integrator, accelerations(q, q_dot, t, p).
     """
-    emitted = kc.emit(read_model(model), target)
-    if emitted.unsolvable:
+    emitted = kc.emit(read_model(model), target, dynamics=dynamics)
+    if emitted.unsolvable and not dynamics:
         click.echo(f"Warning: {emitted.unsolvable}", err=True)
     if output == "-":
         print_data("\n".join(emitted.files.values()))

@@ -7,15 +7,17 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.linalg import norm
 
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import (
     VectorSum,
+    VectorSymbol,
     split_coefficient,
     split_factor,
     vector_sum,
 )
-from kincompile.derivation.joint_terms import abbreviations
+from kincompile.derivation.joint_terms import abbreviations, parts
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import evaluate
 from kincompile.model.resolve import Joint
@@ -38,6 +40,12 @@ SHORTEST = 0.4
 
 AXIS, DIRECTION = 5.0, 7.0
 """Lengths of the axes of a frame and of directions, in sizes of marks."""
+
+SHORTER = 0.75
+"""Part of its length that a direction has where it would lie on another one."""
+
+ALIKE = 1e-2
+"""Difference of unit vectors up to which they are seen as one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +72,7 @@ class Figures:
 
     def mechanism(self) -> Picture | None:
         """Return the whole mechanism with the axes of its bodies; None without bodies."""
-        if self._is_spatial or not self.evaluation.system.bodies:
+        if not self.evaluation.system.bodies:
             return None
         drawn = self._drawn
         named = zip(drawn.frames, drawn.bodies, strict=True)
@@ -72,13 +80,14 @@ class Figures:
         title = f"{drawn.name} at {self.evaluation.origin}"
         return picture(drawn, self.evaluation.q, title, [*self._axes(GROUND_FRAME, ""), *arrows])
 
-    @property
-    def _is_spatial(self) -> bool:
-        return len(self.evaluation.system.ground.kind.axes) > 2
+    @cached_property
+    def _letters(self) -> tuple[str, ...]:
+        """The names of the axes of a frame."""
+        return tuple("xyz"[: self._drawn.dimension])
 
     def joint(self, joint: Joint) -> Picture | None:
-        """Return a joint with the vectors and axes that occur in its equation; none in space."""
-        if self._is_spatial:
+        """Return a joint with the vectors and axes of its equation; None where it has no vector."""
+        if joint.written.is_own:
             return None
         arrows = [*self.vectors(joint)]
         indices = dict(zip(self._frames(joint), "ij", strict=False))
@@ -93,20 +102,21 @@ class Figures:
         frames = self._geometry.frames
         return [frames.get(body.name, GROUND_FRAME) for body in joint.bodies]
 
-    def _place(self, frame: BodyFrame, x: float = 0.0, y: float = 0.0) -> Array:
-        return FramePoint(frame, (x, y)).at(self.evaluation.q)
+    def _place(self, frame: BodyFrame, *point: float) -> Array:
+        """Return where a point of a frame is, without one its origin."""
+        return FramePoint(frame, point or (0.0,) * len(self._letters)).at(self.evaluation.q)
 
     def _axes(self, frame: BodyFrame, index: str) -> Iterator[Arrow]:
         """Yield the axes of a frame at its origin."""
         origin, length = self._place(frame), AXIS * self._drawn.size
-        for letter, x, y in (("x", length, 0.0), ("y", 0.0, length)):
+        for letter, way in zip(self._letters, np.eye(len(self._letters)) * length, strict=True):
             name = f"{letter}_{index}" if index else letter
-            yield Arrow(name, origin, self._place(frame, x, y), frame, is_vector=False)
+            yield Arrow(name, origin, self._place(frame, *way), frame, is_vector=False)
 
     def vectors(self, joint: Joint) -> Iterator[Arrow]:
         """Yield r of each body, s and v of the joint, and d; those of no length are left out."""
         for arrow in (*self._positions(joint), *self._fixed(joint), *self._separations(joint)):
-            if np.hypot(*(arrow.end - arrow.start)) > SHORTEST * self._drawn.size:
+            if norm(arrow.end - arrow.start) > SHORTEST * self._drawn.size:
                 yield arrow
 
     def _positions(self, joint: Joint) -> Iterator[Arrow]:
@@ -116,23 +126,27 @@ class Figures:
     def _fixed(self, joint: Joint) -> Iterator[Arrow]:
         """Yield the points of a joint from their origins, and its directions from their points."""
         last: dict[BodyFrame, Array] = {}
-        for item in joint.written.arguments().values():
-            if item.kind is Kind.POINT:
-                place = self._geometry.point(joint, item.symbol)
-                end = place.at(self.evaluation.q)
-                last.setdefault(place.frame, end)
-                yield Arrow(item.symbol, self._place(place.frame), end, place.frame)
-            elif item.kind is Kind.AXIS:
-                frame = self._geometry.frame_of(joint, item.symbol)
-                x, y = self._geometry.numbers(joint.points[item.symbol])
-                length = DIRECTION * self._drawn.size / np.hypot(x, y)
-                start = last.get(frame, self._place(frame))
-                way = self._place(frame, length * x, length * y) - self._place(frame)
-                yield Arrow(item.symbol, start, start + way, frame)
+        taken: list[Array] = []
+        for symbol, is_point in _fixed_vectors(joint):
+            frame = self._geometry.frame_of(joint, symbol)
+            if is_point:
+                end = self._geometry.point(joint, symbol).at(self.evaluation.q)
+                last.setdefault(frame, end)
+                yield Arrow(symbol, self._place(frame), end, frame)
+                continue
+            direction = np.array(self._geometry.numbers(joint.points[symbol]), dtype=np.float64)
+            start = last.get(frame, self._place(frame))
+            length = DIRECTION * self._drawn.size
+            way = self._place(frame, *(length / norm(direction) * direction)) - self._place(frame)
+            ray = np.concatenate((start, way)) / length
+            if any(norm(ray - other) < ALIKE for other in taken):
+                way = SHORTER * way
+            taken.append(ray)
+            yield Arrow(symbol, start, start + way, frame, is_direction=True)
 
     def _separations(self, joint: Joint) -> Iterator[Arrow]:
         """Yield d from where its negative terms end to where its positive ones do."""
-        expansion = Expansion(SymbolicEnvironment(joint))
+        expansion = Expansion(SymbolicEnvironment(joint), joint.template.dimension)
         values = self.evaluation.values
 
         def where(terms: list[Vector]) -> Array:
@@ -147,3 +161,16 @@ class Figures:
                 negative = [-term for term, sign in pairs if sign < 0]
                 name = f"d_{glyph.index}" if glyph.index else "d"
                 yield Arrow(name, where(negative), where(positive), GROUND_FRAME)
+
+
+def _fixed_vectors(joint: Joint) -> Iterator[tuple[str, bool]]:
+    """Yield the symbols of what is fixed in bodies, and whether it is a point.
+
+    First the arguments, then what else of the triads about them occurs in the equation.
+    """
+    arguments = joint.written.arguments().values()
+    given = {item.symbol: item.kind for item in arguments if item.kind in (Kind.POINT, Kind.AXIS)}
+    yield from ((symbol, kind is Kind.POINT) for symbol, kind in given.items())
+    occurring = (item for Phi in joint.template.Phi for item in parts(Phi))
+    symbols = dict.fromkeys(x.name for x in occurring if isinstance(x, VectorSymbol))
+    yield from ((name, False) for name in symbols if name in joint.points.keys() - given.keys())

@@ -6,7 +6,7 @@ from base64 import b64encode
 from typing import TYPE_CHECKING
 
 from kincompile.derivation.mathml import index_text, letter_text
-from kincompile.derivation.notation import BODY_FIXED, split_name
+from kincompile.derivation.notation import has_prime, split_name
 from kincompile.view.picture import svg_element
 
 if TYPE_CHECKING:
@@ -38,10 +38,10 @@ def svg_address(picture: Picture) -> str:
 def _label(label: PictureLabel, height: float) -> str:
     """Return a symbol with its index, and with the prime of what is given in a body's frame."""
     letter, index, _ = split_name(label.name)
-    prime = "\N{PRIME}" if not label.is_vector or letter in BODY_FIXED else ""
+    prime = "\N{PRIME}" if not label.is_vector or has_prime(letter, index) else ""
     below = f'<tspan dy="4" font-size="{0.7 * SIZE:g}">{index_text(index)}</tspan>' if index else ""
     above = f'<tspan dy="{-4 if index else 0}">{prime}</tspan>' if prime else ""
-    if label.name in ("x", "y"):  # of the ground
+    if label.name in ("x", "y", "z"):  # of the ground
         above = ""
     text = letter_text(letter, bold=label.is_vector)
     return (

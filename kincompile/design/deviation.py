@@ -99,10 +99,9 @@ class Deviation:
         ends = gradients[..., 0] * self.low, gradients[..., 0] * self.high
         return np.minimum(*ends), np.maximum(*ends)
 
-    def shift_and_sigma(self, gradients: Array) -> tuple[Array, Array]:
-        """Return mean and standard deviation of the effect, for gradients of shape (..., 1)."""
-        law, slope = self.law, gradients[..., 0]
-        return slope * float(law.mean()), np.abs(slope) * float(law.std())
+    def moments(self) -> tuple[Array, Array]:
+        """Return the mean (1,) and the covariance (1, 1) of the deviation."""
+        return np.array([float(self.law.mean())]), np.array([[float(self.law.var())]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,10 +120,9 @@ class Clearance:
         most = self.radius * np.hypot(gradients[..., 0], gradients[..., 1])
         return -most, most
 
-    def shift_and_sigma(self, gradients: Array) -> tuple[Array, Array]:
-        """Return mean and standard deviation of the effect, for gradients of shape (..., 2)."""
-        _, most = self.effects(gradients)
-        return np.zeros_like(most), most / math.sqrt(2)
+    def moments(self) -> tuple[Array, Array]:
+        """Return the mean (2,) and the covariance (2, 2) of the vector."""
+        return np.zeros(2), self.radius**2 / 2 * np.eye(2)
 
 
 def _is_number(value: object) -> bool:

@@ -257,12 +257,9 @@ def _with_limits(model: Mechanism, targets: Sequence[Target]) -> Mechanism:
 
 def _require_plan(module: ModuleType) -> None:
     """Check that many sets of parameters can be solved together."""
-    code = code_of(module)
-    if code.redundant or code.lanes is None:
-        reason = f"repeats equations ({listed(code.redundant)})" if code.redundant else "is large"
+    if code_of(module).lanes is None:
         raise UnsupportedError(
-            f"{module.NAME} {reason}: kc.fit takes mechanisms with as many independent equations "
-            "as coordinates, in the inline form. kincompile inspect names what can be left out."
+            f"{module.NAME} is large: kc.fit takes mechanisms that are compiled in the inline form."
         )
 
 
@@ -411,13 +408,26 @@ def _constraints(gaps: Any, gaps_by_u: Any, minimizer: str) -> Any:
 
 def _nowhere(model: Mechanism, finder: Search) -> str:
     """Say that no set of parameters gets through the times, and how far they got."""
+    if finder.moved and (ratios := finder.demands.ratios):
+        return (
+            f"{model.name} moves through the times, but there is no "
+            f"{listed(item.title for item, _ in ratios)}: what has one rises and falls within the "
+            "times of the model, which are one cycle."
+        )
     how_far = (
         "none could be assembled at the first time"
         if not math.isfinite(finder.farthest)
         else f"the farthest came to t = {finder.farthest:.6g}"
     )
+    redundant = code_of(finder.module).redundant
+    hint = (
+        f" Equations that repeat others, {listed(redundant)}, have to agree at all values: make "
+        "one parameter of all dimensions that have to change together."
+        if redundant
+        else ""
+    )
     return (
         f"{model.name} does not move through the times of the targets with any of "
         f"{finder.tried} sets of parameters within the bounds: {how_far}. Give other bounds, more "
-        "samples, or a guess nearer to an assembly."
+        f"samples, or a guess nearer to an assembly.{hint}"
     )

@@ -8,6 +8,7 @@ start. Points without times are looked for along the path, in their order.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +19,13 @@ from scipy.stats import qmc
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.design.demands import deviation, limit_gaps
 from kincompile.design.trial import EAGERNESS
+from kincompile.errors import KincompileWarning
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, all_hold
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.observed import observed
+from kincompile.runtime.solve import solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -165,6 +168,8 @@ class Search:
     def _through(self, sets: Array, guess: Array) -> tuple[NDArray[np.intp], tuple[Array, ...]]:
         """Return which sets get through all times, and q, q_dot, q_ddot, each (B, N, n)."""
         code, times = code_of(self.module), self._times.tolist()
+        if code.redundant:
+            return self._through_with_care(sets, guess)
         with np.errstate(all="ignore"):
             equations = problem(self.module, sets[0], guess, times[0])
             march = March(equations, Planned(code, np.ascontiguousarray(sets.T)), TOLERANCE)
@@ -189,6 +194,22 @@ class Search:
         return alive, tuple(
             np.stack([np.asarray(x)[:, alive].T for x in part], 1) for part in parts
         )
+
+    def _through_with_care(
+        self, sets: Array, guess: Array
+    ) -> tuple[NDArray[np.intp], tuple[Array, ...]]:
+        """Return the same of redundant equations.
+
+        Those that are solved may be singular where all together are not, so that the careful march
+        has to help.
+        """
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", KincompileWarning)
+            found = solve(self.module, self._times, sets[:, np.newaxis], guess)
+        reached = self._times[np.flatnonzero(found.good.any(axis=0))]
+        self.farthest = max(self.farthest, *reached.tolist()) if reached.size else self.farthest
+        alive = np.flatnonzero(found.good.all(axis=1))
+        return alive, tuple(part[alive] for part in (found.q, found.q_dot, found.q_ddot))
 
     def _errors(self, seen: _Columns, count: int) -> tuple[Array, Array]:
         """Return the error of each set, and its variables that are times."""

@@ -7,7 +7,8 @@ model      -> variation      clearances become parameters, zero at first      va
            -> Drawn          the motion of samples, by chance                 draw
 
 To first order :math:`\Delta y = \sum_k y_{p_k} \Delta p_k`: the worst case is the sum of the
-largest terms, the variance that of their variances.
+largest terms, the variance that of their variances. Second derivatives, exact too, shift the mean
+by :math:`\tfrac12 \sum_{kl} y_{p_k p_l} E[\Delta p_k \Delta p_l]`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.stats import qmc
 
 from kincompile.compiler import compile as compile_model
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from kincompile.runtime.results.solution import Solution
 
     Array = NDArray[np.float64]
+    Bands = tuple[Array, Array, Array, Array, Array, Array]
     Sources = dict[str, tuple[tuple[str, ...], Deviation | Clearance]]
 
 MOST_NUMBERS = 20_000_000
@@ -115,8 +118,8 @@ def tolerance(
     times = np.linspace(0.0, model.end, model.points) if t is None else t
     nominal = solve(module, times, dict(p or {}), guess, assembly=assembly, throw=True)
     names = [name for group, _ in sources.values() for name in group]
-    gradients = _gradients(nominal, names, columns)
-    bands = _effects(gradients, sources)
+    gradients, curvatures = _derivatives(nominal, names, columns)
+    bands = _effects(gradients, curvatures, sources)
     values = np.stack([nominal[column.name] for column in columns], axis=-1)
     _require_effect(model.name, sources, columns, bands, values)
     drawn = _drawn(nominal, sources, columns, int(samples), seed) if samples else None
@@ -165,24 +168,37 @@ def _sources(
     return found
 
 
-def _gradients(nominal: Solution, names: Sequence[str], columns: Sequence[Column]) -> Array:
-    """Return the derivatives of columns by parameters, shape (N, columns, parameters)."""
+def _derivatives(
+    nominal: Solution, names: Sequence[str], columns: Sequence[Column]
+) -> tuple[Array, Array]:
+    """Return the derivatives of columns by parameters (N, columns, k), and by pairs of them."""
     of = list(dict.fromkeys(column.of for column in columns))
-    found = sensitivities(nominal, names, of)
-    by_column = [[found[column.name, name] for name in names] for column in columns]
-    return np.moveaxis(np.array(by_column), -1, 0)
+    found = sensitivities(nominal, names, of, second=True)
+    first = [[found[x.name, name] for name in names] for x in columns]
+    second = [[[found[x.name, name, by] for by in names] for name in names] for x in columns]
+    return np.moveaxis(np.array(first), -1, 0), np.moveaxis(np.array(second), -1, 0)
 
 
-def _effects(gradients: Array, sources: Sources) -> tuple[Array, Array, Array, Array, Array]:
-    """Return slope, least and greatest effect, mean and sigma of each source, (N, columns, k)."""
+def _effects(gradients: Array, curvatures: Array, sources: Sources) -> Bands:
+    """Return what each source does, (N, columns, k) each.
+
+    That is slope, least and greatest effect, mean, sigma, and shift of the mean.
+    """
+    moments = [deviation.moments() for _, deviation in sources.values()]
+    means = np.concatenate([mean for mean, _ in moments])
+    products = np.outer(means, means) + block_diag(*(own for _, own in moments))
+    shifts = (curvatures * products).sum(axis=-1) / 2
     found, first = [], 0
-    for names, deviation in sources.values():
-        own = gradients[..., first : first + len(names)]
+    for (names, deviation), (mean, covariance) in zip(sources.values(), moments, strict=True):
+        place = np.s_[..., first : first + len(names)]
+        own = gradients[place]
         first += len(names)
         slope = own[..., 0] if len(names) == 1 else np.linalg.norm(own, axis=-1)
-        found.append((slope, *deviation.effects(own), *deviation.shift_and_sigma(own)))
-    slope, low, high, mean, sigma = (np.stack(part, axis=-1) for part in zip(*found, strict=True))
-    return slope, low, high, mean, sigma
+        sigma = np.sqrt(((own @ covariance) * own).sum(axis=-1))
+        shift = shifts[place].sum(axis=-1)
+        found.append((slope, *deviation.effects(own), own @ mean, sigma, shift))
+    slope, low, high, mean, sigma, shift = (np.stack(x, axis=-1) for x in zip(*found, strict=True))
+    return slope, low, high, mean, sigma, shift
 
 
 def _require_effect(

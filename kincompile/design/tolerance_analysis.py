@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 THREE_SIGMA = (0.00135, 0.99865)
 """Parts of a normal distribution below and above which lies what is beyond three sigma."""
 
-TITLES = ("from", "sensitivity", "least", "greatest", "worst %", "RSS %")
+TITLES = ("from", "sensitivity", "least", "greatest", "mean shift", "worst %", "RSS %")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +61,9 @@ class ToleranceAnalysis(Shown):
         Least and greatest effect of each source alone, to first order.
     mean, sigma : ndarray, shape (N, r, k)
         Mean and standard deviation of its effect, to first order.
+    shift : ndarray, shape (N, r, k)
+        What is added to the mean by second derivatives, which are exact too; those by two sources
+        count half for each. NaN where Phi_q is nearly singular.
     drawn : Drawn or None
         What Monte Carlo gave.
     motion : Solution
@@ -78,6 +81,7 @@ class ToleranceAnalysis(Shown):
     high: Array
     mean: Array
     sigma: Array
+    shift: Array
     drawn: Drawn | None
     motion: Solution
 
@@ -90,6 +94,11 @@ class ToleranceAnalysis(Shown):
         """Return the mean deviation and the standard deviation, shape (N,): root sum of squares."""
         k = self._place(column)
         return self.mean[:, k].sum(axis=-1), np.linalg.norm(self.sigma[:, k], axis=-1)
+
+    def mean_shift(self, column: str) -> Array:
+        """Return what second derivatives add to the mean deviation, shape (N,)."""
+        found: Array = self.shift[:, self._place(column)].sum(axis=-1)
+        return found
 
     def contributions(self, column: str) -> Array:
         """Return the part of each source in the variance [per cent], shape (N, k)."""
@@ -164,6 +173,7 @@ class ToleranceAnalysis(Shown):
             f"{column} = {value:.6g}{unit} at t = {self.t[at]:.6g}",
             f"  worst case {low:+.4g} to {high:+.4g}{unit}",
             f"  RSS {mean - 3 * sigma:+.4g} to {mean + 3 * sigma:+.4g}{unit} (three sigma)",
+            f"  mean shifted by {self.mean_shift(column)[at]:+.3g}{unit} (second order)",
         ]
         if self.drawn is not None and len(self.drawn.values):
             least, greatest = self.quantiles(column)[:, at]
@@ -179,11 +189,12 @@ class ToleranceAnalysis(Shown):
         """Return what each source does to a column at a time, the greatest part first."""
         k = self._place(column)
         low, high, slope = self.low[at, k], self.high[at, k], self.slope[at, k]
+        shift = self.shift[at, k]
         worst, spread = _parts(high - low), self.contributions(column)[at]
         return [
             (
                 self.sources[j], f"{slope[j]:.5g}", f"{low[j]:+.4g}", f"{high[j]:+.4g}",
-                f"{worst[j]:.1f}", f"{spread[j]:.1f}",
+                f"{shift[j]:+.2g}", f"{worst[j]:.1f}", f"{spread[j]:.1f}",
             )
             for j in np.argsort(-spread, kind="stable").tolist()
         ]  # fmt: skip

@@ -1,7 +1,8 @@
 """One trial of a fit: the motion at some variables, its deviations, and their derivatives.
 
 The motion goes through all times of the targets without a break, so that no branch is left between
-them. From one trial to the next the branch is that of the first, by the signs of determinants.
+them. From one trial to the next the branch is that of the first, by the signs of determinants;
+redundant equations have none, and Newton's method starts near the position before.
 """
 
 from __future__ import annotations

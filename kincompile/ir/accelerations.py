@@ -13,17 +13,18 @@ of :math:`\Phi_q^T \Phi_q` is added to it, and to Q accordingly: that changes no
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from kincompile.errors import StructuralError
+from kincompile.errors import InputError, StructuralError
 from kincompile.ir.augmented import plan_augmented
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.graph import Graph
 from kincompile.ir.inline import Entry
-from kincompile.ir.observing import observing_program
+from kincompile.ir.observing import bound, marked, observing_program
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
-from kincompile.names import correction, force_units, listed, rate, solved
+from kincompile.names import correction, force_units, listed, rate, solved, without_loads
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -33,7 +34,9 @@ if TYPE_CHECKING:
 
 
 def require_masses(code: InlineProgram) -> None:
-    """Refuse a mechanism some bodies of which have no mass."""
+    """Refuse a mechanism some bodies of which have no mass, or that has no loads at all."""
+    if not code.program.loads:
+        raise InputError(without_loads(code.program.name))
     heavy = {entry.row for entry in code.entries("M") if entry.row == entry.column}
     light = [body.name for body in code.program.bodies if not heavy.issuperset(body.columns)]
     if light:
@@ -57,6 +60,16 @@ def observing_accelerations(code: InlineProgram, left_out: Collection[int] = ())
     length = code.program.coordinates[body.columns.start].unit if body else ""
     titles.append(OutputColumn(solved("power"), force_units(length)[2]))
     return _program(code, "accelerations", motion, found, titles, left_out)
+
+
+def with_motion(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
+    """Return the program of a mechanism whose accelerations and multipliers are quantities too."""
+    motion = _Motion(code, left_out)
+    found = motion.solution()
+    outputs = {"accelerations": found[: motion.n], "multipliers": found[motion.n :]}
+    instance, values = bound(code.program, "motion", motion.graph, outputs)
+    fingerprint = marked(code.program, "motion", tuple(sorted(left_out)))
+    return replace(code.program, values=values, motion=(instance,), fingerprint=fingerprint)
 
 
 def observing_corrections(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
@@ -90,28 +103,28 @@ class _Motion:
     ----------
     graph
         The mechanism's code, to which that of the solve is added.
-    names
-        The coordinates.
+    names, n
+        The coordinates, and how many they are.
     """
 
     def __init__(self, code: InlineProgram, left_out: Collection[int]) -> None:
         program = code.program
         self._code, self.graph = code, Graph(code.nodes)
         self.names = program.names_of("coordinates")
-        self._n, self._m = len(self.names), len(program.equations)
+        self.n, self._m = len(self.names), len(program.equations)
         self._Phi_q = [entry for entry in code.entries("Phi_q") if entry.row not in left_out]
         self._q_dot = [self.graph.input(rate(name)) for name in self.names]
         self._rows = self._rows_of(self._Phi_q)
         self._weights = self._weighted()
         M = self._mass_matrix()
         self._plan = plan_augmented(
-            self._n,
+            self.n,
             self._m,
             [(x.row, x.column, self.graph.value_of(x.node)) for x in M],
             [(x.row, x.column, code.number(x.node)) for x in self._Phi_q],
             left_out,
         )
-        jacobian = [Entry(self._n + x.row, x.column, x.node) for x in self._Phi_q]
+        jacobian = [Entry(self.n + x.row, x.column, x.node) for x in self._Phi_q]
         mirrored = [Entry(x.column, x.row, x.node) for x in jacobian]
         self._solve = StraightSolve(self.graph, [*M, *jacobian, *mirrored], self._plan)
 
@@ -163,11 +176,15 @@ class _Motion:
                 found[column] = graph.add(found[column], term)
         return found
 
+    def solution(self) -> list[int]:
+        """Return the accelerations, then the multipliers."""
+        gamma = self._column("gamma", self._m)
+        return self._solve.solve([*self._pushed(self._column("Q", self.n), gamma), *gamma])
+
     def accelerations(self) -> list[int]:
         """Return the accelerations, and the power of loads and drivers."""
-        gamma, Q = self._column("gamma", self._m), self._column("Q", self._n)
-        found = self._solve.solve([*self._pushed(Q, gamma), *gamma])
-        return [*found[: self._n], self._power(Q, found[self._n :])]
+        found = self.solution()
+        return [*found[: self.n], self._power(self._column("Q", self.n), found[self.n :])]
 
     def _power(self, Q: Sequence[int], multipliers: Sequence[int]) -> int:
         r"""Return the power of loads and drivers, of which the kinetic energy is the work.
@@ -198,8 +215,8 @@ class _Motion:
             velocity[entry.row] = graph.sub(velocity[entry.row], term)
         found = []
         for right in (position, velocity):
-            still = self._pushed([graph.const(0)] * self._n, right)
-            found += self._solve.solve([*still, *right])[: self._n]
+            still = self._pushed([graph.const(0)] * self.n, right)
+            found += self._solve.solve([*still, *right])[: self.n]
         return found
 
     def _column(self, quantity: str, size: int) -> list[int]:

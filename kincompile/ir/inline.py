@@ -7,13 +7,21 @@ from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import Constant, Graph, Node, number_of
 from kincompile.ir.program import Function
-from kincompile.names import rate
+from kincompile.names import multiplier, rate, solved
 from kincompile.quantities import TOGETHER, quantity_named
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from kincompile.ir.program import Hint, Instance, Program
+    from kincompile.quantities import Rows
+
+
+SOLVED: tuple[tuple[str, Rows, Callable[[str], str]], ...] = (
+    ("accelerations", "coordinates", solved),
+    ("multipliers", "equations", multiplier),
+)
+"""Unknowns of the equations of motion, what they belong to, and what they are called."""
 
 
 def input_name(row: int, column: int) -> str:
@@ -99,6 +107,11 @@ def inline(program: Program) -> InlineProgram:
             for order, quantity in enumerate(TOGETHER["observe"])
             for row, _, node in kernel.outputs.get(quantity, ())
         ]
+        named += [
+            (new[node], name_of(program.names_of(kind)[row]))
+            for quantity, kind, name_of in SOLVED
+            for row, _, node in kernel.outputs.get(quantity, ())
+        ]
         named += [(new[hint.node], _vector_name(hint, instance)) for hint in kernel.hints]
         for node, name in named:
             # A call is named by its function and argument.
@@ -106,9 +119,12 @@ def inline(program: Program) -> InlineProgram:
                 hints.setdefault(node, name)
         entries = _entries(program, instance, new, graph, shared)
         sections.append(ConstraintRows(instance, entries))
-    if shared:  # a sum is complete where the last constraint has contributed
-        sums = _sums(program, graph, shared)
-        sections[-1] = replace(sections[-1], entries={**sections[-1].entries, **sums})
+    for quantity, complete in _sums(program, graph, shared).items():
+        # A sum is complete where the last has contributed.
+        giving = [k for k, x in enumerate(sections) if quantity in x.instance.kernel.outputs]
+        last = giving[-1] if giving else -1
+        own = {**sections[last].entries, quantity: complete}
+        sections[last] = replace(sections[last], entries=own)
     frames = tuple(sorted(body.entries for body in program.bodies))
     return InlineProgram(program, tuple(graph.nodes), tuple(sections), hints, frames)
 

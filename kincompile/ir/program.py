@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kincompile.model.resolve import FreeEquation
     from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.model.spline import SplineTable
-    from kincompile.quantities import Columns, Quantity, Rows
+    from kincompile.quantities import Columns, Part, Quantity, Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +185,11 @@ class Instance:
         return "M" in self.kernel.outputs
 
     @property
+    def is_motion(self) -> bool:
+        """Whether it is the solved equations of motion."""
+        return "accelerations" in self.kernel.outputs
+
+    @property
     def rows(self) -> tuple[OutputColumn, ...]:
         """The outputs that it gives."""
         return self.constraint.rows if isinstance(self.constraint, Observed) else ()
@@ -214,11 +219,12 @@ class Program:
     unsolvable: str = ""  # why the equations cannot determine the coordinates; "" where they can
     observers: tuple[Instance, ...] = ()  # the outputs, an instance each; those of a point are one
     loads: tuple[Instance, ...] = ()  # the masses of bodies and the loads, an instance each
+    motion: tuple[Instance, ...] = ()  # the equations of motion, one, where they were asked for
 
     @property
     def parts(self) -> tuple[Instance, ...]:
-        """Everything that gives entries of quantities: constraints, outputs and loads."""
-        return *self.instances, *self.observers, *self.loads
+        """Everything that gives entries of quantities."""
+        return *self.instances, *self.observers, *self.loads, *self.motion
 
     @property
     def outputs(self) -> tuple[OutputColumn, ...]:
@@ -227,8 +233,13 @@ class Program:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The quantities that there are: those of outputs and of loads only where there are any."""
-        return quantities_of(has_outputs=bool(self.observers), has_loads=bool(self.loads))
+        """The quantities that there are: of outputs, loads and motion only where there are any."""
+        parts: dict[Part, tuple[Instance, ...]] = {
+            "outputs": self.observers,
+            "loads": self.loads,
+            "motion": self.motion,
+        }
+        return quantities_of([part for part, found in parts.items() if found])
 
     @property
     def corners(self) -> bool:

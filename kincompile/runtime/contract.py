@@ -11,10 +11,10 @@ from kincompile.errors import ContractError, InputError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from types import ModuleType
 
-    from kincompile.quantities import Quantity
+    from kincompile.quantities import Part, Quantity
 
 FORMATS = (1, 2, quantities.FORMAT)
 """The formats of emitted modules that this version reads."""
@@ -38,11 +38,17 @@ _CONSTANTS: dict[str, type] = {
 }
 
 
+MARKS: Mapping[Part, str] = {
+    "outputs": "OUTPUTS",
+    "loads": "LOADS",
+    "motion": "forward_dynamics",
+}
+"""What modules have that have quantities of such parts."""
+
+
 def present_in(module: ModuleType) -> tuple[Quantity, ...]:
-    """Return the quantities of a module: those of outputs and of loads where it has any."""
-    return quantities.quantities_of(
-        has_outputs=hasattr(module, "OUTPUTS"), has_loads=hasattr(module, "LOADS")
-    )
+    """Return the quantities of a module: of outputs, of loads and of motion where it has any."""
+    return quantities.quantities_of([part for part, mark in MARKS.items() if hasattr(module, mark)])
 
 
 def functions(module: ModuleType) -> tuple[str, ...]:

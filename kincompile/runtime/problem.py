@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import (
-    AGREEMENT,
     ASTRAY,
     FAR,
     FOLDED,
@@ -33,7 +32,7 @@ from kincompile.criteria import (
     size_of,
 )
 from kincompile.runtime.engine.code import Array, Code, code_of
-from kincompile.runtime.engine.engine import Point, Rates
+from kincompile.runtime.engine.engine import Point, Rates, agree
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.engine.stages import StagedSolver
@@ -328,8 +327,8 @@ class Dense:
         except (ArithmeticError, ValueError):
             return Rates(q_dot, nothing, movement)
         q_ddot = self.solve(point, gamma)
-        agree = _agree(point.Phi_q, q_dot, sides[:, 0]) and _agree(point.Phi_q, q_ddot, gamma)
-        return Rates(q_dot, q_ddot, movement, bool(agree))
+        holds = agree(point.Phi_q, q_dot, sides[:, 0]) and agree(point.Phi_q, q_ddot, gamma)
+        return Rates(q_dot, q_ddot, movement, bool(holds))
 
     def determinants(self, point: Point, before: Point) -> Array:
         """Return the determinants of the blocks; without any, one relative to the point before."""
@@ -375,29 +374,6 @@ class Dense:
             batch = Planned(self.code, self._p)
             return batch.determinants(batch.evaluate(q[:, np.newaxis], t))[:, 0]
         return np.array(found, dtype=np.float64)
-
-
-def _agree(matrix: Array, rates: Array, sides: Array) -> Any:
-    """Say whether redundant equations are all met by the rates: at a point (n,), or at each (N, n).
-
-    `matrix` and `sides` have one axis more and as many.
-    """
-    if matrix.shape[-2] == matrix.shape[-1]:
-        return True
-    rates = rates[..., np.newaxis]
-    terms = (np.abs(matrix) @ np.abs(rates))[..., 0] + np.abs(sides)
-    missing = np.abs((matrix @ rates)[..., 0] - sides)
-    return np.max(missing, axis=-1) <= AGREEMENT * np.max(terms, axis=-1)
-
-
-def rates_agree(code: Code, t: Array, p: Array, states: Sequence[Array]) -> Any:
-    """Say at which points redundant equations are all met by rates that solve the others.
-
-    `states` are position, velocity and acceleration, shape (n, N) each.
-    """
-    q, q_dot, q_ddot = (state.T for state in states)
-    Phi_q, nu, gamma = code.Phi_q(q, t, p), code.nu(q, t, p), code.gamma(q, q_dot, t, p)
-    return _agree(Phi_q, q_dot, nu) & _agree(Phi_q, q_ddot, gamma)
 
 
 def solve_linear(matrix: Array, sides: Array) -> Array:

@@ -131,8 +131,7 @@ def solve(
             start = start_of(inputs, motion)
             solution = solution_of(inputs, motion, outcome)
         else:
-            is_planned = inputs.code.lanes is not None and not inputs.code.redundant
-            solve_all = solve_variants if is_planned else solve_in_turn
+            solve_all = solve_in_turn if inputs.code.lanes is None else solve_variants
             solution = solve_all(inputs, inputs.sets, progress)
             start = start_of_first(inputs, solution)
     solution = finite(solution)

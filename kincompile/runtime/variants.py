@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import MAX_CORRECTIONS, SETTLED, TOO_NEAR
+from kincompile.runtime.engine.engine import rates_agree
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.follow import follow
 from kincompile.runtime.march import March, Outcome, State, all_hold, largest
@@ -113,7 +114,8 @@ def _solve_chunk(inputs: Inputs, begin: Array, sets: Array, arrays: _Arrays, chu
     march(near, *together.scales, sets, motion, residual, status, iterations)
     arrays.residual[:, chunk] = residual
     arrays.status[:, chunk], arrays.iterations[:, chunk] = status, iterations
-    failed = np.flatnonzero(status.any(axis=0) | together.strays(arrays.motion[0, 0, :, chunk]))
+    is_odd = status.any(axis=0) | together.strays(arrays.motion[0, 0, :, chunk])
+    failed = np.flatnonzero(is_odd | ~together.agree(motion))
     if failed.size:
         alone = _Arrays.over(inputs, failed.size)
         _Chunk(inputs, begin, sets[failed], alone, 0).run()
@@ -150,6 +152,14 @@ class _Chunk:
             signs = np.sign(engine.determinants(point))
             found[unsettled] = (signs[:, :-1] != signs[:, -1:]).any(axis=0)
         return found
+
+    def agree(self, motion: Array) -> Any:
+        """Say which variants of a motion (3, N, n, B) meet redundant equations at all times."""
+        if not self._inputs.code.redundant:
+            return True
+        pairs = zip(self._times, motion.swapaxes(0, 1), strict=True)
+        code, p = self._inputs.code, self._sets.T
+        return np.all([rates_agree(code, np.array(t), p, states) for t, states in pairs], axis=0)
 
     def run(self) -> None:
         """Go through the grid with all variants."""
@@ -223,13 +233,23 @@ class _Chunk:
             return
         state.point.q[:, variant] = found.point.q
         state.q_dot[:, variant], state.q_ddot[:, variant] = found.q_dot, found.q_ddot
-        state.determinants[:, variant] = found.determinants
+        state.determinants[:, variant] = self._determinants(found, variant)
         if state.probed is not None:
-            state.probed[:, variant] = np.abs(found.determinants)
+            state.probed[:, variant] = np.abs(state.determinants[:, variant])
             state.sensitivity[variant] = found.sensitivity
         arrays.motion[:, index, :, place] = found.point.q, found.q_dot, found.q_ddot
         arrays.residual[index, place] = np.max(np.abs(found.point.Phi))
         arrays.iterations[index, place] = outcome.iterations
+
+    def _determinants(self, found: State, variant: int) -> Array:
+        """Return the determinants of the blocks of one variant.
+
+        Of redundant equations the careful march has one of all, and a batch those of the others.
+        """
+        if not self._inputs.code.redundant:
+            return found.determinants
+        engine = Planned(self._inputs.code, self._sets[variant])
+        return engine.determinants(engine.evaluate(found.point.q[:, np.newaxis], found.t))[:, 0]
 
 
 def _solution(inputs: Inputs, sets: Array, arrays: _Arrays) -> Solution:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.quantities import FORMAT, quantity_named
-from kincompile.targets.lines import indented, labelled, quoted, table, wrapped
+from kincompile.quantities import quantity_named
+from kincompile.targets.lines import labelled, table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
     from kincompile.ir.program import Instance
@@ -40,33 +40,6 @@ def _load(item: Instance) -> tuple[str, str, str]:
     return name, " - ".join(item.bodies), item.constraint.source
 
 
-def constants(code: InlineProgram, level: int, pair: str) -> dict[str, object]:
-    """Return names, numbers and the pattern of Phi_q, by the slot of a template.
-
-    `level` indents the lines of an array, `pair` is the text of a row and a column, ``{}`` for
-    each.
-    """
-    program = code.program
-
-    def lines(items: Iterable[str]) -> str:
-        return indented(items, level)
-
-    return {
-        "name": program.name,
-        "format": FORMAT,
-        "fingerprint": program.fingerprint,
-        "n": len(program.coordinates),
-        "m": len(program.equations),
-        "k": len(program.parameters),
-        "coordinates": lines(quoted(item.name for item in program.coordinates)),
-        "equations": lines(quoted(program.equations)),
-        "parameters": lines(quoted(item.name for item in program.parameters)),
-        "defaults": lines(wrapped(repr(item.default) for item in program.parameters)),
-        "guess": lines(wrapped(repr(item.guess) for item in program.coordinates)),
-        "pattern": lines(wrapped(pair.format(*place) for place in code.pattern())),
-    }
-
-
 def short_title(section: ConstraintRows, first: int = 0) -> str:
     """Return rows, type and name of a constraint or output, for a comment above its code."""
     instance = section.instance
@@ -80,6 +53,8 @@ def title(section: ConstraintRows, first: int = 0) -> str:
     """
     if section.instance.is_load:
         return "sums over masses and loads"
+    if section.instance.is_motion:
+        return "M, Phi_q, Q and gamma together"
     return f"{short_title(section, first)}: {section.instance.constraint.text}"
 
 
@@ -89,7 +64,7 @@ def entry_titles(quantity: str, code: InlineProgram) -> Callable[[Entry], str]:
     rows, columns = (code.program.names_of(kind) for kind in (found.rows, found.columns))
     if found.is_matrix:
         return lambda entry: f"{rows[entry.row]} by {columns[entry.column]}"
-    return lambda entry: "" if found.rows == "equations" else rows[entry.row]
+    return lambda entry: "" if found.is_by_constraint else rows[entry.row]
 
 
 def _unit(unit: str) -> str:

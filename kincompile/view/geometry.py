@@ -49,12 +49,8 @@ class Geometry:
 
     Attributes
     ----------
-    joints
-        The constraints of known types.
     values
         Parameters by name.
-    frames
-        The frame of each body by name.
     q : ndarray, shape (N, n)
         Positions that rails must fit; all finite.
     """
@@ -88,8 +84,11 @@ class Geometry:
         return tuple(map(self.number, vector))
 
     def frame_of(self, joint: Joint, symbol: str) -> BodyFrame:
-        """Return the frame in which a point of a joint is fixed."""
-        owner = joint.written.owners()[symbol]
+        """Return the frame in which a point or a direction of a joint is fixed.
+
+        What completes a triad, and is no argument, has the index of its body.
+        """
+        owner = joint.written.owners().get(symbol, symbol[-1])
         if owner == GROUND.name:
             return GROUND_FRAME
         arguments = joint.written.arguments().values()
@@ -146,15 +145,7 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True)
 class JointGeometry:
-    """A joint with its attributes as numbers.
-
-    Attributes
-    ----------
-    joint
-        The resolved constraint.
-    mechanism
-        The joints of the whole mechanism, this one among them.
-    """
+    """A joint with its attributes as numbers."""
 
     joint: Joint
     mechanism: Geometry

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.view.marks import GROUND_FRAME, moves_with
-from kincompile.view.polylines import Polyline, of_mark
+from kincompile.view.polylines import Polyline, of_mark, pieces
 from kincompile.view.shapes import DASHES, FILL, GROUND_COLOUR, HUES
-from kincompile.view.worlds import solid_pictures
+from kincompile.view.worlds import PLANE, in_space
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -95,12 +95,12 @@ class Arrow:
     ----------
     name
         Name of its symbol, such as ``"s_i"``.
-    start, end
-        Where it begins and ends.
     frame
         The frame whose colour it has.
     is_vector
         Whether its symbol is bold; an axis of a frame is not.
+    is_direction
+        Whether it is drawn at a length of its own.
     """
 
     name: str
@@ -108,6 +108,7 @@ class Arrow:
     end: Array
     frame: BodyFrame
     is_vector: bool = True
+    is_direction: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,8 +133,6 @@ def picture(
 
     Parameters
     ----------
-    drawn
-        Its shapes.
     q : ndarray, shape (n,)
         The position.
     title
@@ -141,10 +140,11 @@ def picture(
     arrows
         Vectors over it.
     focus
-        Frames that the picture is about; what moves with others is faint. All by default.
+        Frames that the picture is about; what moves with others is faint, in space left out. All
+        by default.
     """
     if drawn.is_spatial:
-        seen: Picture = solid_pictures().picture_in_space(drawn, q, title, arrows, focus)
+        seen: Picture = in_space("solid_picture").picture_in_space(drawn, q, title, arrows, focus)
         return seen
     left, right, low, high = drawn.extent(q)
     ends = [np.stack((arrow.start, arrow.end)) for arrow in arrows]
@@ -189,18 +189,21 @@ class Scale:
     """
 
     def __init__(
-        self, shown: Sequence[Array], most: tuple[float, float] = (WIDTH, TALLEST)
+        self,
+        shown: Sequence[Array],
+        most: tuple[float, float] = (WIDTH, TALLEST),
+        margin: float = MARGIN,
     ) -> None:
         points = np.concatenate(shown)
-        self._low = np.nanmin(points, axis=0)
+        self._margin, self._low = margin, np.nanmin(points, axis=0)
         wide, tall = np.nanmax(points, axis=0) - self._low
-        self.factor = min((most[0] - 2 * MARGIN) / wide, (most[1] - 2 * MARGIN) / tall)
-        self.width = self.factor * float(wide) + 2 * MARGIN
-        self.height = self.factor * float(tall) + 2 * MARGIN
+        self.factor = min((most[0] - 2 * margin) / wide, (most[1] - 2 * margin) / tall)
+        self.width = self.factor * float(wide) + 2 * margin
+        self.height = self.factor * float(tall) + 2 * margin
 
     def at(self, points: Array) -> Array:
         """Return where points are on the picture."""
-        return np.asarray(MARGIN + self.factor * (points - self._low), dtype=np.float64)
+        return np.asarray(self._margin + self.factor * (points - self._low), dtype=np.float64)
 
 
 def opacity_of(mark: Mark, shown: set[BodyFrame] | None) -> float:
@@ -223,11 +226,8 @@ def _paths(polyline: Polyline, q: Array, scale: Scale, opacity: float) -> Iterab
         fill = look.area or colour
         yield PicturePath(points, colour, fill, look.width, opacity, is_pale=not look.area)
         return
-    gaps = np.flatnonzero(np.isnan(points).any(axis=1))
-    for piece in np.split(points, gaps):
-        kept = piece[~np.isnan(piece).any(axis=1)]
-        if len(kept) > 1:
-            yield PicturePath(kept, colour, "", look.width, opacity, dash=look.dash)
+    for piece in pieces(points):
+        yield PicturePath(piece, colour, "", look.width, opacity, dash=look.dash)
 
 
 def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, PicturePath]:
@@ -243,10 +243,13 @@ def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, Picture
 
 
 def _places(arrow: Arrow, start: Array, end: Array) -> list[Array]:
-    """Return where the label of a vector may stand; that of an axis is at its end."""
+    """Return where the label of a vector may stand; that of an axis is at its end.
+
+    So is that of a direction in space, where six of them may begin at one point.
+    """
     along = (end - start) / float(np.hypot(*(end - start)))
     aside = ASIDE * np.array((-along[1], along[0]))
-    if not arrow.is_vector:
+    if not arrow.is_vector or (arrow.is_direction and len(arrow.start) > PLANE):
         return [end + ASIDE * along, end + aside, end - aside]
     return [start + part * (end - start) + side for part in ALONG for side in (aside, -aside)]
 

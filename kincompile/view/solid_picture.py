@@ -9,23 +9,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.view.marks import GROUND_FRAME, moves_with
+from kincompile.view.marks import GROUND_FRAME, Dot, Hull, Polygon, moves_with
 from kincompile.view.picture import (
-    MOST_FAINT,
+    ASIDE,
+    MARGIN,
     PicturePath,
     Scale,
     colour_of,
     composed,
-    opacity_of,
 )
-from kincompile.view.shapes import FILL, HUES, INKS
+from kincompile.view.polylines import pieces
+from kincompile.view.shapes import FILL, HUES, INKS, mixed
 from kincompile.view.solids import Position, facets_of, solids
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import Array, BodyFrame
+    from kincompile.view.marks import Array, BodyFrame, Mark
     from kincompile.view.picture import Arrow, Picture
     from kincompile.view.solids import Part, Solid
 
@@ -48,6 +49,9 @@ RIM = 0.6
 
 SEAM = 0.4
 """Width of the line in its own colour around a facet of a round solid, which closes seams."""
+
+LETTER = 6.0
+"""Width of a letter in the name of an axis [points]."""
 
 CIRCLE = np.stack([f(np.radians(np.arange(0, 360, 10))) for f in (np.cos, np.sin)], axis=-1)
 """A ball of radius one."""
@@ -91,27 +95,38 @@ def picture_in_space(
 ) -> Picture:
     """Draw a mechanism in space; `picture` says what is given."""
     ends = [camera.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]
-    seen = seen_paths(drawn, q, camera, focus)
-    scale = Scale([*(path.points for path in seen), *ends])
+    seen = seen_paths(_about(drawn, focus) if focus else drawn, q, camera)
+    longest = max((len(arrow.name) for arrow in arrows), default=0)
+    margin = max(MARGIN, ASIDE + LETTER / 2 * longest)
+    scale = Scale([*(path.points for path in seen), *ends], margin=margin)
     shown = (dataclasses.replace(path, points=scale.at(path.points)) for path in seen)
     return composed(title, scale, shown, zip(arrows, ends, strict=True))
 
 
-def seen_paths(
-    drawn: Drawing, q: Array, camera: Camera, focus: Iterable[BodyFrame] | None = None
-) -> list[PicturePath]:
+def _about(drawn: Drawing, focus: Iterable[BodyFrame]) -> Drawing:
+    """Return a drawing of some bodies, and of what joins them with each other and the ground."""
+    shown = {*focus, GROUND_FRAME}
+    joined: dict[object, set[BodyFrame]] = {}
+    for mark in drawn.marks:
+        joined.setdefault(_joint_of(mark), set()).update(moves_with(mark))
+    marks = tuple(mark for mark in drawn.marks if joined[_joint_of(mark)] <= shown)
+    return dataclasses.replace(drawn, marks=marks)
+
+
+def _joint_of(mark: Mark) -> object:
+    """Return the name of the joint that a mark shows, or the mark of a body itself."""
+    return mark if isinstance(mark, Hull | Polygon | Dot) else mark.joint
+
+
+def seen_paths(drawn: Drawing, q: Array, camera: Camera) -> list[PicturePath]:
     """Return what is seen of a mechanism from back to front, in lengths of the model."""
-    shown = None if focus is None else {*focus, GROUND_FRAME}
     position, found = Position(q), []
     for solid in solids(drawn):
-        if shown and len(drawn.bodies) > MOST_FAINT and not moves_with(solid.mark) <= shown:
-            continue
-        opacity = opacity_of(solid.mark, shown)
         for part in solid.parts(position):
             if is_visible(solid, part, camera):
                 points = camera.seen(part.points)
                 depth = float(points[:, 2].mean()) + part.radius
-                found.append((depth, _path(solid, part, camera, points[:, :2], opacity)))
+                found.append((depth, _path(solid, part, camera, points[:, :2])))
     return [path for _, path in sorted(found, key=lambda item: item[0])]
 
 
@@ -139,18 +154,16 @@ def is_gap(solid: Solid, part: Part) -> bool:
     return solid.piece.look == "gap" and bool(np.max(way) <= 1e-3 * solid.size)
 
 
-def _path(solid: Solid, part: Part, camera: Camera, points: Array, opacity: float) -> PicturePath:
-    """Return a part as it is seen."""
+def _path(solid: Solid, part: Part, camera: Camera, points: Array) -> PicturePath:
     look, line = solid.look, solid.look.colour or colour_of(solid.frame)
     if part.radius:
         face = look.area or mixed(line, FILL)
-        return PicturePath(points + part.radius * CIRCLE, line, face, look.width, opacity)
+        return PicturePath(points + part.radius * CIRCLE, line, face, look.width)
     if part.normal is None:
-        return PicturePath(points, line, "", look.width, opacity, dash=look.dash)
+        return PicturePath(points, line, "", look.width, dash=look.dash)
     face = (look.area or line) if part.is_flat else shade(line, part.normal, camera)
     width = RIM * look.width if part.is_rim else SEAM
-    if solid.piece.look == "plate":
-        opacity *= PLATE
+    opacity = PLATE if solid.piece.look == "plate" else 1.0
     return PicturePath(points, line if part.is_rim else face, face, width, opacity)
 
 
@@ -160,18 +173,9 @@ def shade(colour: str, normal: Array, camera: Camera) -> str:
     return mixed(colour, 0.85 - 0.6 * lit)
 
 
-def mixed(colour: str, part: float) -> str:
-    """Return a part of a colour on white paper."""
-    channels = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    return "#" + "".join(f"{round(part * x + (1 - part) * 255):02x}" for x in channels)
-
-
 def trace(index: int, points: Array) -> Iterator[PicturePath]:
-    """Yield a path in a colour of its own, on a rim of paper, in pieces that NaN separates."""
+    """Yield a path in a colour of its own, on a rim of paper."""
     hues = HUES["light"]
-    gaps = np.flatnonzero(np.isnan(points).any(axis=1))
-    for piece in np.split(points, gaps):
-        kept = piece[~np.isnan(piece).any(axis=1)]
-        if len(kept) > 1:
-            yield PicturePath(kept, INKS["paper"], "", 3.0)
-            yield PicturePath(kept, hues[(index + 4) % len(hues)], "", 1.5)
+    for piece in pieces(points):
+        yield PicturePath(piece, INKS["paper"], "", 3.0)
+        yield PicturePath(piece, hues[(index + 4) % len(hues)], "", 1.5)

@@ -8,6 +8,7 @@ import numpy as np
 
 from kincompile.criteria import RESIDUAL_FACTOR, TOLERANCE
 from kincompile.errors import InputError, UnsupportedError
+from kincompile.names import without_loads
 from kincompile.runtime.engine.code import DYNAMICS, code_of
 from kincompile.runtime.problem import problem
 
@@ -34,10 +35,7 @@ def dynamic_modules(module: ModuleType) -> DynamicModules:
     if found is not None:
         return found()
     if not hasattr(module, "LOADS"):
-        raise InputError(
-            f"{module.NAME} has no masses and no forces, from which a motion would follow: give "
-            "its bodies masses, m.body(..., mass=..., inertia=...), and set m.gravity."
-        )
+        raise InputError(without_loads(module.NAME))
     if code_of(module).evaluate is not None:
         raise UnsupportedError(
             f"{module.NAME} is in grouped form, as large mechanisms are, whose equations of motion "

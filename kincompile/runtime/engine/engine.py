@@ -17,7 +17,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.criteria import AGREEMENT
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from kincompile.runtime.engine.code import Code
 
 Array = NDArray[np.float64]
@@ -46,7 +50,7 @@ class Rates:
     q_dot: Array
     q_ddot: Array
     movement: Array  # shape of q: the solution for the right side that was asked for besides
-    agree: bool = True  # whether redundant equations are all met by the rates
+    agree: Any = True  # whether redundant equations are all met by the rates, shape (N,) or one
 
 
 class Engine(Protocol):
@@ -83,3 +87,28 @@ class Engine(Protocol):
 
     def signs(self, point: Point) -> tuple[float, ...]:
         """Return their signs at one point; none where redundant equations forbid a determinant."""
+
+
+def agree(matrix: Array, rates: Array, sides: Array) -> Any:
+    """Say whether redundant equations are all met by the rates: at a point (n,), or at each (N, n).
+
+    `matrix` and `sides` have one axis more and as many.
+    """
+    if matrix.shape[-2] == matrix.shape[-1]:
+        return True
+    rates = rates[..., np.newaxis]
+    terms = (np.abs(matrix) @ np.abs(rates))[..., 0] + np.abs(sides)
+    missing = np.abs((matrix @ rates)[..., 0] - sides)
+    return np.max(missing, axis=-1) <= AGREEMENT * np.max(terms, axis=-1)
+
+
+def rates_agree(code: Code, t: Any, p: Any, states: Sequence[Array]) -> Any:
+    """Say at which points redundant equations are all met by rates that solve the others.
+
+    `states` are position, velocity and acceleration, shape (n, N) each; `p` is (k,) or (k, N).
+    """
+    finite = np.isfinite(sum(states)).all(axis=0)
+    q, q_dot, q_ddot = (np.where(finite, state, 0.0).T for state in states)
+    t, p = np.broadcast_to(t, len(q)), np.asarray(p).T
+    Phi_q, nu, gamma = code.Phi_q(q, t, p), code.nu(q, t, p), code.gamma(q, q_dot, t, p)
+    return finite & agree(Phi_q, q_dot, nu) & agree(Phi_q, q_ddot, gamma)

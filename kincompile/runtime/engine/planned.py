@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kincompile.criteria import SMALLEST_DETERMINANT
-from kincompile.runtime.engine.engine import Point, Rates
+from kincompile.runtime.engine.engine import Point, Rates, rates_agree
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array, Code, LaneFunctions
@@ -74,7 +74,11 @@ class Planned:
         q_dot, q_ddot = self.velocity_and_acceleration(point)
         movement = () if besides is None else self.solve(point, besides)
         points = point.q.shape[1]
-        return Rates(stacked(q_dot, points), stacked(q_ddot, points), stacked(movement, points))
+        found = Rates(*(stacked(part, points) for part in (q_dot, q_ddot, movement)))
+        if self.code.redundant:  # the elimination leaves them out
+            states = point.q, found.q_dot, found.q_ddot
+            return replace(found, agree=rates_agree(self.code, point.t, self.p, states))
+        return found
 
     def determinants(self, point: Point, before: Point | None = None) -> Array:
         """Return the determinants of the blocks, shape (blocks, N)."""

@@ -28,6 +28,7 @@ from kincompile.names import (
     suggestion,
 )
 from kincompile.runtime.engine.code import SENSITIVITIES, code_of
+from kincompile.runtime.engine.engine import agree
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import rate_unit
@@ -45,6 +46,9 @@ if TYPE_CHECKING:
     from kincompile.runtime.results.solution import Solution
 
     Coupling = Sequence[tuple[int, int, Array]]
+
+WITNESSES = 5
+"""Points at which redundant equations are looked at; most of them stand nowhere special."""
 
 BLOCK = 500
 """Points whose matrices are taken at a time, so that they fit into memory."""
@@ -220,8 +224,9 @@ def sensitivities(
     Raises
     ------
     InputError
-        If this is no Solution, or one that was pickled or solved with a module from a file, or a
-        name is none of a parameter or column, or is there twice.
+        If this is no Solution, or one that was pickled or solved with a module from a file, a
+        name is none of a parameter or column, or is there twice, or redundant equations would no
+        longer agree if a parameter changed.
     UnsupportedError
         If the mechanism is so large that its module is in grouped form.
     """
@@ -309,6 +314,9 @@ def _over_motion(
     modules = _modules(code.module)
     points = _Points(code, modules, names, columns, second, sets, times, *motion)
     finite = np.isfinite(motion[1].sum(axis=0))
+    if code.redundant and finite.any():
+        some = np.flatnonzero(finite)
+        _require_agreement(points.at(some[:: max(1, some.size // WITNESSES)]), solution.name)
     with np.errstate(all="ignore"):
         found, is_trusted = points.by_plan()
         left = np.flatnonzero(finite & ~is_trusted)
@@ -322,6 +330,25 @@ def _over_motion(
         own = sum(name in code.coordinates for name in columns)
         found[2, :, :own, ~accelerated] = np.nan
     return found.reshape(*found.shape[:3], *shape)
+
+
+def _require_agreement(points: _Points, mechanism: str) -> None:
+    """Check that redundant equations go on to agree when a parameter changes.
+
+    Raises
+    ------
+    InputError
+        With each parameter that would take the mechanism apart.
+    """
+    matrices, sides = points.slopes()
+    moved = np.linalg.pinv(matrices)[:, np.newaxis] @ sides[..., np.newaxis]
+    is_met = np.mean(agree(matrices[:, np.newaxis], moved[..., 0], sides), axis=0) > 1 / 2
+    if wrong := [name for name, met in zip(points.names, is_met, strict=True) if not met]:
+        raise InputError(
+            f"{mechanism} has redundant equations, {listed(points.code.redundant)}, which would no "
+            f"longer agree with the others if {listed(wrong)} changed alone: it could not be "
+            "assembled. Make one parameter of all dimensions that have to change together."
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -360,26 +387,33 @@ class _Points:
         found: Array = seen[:, blocks:].reshape(3, *size, -1)
         return found, trusted(seen[0, :blocks])
 
+    def slopes(self) -> tuple[Array, Array]:
+        """Return Phi_q, (L, m, n), and -Phi_a of each parameter, (L, k, m)."""
+        m, k, q = len(self.code.equations), len(self.names), self.q.T
+        held = np.concatenate((q, np.zeros((len(q), k * q.shape[1]))), axis=1)
+        sides = -self.modules.larger(self.names).Phi(held, self.t, self.p.T)[:, m:]
+        return self.code.Phi_q(q, self.t, self.p.T), sides.reshape(-1, k, m)
+
     def by_matrices(self) -> Array:
         """Return the derivatives by singular values; of redundant equations by least squares."""
         larger = self.modules.larger(self.names)
         m, n, k = len(self.code.equations), len(self.code.coordinates), len(self.names)
         q, q_dot, q_ddot, t, p = self.q.T, self.q_dot.T, self.q_ddot.T, self.t, self.p.T
-        inverses = np.linalg.pinv(self.code.Phi_q(q, t, p))
+        matrices, first = self.slopes()
+        inverses = np.linalg.pinv(matrices)
 
         def solved(sides: Array) -> Array:
             """Return derivatives, (L, k n), for right sides below the mechanism's own."""
-            own = sides[:, m:].reshape(-1, k, m)
+            own = sides.reshape(-1, k, m)
             found: Array = np.einsum("lij,lkj->lki", inverses, own).reshape(-1, k * n)
             return found
 
-        held = np.concatenate((q, np.zeros((len(q), k * n))), axis=1)
-        every_q = np.concatenate((q, solved(-larger.Phi(held, t, p))), axis=1)
+        every_q = np.concatenate((q, solved(first)), axis=1)
         coupling = _coupling(larger, every_q, t, p, m, n)
         nu = _reduced(larger.nu(every_q, t, p), coupling, q_dot)
-        every_q_dot = np.concatenate((q_dot, solved(nu)), axis=1)
+        every_q_dot = np.concatenate((q_dot, solved(nu[:, m:])), axis=1)
         gamma = _reduced(larger.gamma(every_q, every_q_dot, t, p), coupling, q_ddot)
-        every = every_q, every_q_dot, np.concatenate((q_ddot, solved(gamma)), axis=1)
+        every = every_q, every_q_dot, np.concatenate((q_ddot, solved(gamma[:, m:])), axis=1)
         found = np.array(every)[..., n:].reshape(3, -1, k, n)
         if outputs := getattr(self.code.module, "OUTPUTS", ()):
             seen = observed(larger, every, t, p)

@@ -24,6 +24,7 @@ ABOUT = {
     "position": "Phi and Phi_q in one go: a step of Newton's method.",
     "kinematics": "Phi, Phi_q, nu and gamma in one go.",
     "observe": "Outputs y, y_dot and y_ddot in one go.",
+    "forward_dynamics": "Accelerations and multipliers in one go.",
 }
 """What the kernels of several quantities give."""
 

@@ -127,6 +127,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "equations": tuple_text(f'"{name}"' for name in program.equations),
         "solvability": solvability_text(program),
         "has_outputs": bool(program.outputs),
+        "has_motion": bool(program.motion),
         "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
         "loads": tuple_text(f'"{item.name}"' for item in program.loads),
         "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
@@ -311,10 +312,8 @@ def _section(
     texts = [printer.text(entry.node) for entry in entries]
     if about is None or not entries:
         return [line for text in texts for line in element(text, "")]
-    quantity = quantity_named(name)
-    is_own = quantity.rows == "equations" and not quantity.is_matrix
     lines: list[str] = []
-    if is_own:
+    if quantity_named(name).is_by_constraint:
         line = f"    {', '.join(texts)},  # {short_title(section)}"
         if name != "Phi" and len(line) <= WIDTH - 4:
             return [line]

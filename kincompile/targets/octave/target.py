@@ -55,9 +55,9 @@ KEYWORDS = (
 CALLED = (
     *NAMES.values(), "abs", "all", "any", "circshift", "deal", "det", "diag", "double", "either",
     "eps", "error", "eye", "false", "find", "in_reals", "Inf", "isempty", "isfinite", "isnan",
-    "isreal", "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell", "numel", "pi",
-    "polyval", "rcond", "round", "sign", "single", "size", "sortrows", "sqrt", "sum", "svd",
-    "true", "zeros",
+    "isreal", "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell", "numel",
+    "ode45", "odeset", "pi", "pinv", "polyval", "rcond", "round", "sign", "single", "size",
+    "sortrows", "sqrt", "sum", "svd", "true", "zeros",
 )  # fmt: skip
 """Functions that the files call; a script of such a name would be called in their place."""
 
@@ -90,7 +90,7 @@ def files(
     """Return the .m files, the script first; refuse names longer than MATLAB reads."""
     program = code.program
     found = {NameTable((*KEYWORDS, *CALLED)).take(program.name): _script(code)}
-    if not program.unsolvable:
+    if not program.unsolvable and not program.motion:
         found[f"{program.name}_assemble"] = _assembly(code)
     for name, lines in functions.items():
         found[f"{program.name}_{name}"] = _function_file(name, code, "\n".join(lines))
@@ -185,7 +185,7 @@ def _blocks(code: InlineProgram) -> list[str]:
 
 
 def _script(code: InlineProgram) -> str:
-    """Return the script that solves the motion."""
+    """Return the script that solves the motion, or with equations of motion integrates it."""
     program = code.program
     try:
         end, points = float(program.end), int(program.points)
@@ -196,17 +196,21 @@ def _script(code: InlineProgram) -> str:
             f"end = {program.end!r}, points = {program.points!r}: give a finite time, and at least "
             "one point"
         )
-    data = {
+    data: dict[str, object] = {
         "name": program.name,
         "header": WRITE.header(code),
         "n": len(program.coordinates),
-        "unsolvable": indented(_literal(piece) for piece in pieces(program.unsolvable)),
-        "has_redundant": bool(program.redundant),
-        "AGREEMENT": repr(criteria.AGREEMENT),
         "end": repr(end),
         "points": points,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 1),
         "guess": _column(((item.name, item.guess) for item in program.coordinates), 1),
+    }
+    if program.motion:
+        return fill("octave/motion.m.jinja", {**data, "m": len(program.equations)})
+    data |= {
+        "unsolvable": indented(_literal(piece) for piece in pieces(program.unsolvable)),
+        "has_redundant": bool(program.redundant),
+        "AGREEMENT": repr(criteria.AGREEMENT),
     }
     return fill("octave/script.m.jinja", data)
 

@@ -5,13 +5,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import kincompile as kc
+from kincompile import spatial
 from kincompile.derivation.document import Figure
 from kincompile.derivation.evaluation import evaluation
 from kincompile.derivation.figures import Figures
 from kincompile.derivation.svg import as_svg
+from kincompile.model.constraint import Constraint
+from kincompile.space.catalogue import CONSTRAINTS
 from kincompile.view.picture import Arrow
+from kincompile.view.solid_picture import ISOMETRIC
+from tests.unit.spatial import test_golden_rows as golden
 
 
 def offset_slider() -> kc.Mechanism:
@@ -104,3 +110,91 @@ def test_that_nothing_of_a_picture_is_outside_it(name: str, example_named: Any) 
         x, y = np.asarray(path.points).T
         assert -1 < x.min() <= x.max() < shown.width + 1
         assert -1 < y.min() <= y.max() < shown.height + 1
+
+
+@pytest.fixture(scope="module")
+def in_space() -> Figures:
+    """Return the figures of one constraint of each type in space, at the golden state."""
+    found = {}
+    for case, make in golden.CASES.items():
+        for item in make():
+            if isinstance(item, Constraint) and case != "dot2_reversed":
+                kind = CONSTRAINTS[
+                    next(x.__name__ for x in type(item).__mro__ if x.__name__ in CONSTRAINTS)
+                ]
+                values = {name: getattr(item, name) for name in kind.arguments()}
+                found[kind.__name__] = kind(name=kind.__name__, **values)
+    turning = found["RelativeRotation"]
+    values = {name: getattr(turning, name) for name in CONSTRAINTS["JointAngle"].arguments()}
+    found["JointAngle"] = CONSTRAINTS["JointAngle"](name="JointAngle", **values)
+    assert found.keys() == CONSTRAINTS.keys() - {"Normalization"}
+    m = golden.mechanism(list(found.values()))
+    names = [item.name for item in m.system().coordinates]
+    numbers = [*golden.Q, *(0.3 for _ in names[len(golden.Q) :])]
+    return Figures(evaluation(m.system(), dict(zip(names, numbers, strict=True))))
+
+
+def joint_of(figures: Figures, name: str) -> Any:
+    return next(item for item in figures.evaluation.system.constraints if item.name == name)
+
+
+@pytest.mark.parametrize("name", sorted(CONSTRAINTS.keys() - {"Normalization"}))
+def test_that_each_type_in_space_has_the_vectors_of_its_equation(
+    name: str, in_space: Figures
+) -> None:
+    joint, given = joint_of(in_space, name), golden.GIVEN
+    turns = {key: Rotation.from_quat(given[f"p_{key}"], scalar_first=True) for key in "ij"}
+    arrows = {arrow.name: arrow for arrow in in_space.vectors(joint)}
+    for key, arrow in arrows.items():
+        letter, _, index = key.partition("_")
+        if letter == "r":
+            np.testing.assert_allclose(arrow.end, given[key], atol=1e-12)
+        elif letter == "s" and not joint.bodies["ij".index(index)].is_ground:
+            np.testing.assert_allclose(arrow.start, given[f"r_{index}"], atol=1e-12)
+            way = turns[index].apply(given[key])
+            np.testing.assert_allclose(arrow.end - arrow.start, way, atol=1e-12)
+        elif letter in ("h", "f", "g") and len(joint.bodies) > 1:
+            local = np.array(joint.points[key], dtype=float)
+            way, drawn = turns[index].apply(local), arrow.end - arrow.start
+            np.testing.assert_allclose(drawn / np.linalg.norm(drawn), way, atol=1e-12)
+    ways = {key: arrow.end - arrow.start for key, arrow in arrows.items()}
+    if {"d", "s_j", "r_j"} <= arrows.keys():
+        reach = [ways[f"r_{key}"] + ways[f"s_{key}"] for key in "ij"]
+        np.testing.assert_allclose(ways["d"], reach[1] - reach[0], atol=1e-12)
+    picture = in_space.joint(joint)
+    assert picture is not None
+    shown = {label.name for label in picture.labels}
+    assert shown >= arrows.keys() | {"x_i", "y_i", "z_i"}
+
+
+def test_that_a_figure_in_space_is_seen_from_one_side(in_space: Figures) -> None:
+    """Vectors of the picture are those of space, to the right and up, by one scale."""
+    joint = joint_of(in_space, "Revolute")
+    picture = in_space.joint(joint)
+    assert picture is not None
+    arrows = [*in_space.vectors(joint)]
+    drawn = [np.asarray(path.points) for path in picture.paths if not path.stroke][: len(arrows)]
+    tips = np.array([points[0] for points in drawn])
+    ends = np.array([ISOMETRIC.seen(arrow.end)[:2] for arrow in arrows])
+    scale = (tips[1] - tips[0]) / (ends[1] - ends[0])
+    np.testing.assert_allclose(scale[0], scale[1], rtol=1e-9)
+    np.testing.assert_allclose(tips - tips[0], scale * (ends - ends[0]), atol=1e-9)
+
+
+def test_that_a_direction_on_another_is_shorter_and_others_are_left_out() -> None:
+    m = spatial.Mechanism("pair")
+    arm, hand = m.body("arm", (0.2, 0, 0)), m.body("hand", (0.5, 0, 0))
+    far = m.body("far", (0, 9, 0))
+    z, end = (0, 0, 1), (0.1, 0, 0)
+    m.add(spatial.Revolute("elbow", arm, end, z, hand, (-0.2, 0, 0), z))
+    m.add(spatial.Spherical("away", arm, end, far, (0, -9, 0)))
+    state = {item.name: item.guess for item in m.system().coordinates}
+    figures = Figures(evaluation(m.system(), state))
+    joint = joint_of(figures, "elbow")
+    lengths = {x.name: np.linalg.norm(x.end - x.start) for x in figures.vectors(joint)}
+    assert lengths["h_j"] < lengths["h_i"] == pytest.approx(lengths["g_i"])
+    picture, whole = figures.joint(joint), figures.mechanism()
+    assert picture is not None
+    assert whole is not None
+    assert len(picture.paths) < len(whole.paths)
+    assert figures.joint(joint_of(figures, "norm_arm")) is None

@@ -237,12 +237,30 @@ def test_same_seed_gives_the_same_result():
         ({"targets": [], "bounds": {"u": (0, 1)}}, "there is nothing to reach"),
         ({"targets": ["P"], "bounds": {"u": (0, 1)}}, "'P' is not a target"),
         ({"targets": kc.targets.path("Q", [(1, 2)]), "bounds": {"u": (0, 1)}}, "'x_Q'"),
+        (
+            {"targets": kc.targets.time_ratio("speed", 2), "bounds": {"u": (0, 1)}},
+            "time ratio of speed: four_bar: the output 'speed' has no second rate",
+        ),
+        (
+            {"targets": kc.targets.value("speed_ddot", [1.0], [0.5]), "bounds": {"u": (0, 1)}},
+            "speed_ddot: four_bar: the output 'speed' has no second rate",
+        ),
+        (
+            {"targets": kc.targets.time_ratio("P.x_dot", 2), "bounds": {"u": (0, 1)}},
+            "name the coordinate or output itself",
+        ),
+        (
+            {"targets": kc.targets.time_ratio("crank.phi", 2), "bounds": {"u": (1.6, 1.7)}},
+            "there is no time ratio of phi_crank: what has one rises and falls",
+        ),
     ],
 )
 def test_bad_input_says_what_and_where(arguments, words):
-    given = {"targets": kc.targets.path("P", [(3, 3)], [0.5]), **arguments}
+    given = {"samples": 32, "targets": kc.targets.path("P", [(3, 3)], [0.5]), **arguments}
+    m = fourbar()
+    m.output("speed", sympy.Symbol("phi_rocker_dot"))
     with pytest.raises(kc.InputError, match=words):
-        kc.fit(fourbar(), **given)
+        kc.fit(m, **given)
 
 
 @pytest.mark.parametrize(
@@ -266,13 +284,35 @@ def test_targets_check_what_they_are_given(make, words):
         make()
 
 
+def three_cranks():
+    """Three parallel cranks that carry a bar: one joint more than the motion needs."""
+    m = kc.Mechanism("cranks", end=6.0, points=25)
+    a, other = m.parameter("a", 1.0, "m"), m.parameter("other", 1.0, "m")
+    u, v = m.parameter("u", 0.5, "m"), m.parameter("v", 0.8, "m")
+    bar = m.body("bar", (1, 0, 0))
+    for k, at in enumerate([(0, 0), (2, 0), (1, 1.5)]):
+        crank = m.body(f"crank_{k}", (*at, 0.01))
+        m.add(kc.Revolute(f"A{k}", m.ground, at, crank, (0, 0)))
+        m.add(kc.Revolute(f"B{k}", crank, (a if k < 2 else a * other, 0), bar, at))
+        if k == 0:
+            m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    m.point("P", bar, (u, v))
+    return m
+
+
 @pytest.mark.filterwarnings("ignore::kincompile.errors.RedundantConstraintWarning")
-def test_redundant_equations_are_refused():
-    m = fourbar()
-    rod, rocker = (body for body in m.bodies if body.name in ("rod", "rocker"))
-    m.add(kc.Revolute("C2", rod, (sympy.Symbol("r3"), 0), rocker, (sympy.Symbol("r4"), 0)))
-    with pytest.raises(kc.UnsupportedError, match="repeats equations"):
-        kc.fit(m, kc.targets.path("P", [(3, 3)], [0.5]), bounds={"u": (1, 2)})
+def test_redundant_equations_are_fitted_as_others_are():
+    t = np.linspace(0, 6, 7)  # at zero two of the cranks are a flat parallelogram
+    circle = np.column_stack((1.3 * np.cos(t) + 0.7, 1.3 * np.sin(t) + 0.4))
+    bounds = {"a": (0.5, 2), "u": (0, 1), "v": (0, 1)}
+    target = kc.targets.path("P", circle, t)
+    found = kc.fit(three_cranks(), target, bounds=bounds, samples=8, starts=1)
+    assert found.success
+    assert [found.parameters[name] for name in "auv"] == pytest.approx([1.3, 0.7, 0.4])
+    with pytest.raises(kc.InputError, match=r"Equations that repeat others, B2\.y, have to agree"):
+        kc.fit(three_cranks(), target, bounds={"other": (0.5, 0.9)}, samples=4, starts=1)
+    with pytest.raises(kc.InputError, match="no longer agree with the others if other changed"):
+        kc.tolerance(three_cranks(), {"a": 1e-3, "other": 1e-3}, of="P.x")
 
 
 def test_points_are_matched_in_their_order_at_least_cost():

@@ -36,6 +36,26 @@ def test_worst_case_rss_and_contributions_are_those_of_the_closed_form(slider_cr
     assert found.sources == tuple(LIMITS)
 
 
+def test_second_derivatives_shift_the_mean_by_the_closed_form(slider_crank):
+    found = kc.tolerance(slider_crank, LIMITS, of="slider.x", t=0.0)
+    assert found.mean_shift("slider.x")[0] == pytest.approx(-8.30608735156842e-9, rel=1e-11)
+    bend = -(math.sin(1.1) ** 2) / (0.3 * math.cos(slider()[1]) ** 3)  # d2x/dr2
+    assert found.shift[0, 0, 0] == pytest.approx(bend * (1e-4 / 3) ** 2 / 2, rel=1e-11)
+    assert "mean shifted by -8.31e-09 m (second order)" in str(found)
+
+
+def test_mean_shift_is_that_of_samples(slider_crank):
+    # Large, one-sided and with a clearance, of an acceleration: all terms matter.
+    given = {"r": (-5e-3, 15e-3), "L": kc.Deviation(-1e-2, 3e-2, "uniform")}
+    found = kc.tolerance(
+        slider_crank, given, of="slider.x_ddot", t=0.0, clearances={"B": 4e-3}, samples=4096
+    )
+    first, drawn = found.rss("slider.x_ddot")[0][0], found.samples("slider.x_ddot").mean()
+    shift = found.mean_shift("slider.x_ddot")[0]
+    assert drawn - first == pytest.approx(shift, rel=0.1)
+    assert abs(shift) > 0.02 * abs(first)
+
+
 def test_samples_are_exact_motions_and_agree_with_rss(slider_crank):
     found = kc.tolerance(slider_crank, LIMITS, of="slider.x", t=0.0, samples=2048)
     drawn = found.drawn
@@ -160,10 +180,13 @@ def test_all_that_is_wrong_is_said_at_once(slider_crank):
         ({"tolerances": {"L": 0.1}, "clearances": {"motor": 1e-5}}, "no joint 'motor'"),
         ({"tolerances": {}}, "there are no tolerances"),
         ({"tolerances": {"L": 0.1}, "samples": -1}, "samples is -1"),
+        ({"tolerances": {"L": 0.1}, "of": ["speed_dot_dot"]}, "no coordinate, point or output"),
+        ({"tolerances": {"L": 0.1}, "of": ["speed_ddot"]}, "output 'speed' has no second rate"),
         ({"tolerances": {"L": 0.1}, "of": ["slidr.x"]}, "no coordinate, point or output 'slidr.x'"),
     ],
 )
 def test_bad_input_says_what_and_where(slider_crank, arguments, words):
+    slider_crank.output("speed", sympy.Symbol("x_slider_dot"))
     with pytest.raises(kc.InputError, match=words):
         kc.tolerance(slider_crank, **{"of": "slider.x", "t": 0.0, **arguments})
 

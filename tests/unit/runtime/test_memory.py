@@ -1,5 +1,6 @@
 """Memory of large results is used again when nobody holds them, and never before."""
 
+import gc
 import threading
 
 import numpy as np
@@ -149,3 +150,15 @@ def test_a_file_that_is_loaded_uses_memory_again(tmp_path):
     module = kc.load(tmp_path / "rod.py")
     module.Phi(np.zeros((50_000, 3)), 0.0)
     assert memory.free
+
+
+def test_a_solution_that_is_gone_leaves_its_memory_to_the_next_at_once(four_bar):
+    t = np.linspace(0, 1, 3000)
+    collects = gc.isenabled()
+    gc.disable()  # a cycle of references would keep the memory until garbage is collected
+    try:
+        place = kc.solve(four_bar, t).q.ctypes.data
+        assert kc.solve(four_bar, t).q.ctypes.data == place
+    finally:
+        if collects:
+            gc.enable()

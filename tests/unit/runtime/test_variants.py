@@ -100,3 +100,26 @@ def test_that_files_hold_all_variants(four_bar, sets, tmp_path):
     place = header.split(",").index("phi_rocker [rad]")
     found = np.array([float(row.split(",")[place]) for row in rows])
     np.testing.assert_array_equal(found.reshape(2, 2), solution["phi_rocker"])
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+@pytest.mark.filterwarnings("ignore::kincompile.errors.RedundantConstraintWarning")
+def test_that_redundant_equations_are_solved_together_as_alone(target):
+    m = kc.Mechanism("cranks")
+    a, third = m.parameter("a", 1.0), m.parameter("third", 1.0)
+    bar = m.body("bar", (1, 0, 0))
+    for k, at in enumerate([(0, 0), (2, 0), (1, 1.5)]):
+        crank = m.body(f"crank_{k}", (*at, 0.01))
+        m.add(kc.Revolute(f"A{k}", m.ground, at, crank, (0, 0)))
+        m.add(kc.Revolute(f"B{k}", crank, (third if k == 2 else a, 0), bar, at))
+        if k == 0:
+            m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    module, t = kc.compile(m, target), np.linspace(0, 4, 9)  # flat at first, alone at this time
+    lengths = np.array([1.0, 1.2, 1.1, 0.8]), np.array([1.0, 1.2, 1.0, 0.8])
+    together = kc.solve(module, t, {"a": lengths[0], "third": lengths[1]})
+    assert together.good.all(axis=1).tolist() == [True, True, False, True]
+    for k, (one, other) in enumerate(zip(*lengths, strict=True)):
+        alone = kc.solve(module, t, {"a": one, "third": other})
+        np.testing.assert_array_equal(together.status[k], alone.status)
+        np.testing.assert_allclose(together.q[k], alone.q, atol=1e-12)
+        np.testing.assert_allclose(together.q_ddot[k], alone.q_ddot, atol=1e-9)
