@@ -95,7 +95,6 @@ def load_abbreviations(template: LoadTemplate) -> dict[Expression, Glyph]:
 
 
 def _section(evaluation: Evaluation, load: AppliedLoad) -> Chapter:
-    """Return the derivation of a load."""
     name = load.name
     steps = (
         _step(load, 1, "What it is", attributes_table(load, evaluation.values), level=""),

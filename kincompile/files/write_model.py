@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 @model_text.register(ConstraintSystem)
 def _model_text(system: ConstraintSystem, form: str) -> str:
-    """Return a system as the text of a file."""
     data = model_data(system)
     if form == "toml":
         return toml_text(data)
@@ -108,7 +107,6 @@ def _with_centre(row: dict[str, Any], item: Body) -> dict[str, Any]:
 
 
 def _nested(given: Any) -> list[Any]:
-    """Return a vector or the rows of a matrix as lists of values."""
     return [_nested(item) if hasattr(item, "__len__") else value(item) for item in given]
 
 
@@ -188,7 +186,6 @@ def _scalar(given: Scalar) -> Any:
 
 
 def _profile(written: Constraint, name: str, rho: sympy.Expr) -> Any:
-    """Return a profile: the table as it was given, or the formula in alpha."""
     given = getattr(written, name)
     if isinstance(given, tuple | list):
         angles, radii = ([float(number) for number in column] for column in given)
@@ -285,7 +282,6 @@ def _fields(content: dict[str, Any]) -> Iterator[str]:
 
 
 def _toml(item: Any) -> str:
-    """Return a value as TOML, on one line."""
     if isinstance(item, dict):
         return "{ " + ", ".join(f"{_key(key)} = {_toml(part)}" for key, part in item.items()) + " }"
     if isinstance(item, list):

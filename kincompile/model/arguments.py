@@ -83,7 +83,6 @@ _DRIVEN = "a number or an expression of parameters; with `t` in it, a driver."
 
 
 def _declared(kind: Kind, symbol: str, text: str, on: str = "", unit: str = "length") -> Any:
-    """Return a field of a constraint type."""
     return field(metadata={"argument": Argument(kind, symbol, text, on, unit)})
 
 
