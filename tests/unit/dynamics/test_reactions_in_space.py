@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -150,11 +151,11 @@ def test_that_a_spatial_slider_crank_bears_what_its_free_bodies_say(turn):
         ("slider", slider.at((0, 0.1, 0)), rub[:, np.newaxis] * x, 0),
     ]
     unknowns = wrenches(moving, turn @ (0.3, -1, -G), joints, applied)
-    known = {}
+    known: dict[str, Any] = {}
     for name, (_, _, _, forces, moments) in zip("OABC", joints, strict=False):
         known[name] = taken(unknowns, forces), taken(unknowns, moments)
     motor = next(unknowns)
-    close = {"rtol": 1e-9, "atol": 1e-9}
+    close: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9}
     for name, (force, moment) in known.items():
         reaction = found.reactions[name]
         np.testing.assert_allclose(reaction.force, force, **close)
@@ -234,7 +235,7 @@ def test_that_an_rssr_bears_what_its_free_bodies_say(turn):
         ("crank", crank.r, np.zeros(3), turn @ (0.2, -0.1, 0.4)),
     ]
     unknowns = wrenches(moving, turn @ (0, 0, -G), joints, applied)
-    close = {"rtol": 1e-9, "atol": 1e-9}
+    close: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9}
     for name, (_, _, _, forces, moments) in zip("OP", joints, strict=False):
         reaction = found.reactions[name]
         np.testing.assert_allclose(reaction.force, taken(unknowns, forces), **close)
@@ -305,7 +306,7 @@ def test_the_balance_of_power_and_of_momentum_in_every_example(path):
         if name.startswith("P_"):
             supplied += found[name]
             largest += np.abs(found[name])
-    close = {"rtol": 0, "atol": 1e-10 * largest[good].max()}
+    close: dict[str, Any] = {"rtol": 0, "atol": 1e-10 * largest[good].max()}
     np.testing.assert_allclose(supplied[good], gained[good], **close)
     for known, given in ((force, found.ground.force), (moment, found.ground.moment)):
         size = np.abs(known[good]).max()
