@@ -40,9 +40,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from kincompile.calculus.expressions import Expression
     from kincompile.derivation.formulas import Glyph
     from kincompile.model.mechanism import Mechanism
@@ -256,9 +253,5 @@ def _state_code(chosen: Evaluation) -> str:
     """Return the state as Python code, exact to the last digit."""
     lines = [f"t = {chosen.t!r}"]
     for name, values in (("q", chosen.q), ("q_dot", chosen.q_dot), ("p", chosen.p)):
-        lines.append(f"{name} = np.array({_listed(values)})")
+        lines.append(f"{name} = np.array({(values + 0.0).tolist()})")
     return "\n".join(lines)
-
-
-def _listed(values: NDArray[np.float64]) -> str:
-    return repr([value + 0.0 for value in values.tolist()])
