@@ -21,7 +21,8 @@ from kincompile.derivation.figures import Figures
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
 from kincompile.derivation.load_section import load_abbreviations, loads_section
-from kincompile.derivation.to_html import as_html, as_slides
+from kincompile.derivation.slides import slides_of
+from kincompile.derivation.to_html import as_html
 from kincompile.derivation.to_latex import as_tex
 from kincompile.derivation.to_markdown import as_markdown
 from kincompile.derivation.to_notebook import as_notebook
@@ -59,7 +60,7 @@ class Derivation(Manuscript):
 
     def to_slides(self) -> str:
         """Return a page of slides, one for each constraint, for a screen or to be printed."""
-        return as_slides(self)
+        return as_html(slides_of(self), kind="slides")
 
     def to_latex(self) -> str:
         """Return a LaTeX document, for pdflatex."""
