@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
 
 class Verdict(StrEnum):
@@ -65,7 +66,7 @@ class Difference:
     hand: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ComparedEntry:
     """One entry of Phi, Phi_q, nu or gamma.
 
@@ -77,8 +78,8 @@ class ComparedEntry:
         Name of the equation.
     column
         Name of the coordinate; None but for Phi_q.
-    generated
-        The right formula, in the system's own conventions.
+    right
+        Gives the right formula, in the system's own conventions.
     hand
         The formula as written; empty for arrays and functions.
     verdict
@@ -96,12 +97,17 @@ class ComparedEntry:
     quantity: str
     row: str
     column: str | None
-    generated: str
+    right: Callable[[], str] = field(repr=False, compare=False)
     hand: str
     verdict: Verdict
     accepted: bool
     diagnoses: tuple[Diagnosis, ...] = ()
     difference: Difference | None = None
+
+    @cached_property
+    def generated(self) -> str:
+        """The right formula, in the system's own conventions."""
+        return self.right()
 
     @property
     def label(self) -> str:
@@ -129,10 +135,10 @@ class ComparedEntry:
 
     def to_data(self, reveal: bool) -> dict[str, Any]:
         """Return the entry as plain data; the right formula and value only where revealed."""
-        data = asdict(self) | {"verdict": self.verdict.value}
-        data["diagnoses"] = list(data["diagnoses"])
+        data = {"generated" if key == "right" else key: x for key, x in asdict(self).items()}
+        data["generated"] = self.generated if reveal else None
+        data |= {"verdict": self.verdict.value, "diagnoses": list(data["diagnoses"])}
         if not reveal:
-            data["generated"] = None
             for item in data["diagnoses"]:
                 item["detail"] = None
             if self.difference is not None:

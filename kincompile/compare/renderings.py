@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.compare.comparison import Verdict
 from kincompile.tables import indented, table
-from kincompile.targets.templates import fill
+from kincompile.targets.templates import fill, read
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -78,7 +78,7 @@ def as_page(found: Comparison, reveal: bool) -> str:
         "report/comparison.html.jinja",
         {
             "found": found, "verdicts": list(Verdict), "rows": rows, "columns": columns,
-            "details": details, "reveal": reveal,
+            "details": details, "reveal": reveal, "style": read("report/comparison.css").rstrip(),
         },
     )  # fmt: skip
 

@@ -83,8 +83,6 @@ def derive_reactions(
 
     Parameters
     ----------
-    template
-        Its Phi.
     points
         The symbol of the joint's point on each of its bodies.
     axis
@@ -148,7 +146,6 @@ def _turns(frame: Frame) -> Iterator[Direction]:
 
 
 def _work(template: Template, direction: Direction) -> ex.Scalar:
-    """Return the work of the constraint forces for a displacement."""
     size = template.frames[0].size
     terms: list[ex.Scalar] = [ex.ZERO]
     for Phi, factor in zip(template.Phi, multipliers(template, size), strict=True):

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from kincompile.criteria import probe_of
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, rate, suggestion
 from kincompile.runtime.results.columns import rate_unit
@@ -33,19 +36,38 @@ def column_of(module: ModuleType, name: str) -> Column:
     Raises
     ------
     InputError
-        If there is none.
+        If there is none, or it would need a third derivative of coordinates.
     """
     known = (*module.COORDINATES, *getattr(module, "OUTPUTS", ()))
     wanted = column_name(str(name))
     for of in known:
         for order in range(3):
             if rate(of, order) == wanted:
+                _require_rate(module, of, order)
                 return Column(wanted, rate_unit(module.UNITS.get(of, ""), order), of, order)
     near = suggestion(wanted, known) or "."
     raise InputError(
         f"{module.NAME} has no coordinate, point or output {name!r}{near} There are "
         f"{listed(known)}; add _dot or _ddot for the rates."
     )
+
+
+def _require_rate(module: ModuleType, of: str, order: int) -> None:
+    """Check that an output has a rate of this order; those of third derivatives are NaN."""
+    outputs = getattr(module, "OUTPUTS", ())
+    if of not in outputs or order == 0:
+        return
+    probe = probe_of(len(module.GUESS))
+    with np.errstate(all="ignore"):
+        seen = np.array(module.observe(module.GUESS, probe, probe**2, 0.0, module.DEFAULTS))
+    y = seen[:, outputs.index(of)]
+    if np.isfinite(y[0]) and np.isnan(y[order]):
+        which = ("rate", "second rate")[order - 1]
+        raise InputError(
+            f"{module.NAME}: the output {of!r} has no {which}, since it has rates or accelerations "
+            "in it: that would take third derivatives of the coordinates, and they are not solved "
+            "for."
+        )
 
 
 def columns_of(module: ModuleType, names: Iterable[str] | str | None) -> list[Column]:

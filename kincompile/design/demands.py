@@ -17,6 +17,7 @@ import sympy
 from kincompile.design.columns import Column, column_of
 from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
 from kincompile.errors import InputError
+from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -103,19 +104,31 @@ def read_demands(
     """
     problems: list[str] = []
 
-    def column(name: str) -> Column:
+    def column(name: str, title: str = "", further: int = 0) -> Column:
+        """Return a column, of which rates of some further order are needed too."""
         try:
-            return column_of(module, name)
+            found = column_of(module, name)
+            column_of(module, rate(found.of, min(found.order + further, 2)))
         except InputError as error:
-            problems.extend(error.problems)
+            problems.extend(f"{title}: {item}" if title else item for item in error.problems)
             return Column(name, "", name, 0)
+        return found
 
     passing = tuple(
-        (target, tuple(map(column, target.columns)))
+        (
+            target,
+            tuple(column(name, target.title, target.times is None) for name in target.columns),
+        )
         for target in targets
         if isinstance(target, Passing)
     )
-    ratios = tuple((item, column(item.column)) for item in targets if isinstance(item, TimeRatio))
+    ratios = tuple(
+        (item, column(item.column, item.title, 2))
+        for item in targets
+        if isinstance(item, TimeRatio)
+        for item in targets
+        if isinstance(item, TimeRatio)
+    )
     limits = []
     for number, item in enumerate(item for item in targets if isinstance(item, Limit)):
         is_expression = isinstance(item.what, sympy.Expr)
@@ -125,6 +138,11 @@ def read_demands(
         f"{target.title}: times of second rates cannot be found; give times"
         for target, columns in passing
         if target.times is None and any(item.order == 2 for item in columns)
+    ]
+    problems += [
+        f"{item.title}: it is a time ratio of {found.of}; name the coordinate or output itself"
+        for item, found in ratios
+        if found.order
     ]
     if problems:
         raise InputError(problems)

@@ -432,6 +432,12 @@ def _constraints(gaps: Any, gaps_by_u: Any, minimizer: str) -> Any:
 
 def _nowhere(model: Mechanism, finder: Search) -> str:
     """Say that no set of parameters gets through the times, and how far they got."""
+    if finder.moved and (ratios := finder.demands.ratios):
+        return (
+            f"{model.name} moves through the times, but there is no "
+            f"{listed(item.title for item, _ in ratios)}: what has one rises and falls within the "
+            "times of the model, which are one cycle."
+        )
     how_far = (
         "none could be assembled at the first time"
         if not math.isfinite(finder.farthest)

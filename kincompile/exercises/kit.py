@@ -117,8 +117,12 @@ class ExerciseKit:
 
     def __repr__(self) -> str:
         """Return name and sizes."""
-        sizes = f"{len(self.variants)} students, {len(self.blanks)} blanks"
-        return f"<ExerciseKit {self.name!r}: {sizes}>"
+        return f"<ExerciseKit {self.name!r}: {self.sizes}>"
+
+    @property
+    def sizes(self) -> str:
+        """How many students and blanks it has, in words."""
+        return f"{len(self.variants)} students, {len(self.blanks)} blanks"
 
 
 def exercise(

@@ -30,15 +30,7 @@ SMOOTHNESS = 4
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a table.
-
-    Attributes
-    ----------
-    schema
-        JSON Schema of its value.
-    is_required
-        Whether it must be there.
-    """
+    """A field of a table."""
 
     schema: Mapping[str, Any]
     is_required: bool = True
@@ -73,6 +65,9 @@ DISTRIBUTIONS = ("normal", "uniform", "truncated")
 SEARCHES = ("sobol", "differential evolution")
 MINIMIZERS = ("SLSQP", "trust-constr")
 """What tolerances may be distributed by, and how a fit may search and end."""
+
+TASKS = ("tolerance", "fit", "sweep")
+"""Tables that commands of these names read; to a model they belong as data."""
 
 
 def _list(name: str) -> dict[str, Any]:
@@ -390,12 +385,10 @@ def model_schema() -> dict[str, Any]:
 
 
 def _loads(count: int) -> list[dict[str, Any]]:
-    """Return the schemas of all loads in the plane, or in space."""
     return [_object(load_fields(item)) for item in dimensions(count).loads().values()]
 
 
 def _constraints(count: int) -> list[dict[str, Any]]:
-    """Return the schemas of all constraints in the plane, or in space."""
     kinds = dimensions(count).constraints.values()
     return [*(_object(constraint_fields(item)) for item in kinds), _object(FIELDS["Equation"])]
 

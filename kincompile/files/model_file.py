@@ -30,6 +30,7 @@ from kincompile.files.file_format import (
     FIELDS,
     MOST_POINTS,
     SMOOTHNESS,
+    TASKS,
     VERSION,
     Field,
     constraint_fields,
@@ -59,13 +60,6 @@ Row = dict[str, Any]
 
 def read_data_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
     """Read a model from TOML or JSON.
-
-    Parameters
-    ----------
-    path
-        The file: its suffix, and its name in messages.
-    content
-        Its content.
 
     Returns
     -------
@@ -124,6 +118,7 @@ class _ModelReader(BodyReader):
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
             "gravity": self.place(data, (), "gravity"),
+            "tasks": {key: data[key] for key in TASKS if key in data},
         }
         return self._checked(name, content, options)
 
@@ -157,7 +152,9 @@ class _ModelReader(BodyReader):
         model = self.words.mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
         model.constraints, model.outputs = content["constraints"], content["outputs"]
-        model.loads, model.gravity = content["loads"], content["gravity"]
+        model.gravity, model.tasks = content["gravity"], content["tasks"]
+        for load in content["loads"]:
+            model.add(load)
         free = content["coordinates"]
         if self.problems and not (model.constraints and (model.bodies or free)):
             return None
@@ -176,6 +173,7 @@ class _ModelReader(BodyReader):
                 loads=model.loads,
                 gravity=model.gravity,
                 ground=model.ground,
+                tasks=model.tasks,
                 **options,
             )
         except ModelError as error:
@@ -183,7 +181,6 @@ class _ModelReader(BodyReader):
         return None
 
     def _analysis(self, given: Any) -> Row:
-        """Return the last time and the number of points."""
         if not isinstance(given, dict):
             self.problem(("analysis",), f"expected a table of end and points, not {shown(given)}")
             return {}
@@ -242,7 +239,6 @@ class _ModelReader(BodyReader):
         return {**self.names, **self.spins, **{item: sympy.Symbol(item) for item in rates}}
 
     def _load(self, address: Address, row: Row) -> Load | None:
-        """Return a load, None where something is wrong with it."""
         known = self.words.loads()
         before = len(self.problems)
         name = self.name(row, address, "a load")
@@ -263,7 +259,6 @@ class _ModelReader(BodyReader):
         return known[kind](name, **given) if len(self.problems) == before else None
 
     def _type_of(self, row: Row, address: Address, known: Collection[str]) -> str | None:
-        """Return the type of a constraint or a load."""
         kind = row.get("type")
         if isinstance(kind, str) and kind in known:
             return kind
@@ -281,7 +276,6 @@ class _ModelReader(BodyReader):
             self.names |= {contact: sympy.Symbol(contact) for contact in contacts}
 
     def _constraint(self, address: Address, row: Row) -> Constraint | Equation | None:
-        """Return a joint, a driver or a free equation, None where something is wrong with it."""
         before = len(self.problems)
         known = self.words.constraints
         kind = self._type_of(row, address, (*known, "Equation"))
@@ -337,7 +331,6 @@ class _ModelReader(BodyReader):
         return self.expressions(given, address, self.names, f"{count} start values", count)
 
     def _argument(self, item: Argument, given: Any, address: Address) -> Any:
-        """Return the value of a constraint's argument."""
         if item.kind is Kind.BODY:
             return self.body_name(given, address)
         if item.kind in (Kind.POINT, Kind.AXIS):
@@ -364,7 +357,6 @@ class _ModelReader(BodyReader):
         return self.expression(given, address, self._moving_names())
 
     def _profile(self, given: Any, address: Address) -> Any:
-        """Return a radius as a formula in alpha, or as a table."""
         if not isinstance(given, dict):
             return self.expression(given, address, {**self.names, alpha.name: alpha})
         if not self.has_fields(address, given, FIELDS["profile"]):
@@ -378,7 +370,6 @@ class _ModelReader(BodyReader):
         return tuple(self._numbers(given[key], (*address, key)) for key in ("angles", "radii"))
 
     def _corners(self, row: Row, address: Address) -> bool:
-        """Return whether a driver may have corners."""
         given = row.get("corners", False)
         if not isinstance(given, bool):
             self.problem((*address, "corners"), f"expected true or false, not {shown(given)}")

@@ -10,7 +10,7 @@ from sympy.printing.str import StrPrinter
 
 from kincompile.errors import ModelError
 from kincompile.files.dimensions import SPACE
-from kincompile.files.file_format import SMOOTHNESS, VERSION, load_fields
+from kincompile.files.file_format import SMOOTHNESS, TASKS, VERSION, load_fields
 from kincompile.model.arguments import Kind
 from kincompile.model.constraint import CamConstraint, Constraint
 from kincompile.model.directions import VectorFunction
@@ -22,7 +22,7 @@ from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from kincompile.model.bodies import Body, Coordinate, Parameter
     from kincompile.model.expressions import Scalar
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 @model_text.register(ConstraintSystem)
 def _model_text(system: ConstraintSystem, form: str) -> str:
-    """Return a system as the text of a file."""
     data = model_data(system)
     if form == "toml":
         return toml_text(data)
@@ -65,6 +64,7 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         "analysis": {"end": _end(system), "points": int(system.points)},
         **({"gravity": gravity} if any(gravity) else {}),
         **{name: rows for name, rows in sections.items() if rows},
+        **system.tasks,
     }
 
 
@@ -107,7 +107,6 @@ def _with_centre(row: dict[str, Any], item: Body) -> dict[str, Any]:
 
 
 def _nested(given: Any) -> list[Any]:
-    """Return a vector or the rows of a matrix as lists of values."""
     return [_nested(item) if hasattr(item, "__len__") else value(item) for item in given]
 
 
@@ -164,7 +163,9 @@ def _load(item: AppliedLoad) -> dict[str, Any]:
     for name, argument in written.arguments().items():
         if argument.kind is Kind.BODY:
             row[name] = next(bodies).name
-        elif argument.symbol in item.points:
+        elif argument.kind in (Kind.POINT, Kind.AXIS):
+            row[name] = [value(number) for number in getattr(written, name)]
+        elif argument.kind is Kind.LOADS:
             row[name] = [_scalar(number) for number in item.points[argument.symbol]]
         else:
             row[name] = _scalar(item.scalars[argument.symbol])
@@ -185,7 +186,6 @@ def _scalar(given: Scalar) -> Any:
 
 
 def _profile(written: Constraint, name: str, rho: sympy.Expr) -> Any:
-    """Return a profile: the table as it was given, or the formula in alpha."""
     given = getattr(written, name)
     if isinstance(given, tuple | list):
         angles, radii = ([float(number) for number in column] for column in given)
@@ -264,21 +264,35 @@ def toml_text(data: dict[str, Any]) -> str:
         if key == "constraints":
             for row in content:
                 lines += ["", "[[constraints]]"]
-                lines += [f"{name} = {_toml(item)}" for name, item in row.items()]
-        elif isinstance(content, list) and isinstance(content[0], dict):
-            lines += [f"{key} = [", *(f"    {_toml(row)}," for row in content), "]"]
+                lines += _fields(row)
+        elif key in TASKS and isinstance(content, dict):
+            lines += ["", f"[{key}]", *_fields(content)]
         else:
-            lines.append(f"{key} = {_toml(content)}")
+            lines += _fields({key: content})
     return "\n".join(lines) + "\n"
 
 
+def _fields(content: dict[str, Any]) -> Iterator[str]:
+    """Yield fields as TOML, a line each; of a list of tables a line a table."""
+    for name, item in content.items():
+        if isinstance(item, list) and item and isinstance(item[0], dict):
+            yield from (f"{_key(name)} = [", *(f"    {_toml(row)}," for row in item), "]")
+        else:
+            yield f"{_key(name)} = {_toml(item)}"
+
+
 def _toml(item: Any) -> str:
-    """Return a value as TOML, on one line."""
     if isinstance(item, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in item.items()) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {_toml(part)}" for key, part in item.items()) + " }"
     if isinstance(item, list):
         return _listed(item)
     return json.dumps(item, ensure_ascii=False) if isinstance(item, str | bool) else repr(item)
+
+
+def _key(name: str) -> str:
+    """Return a key, in quotes where it has to be."""
+    is_bare = name.isascii() and name.replace("-", "_").isidentifier()
+    return name if is_bare else json.dumps(name, ensure_ascii=False)
 
 
 def _listed(items: Sequence[Any]) -> str:

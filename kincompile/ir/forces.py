@@ -13,7 +13,14 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.expressions import ZERO, Basis, Scalar, VectorSymbol
+from kincompile.calculus.expressions import (
+    ZERO,
+    ZERO_VECTOR,
+    Basis,
+    Scalar,
+    VectorSymbol,
+    split_factor,
+)
 from kincompile.derive.reactions import derive_reactions, multipliers
 from kincompile.derive.rules import along
 from kincompile.errors import ModelError
@@ -126,12 +133,11 @@ def _reaction_kernel(
 @cache
 def _work_kernel(template: LoadTemplate) -> tuple[_Expanded, bool]:
     """Return the code of what a load between bodies pulls with, and whether that is a torque."""
-    ((force, moved),) = template.work
-    assert isinstance(force, Scalar)
-    assert isinstance(moved, Scalar)
+    force, moved = template.work[0]  # of a couple in space, a force at the end of a unit arm
+    size = force if isinstance(force, Scalar) else split_factor(force)[0]
     shifts: Iterator[Direction] = ({frame.r: Basis(0, frame.size)} for frame in template.frames)
-    is_torque = all(along(moved, shift) == ZERO for shift in shifts)
-    return _Expanded.of(template, [-force]), is_torque
+    is_torque = all(along(moved, shift) in (ZERO, ZERO_VECTOR) for shift in shifts)
+    return _Expanded.of(template, [-size]), is_torque
 
 
 @dataclass(frozen=True, slots=True)

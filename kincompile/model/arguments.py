@@ -49,7 +49,7 @@ class Kind(Enum):
     DISTANCE = "a positive distance, or an expression of parameters and t"
     PROFILE = "a radius rho(alpha) or a table (angles, radii)"
     LOAD = "a number or an expression of parameters, t, coordinates and rates"
-    LOADS = "two components, each such an expression"
+    LOADS = "components of a vector, each such an expression"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,6 @@ _DRIVEN = "a number or an expression of parameters; with `t` in it, a driver."
 
 
 def _declared(kind: Kind, symbol: str, text: str, on: str = "", unit: str = "length") -> Any:
-    """Return a field of a constraint type."""
     return field(metadata={"argument": Argument(kind, symbol, text, on, unit)})
 
 
@@ -165,7 +164,12 @@ def load(symbol: str, text: str, default: ValueLike | None = None) -> Any:
     return field(default=default, metadata={"argument": made})
 
 
+def measured(symbol: str, text: str, default: None) -> Any:
+    """Declare a coordinate that may be left out: the mechanism then gets one."""
+    return field(default=default, metadata={"argument": Argument(Kind.LOAD, symbol, text)})
+
+
 def loads(symbol: str, text: str) -> Any:
-    """Declare the two components of a force."""
-    about = f"{text}, two numbers or expressions of parameters, t, coordinates and rates."
+    """Declare the components of a force."""
+    about = f"{text}, numbers or expressions of parameters, t, coordinates and rates."
     return field(metadata={"argument": Argument(Kind.LOADS, symbol, about)})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 import sympy
 
@@ -19,7 +19,7 @@ from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import TextViews
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from kincompile.model.arguments import BodyLike, PointLike
     from kincompile.model.expressions import Scalar, Scalars
@@ -49,6 +49,9 @@ class Mechanism(MatrixViews, TextViews):
         The fixed frame.
     gravity
         Acceleration of gravity (g_x, g_y), none at first: ``m.gravity = (0, -9.81)``.
+    tasks
+        The tables ``tolerance``, ``fit`` and ``sweep`` of the file that it was read from, as data:
+        commands of these names read them, and `to_toml` writes them.
     """
 
     fixed: ClassVar[Body] = GROUND
@@ -68,6 +71,7 @@ class Mechanism(MatrixViews, TextViews):
         self.outputs: list[BodyPoint | Output] = []
         self.loads: list[Element] = []
         self.gravity: Scalars = (0,) * len(self.fixed.kind.axes)
+        self.tasks: Mapping[str, Any] = {}
 
     @property
     def end(self) -> float:
@@ -196,11 +200,16 @@ class Mechanism(MatrixViews, TextViews):
 
         Its equations are the next rows of the system, its contact parameters the next coordinates.
         """
-        if isinstance(constraint, Element) and constraint.is_load:
-            self.loads.append(constraint)
-        else:
-            self.constraints.append(cast("Constraint | Equation", constraint))
-        return constraint
+        if not isinstance(constraint, Element):
+            self.constraints.append(cast("Equation", constraint))
+            return constraint
+        *others, own = constraint.with_own()
+        for item in (*others, own):
+            if item.is_load:
+                self.loads.append(item)
+            else:
+                self.constraints.append(cast("Constraint", item))
+        return cast("Item", own)
 
     def written(self) -> list[Constraint | Equation]:
         """Return the constraints in the order of their rows."""
@@ -226,6 +235,7 @@ class Mechanism(MatrixViews, TextViews):
             length_unit=self.length_unit,
             end=self.end_given,
             points=self.points,
+            tasks=self.tasks,
         )
 
     def __repr__(self) -> str:

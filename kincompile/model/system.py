@@ -71,7 +71,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         Springs, forces and the like.
     ground
         The fixed frame of the bodies.
-    gravity, length_unit, end, points
+    gravity, length_unit, end, points, tasks
         As for `Mechanism`.
 
     Attributes
@@ -103,6 +103,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
         "gravity", "ground", "length_unit", "loads", "name", "observers", "parameters", "points",
+        "tasks",
     )  # fmt: skip
 
     name: str
@@ -120,6 +121,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     end: float
     end_given: Scalar
     points: int
+    tasks: Mapping[str, Any]
 
     def __init__(
         self,
@@ -137,6 +139,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         length_unit: str = "m",
         end: Scalar = 1.0,
         points: int = 101,
+        tasks: Mapping[str, Any] | None = None,
     ) -> None:
         problems: list[str] = []
         bodies = checked_bodies(bodies, problems)
@@ -175,6 +178,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             "constraints": constraints, "equations": names, "body_points": body_points,
             "observers": observers, "loads": applied, "gravity": gravity, "ground": ground,
             "length_unit": length_unit, "end": last, "end_given": end, "points": points,
+            "tasks": tasks or {},
         }  # fmt: skip
         _fill(self, values)
 
@@ -268,7 +272,6 @@ def _loads(
 
 
 def _fill(system: ConstraintSystem, values: Mapping[str, Any]) -> None:
-    """Set the attributes of a system, once."""
     for key, value in values.items():
         object.__setattr__(system, key, value)
 
@@ -280,7 +283,6 @@ def _scope(
     problems: list[str],
     ground: Body,
 ) -> Scope:
-    """Return the names that may be used in a system."""
     return Scope(
         {body.name: body for body in bodies},
         [item.name for item in coordinates],
@@ -293,7 +295,6 @@ def _scope(
 def _resolved(
     written: list[Constraint | Equation], scope: Scope
 ) -> tuple[Joint | FreeEquation, ...]:
-    """Return the valid constraints, resolved."""
     found = (
         resolve_equation(item, scope) if isinstance(item, Equation) else resolve_joint(item, scope)
         for item in written

@@ -37,7 +37,18 @@ SPATIAL = BodyKind(
         "RevoluteTranslational": "spatial.PointOnLine",
         "TranslationalDistance": "spatial.RelativeTranslation",
         "Gear": "an Equation between two spatial.JointAngle",
-        **{name: f"spatial.{name}" for name in ("Force", "FollowerForce", "Torque", "Spring")},
+        **{
+            name: f"spatial.{name}"
+            for name in (
+                "Force",
+                "FollowerForce",
+                "Torque",
+                "Spring",
+                "TorsionSpring",
+                "HingeFriction",
+                "SliderFriction",
+            )
+        },
         "RackAndPinion": "an Equation between a spatial.JointAngle and a way",
     },
     masses="kincompile.space.masses",

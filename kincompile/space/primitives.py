@@ -114,12 +114,18 @@ class Distance(SpatialPoints):
 
 
 @constraint_type
-class AbsoluteX(SpatialConstraint):
+class OnePoint(SpatialConstraint):
+    """A constraint of a point on a body; the types are its subclasses."""
+
+    body: BodyLike = argument.body("i")
+    point: PointLike = argument.point("s_i", on="i")
+
+
+@constraint_type
+class AbsoluteX(OnePoint):
     """The global x coordinate of a point on a body is C."""
 
     source = "Haug 9.4"
-    body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -129,12 +135,10 @@ class AbsoluteX(SpatialConstraint):
 
 
 @constraint_type
-class AbsoluteY(SpatialConstraint):
+class AbsoluteY(OnePoint):
     """The global y coordinate of a point on a body is C."""
 
     source = "Haug 9.4"
-    body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -144,12 +148,10 @@ class AbsoluteY(SpatialConstraint):
 
 
 @constraint_type
-class AbsoluteZ(SpatialConstraint):
+class AbsoluteZ(OnePoint):
     """The global z coordinate of a point on a body is C."""
 
     source = "Haug 9.4"
-    body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -159,12 +161,10 @@ class AbsoluteZ(SpatialConstraint):
 
 
 @constraint_type
-class AbsoluteDistance(SpatialConstraint):
+class AbsoluteDistance(OnePoint):
     """The distance from a ground point to a point on a body is C > 0."""
 
     source = "Haug 9.4"
-    body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
     ground_point: PointLike = argument.point("c", on="ground")
     distance: ValueLike = argument.distance()
 

@@ -83,7 +83,9 @@ class Equations:
         left_out = set(modules.redundant)
         rows = [k for k, name in enumerate(self.code.equations) if name not in left_out]
         self.independent = np.array(rows, dtype=int)
-        self.evaluations = 0
+        self.evaluations = self.jacobians = 0
+        self._modules = modules
+        self._slopes: _Slopes | None = None
         self.measure_at(inputs.guess, float(inputs.t[0]))
 
     def measure_at(self, q: Array, t: float) -> None:
@@ -101,6 +103,13 @@ class Equations:
         n = self.n
         found = self._accelerate(y, t)
         return np.concatenate((y[n : 2 * n], found))
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """Return the derivatives of the rate of a state by the state, shape (2 n + 1, 2 n + 1)."""
+        self.jacobians += 1
+        if self._slopes is None:
+            self._slopes = _Slopes(self._modules, len(self.code.equations), self.parameters, self.n)
+        return self._slopes.jacobian(t, y)
 
     def corrected(self, t: float, y: Array) -> tuple[Array, float]:
         """Return a state led back to its constraints, and by how much at most, in scales.
@@ -139,6 +148,32 @@ class Equations:
     def nu(self, q: Array, t: float) -> Array:
         """Return the right side of the velocity equation."""
         return np.asarray(self.code.nu(q, t, self.parameters))
+
+
+class _Slopes:
+    """The linear system that the derivatives of accelerations and power solve, evaluated."""
+
+    def __init__(self, modules: DynamicModules, m: int, p: Array, n: int) -> None:
+        module, places, numbers = modules.slopes()
+        self._evaluate = _evaluator(module, n, p)
+        self._n, self._size, size = n, n + m + 1, n + m + 1 + 2 * n
+        self._system = np.zeros((self._size, size))
+        for (row, column), number in numbers.items():
+            self._system[row, column] = number
+        self._places = np.array([row * size + column for row, column in places], dtype=int)
+        self._found = np.zeros((2 * n + 1, 2 * n + 1))
+        self._found[:n, n : 2 * n] = np.eye(n)
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """Return the derivatives of the rate of a state; NaN where there are none."""
+        n, system, found = self._n, self._system.copy(), self._found.copy()
+        system.put(self._places, self._evaluate(y, t))
+        try:
+            solved = np.linalg.solve(system[:, : self._size], system[:, self._size :])
+        except np.linalg.LinAlgError:  # singular: the step fails, and says why
+            return np.full_like(found, np.nan)
+        found[n:, : 2 * n] = solved[[*range(n), -1]]
+        return found
 
 
 def _evaluator(module: ModuleType, n: int, p: Array) -> Evaluate:

@@ -59,7 +59,7 @@ def _variant(solution: Solution, number: int, angle_unit: str) -> str:
 def _table(solution: Solution, angle_unit: str) -> list[str]:
     """Return the lines of the table of coordinates."""
     motion = solution.q, solution.q_dot, solution.q_ddot
-    shown = [_without_noise(values).T for values in motion]
+    shown = [without_noise(values).T for values in motion]
     rows = []
     for name, q, q_dot, q_ddot in zip(solution.coordinates, *shown, strict=True):
         unit, factor = shown_unit(solution.units[name], angle_unit)
@@ -69,7 +69,7 @@ def _table(solution: Solution, angle_unit: str) -> list[str]:
     return table(header, rows, right=_NUMBERS)
 
 
-def _without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the values, with zero for those that are rounding errors of the largest."""
     largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
     return np.where(np.abs(values) < NOISE * largest, 0.0, values)

@@ -236,12 +236,30 @@ def test_same_seed_gives_the_same_result():
         ({"targets": [], "bounds": {"u": (0, 1)}}, "there is nothing to reach"),
         ({"targets": ["P"], "bounds": {"u": (0, 1)}}, "'P' is not a target"),
         ({"targets": kc.targets.path("Q", [(1, 2)]), "bounds": {"u": (0, 1)}}, "'x_Q'"),
+        (
+            {"targets": kc.targets.time_ratio("speed", 2), "bounds": {"u": (0, 1)}},
+            "time ratio of speed: four_bar: the output 'speed' has no second rate",
+        ),
+        (
+            {"targets": kc.targets.value("speed_ddot", [1.0], [0.5]), "bounds": {"u": (0, 1)}},
+            "speed_ddot: four_bar: the output 'speed' has no second rate",
+        ),
+        (
+            {"targets": kc.targets.time_ratio("P.x_dot", 2), "bounds": {"u": (0, 1)}},
+            "name the coordinate or output itself",
+        ),
+        (
+            {"targets": kc.targets.time_ratio("crank.phi", 2), "bounds": {"u": (1.6, 1.7)}},
+            "there is no time ratio of phi_crank: what has one rises and falls",
+        ),
     ],
 )
 def test_bad_input_says_what_and_where(arguments, words):
-    given = {"targets": kc.targets.path("P", [(3, 3)], [0.5]), **arguments}
+    given = {"samples": 32, "targets": kc.targets.path("P", [(3, 3)], [0.5]), **arguments}
+    m = fourbar()
+    m.output("speed", sympy.Symbol("phi_rocker_dot"))
     with pytest.raises(kc.InputError, match=words):
-        kc.fit(fourbar(), **given)
+        kc.fit(m, **given)
 
 
 @pytest.mark.parametrize(

@@ -180,10 +180,13 @@ def test_all_that_is_wrong_is_said_at_once(slider_crank):
         ({"tolerances": {"L": 0.1}, "clearances": {"motor": 1e-5}}, "no joint 'motor'"),
         ({"tolerances": {}}, "there are no tolerances"),
         ({"tolerances": {"L": 0.1}, "samples": -1}, "samples is -1"),
+        ({"tolerances": {"L": 0.1}, "of": ["speed_dot_dot"]}, "no coordinate, point or output"),
+        ({"tolerances": {"L": 0.1}, "of": ["speed_ddot"]}, "output 'speed' has no second rate"),
         ({"tolerances": {"L": 0.1}, "of": ["slidr.x"]}, "no coordinate, point or output 'slidr.x'"),
     ],
 )
 def test_bad_input_says_what_and_where(slider_crank, arguments, words):
+    slider_crank.output("speed", sympy.Symbol("x_slider_dot"))
     with pytest.raises(kc.InputError, match=words):
         kc.tolerance(slider_crank, **{"of": "slider.x", "t": 0.0, **arguments})
 

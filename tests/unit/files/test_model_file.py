@@ -1,6 +1,7 @@
 """Models as data: what is read, what is refused and where, and that writing and reading agree."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -348,3 +349,33 @@ def test_that_the_schema_agrees_with_the_reader(example):
 def test_that_alpha_stands_in_profiles_alone():
     assert alpha.name not in toml(ARM).to_toml()
     assert "there is no 'alpha'" in problems(ARM.replace('"2*t"', '"alpha"'))[0]
+
+
+TASKS = """
+[tolerance]
+of = ["tip.x"]
+parameters = { a = { low = "-a/3", high = 1e-4, distribution = "uniform" } }
+clearances = { "no name" = 2e-5 }
+
+[fit]
+parameters = { a = [0.1, "2*pi"] }
+targets = [{ path = "tip", points = [[1, 2], [3, 4]], weight = 2.0 }, { moves = true }]
+seed = 3
+
+[sweep]
+parameters = { a = { from = 0.2, to = 0.6, count = 5 } }
+product = true
+"""
+
+
+@pytest.mark.parametrize("form", ["toml", "json"])
+def test_tables_of_commands_come_back(form):
+    given = tomllib.loads(TASKS)
+    model = toml(ARM + TASKS)
+    assert model.tasks == given
+    text = model.to_toml() if form == "toml" else model.to_json()
+    again = read_data_model(FILE.with_suffix(f".{form}"), text.encode())
+    assert again.tasks == given
+    assert again.system().tasks == given
+    assert toml(ARM).tasks == {}
+    assert text == (again.to_toml() if form == "toml" else again.to_json())
