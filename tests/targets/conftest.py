@@ -29,8 +29,7 @@ from kincompile.ir.lower import lower
 from kincompile.model.expressions import SMOOTH
 from kincompile.model.laws import RISES, MotionLaw
 from kincompile.model.spline import PeriodicSpline
-from tests import spatial_golden
-from tests.spatial_golden import CASES, GIVEN, Q_DOT, Q
+from tests.targets import golden_rows
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.py"))
 STATES = 4
@@ -306,9 +305,10 @@ def hinged() -> Case:
 
 def in_space() -> Case:
     """Return two bodies with every spatial constraint, the first state the golden one."""
-    random = np.random.default_rng(7).uniform(-1, 1, (STATES - 1, Q.size))
-    case = Case.of(spatial_golden.mechanism(*CASES), [Q, *random], [GIVEN["t"], 0.2, 0.5, 0.8])
-    case.q_dot[0] = Q_DOT
+    q = golden_rows.Q
+    random = np.random.default_rng(7).uniform(-1, 1, (STATES - 1, q.size))
+    case = Case.of(golden_rows.mechanism(), [q, *random], [0.4, 0.2, 0.5, 0.8])
+    case.q_dot[0] = golden_rows.Q_DOT
     return case
 
 
