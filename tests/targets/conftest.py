@@ -32,6 +32,11 @@ from kincompile.model.spline import PeriodicSpline
 from tests.targets import golden_rows
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.py"))
+SPACE = [
+    path
+    for path in sorted(EXAMPLES[0].with_name("space").glob("*.py"))
+    if path.stem != "bennett"  # the rows that are solved are nearly dependent on the way
+]
 STATES = 4
 STEP = 30
 """Digits of a step of differences: of 120, 60 are lost in a second one, and its error is 1e-60."""
@@ -138,7 +143,10 @@ class Case:
         splines = {key: lambda a, f=f: f.table(float(a), f.order) for key, f in tables.items()}
         for key, item in tables.items():
             matrix = matrix.replace(item, sympy.Function(key))
-        return sympy.lambdify(dummies, matrix.tolist(), modules=[splines, "mpmath"])
+        function: Callable[..., Any] = sympy.lambdify(
+            dummies, matrix.tolist(), modules=[splines, "mpmath"]
+        )
+        return function
 
     def points(self) -> list[list[Any]]:
         """Return the states one by one, as lists of numbers."""
