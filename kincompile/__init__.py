@@ -22,6 +22,7 @@ _HOME = {
     name: module for module, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.MULTILINE)
 }
 _CATALOGUE = "kincompile.model.catalogue"
+_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "sqrt")
 _WITHOUT_SYMPY = ("kincompile.runtime", "kincompile.errors")
 
 __version__ = "0.1.0"
@@ -36,6 +37,7 @@ def __getattr__(name: str) -> Any:
     if name not in homes:
         catalogue = sys.modules.get(_CATALOGUE)
         near = (catalogue.meant_by(name) if catalogue else "") or suggestion(name, homes)
+        near = f"; functions are SymPy's: sympy.{name}" if name in _FUNCTIONS else near
         raise AttributeError(f"module 'kincompile' has no attribute {name!r}{near}")
     module = homes[name]
     if not module.startswith(_WITHOUT_SYMPY):

@@ -41,7 +41,7 @@ from kincompile.targets.emission import emit_program
 from kincompile.targets.registry import TARGETS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from kincompile.ir.grouping import GroupedProgram
     from kincompile.ir.program import Program
     from kincompile.model.system import ConstraintSystem
-    from kincompile.runtime.engine.code import DynamicModules
+    from kincompile.runtime.engine.code import DynamicModules, Place
     from kincompile.structure.report import Inspection
     from kincompile.targets.target import Emitted
 
@@ -363,7 +363,18 @@ def _dynamic_modules(code: InlineProgram, system: ConstraintSystem, target: str)
     left_out, redundant, free = _dependent(code, system)
     accelerations = _observing(observing_accelerations(code, left_out), target)
     corrections = _observing(observing_corrections(code, left_out), target)
-    return DynamicModules(accelerations, corrections, redundant, free)
+    slopes = cache(partial(_slopes_module, code, left_out, target))
+    return DynamicModules(accelerations, corrections, slopes, redundant, free)
+
+
+def _slopes_module(
+    code: InlineProgram, left_out: Collection[int], target: str
+) -> tuple[ModuleType, Sequence[Place], Mapping[Place, float]]:
+    """Return the module of the derivatives of accelerations, for implicit integrators."""
+    from kincompile.ir.accelerations import observing_slopes
+
+    program, places, numbers = observing_slopes(code, left_out)
+    return _observing(program, target), places, numbers
 
 
 def _dependent(

@@ -16,7 +16,10 @@ from kincompile.space.catalogue import *  # noqa: F403
 from kincompile.space.loads import FollowerForce as FollowerForce
 from kincompile.space.loads import FollowerTorque as FollowerTorque
 from kincompile.space.loads import Force as Force
+from kincompile.space.loads import HingeFriction as HingeFriction
+from kincompile.space.loads import SliderFriction as SliderFriction
 from kincompile.space.loads import Spring as Spring
 from kincompile.space.loads import Torque as Torque
+from kincompile.space.loads import TorsionSpring as TorsionSpring
 from kincompile.space.mechanism import Mechanism as Mechanism
 from kincompile.space.sketch import Sketch as Sketch

@@ -144,6 +144,8 @@ def _last(name: str) -> str:
 
 def title(name: str) -> str:
     """Return the name of an example as a heading."""
+    if name == "rssr":
+        return "RSSR"
     return re.sub(r"(?<=\d) (?=\d)", ".", name.replace("_", " ")).capitalize()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from kincompile import spatial
 from kincompile.view.drawing import drawing
-from kincompile.view.solid_svg import svg_in_space
+from kincompile.view.svg import as_svg
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -54,4 +54,4 @@ def joints_in_space() -> str:
         m.add(getattr(spatial, name)(f"joint_{k}", *arguments(m.ground, place, body)))
     q = np.array([float(item.guess) for item in m.system().coordinates])
     drawn = replace(drawing(m), size=SIZE)
-    return svg_in_space(drawn, q[None], "Joints in space: the ground is grey, the body coloured.")
+    return as_svg(drawn, q[None], "Joints in space: the ground is grey, the body coloured.")

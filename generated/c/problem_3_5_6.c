@@ -603,23 +603,18 @@ static const double PROBE[] = {
 };
 
 // Error of a prediction, in radians or sizes of the mechanism, up to which it stays on its branch.
-static const double LARGEST_ERROR = 0.05;
-// Sensitivity is the movement, in scales, for an error of one scale in the equations: beyond this
-// Phi_q is singular, or so nearly that rates are too uncertain to go on from.
-static const double TOO_NEAR = 100000.0;
-// Sensitivity from which on two branches may be so near each other that Newton confuses them. On one
-// branch the error of the predicted velocity, times the step, is a few times that of the position;
-// on another it is not. Below SMOOTH rounding errors decide.
+// Sensitivity is the movement, in scales, for an error of one scale in the equations: beyond
+// TOO_NEAR rates are too uncertain to go on from.
+static const double LARGEST_ERROR = 0.05, TOO_NEAR = 100000.0;
+// Sensitivity from which on Newton may confuse two branches. On one branch the error of the predicted
+// velocity, times the step, is a few times that of the position. Below SMOOTH rounding decides.
 static const double NEARLY_SINGULAR = 30.0, KINK = 8.0, SMOOTH = 1e-09;
-// How much larger than the tolerance, relative to its terms, a residual may be at the end, and
-// the part of a coordinate or of an equation's terms that rounding leaves.
+// How much larger than the tolerance, relative to its terms, a residual may be at the end; what
+// rounding leaves; the part of the way between two times below which a step is not halved.
 static const double RESIDUAL_FACTOR = 10.0, ROUNDING = 3.552713678800501e-15;
-// Newton iterations of a predicted point; a good prediction takes three.
-enum { MAX_CORRECTIONS = 6 };
-// A step of this part of the distance between two times is not halved again; sub-steps between two
-// times after which the march is given up.
 static const double SMALLEST_PART = 9.5367431640625e-07;
-enum { MAX_SUBSTEPS = 10000 };
+// Newton iterations of a predicted point, sub-steps between two times.
+enum { MAX_CORRECTIONS = 6, MAX_SUBSTEPS = 10000 };
 
 // Measure the equations of a mechanism around the positions in a strip, which stay as they are.
 static void measure(strip *b, double size, size_t count, scales *s)

@@ -20,8 +20,10 @@ const problem_3_5_6 = (() => {
     const NAME = "problem_3_5_6";
     const FORMAT = 3;
     const FINGERPRINT = "fa7adf382924fd70db26c5bd35276fee";
-    const N_COORDINATES = 3;
-    const N_EQUATIONS = 3;    const COORDINATES = [
+    const N_COORDINATES = 3, N_EQUATIONS = 3;
+    // BODIES: name, first column and number of columns; PATTERN: row, column of the entries of Phi_q
+    // that are not identically zero; CORNERS: whether velocities of drivers may jump
+    const COORDINATES = [
         "x2", "y2", "phi3",
     ];
     const EQUATIONS = [
@@ -30,9 +32,6 @@ const problem_3_5_6 = (() => {
     const PARAMETERS = [
 
     ];
-    const UNITS = {
-        "x2": "", "y2": "", "phi3": "",
-    };
     const DEFAULTS = [
 
     ];
@@ -42,16 +41,16 @@ const problem_3_5_6 = (() => {
     const OUTPUTS = [
 
     ];
-    // name, first column and number of columns
     const BODIES = [
 
     ];
-    // whether velocities of drivers may jump
-    const CORNERS = false;
-    // row, column of the entries of Phi_q that are not identically zero
     const PATTERN = [
         [0, 0], [0, 2], [1, 1], [1, 2], [2, 0], [2, 1],
     ];
+    const UNITS = {
+        "x2": "", "y2": "", "phi3": "",
+    };
+    const CORNERS = false;
     const MATRICES = {
         Phi_q: {
             rows: 3, columns: 3,
@@ -102,9 +101,7 @@ const problem_3_5_6 = (() => {
         return matrix;
     }
 
-    function square(x) {
-        return x * x;
-    }
+    const square = x => x * x;
 
     function position_at(at) {
         const { q, t, p, Phi, Phi_q } = at;
@@ -219,31 +216,25 @@ const problem_3_5_6 = (() => {
        where a step does not stay on its branch. The planned elimination takes the ordinary steps; where
        anything is out of the ordinary, dense matrices with pivoting have the last word. */
     const solver = (() => {
-        const CONVERGED = 0, NOT_CONVERGED = 1, SINGULAR = 2, NOT_FINITE = 3, NOT_REACHED = 4, CORNER = 5;
-        const TOLERANCE = 1e-10;  // of the last correction, in scales; it has been applied
-        const ASSEMBLED = 10.0 * TOLERANCE;  // residual, relative to its terms, at the end
-        const ROUNDING = 3.552713678800501e-15;  // all that floating point has to give, relatively
-        const MAX_ITERATIONS = 25, MAX_CORRECTIONS = 6;
-        const [WILD, STEEP, FAR] = [1000.0, 1000000.0, 0.7853981633974483];
-        const [SMALL_PART, CONSTANT] = [1e-08, 1e-12];
-        const [LARGEST_ANGLE, BEND, NUDGE, RESTARTS] = [0.5, 0.01, 0.3, 4];
-        const [SUFFICIENT, SHORTEST_STEP] = [0.0001, 9.5367431640625e-07];
-        const [SAME, MOST_TURNED] = [1e-06, 300];
-        const [NEAR_ANGLE, NEAR_PART, SETTLED] = [0.5235987755982988, 0.1, 0.5];
-        const [ASTRAY, AS_NEAR, MIRRORED] = [5.0, 1.1, 2.0];
-        const [MOST_MIRRORED, MIRROR_STEP, AT_EVENT] = [300, 1e-05, 1e-09];
-        const [SINGULAR_SENSITIVITY, TOO_NEAR] = [10000000.0, 100000.0];
-        const [NEARLY_SINGULAR, KINK, SMOOTH] = [30.0, 8.0, 1e-09];
-        const [SMALL_ERROR, LARGE_ERROR, ALLOWED_PART] = [0.05, 0.5, 0.25];
-        const [SMALLEST_PART, MAX_SUBSTEPS, PATIENCE] = [9.5367431640625e-07, 10000, 8];
-        const OTHER_SIZE = 100.0;
-        const [LONGEST_ARC, FIRST_ARC, SHORTEST_ARC] = [0.05, 0.01, 1e-09];
-        const [MAX_ARCS, ARC_CORRECTIONS, STRAIGHT] = [400, 12, 0.98];
-        const [SMALL_CORRECTION, TOLERABLE_CORRECTION] = [1e-12, 1e-07];
-        const [ROOT_LENGTH, ROOT_STEPS, AROUND] = [1e-13, 80, 0.002];
-        const AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05];
-        const [INVOLVED, LATE, IN_RANGE] = [0.02, 1e-06, 1e-06];
-        const [CORNER_JUMP, SAME_TIME] = [1e-09, 8.881784197001252e-16];
+        const CONVERGED = 0, NOT_CONVERGED = 1, SINGULAR = 2, NOT_FINITE = 3, NOT_REACHED = 4, AT_CORNER = 5;
+        // the criteria of the runtime; residuals at the end are relative to their terms
+        const ALLOWED_PART = 0.25, ARC_CORRECTIONS = 12, AROUND = 0.002,
+            AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], ASTRAY = 5.0, AS_NEAR = 1.1, AT_EVENT = 1e-09,
+            BEND = 0.01, BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05], CONSTANT = 1e-12,
+            CORNER = 1e-09, FAR = 0.7853981633974483, FIRST_ARC = 0.01, INVOLVED = 0.02,
+            IN_RANGE = 1e-06, KINK = 8.0, LARGEST_ANGLE = 0.5, LARGE_ERROR = 0.5, LATE = 1e-06,
+            LONGEST_ARC = 0.05, MAX_ARCS = 400, MAX_CORRECTIONS = 6, MAX_ITERATIONS = 25,
+            MAX_SUBSTEPS = 10000, MIRRORED = 2.0, MIRROR_STEP = 1e-05, MOST_MIRRORED = 300,
+            MOST_TURNED = 300, NEARLY_SINGULAR = 30.0, NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1,
+            NUDGE = 0.3, OTHER_SIZE = 100.0, PATIENCE = 8, RESIDUAL_FACTOR = 10.0, RESTARTS = 4,
+            ROOT_LENGTH = 1e-13, ROOT_STEPS = 80, ROUNDING = 3.552713678800501e-15,
+            SAME_POSITION = 1e-06, SAME_TIME = 8.881784197001252e-16, SETTLED = 0.5,
+            SHORTEST_ARC = 1e-09, SHORTEST_STEP = 9.5367431640625e-07,
+            SINGULAR_SENSITIVITY = 10000000.0, SMALLEST_PART = 9.5367431640625e-07,
+            SMALL_CORRECTION = 1e-12, SMALL_ERROR = 0.05, SMALL_PART = 1e-08, SMOOTH = 1e-09,
+            STEEP = 1000000.0, STRAIGHT = 0.98, SUFFICIENT = 0.0001, TOLERABLE_CORRECTION = 1e-07,
+            TOLERANCE = 1e-10, TOO_NEAR = 100000.0, WILD = 1000.0;
+        const ASSEMBLED = RESIDUAL_FACTOR * TOLERANCE;
 
         const norm = vector => Math.hypot(...vector);
         const largest = vector => vector.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
@@ -641,7 +632,7 @@ const problem_3_5_6 = (() => {
                 }
             }
             const [first, ...rest] = good, reach = AS_NEAR * away(first.last.q);
-            const isOther = q => equations.distance(q, first.last.q) > SAME && away(q) <= reach;
+            const isOther = q => equations.distance(q, first.last.q) > SAME_POSITION && away(q) <= reach;
             first.other = rest.find(({ last }) => isOther(last.q))?.last ?? null;
             return first;
         }
@@ -691,7 +682,7 @@ const problem_3_5_6 = (() => {
                 for (const k of some) q[k] -= 2 * Math.PI * Math.round((q[k] - guess[k]) / (2 * Math.PI));
                 if (q.every((x, k) => x === at.q[k])) continue;
                 const turned = iterate(equations, t, q, MAX_CORRECTIONS);
-                if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME) at = turned.last;
+                if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME_POSITION) at = turned.last;
             }
             return at;
         }
@@ -841,7 +832,7 @@ const problem_3_5_6 = (() => {
                 before.forEach((x, i) => { most[i] = Math.max(most[i], Math.abs(x) || 0, Math.abs(after[i]) || 0); });
                 return before.map((x, i) => Math.abs(after[i] - x));
             });
-            return times.map((_, k) => (jumps[k].some((x, i) => x > CORNER_JUMP * most[i]) ? reach : 0));
+            return times.map((_, k) => (jumps[k].some((x, i) => x > CORNER * most[i]) ? reach : 0));
         }
 
         /* The motion over times: arrays q, q_dot, q_ddot (a point after another, NaN where nothing was
@@ -897,7 +888,7 @@ const problem_3_5_6 = (() => {
             }
             for (let k = 0; k < count; k += 1) {
                 if (!corners[k] || motion.status[k] !== CONVERGED) continue;
-                motion.status[k] = CORNER;
+                motion.status[k] = AT_CORNER;
                 motion.q_ddot.fill(NaN, k * n, (k + 1) * n);
             }
             return motion;
@@ -1228,8 +1219,8 @@ const problem_3_5_6 = (() => {
     })();
 
     return {
-        NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, COORDINATES, EQUATIONS, PARAMETERS,
-        UNITS, DEFAULTS, GUESS, OUTPUTS, BODIES, CORNERS, PATTERN,
+        NAME, FORMAT, FINGERPRINT, N_COORDINATES, N_EQUATIONS, UNITS, CORNERS,
+        COORDINATES, EQUATIONS, PARAMETERS, DEFAULTS, GUESS, OUTPUTS, BODIES, PATTERN,
         Phi, Phi_q, nu, gamma, position_at, nu_at, gamma_at,
         point, rows_of, factor_at, solve_at, solver,
     };

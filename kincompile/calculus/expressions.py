@@ -251,10 +251,6 @@ class Rotated(Vector):
 
     Attributes
     ----------
-    rotation
-        What turns it.
-    vector
-        What is turned.
     along
         The directions in which A is differentiated: none for ``A v``.
     """

@@ -20,10 +20,6 @@ class Template:
     ----------
     type_name
         Name of the constraint type, for instance ``Revolute``.
-    frames
-        Bodies i, or i and j.
-    contacts
-        Contact parameters of cam profiles.
     Phi
         One expression per row block: a vector is two equations, a scalar one.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 import kincompile as kc
 from kincompile.cli.motion import set_values
@@ -17,6 +18,7 @@ from kincompile.cli.shared import (
     set_option,
 )
 from kincompile.errors import InputError
+from kincompile.runtime.results.summary import without_noise
 from kincompile.tables import table
 
 if TYPE_CHECKING:
@@ -69,8 +71,8 @@ def _listed(module: ModuleType, found: Sequence[kc.Equilibrium], t: float) -> li
     many = "1 equilibrium" if len(found) == 1 else f"{len(found)} equilibria"
     numbers = [str(k) for k in range(1, len(found) + 1)]
     rows = [["", "", *(item.stability[0] for item in found)]]
-    for k, name in enumerate(module.COORDINATES):
-        shown = (f"{item.q[0, k] + 0.0:.6g}" for item in found)
-        rows.append([name, module.UNITS[name], *shown])
+    values = without_noise(np.stack([item.q[0] for item in found]))
+    for name, shown in zip(module.COORDINATES, values.T, strict=True):
+        rows.append([name, module.UNITS[name], *(f"{value + 0.0:.6g}" for value in shown)])
     heading = f"{module.NAME}: {many} at t = {t:g}"
     return [heading, "", *table(("coordinate", "unit", *numbers), rows, right=numbers)]

@@ -26,4 +26,4 @@ def command(model: str, output: str, students: int, seed: int, signs: bool, leng
     """
     made = kc.exercise(read_model(model), students, seed, signs=signs, lengths=lengths)
     written = made.write(Path(output))
-    click.echo(f"Wrote {written}: {made!r}", err=True)
+    click.echo(f"Wrote {written}: {made.sizes}", err=True)

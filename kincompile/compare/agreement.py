@@ -74,8 +74,6 @@ def multiple(
         A column that is NaN in `generated` belongs to the ground and is not compared.
     group
         The set of parameters of each state, shape (N,).
-    may_scale
-        Whether the factor may differ from 1.
     """
     checked = ~np.isnan(generated).any(axis=0)
     w, s, g = (array[:, None, checked] for array in (written, sizes, generated))
@@ -101,7 +99,6 @@ def _share(equal: Array, generated: Array) -> float:
 
 
 def _ratios(written: Array, generated: Array, group: Array) -> list[Array]:
-    """Return the ratios of entries that do not vary within a group of states."""
     if np.min(np.bincount(group)[group]) < 2:
         return []  # one state says nothing about a factor: any two numbers have one
     usable = (np.abs(generated) > ABSOLUTE) & (np.abs(written) > ABSOLUTE) & np.isfinite(written)

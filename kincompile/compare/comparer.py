@@ -13,7 +13,6 @@ from kincompile.compare.comparison import (
     ComparedEntry,
     Convention,
     Diagnosis,
-    Difference,
     Verdict,
 )
 from kincompile.compare.conventions import OPPOSITE, conventions_found
@@ -91,7 +90,6 @@ class Comparer:
         return any(item.name in missing for item in self._reference.system.parameters)
 
     def _adopt(self, matching: Matching) -> None:
-        """Compare under a matching."""
         self._matching = matching
         self._written = self._matcher.written(matching, self._subject.states)
         self._exact = self._matcher.written(matching, self._subject.states, exact=True)
@@ -101,7 +99,6 @@ class Comparer:
         }
 
     def _judged(self, name: str) -> Iterator[tuple[Spot, Verdict]]:
-        """Yield the verdict of every entry that is compared, row by row."""
         expected = self._expected[name]
         equal = np.all(agrees(*self._written[name], expected), axis=0)
         exact = np.all(agrees(*self._exact[name], expected), axis=0)
@@ -115,7 +112,6 @@ class Comparer:
                     yield (name, row, column), right if is_equal else Verdict.DIFFERENT
 
     def _conventions(self) -> Iterator[Convention]:
-        """Yield the conventions in which the two differ."""
         yield from [self._convention] if self._convention else []
         yield from conventions_found(self._matching, self._reference)
         for name, item in self._quantities.items():
@@ -239,21 +235,18 @@ class Comparer:
         return name == "Phi" or bool(is_opposite) or self._has_rates(spot)
 
     def _has_rates(self, spot: Spot) -> bool:
-        """Return whether rates stand in an entry of Phi, Phi_q or nu."""
         name, row, column = spot
         expression = self._quantities[name].formula(row, column)
         names = symbol_names(expression) if expression is not None else set()
         return name != "gamma" and not names.isdisjoint(self._reference.rates)
 
     def _is_accepted(self, spot: Spot) -> bool:
-        """Return whether an entry counts as right."""
         verdict = self._verdicts[spot]
         if self._strict:
             return verdict is Verdict.EQUAL
         return verdict.is_right or (verdict is Verdict.MANIFOLD and spot[0] in ("nu", "gamma"))
 
     def _diagnoses(self) -> dict[Spot, tuple[Diagnosis, ...]]:
-        """Return the explanations of every entry that is not right."""
         found: dict[Spot, tuple[Diagnosis, ...]] = {}
         for block in self._subject.blocks:
             wrong = [spot for spot in self._wrong(block) if not self._is_accepted(spot)]
@@ -382,6 +375,7 @@ class Comparer:
     def _entry(self, spot: Spot, diagnoses: tuple[Diagnosis, ...]) -> ComparedEntry:
         name, row, column = spot
         system_row, system_column = self._index(spot)
+        values = self._written[name][0][:, row, column], self._expected[name][:, row, column]
         is_accepted = self._is_accepted(spot)
         reference, form_row = self._reference, system_row
         form = self._matching.form(system_row)
@@ -391,22 +385,13 @@ class Comparer:
             name,
             self._reference.equations[system_row],
             self._reference.coordinates[system_column] if name == "Phi_q" else None,
-            reference.text(name, form_row, system_column),
+            reference.later(name, form_row, system_column),
             self._quantities[name].texts[row][column],
             self._verdicts[spot],
             is_accepted,
             diagnoses,
-            None if is_accepted else self._difference(spot),
+            None if is_accepted else self._reference.difference(self._subject.states, *values),
         )
-
-    def _difference(self, spot: Spot) -> Difference:
-        """Return the state at which an entry differs the most."""
-        name, row, column = spot
-        written = self._written[name][0][:, row, column]
-        expected = self._expected[name][:, row, column]
-        k = int(np.argmax(np.nan_to_num(np.abs(written - expected), nan=np.inf, posinf=np.inf)))
-        state = self._reference.named(self._subject.states, k)
-        return Difference(state, float(expected[k]), float(written[k]))
 
 
 def _same_space(where: str, Phi: str) -> Diagnosis:

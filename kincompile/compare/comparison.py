@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
 
 class Verdict(StrEnum):
@@ -65,7 +66,7 @@ class Difference:
     hand: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ComparedEntry:
     """One entry of Phi, Phi_q, nu or gamma.
 
@@ -77,8 +78,8 @@ class ComparedEntry:
         Name of the equation.
     column
         Name of the coordinate; None but for Phi_q.
-    generated
-        The right formula, in the system's own conventions.
+    right
+        Gives the right formula, in the system's own conventions.
     hand
         The formula as written; empty for arrays and functions.
     verdict
@@ -96,12 +97,17 @@ class ComparedEntry:
     quantity: str
     row: str
     column: str | None
-    generated: str
+    right: Callable[[], str] = field(repr=False, compare=False)
     hand: str
     verdict: Verdict
     accepted: bool
     diagnoses: tuple[Diagnosis, ...] = ()
     difference: Difference | None = None
+
+    @cached_property
+    def generated(self) -> str:
+        """The right formula, in the system's own conventions."""
+        return self.right()
 
     @property
     def label(self) -> str:
@@ -129,10 +135,10 @@ class ComparedEntry:
 
     def to_data(self, reveal: bool) -> dict[str, Any]:
         """Return the entry as plain data; the right formula and value only where revealed."""
-        data = asdict(self) | {"verdict": self.verdict.value}
-        data["diagnoses"] = list(data["diagnoses"])
+        data = {"generated" if key == "right" else key: x for key, x in asdict(self).items()}
+        data["generated"] = self.generated if reveal else None
+        data |= {"verdict": self.verdict.value, "diagnoses": list(data["diagnoses"])}
         if not reveal:
-            data["generated"] = None
             for item in data["diagnoses"]:
                 item["detail"] = None
             if self.difference is not None:
@@ -157,81 +163,3 @@ class Convention:
     kind: str
     text: str
     rows: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class Comparison:
-    """All entries of a comparison with their verdicts.
-
-    Attributes
-    ----------
-    model
-        Name of the mechanism.
-    constraint
-        The constraint that was checked alone, or None.
-    entries
-        All entries, quantity by quantity, row by row.
-    conventions
-        Differences in the author's way of writing that are not mistakes.
-    """
-
-    model: str
-    constraint: str | None
-    entries: tuple[ComparedEntry, ...]
-    conventions: tuple[Convention, ...]
-
-    @property
-    def verdict(self) -> Verdict:
-        """The most severe verdict of any entry."""
-        return worst(entry.verdict for entry in self.entries)
-
-    @property
-    def equal(self) -> bool:
-        """Whether every entry is accepted.
-
-        Equal up to a named convention counts, and so does an entry of nu or gamma that is equal on
-        the constraint manifold, where velocity and acceleration are solved: a textbook's formula is
-        not wrong. Where the comparison is strict, equal alone counts.
-        """
-        return all(entry.accepted for entry in self.entries)
-
-    @property
-    def different(self) -> tuple[ComparedEntry, ...]:
-        """The entries that are not accepted."""
-        return tuple(entry for entry in self.entries if not entry.accepted)
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """The quantities compared, in order."""
-        return tuple(dict.fromkeys(entry.quantity for entry in self.entries))
-
-    @property
-    def title(self) -> str:
-        """The model, and the constraint that was checked alone."""
-        return self.model if self.constraint is None else f"{self.model}, {self.constraint}"
-
-    @property
-    def summary(self) -> str:
-        """One sentence: how many entries have which verdict."""
-        counts = [
-            f"{number} {verdict.value}"
-            for verdict in Verdict
-            if (number := sum(entry.verdict is verdict for entry in self.entries))
-        ]
-        return f"{self.title}: {len(self.entries)} entries compared, {', '.join(counts)}."
-
-    def rows(self, quantity: str) -> dict[str, list[ComparedEntry]]:
-        """Return the entries of a quantity by equation."""
-        rows: dict[str, list[ComparedEntry]] = {}
-        for entry in self.entries:
-            if entry.quantity == quantity:
-                rows.setdefault(entry.row, []).append(entry)
-        return rows
-
-    def counts(self) -> list[tuple[str, list[int]]]:
-        """Return, for every quantity, the number of entries with each verdict."""
-        return [
-            (name, [sum(e.quantity == name and e.verdict is v for e in self.entries)
-                    for v in Verdict])
-            for name in self.quantities
-        ]  # fmt: skip

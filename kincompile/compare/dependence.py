@@ -24,17 +24,7 @@ _ORDERS = {2.0: "linear", 4.0: "quadratic"}
 
 
 class Dependence:
-    """The symbols that written and right formulas, and their differences, depend on.
-
-    Parameters
-    ----------
-    reference
-        The system whose coordinates, rates and parameters are changed.
-    states
-        Where to evaluate.
-    evaluate
-        Gives the formulas as written and as they should be.
-    """
+    """The symbols that written and right formulas, and their differences, depend on."""
 
     def __init__(self, reference: Reference, states: States, evaluate: Evaluate) -> None:
         self._evaluate = evaluate

@@ -50,15 +50,7 @@ Given = tuple[Array, Array]
 
 
 class Diagnostician:
-    """Explains differences in the formulas of one system; keeps the catalogues that it has made.
-
-    Parameters
-    ----------
-    reference
-        The system.
-    states
-        Where formulas are compared.
-    """
+    """Explains differences in the formulas of one system; keeps the catalogues that it has made."""
 
     def __init__(self, reference: Reference, states: States) -> None:
         self._reference = reference
@@ -78,10 +70,6 @@ class Diagnostician:
 
         Parameters
         ----------
-        block
-            The constraint.
-        quantity
-            Phi, Phi_q, nu or gamma.
         written
             By row and column of the system, with the author's conventions taken out: comparable to
             the generated values as they are.
@@ -184,7 +172,6 @@ class Diagnostician:
                 yield Fault(Kind.OTHER_FORM, f"it belongs to {text}, and not to your Phi", result)
 
     def _right(self, quantity: str, form: Form | None) -> Array:
-        """Return the right values by row and column of the system."""
         right = self._generated.of(quantity)
         if form is not None:
             right = right.copy()
@@ -192,7 +179,6 @@ class Diagnostician:
         return right
 
     def _typed(self, quantity: str, place: Index, form: Form | None) -> list[NumericFault]:
-        """Return the faults of one entry as it is typed."""
         key = (quantity, place, form)
         if key not in self._entries:
             reference, row = self._reference, place[0]

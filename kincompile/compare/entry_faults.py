@@ -28,17 +28,7 @@ MOST_EXPANDED = 1000
 def entry_faults(
     reference: Reference, quantity: str, row: int, column: int, states: States
 ) -> Iterator[Fault[Mapping[tuple[int, int], Array]]]:
-    """Yield the faults of one entry; they show there and nowhere else.
-
-    Parameters
-    ----------
-    reference
-        The system.
-    quantity, row, column
-        The entry, by its place in the system; the column of a vector is 0.
-    states
-        Where to evaluate.
-    """
+    """Yield the faults of one entry; they show there and nowhere else."""
     entry = reference.expression(quantity, row, column)
     if _count(entry) <= MOST_EXPANDED:
         entry = sympy.expand(entry)

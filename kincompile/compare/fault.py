@@ -72,10 +72,6 @@ class Fault(Generic[Result]):
 
     Attributes
     ----------
-    kind
-        The fault in a few words.
-    text
-        What is wrong, and where.
     result
         The faulty formula, formulas by part, or numbers by entry.
     detail

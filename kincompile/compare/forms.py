@@ -67,10 +67,6 @@ class Form:
         The rows of the system, in the order of the form's own.
     evaluate
         Gives its quantities at states.
-    joint
-        The joint of which these are the formulas in vectors, if any.
-    formulas
-        The system of these equations alone, if they are formulas.
     accuracy
         Relative accuracy of its values; 0 where they are exact.
     defines
@@ -129,19 +125,7 @@ def _of_joint(
 def own_form(
     subject: Subject, rows: Sequence[int], Phi: Written, own: Sequence[int]
 ) -> Form | None:
-    """Return the form that an author's own Phi defines, None if it is another constraint.
-
-    Parameters
-    ----------
-    subject
-        What is compared.
-    rows
-        Rows of the system.
-    Phi
-        The author's.
-    own
-        The author's rows that stand for them.
-    """
+    """Return the form that an author's own Phi defines, None if it is another constraint."""
     form, reference = None, subject.reference
     if Phi.expressions is not None:
         form = _derived(reference, rows, [Phi.expressions[k] for k in own])

@@ -125,7 +125,6 @@ def _terms(
 def _with_multiple(
     terms: tuple[Any, ...], k: int, build: Callable[[Any], ex.Expression], factor: Fraction
 ) -> ex.Expression:
-    """Return a sum with a multiple of one of its terms."""
     own = (times(factor, terms[k]),) if factor else ()
     return build((*terms[:k], *own, *terms[k + 1 :]))
 

@@ -58,10 +58,6 @@ class Forms:
 
     Attributes
     ----------
-    reference
-        The system by its coordinates.
-    stated
-        What the author says.
     constraint
         Name of the one constraint that is checked; all where None.
     """

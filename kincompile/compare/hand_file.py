@@ -45,14 +45,10 @@ class HandFile:
 
     Attributes
     ----------
-    name
-        Name of the file.
     quantities
         Rows of elements by quantity: Phi, Phi_q, nu, gamma, M, Q.
     aliases
         The author's own names, each with its expression.
-    constraint
-        The constraint that is checked alone, or None.
     conventions
         What its author says that nu and gamma are.
     """

@@ -90,12 +90,6 @@ class JointFaults:
     ----------
     joint
         The joint, as its author sees the roles of its bodies.
-    quantity
-        Phi, Phi_q, nu or gamma.
-    reference
-        The system it belongs to.
-    states
-        Where to evaluate.
     """
 
     def __init__(self, joint: Joint, quantity: str, reference: Reference, states: States) -> None:
@@ -151,7 +145,6 @@ class JointFaults:
         }
 
     def _values(self, place: Index, expression: ex.Expression) -> Array:
-        """Return the values of a part, shape (N, rows, columns)."""
         b, k = place
         with np.errstate(all="ignore"):
             if self._quantity != "Phi_q":
@@ -162,7 +155,6 @@ class JointFaults:
         return self._reference.in_axes(columns, self._joint.bodies[k // 2], self._states)
 
     def _corner(self, place: Index) -> Index:
-        """Return row and column of the first entry of a part."""
         b, k = place
         size = self._joint.template.dimension
         rows = sum(size if isinstance(block.Phi, ex.Vector) else 1 for block in self._blocks[:b])
@@ -399,7 +391,6 @@ def _missing_parts_of_gamma(block: RowBlock) -> Iterator[Fault[ex.Expression]]:
 
 
 def _sum(terms: tuple[ex.Expression, ...]) -> ex.Expression:
-    """Return a sum as it stands, of vectors or of scalars."""
     vectors = tuple(item for item in terms if isinstance(item, ex.Vector))
     return (
         ex.VectorSum(vectors)
@@ -459,6 +450,5 @@ def _wrong_squares(
 
 
 def _velocities(term: ex.Scalar) -> ex.Scalar:
-    """Return the product of the angular velocities in a term."""
     _, factors = ex.split_coefficient(term)
     return ex.product_of(tuple(factor for factor in factors if is_rate(factor)))

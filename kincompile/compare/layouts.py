@@ -70,7 +70,6 @@ def usual_layout(reference: Reference, block: ConstraintBlock | None, width: int
 
 
 def _ground(reference: Reference) -> Columns:
-    """Return the columns of the ground, as many as a body has."""
     return (None,) * len(next(iter(reference.body_columns), ()))
 
 

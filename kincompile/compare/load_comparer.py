@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.compare.agreement import ABSOLUTE, OF_TERMS, agrees
-from kincompile.compare.comparison import ComparedEntry, Diagnosis, Difference, Verdict
+from kincompile.compare.comparison import ComparedEntry, Diagnosis, Verdict
 from kincompile.compare.fault import Fault, Kind, term_faults, whole_faults
 from kincompile.model.matrices import load_entries
 from kincompile.model.resolve import title_of
@@ -37,12 +37,6 @@ class LoadComparer:
 
     Attributes
     ----------
-    reference
-        The generated side.
-    written
-        M, Q or both.
-    states
-        Where they are compared.
     strict
         Whether what is right by a convention alone is not accepted.
     """
@@ -69,7 +63,6 @@ class LoadComparer:
 
     @cached_property
     def _equal(self) -> dict[str, Array]:
-        """Which entries agree at all states, (rows, columns)."""
         expected = self.reference.values(self.states)
         return {
             name: np.all(agrees(*self._values[name], expected.of(name)), axis=0)
@@ -83,28 +76,21 @@ class LoadComparer:
             explained = {} if equal.all() else self._explained(name)
             for place in np.ndindex(*equal.shape):
                 row, column = place
+                right_values = self.reference.values(self.states).of(name)
+                values = self._values[name][0][:, row, column], right_values[:, row, column]
                 verdict = right if equal[place] else Verdict.DIFFERENT
                 is_accepted = verdict is Verdict.EQUAL or (verdict.is_right and not self.strict)
                 yield ComparedEntry(
                     name,
                     self.reference.coordinates[row],
                     self.reference.coordinates[column] if name == "M" else None,
-                    self.reference.text(name, row, column),
+                    self.reference.later(name, row, column),
                     item.texts[row][column],
                     verdict,
                     is_accepted,
                     explained.get(place, ()),
-                    None if is_accepted else self._difference(name, place),
+                    None if is_accepted else self.reference.difference(self.states, *values),
                 )
-
-    def _difference(self, name: str, place: tuple[int, ...]) -> Difference:
-        """Return the state at which an entry differs the most."""
-        values, right_values = self._values[name][0], self.reference.values(self.states).of(name)
-        row, column = place
-        written, right = (item[:, row, column] for item in (values, right_values))
-        k = int(np.argmax(np.nan_to_num(np.abs(written - right), nan=np.inf, posinf=np.inf)))
-        state = self.reference.named(self.states, k)
-        return Difference(state, float(right[k]), float(written[k]))
 
     def _explained(self, name: str) -> dict[tuple[int, ...], tuple[Diagnosis, ...]]:
         """Return the explanations of the entries that differ: the slips that fit the best."""
@@ -126,7 +112,6 @@ class LoadComparer:
             yield from self._faults_of(name, load, total)
 
     def _faults_of(self, name: str, load: AppliedLoad, total: Array) -> Iterator[Fault[Array]]:
-        """Yield the slips with one load."""
         own = self._added(name, load, self.states)
         if not np.any(np.abs(own) > ABSOLUTE):
             return
@@ -161,19 +146,17 @@ class LoadComparer:
 def _changes(load: AppliedLoad) -> Iterator[tuple[str, AppliedLoad, AppliedLoad]]:
     """Yield the arguments of a load, with the load as if they were zero, and reversed."""
     for name, item in load.written.arguments().items():
-        if item.symbol in load.scalars and load.scalars[item.symbol] != 0:
-            value = load.scalars[item.symbol]
-            zero, opposite = (
-                replace(load, scalars={**load.scalars, item.symbol: new}) for new in (0, -value)
-            )
-            yield name, zero, opposite
-        elif any(x != 0 for x in load.points.get(item.symbol, ())):
-            point = load.points[item.symbol]
-            zero, opposite = (
-                replace(load, points={**load.points, item.symbol: tuple(factor * x for x in point)})
-                for factor in (0, -1)
-            )
-            yield name, zero, opposite
+        symbol = item.symbol
+        value, point = load.scalars.get(symbol, 0), load.points.get(symbol, ())
+        if value != 0:
+            changed = (replace(load, scalars={**load.scalars, symbol: x}) for x in (0, -value))
+        elif any(x != 0 for x in point):
+            points = (tuple(factor * x for x in point) for factor in (0, -1))
+            changed = (replace(load, points={**load.points, symbol: x}) for x in points)
+        else:
+            continue
+        zero, opposite = changed
+        yield name, zero, opposite
 
 
 def _best(faults: list[tuple[int, Fault[Array]]]) -> tuple[Diagnosis, ...]:

@@ -107,17 +107,7 @@ class _Candidate:
 
 
 class Matcher:
-    """Finds the matching that explains the most, the plain one first.
-
-    Parameters
-    ----------
-    subject
-        What is compared.
-    written
-        The formulas by quantity.
-    signs
-        The signs of whole vectors that their author states.
-    """
+    """Finds the matching that explains the most, the plain one first."""
 
     def __init__(
         self, subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float]
@@ -305,7 +295,6 @@ class Matcher:
         own: list[int],
         written: Mapping[str, tuple[Array, Array]],
     ) -> Matching:
-        """Return the matching with one constraint in another form and the factors it then has."""
         factors = matching.factors.copy()
         factors[own] = 1.0
         trial = replace(matching, forms=(*matching.forms, form), factors=factors)
@@ -320,7 +309,6 @@ class Matcher:
         return trial
 
     def _right_rows(self, matching: Matching, written: Mapping[str, tuple[Array, Array]]) -> Array:
-        """Return for every written row whether all its quantities agree."""
         expected = self.expected(matching, self._subject.states)
         right = np.ones(len(matching.rows), dtype=bool)
         for name, (values, sizes) in written.items():

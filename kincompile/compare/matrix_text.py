@@ -44,8 +44,6 @@ def split_matrix(text: str, place: TextPlace) -> Rows:
     ----------
     text
         For instance ``[[1, 0], [0, cos(phi)]]``, ``[1 0; 0 cos(phi)]`` or one expression.
-    place
-        Where the text begins in the file.
 
     Raises
     ------
@@ -56,8 +54,6 @@ def split_matrix(text: str, place: TextPlace) -> Rows:
 
 
 class _Splitter:
-    """A text to be split."""
-
     def __init__(self, text: str, place: TextPlace) -> None:
         self._places = TextPlaces(text, place)
         # Same length, so that offsets stay: x.*y, x./y, x.^y of MATLAB; its continued lines.
@@ -97,11 +93,9 @@ class _Splitter:
         return start, end
 
     def _after_bracket(self, start: int) -> int:
-        """Return the offset after the closing partner of a bracket."""
         return self._depth.index(self._depth[start], start + 1)
 
     def _bracketed_rows(self, start: int, end: int) -> list[Span]:
-        """Return the rows of a nested list."""
         spans = []
         while start < end:
             if self._text[start] == "[":

@@ -14,12 +14,6 @@ if TYPE_CHECKING:
 
 def described(expression: ex.Expression) -> str:
     """Return an expression as plain text."""
-    if isinstance(expression, ex.Scalar):
-        return _scalar(expression)
-    return _vector(expression)
-
-
-def _scalar(expression: ex.Scalar) -> str:
     match expression:
         case ex.Number(value):
             return str(value)
@@ -29,59 +23,52 @@ def _scalar(expression: ex.Scalar) -> str:
             return _symbol(name)
         case ex.TimeFunction(name, order) | ex.ProfileFunction(name, _, order):
             return name + "'" * order
-        case ex.Sum(terms):
-            return _sum([_scalar(term) for term in terms])
+        case ex.Sum(terms) | ex.VectorSum(terms):
+            return _sum([described(term) for term in terms]) if terms else "0"
         case ex.Product(factors):
             return _product(factors)
         case ex.Power(base, exponent):
-            return f"{_bracketed(_scalar(base))}^{exponent}"
+            return f"{_factor(base)}^{exponent}"
         case ex.Norm(vector):
-            return f"|{_vector(vector)}|"
+            return f"|{described(vector)}|"
         case ex.Circular(name, argument):
-            return f"{name}({_scalar(argument)})"
+            return f"{name}({described(argument)})"
         case ex.Angle(sine, cosine):
-            return f"atan2({_scalar(sine)}, {_scalar(cosine)})"
+            return f"atan2({described(sine)}, {described(cosine)})"
         case ex.Dot(left, right):
-            return f"({_vector(left)})^T {_bracketed(_vector(right))}"
-    raise TypeError(f"not a scalar expression: {expression!r}")
-
-
-def _vector(expression: ex.Vector) -> str:
-    match expression:
+            return f"({described(left)})^T {_factor(right)}"
         case ex.VectorSymbol(name):
             return f"{name}'" if name.startswith(("omega_", "pi_")) else name
         case ex.Basis(axis, size):
             return f"e_{'xyz'[axis]}" if size < 4 else f"e_{axis}"
         case ex.Rotated(EulerRotation(p), vector, along):
             if not along:
-                return f"A_{p.name.removeprefix('p_')} {_bracketed(_vector(vector))}"
+                return f"A_{p.name.removeprefix('p_')} {_factor(vector)}"
             first, last = (p, *along)[-2:]
-            return f"B({described(first)}, {_vector(vector)}) {_bracketed(described(last))}"
+            return f"B({described(first)}, {described(vector)}) {_factor(last)}"
         case ex.RotationSlope(EulerRotation(p), vector, True):
-            return f"A_{p.name.removeprefix('p_')} {_bracketed(_vector(vector))}~"
+            return f"A_{p.name.removeprefix('p_')} {_factor(vector)}~"
         case ex.Cross(left, right):
-            return f"{_bracketed(_vector(left))}~ {_bracketed(_vector(right))}"
+            return f"{_factor(left)}~ {_factor(right)}"
         case ex.TimesG(p, vector, is_transposed):
             mark = "^T" if is_transposed else ""
-            return f"G_{_vector(p).removeprefix('p_')}{mark} {_bracketed(_vector(vector))}"
+            return f"G_{described(p).removeprefix('p_')}{mark} {_factor(vector)}"
         case ex.RotationSlope(EulerRotation(p), vector):
-            return f"B({p.name}, {_vector(vector)})"
+            return f"B({p.name}, {described(vector)})"
         case ex.RowOfSlope(left, slope):
-            return f"({_vector(left)})^T {_vector(slope)}"
+            return f"({described(left)})^T {described(slope)}"
         case ex.Rotated(PlaneRotation(angle) as rotation, vector):
             letter = rotation.letters[expression.order]
             of_body = isinstance(angle, ex.Symbol) and angle.name.startswith("phi_")
-            index = _scalar(angle).removeprefix("phi") if of_body else f"({_scalar(angle)})"
-            return f"{letter}{index} {_bracketed(_vector(vector))}"
+            index = described(angle).removeprefix("phi") if of_body else f"({described(angle)})"
+            return f"{letter}{index} {_factor(vector)}"
         case ex.Perpendicular(vector):
-            return f"R {_bracketed(_vector(vector))}"
-        case ex.VectorSum(terms):
-            return _sum([_vector(term) for term in terms]) if terms else "0"
+            return f"R {_factor(vector)}"
         case ex.Scaled(factor, vector):
             number, rest = ex.split_coefficient(factor)
-            parts = [_number(number), *(_bracketed(_scalar(item)) for item in rest)]
-            return " ".join([*filter(None, parts), _bracketed(_vector(vector))])
-    raise TypeError(f"not a vector expression: {expression!r}")
+            parts = [_number(number), *(_factor(item) for item in rest)]
+            return " ".join([*filter(None, parts), _factor(vector)])
+    raise TypeError(f"not an expression: {expression!r}")
 
 
 def _symbol(name: str) -> str:
@@ -93,7 +80,7 @@ def _symbol(name: str) -> str:
 
 def _product(factors: tuple[ex.Scalar, ...]) -> str:
     number, rest = ex.split_coefficient(ex.Product(factors))
-    parts = [_number(number), *(_bracketed(_scalar(item)) for item in rest)]
+    parts = [_number(number), *(_factor(item) for item in rest)]
     return " ".join(filter(None, parts))
 
 
@@ -107,5 +94,6 @@ def _sum(terms: list[str]) -> str:
     return " + ".join(terms).replace("+ - ", "- ").replace("+ -", "- ")
 
 
-def _bracketed(text: str) -> str:
+def _factor(expression: ex.Expression) -> str:
+    text = described(expression)
     return f"({text})" if " + " in text or " - " in text[1:] else text

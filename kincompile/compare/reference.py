@@ -12,6 +12,7 @@ import numpy as np
 import sympy
 
 from kincompile import quantities
+from kincompile.compare.comparison import Difference
 from kincompile.compare.states import (
     SEED,
     Array,
@@ -81,11 +82,6 @@ class ConstraintBlock:
 class Reference:
     """The formulas that the compiler derives from a model, ready to be evaluated anywhere.
 
-    Parameters
-    ----------
-    model
-        A mechanism or a system of free equations.
-
     Raises
     ------
     ModelError
@@ -97,8 +93,6 @@ class Reference:
         What comparisons at the random states have found out about the system, for the next ones.
     base
         The formulas by the coordinates of the system; itself, except in another form.
-    body_columns
-        The columns of Phi_q of each body.
     """
 
     convention: Convention | None = None
@@ -165,12 +159,10 @@ class Reference:
 
     @cached_property
     def _rows(self) -> list[EquationRow]:
-        """The rows as SymPy expressions, which people read."""
         return assemble(self.system)
 
     @cached_property
     def _of_loads(self) -> dict[str, sympy.ImmutableDenseMatrix]:
-        """M and Q, which people read."""
         return {"M": self.system.M, "Q": self.system.Q}
 
     def expression(self, quantity: str, row: int, column: int) -> sympy.Expr:
@@ -188,6 +180,10 @@ class Reference:
     def text(self, quantity: str, row: int, column: int) -> str:
         """Return an entry as people type it."""
         return self.printed(self.expression(quantity, row, column))
+
+    def later(self, quantity: str, row: int, column: int) -> Callable[[], str]:
+        """Return what gives an entry as people type it: few are read, and SymPy takes long."""
+        return lambda: self.text(quantity, row, column)
 
     def printed(self, expression: object) -> str:
         """Return an expression, or a number, as text; SymPy takes long over it."""
@@ -294,9 +290,11 @@ class Reference:
                     known[item][0] += results[node]
                     known[item][1] += np.abs(results[node])
 
-    def named(self, states: States, k: int) -> dict[str, float]:
-        """Return one of the states as numbers by name."""
-        return {name: float(value[k]) for name, value in self.inputs(states).items()}
+    def difference(self, states: States, written: Array, right: Array) -> Difference:
+        """Return the state at which an entry differs the most, of values of shape (N,)."""
+        k = int(np.argmax(np.nan_to_num(np.abs(written - right), nan=np.inf, posinf=np.inf)))
+        state = {name: float(value[k]) for name, value in self.inputs(states).items()}
+        return Difference(state, float(right[k]), float(written[k]))
 
     def inputs(self, states: States) -> dict[str, Array]:
         """Return the values of coordinates, rates, parameters and t by name, (N,) each.

@@ -31,8 +31,6 @@ def match_rows(
         The generated ones; Phi last.
     group
         The set of parameters of each state, shape (N,).
-    may_scale
-        Whether a row may be a multiple of the generated one.
     """
 
     def pair(row: int, target: int) -> Multiple:

@@ -77,8 +77,6 @@ def random_states(system: ConstraintSystem, is_usable: Callable[[States], Array]
 
     Parameters
     ----------
-    system
-        The system; its guess gives the size of lengths.
     is_usable
         Returns for each state whether it can be used, shape (N,). Far from the guess a root or a
         logarithm may not exist; then states near the guess serve.
@@ -138,8 +136,6 @@ def given_states(given: Mapping[str, ArrayLike], system: ConstraintSystem) -> St
     given
         Arrays ``q`` (N, n), and ``q_dot`` (N, n), ``t`` (N,), ``p`` (N, k), which default to zero
         rates, t = 0 and the parameters' defaults. One state may do without its leading axis.
-    system
-        The system whose states they are.
 
     Raises
     ------

@@ -90,7 +90,6 @@ class TurnedReference(Reference):
 
     @cached_property
     def _rows(self) -> list[EquationRow]:
-        """The rows as SymPy expressions, which people read."""
         rows = turned_rows(self.constraints, self.system.bodies)
         return [self._about_global_axes(row) for row in rows] if self.is_global else rows
 

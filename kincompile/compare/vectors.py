@@ -199,7 +199,6 @@ def with_roles_exchanged(joint: Joint) -> Joint | None:
 
 
 def _other(name: str) -> str:
-    """Return the name of the same attribute on the other body."""
     if name.endswith("_i"):
         return name[:-1] + "j"
     return name[:-1] + "i" if name.endswith("_j") else name

@@ -179,8 +179,6 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
 
     Parameters
     ----------
-    reference
-        The system.
     aliases
         Further names, each with its expression: a text, a `Cell` or SymPy. An alias may use those
         before it.
@@ -244,7 +242,6 @@ def _numbered(reference: Reference) -> Iterator[tuple[str, str]]:
 
 
 def _help(reference: Reference) -> str:
-    """Return in words which names there are."""
     system = reference.system
     names = [*reference.coordinates, *(item.name for item in system.parameters), "t"]
     text = f"the names are: {listed(names, 60)}, and rates such as {rate(names[0])}"
@@ -277,16 +274,10 @@ def read_written(
 
     Parameters
     ----------
-    quantity
-        Phi, Phi_q, nu, gamma, M or Q.
     given
         Text, rows of `Cell`, nested lists of numbers, texts and SymPy expressions, a SymPy matrix,
         a NumPy array, or a function ``f(q, t)`` (of gamma and Q: ``f(q, q_dot, t)``), which
         may also take the parameters as a last argument.
-    words
-        The names that formulas may use.
-    reference
-        The system that the quantity belongs to.
     at_states
         Whether an array holds values at given states.
     shape_problems
@@ -314,7 +305,6 @@ def read_written(
 
 
 def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> list[sympy.Expr]:
-    """Return the entries as expressions, row by row."""
     expressions: list[sympy.Expr] = []
     problems: list[str | None] = []
     for r, row in enumerate(rows, 1):

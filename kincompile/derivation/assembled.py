@@ -252,7 +252,6 @@ def _square_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entr
 
 
 def _listed_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> Block:
-    """Return the entries one below the other."""
     rows: Rows = [
         (
             Verbatim(evaluation.system.equations[row]),
@@ -303,7 +302,6 @@ def _iterations(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]
 
 
 def _first_step(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]:
-    """Yield the first correction with all its numbers."""
     if result.iterations == 0:
         return
     guess = result.iterates[0] + 0.0

@@ -212,7 +212,6 @@ def constraint_chapters(
 
 
 def _require_form(system: ConstraintSystem, constraint: str | None, form: str) -> None:
-    """Check that a mechanism, or a constraint of it, has a form."""
     if form not in (BY_P, BY_OMEGA):
         raise InputError(f"there is no form {form!r}; forms are: {listed((BY_P, BY_OMEGA))}")
     if form == BY_P:
@@ -228,7 +227,6 @@ def _require_form(system: ConstraintSystem, constraint: str | None, form: str) -
 def _require_known(
     system: ConstraintSystem, constraint: str | None, levels: tuple[str, ...]
 ) -> None:
-    """Check the name of a constraint and those of levels."""
     names = [item.name for item in system.constraints]
     if constraint is not None and constraint not in names:
         raise InputError(

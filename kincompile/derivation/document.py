@@ -47,15 +47,7 @@ Runs: TypeAlias = tuple[Run, ...]
 
 @dataclass(frozen=True, slots=True)
 class SourceLine:
-    """Lines of the emitted module.
-
-    Attributes
-    ----------
-    number
-        Number of the first line, from 1.
-    text
-        The lines, stripped.
-    """
+    """Lines of the emitted module."""
 
     number: int
     text: str
@@ -74,8 +66,6 @@ class Display:
 
     Attributes
     ----------
-    formula
-        What is displayed.
     anchor
         Where links to it lead; "" for none.
     source
@@ -93,10 +83,6 @@ class Table:
 
     Attributes
     ----------
-    header
-        Titles of the columns.
-    rows
-        Cells, each a text.
     folded
         Title under which it is folded away where the medium can fold, "" for an open table.
     """
@@ -112,8 +98,6 @@ class Pattern:
 
     Attributes
     ----------
-    rows, columns
-        Names.
     entries
         Anchor of the derivation of each entry, by row and column.
     bands
@@ -151,12 +135,6 @@ class Chapter:
     ----------
     anchor
         Where links to it lead.
-    title
-        A text.
-    blocks
-        What it says.
-    sections
-        Its parts, after the blocks.
     level
         "vector", "expanded" or "numeric"; "" where that says nothing.
     is_folded
@@ -177,16 +155,12 @@ class Manuscript:
 
     Attributes
     ----------
-    name
-        Name of the mechanism.
     summary
         Sizes, and the state of the numbers, in a few words.
     sections
         What the page says: coordinates, constraints (nine steps each), the assembled system.
     abbreviations
         Symbols that stand for vectors and angles which occur again and again.
-    source
-        Text of the emitted module.
     state
         Python code that sets t, q, q_dot and p to the state of the numbers.
     """

@@ -52,16 +52,10 @@ class Evaluation:
 
     Attributes
     ----------
-    system, code, source, module
-        The system, its program, the text of the emitted module, the module.
     origin
         The source of the state, in words.
-    t
-        Time.
     q, q_dot, q_ddot
         Coordinates and rates, shape (n,); the rates are zero where they are not determined.
-    p
-        Parameters, shape (k,).
     Phi, Phi_q, nu, gamma
         The values of the emitted module there.
     assembly

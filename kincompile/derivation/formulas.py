@@ -24,10 +24,6 @@ class Glyph:
         The letter, or the name of a Greek one.
     index
         Subscript; several indices are separated by commas.
-    dots
-        Number of dots over it.
-    bold
-        Whether it is a vector or a matrix.
     exponent
         Superscript, "" for none.
     """

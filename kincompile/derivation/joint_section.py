@@ -216,7 +216,6 @@ class JointSteps(Steps[RowBlock]):
                 yield Display(Equated((Glyph(letter, frame.index), decimals(np.array(matrix)))))
 
     def _rotations(self) -> Iterator[Block]:
-        """Yield the rotation matrices of bodies in space."""
         expansion = Expansion(SymbolicEnvironment(self.joint), 3)
         for frame in self.joint.template.frames:
             entries = [
@@ -270,7 +269,6 @@ def _attribute_symbol(symbol: str, kind: Kind) -> Formula:
 
 
 def _attribute(joint: Joint | AppliedLoad, symbol: str) -> Formula:
-    """Return an attribute as the user wrote it."""
     if symbol in joint.points:
         return column(tuple(_as_written(value) for value in joint.points[symbol]))
     if symbol in joint.profiles:

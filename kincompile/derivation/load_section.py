@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy
 
-from kincompile.calculus.expressions import ZERO, Norm, Scalar, Vector, VectorSum
+from kincompile.calculus.expressions import (
+    ZERO,
+    Norm,
+    Scalar,
+    Sum,
+    Vector,
+    VectorSum,
+    dot,
+    split_factor,
+    sum_of,
+)
 from kincompile.derivation.document import Chapter, Display, Math, Verbatim, table, text
 from kincompile.derivation.formulas import (
     LAMBDA,
@@ -63,7 +73,7 @@ def loads_section(evaluation: Evaluation) -> Chapter:
 
 
 def load_abbreviations(template: LoadTemplate) -> dict[Expression, Glyph]:
-    """Name the vector between the points of a load, and its rate."""
+    """Name the vector between the points of a load and its rate, torque and rate of a hinge."""
     q_dot: Direction = dict(zip(template.coordinates, template.rates, strict=True))
     found = (item for _, moved in template.work for item in parts(moved))
     names: dict[Expression, Glyph] = {}
@@ -71,11 +81,20 @@ def load_abbreviations(template: LoadTemplate) -> dict[Expression, Glyph]:
         if isinstance(item, Norm) and isinstance(item.vector, VectorSum):
             names[item.vector] = Glyph("d")
             names[along(item.vector, q_dot)] = Glyph("d", dots=1)
+    if len(template.frames) > 1 and len(template.work) > 1:  # a couple about a hinge in space
+        rates: list[Scalar] = []
+        for force, moved in template.work:
+            assert isinstance(force, Vector)
+            assert isinstance(moved, Vector)
+            torque, way = split_factor(force)
+            rates.append(dot(way, along(moved, q_dot)))
+            if isinstance(torque, Sum):
+                names[torque] = Glyph("tau", bold=False)
+        names[sum_of(tuple(rates))] = Glyph("omega", bold=False)
     return names
 
 
 def _section(evaluation: Evaluation, load: AppliedLoad) -> Chapter:
-    """Return the derivation of a load."""
     name = load.name
     steps = (
         _step(load, 1, "What it is", attributes_table(load, evaluation.values), level=""),

@@ -25,7 +25,6 @@ DOTS = ("", "\N{DOT ABOVE}", "\N{DIAERESIS}")
 
 
 def _alphabet(latin: str, greek: str, capital_greek: str) -> dict[int, int]:
-    """Return plain letters as those of a mathematical alphabet, given the first of each range."""
     ranges = (("A", "Z", latin, 0), ("a", "z", latin, 26), ("\u03b1", "\u03c9", greek, 0),
               ("\u0391", "\u03a9", capital_greek, 0))  # fmt: skip
     return {

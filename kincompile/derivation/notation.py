@@ -76,6 +76,10 @@ def split_name(name: str) -> tuple[str, str, int]:
 class Notation:
     """Printing methods for the vector calculus, for formulas and for the expanded code.
 
+    A medium gives the first methods: things side by side, letters by their names, the text of an
+    index, operators and brackets, one at the beginning of a continued line (`_leading`), numerals,
+    dots or a tilde over something, an index or an exponent or both, and so on.
+
     Attributes
     ----------
     abbreviations
@@ -84,51 +88,26 @@ class Notation:
 
     abbreviations: Mapping[Any, Glyph]
 
-    def _row(self, parts: Sequence[Printed]) -> Printed:
-        """Return things side by side."""
-
-    def _letter(self, name: str, *, bold: bool = False) -> Printed:
-        """Return a letter, a Greek letter by its name, or a word."""
-
-    def _index_text(self, index: str) -> Printed:
-        """Return the text of an index."""
-
-    def _operator(self, text: str) -> Printed:
-        """Return an operator or a bracket."""
-
-    def _leading(self, text: str) -> Printed:
-        """Return an operator at the beginning of a continued line."""
-
-    def _numeral(self, text: str) -> Printed:
-        """Return a number."""
-
-    def _dotted(self, base: Printed, dots: int) -> Printed:
-        """Return something with dots over it."""
-
-    def _tilded(self, base: Printed) -> Printed:
-        """Return something with a tilde over it: a skew matrix."""
-
-    def _scripts(self, base: Printed, index: Printed | None, exponent: Printed | None) -> Printed:
-        """Return something with an index, an exponent, or both."""
-
-    def _fraction(self, numerator: Printed, denominator: Printed) -> Printed:
-        """Return a fraction."""
-
-    def _function(self, name: str) -> Printed:
-        """Return the name of a function."""
-
-    def _root(self, value: Printed) -> Printed:
-        """Return a square root."""
-
+    def _row(self, parts: Sequence[Printed]) -> Printed: ...
+    def _letter(self, name: str, *, bold: bool = False) -> Printed: ...
+    def _index_text(self, index: str) -> Printed: ...
+    def _operator(self, text: str) -> Printed: ...
+    def _leading(self, text: str) -> Printed: ...
+    def _numeral(self, text: str) -> Printed: ...
+    def _dotted(self, base: Printed, dots: int) -> Printed: ...
+    def _tilded(self, base: Printed) -> Printed: ...
+    def _scripts(
+        self, base: Printed, index: Printed | None, exponent: Printed | None
+    ) -> Printed: ...
+    def _fraction(self, numerator: Printed, denominator: Printed) -> Printed: ...
+    def _function(self, name: str) -> Printed: ...
+    def _root(self, value: Printed) -> Printed: ...
     def _fenced_with(self, value: Printed, exponent: Printed) -> Printed:
         """Return something in brackets with an exponent."""
         return self._scripts(self._fenced(value), None, exponent)
 
-    def _thin_space(self) -> Printed:
-        """Return what stands between factors."""
-
-    def _array(self, rows: Sequence[Sequence[Printed]]) -> Printed:
-        """Return a matrix in brackets."""
+    def _thin_space(self) -> Printed: ...
+    def _array(self, rows: Sequence[Sequence[Printed]]) -> Printed: ...
 
     if TYPE_CHECKING:
 
@@ -237,6 +216,9 @@ class Notation:
 
     def _print_Norm(self, expr: ex.Norm) -> Printed:
         return self._row([self._operator("|"), self._short(expr.vector), self._operator("|")])
+
+    def _print_Root(self, expr: ex.Root) -> Printed:
+        return self._root(self._print(expr.square))
 
     def _print_Dot(self, expr: ex.Dot) -> Printed:
         return self._row([self._transposed(expr.left), self._factor(expr.right)])
@@ -484,7 +466,6 @@ class Notation:
 
 
 def _is_slope(term: Any) -> bool:
-    """Return whether a term is a row of the derivative of a rotation."""
     return isinstance(term.vector if isinstance(term, ex.Scaled) else term, ex.RowOfSlope)
 
 

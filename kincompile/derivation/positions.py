@@ -79,6 +79,5 @@ def _leads(result: NewtonResult, q: Array, scales: Array) -> bool:
 
 
 def _scales(module: ModuleType, q: Array, t: float) -> Array:
-    """Return the scale of each coordinate."""
     with np.errstate(all="ignore"):
         return problem(module, module.DEFAULTS, q, t).reference

@@ -56,14 +56,8 @@ class Steps(ABC, Generic[Derived]):
 
     Attributes
     ----------
-    evaluation
-        The emitted module, for formulas and numbers.
     rows
         The rows of the constraint in the emitted program.
-    name
-        Name of the constraint.
-    columns
-        Names of its coordinates.
     derivatives
         What follows from Phi, for each row block of a joint or each expression of an equation.
     level
@@ -156,7 +150,6 @@ class Steps(ABC, Generic[Derived]):
         return self.step(9, "In numbers", *blocks, *self._results(), level="numeric")
 
     def _state(self) -> Block:
-        """Return coordinates and rates at the state."""
         evaluation = self.evaluation
         rows: list[tuple[Run | Runs, ...]] = []
         for name in self.columns:

@@ -39,8 +39,6 @@ class TexPrinter(Notation, LatexPrinter):
 
     Parameters
     ----------
-    abbreviations
-        What is printed as one symbol.
     is_breakable
         Whether a line may be broken between factors.
     """

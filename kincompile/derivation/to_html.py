@@ -52,7 +52,7 @@ def as_html(
     renderer = _HtmlRenderer(document)
     data = {
         "kind": kind,
-        "font": read("derivation/math.css"),
+        "style": read("derivation/math.css") + read("derivation/page.css").rstrip(),
         "title": escape(f"{title} {document.name}"),
         "heading": f"{escape(title)} <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
@@ -65,8 +65,6 @@ def as_html(
 
 
 class _HtmlRenderer(Renderer):
-    """Prints elements of HTML."""
-
     def __init__(self, document: Manuscript) -> None:
         self._printer = MathMLPrinter(document.abbreviations)
 

@@ -44,8 +44,6 @@ def as_tex(document: Manuscript) -> str:
 
 
 class _LatexRenderer(Renderer):
-    """Prints LaTeX."""
-
     def __init__(self, document: Manuscript) -> None:
         self._printer = TexPrinter(document.abbreviations, is_breakable=True)
 

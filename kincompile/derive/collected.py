@@ -49,8 +49,6 @@ def collected(expression: ex.Expression, names: Mapping[ex.Expression, object]) 
 
     Parameters
     ----------
-    expression
-        What was derived.
     names
         What is printed as one symbol, and so not multiplied out.
 
@@ -72,13 +70,7 @@ def collected(expression: ex.Expression, names: Mapping[ex.Expression, object]) 
 def like_terms(
     expression: ex.Expression, names: Mapping[ex.Expression, object]
 ) -> list[tuple[Monomial, Core, Polynomial]]:
-    """Return an expression multiplied out: scalars, vector, and the rates that stand with them.
-
-    Parameters
-    ----------
-    expression, names
-        As for `collected`.
-    """
+    """Return an expression multiplied out: scalars, vector, and the rates that stand with them."""
     found: dict[tuple[Monomial, Core], Polynomial] = {}
     for number, monomial, core in _terms(expression, _Atoms(names)):
         rates = tuple(item for item in monomial if is_rate(item[0]))
@@ -130,7 +122,6 @@ class _Atoms:
 
 
 def _terms(expression: ex.Expression, atoms: _Atoms) -> list[Term]:
-    """Return the terms of an expression, multiplied out."""
     if expression in atoms.whole:
         return [_atom(expression)]
     match expression:
@@ -190,7 +181,6 @@ def _multiplied(parts: list[list[Term]]) -> list[Term]:
 
 
 def _times(first: Term, second: Term) -> Term:
-    """Return the product of two terms, of which one at most is a vector."""
     core = first[2] if second[2] is None else second[2]
     return first[0] * second[0], _joined(first[1], second[1]), core
 

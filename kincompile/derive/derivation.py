@@ -20,8 +20,6 @@ class RowBlock:
 
     Attributes
     ----------
-    Phi
-        The constraint.
     Phi_q
         Its columns: Phi_q q_dot with each rate one in turn, by component of the coordinates of the
         template, and each a vector or a scalar, as Phi is.

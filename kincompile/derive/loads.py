@@ -83,8 +83,6 @@ def derive_load(template: LoadTemplate, others: int, *, varies: bool) -> LoadDer
 
     Parameters
     ----------
-    template
-        Its kinetic energy and its work.
     others
         How many coordinates of others its values depend on.
     varies
@@ -119,7 +117,6 @@ def _columns(symbols: tuple[Leaf, ...]) -> list[Direction]:
 
 
 def _work(template: LoadTemplate, direction: Direction) -> tuple[ex.Scalar, ...]:
-    """Return the work of each force for a displacement."""
     return tuple(inner(force, along(moved, direction)) for force, moved in template.work)
 
 

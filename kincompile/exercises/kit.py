@@ -117,8 +117,12 @@ class ExerciseKit:
 
     def __repr__(self) -> str:
         """Return name and sizes."""
-        sizes = f"{len(self.variants)} students, {len(self.blanks)} blanks"
-        return f"<ExerciseKit {self.name!r}: {sizes}>"
+        return f"<ExerciseKit {self.name!r}: {self.sizes}>"
+
+    @property
+    def sizes(self) -> str:
+        """How many students and blanks it has, in words."""
+        return f"{len(self.variants)} students, {len(self.blanks)} blanks"
 
 
 def exercise(
@@ -178,13 +182,7 @@ def exercise(
 
 
 def require_new_folder(folder: Path) -> None:
-    """Refuse a folder that exists and is not empty, or whose place does not exist.
-
-    Raises
-    ------
-    InputError
-        Says which, and what to do.
-    """
+    """Refuse a folder that exists and is not empty, or whose place does not exist."""
     if folder.is_dir() and not any(folder.iterdir()):
         return
     if folder.exists():

@@ -65,13 +65,6 @@ class AnalysisSettings:
 def read_adm(path: Path, content: bytes) -> Mechanism:
     """Read a model of simEngine2D.
 
-    Parameters
-    ----------
-    path
-        The file, for messages.
-    content
-        What the file holds.
-
     Returns
     -------
     Mechanism
@@ -100,8 +93,6 @@ def read_acf(path: Path, content: bytes) -> AnalysisSettings:
 
     Parameters
     ----------
-    path
-        The file, for messages.
     content
         What the file holds: simulation, tend, stepSize, outputSteps.
 
@@ -142,7 +133,6 @@ def _check_kind(reader: FieldReader, given: Any) -> None:
 
 
 def _steps(reader: FieldReader, data: Row, end: float) -> int:
-    """Return the number of steps between the times of the output."""
     if "outputSteps" in data:
         steps = data["outputSteps"]
         if type(steps) is int and 1 <= steps <= MOST_POINTS:
@@ -277,7 +267,6 @@ class _AdmReader(FieldReader):
         return constraint(name, *values)
 
     def _value(self, key: str, row: Row, address: Address) -> Any:
-        """Return the value of a field: a body, a point, a direction, a number or a function."""
         place = (*address, key)
         if key in ("body1", "body2"):
             return self._body_of(row, key, place)

@@ -106,19 +106,16 @@ class BodyReader(SketchReader):
         return body, (*("position",) * 3, *(turned,) * 4)
 
     def _orientation(self, given: Any, address: Address) -> Any:
-        """Return four Euler parameters, or the three rows of a rotation matrix."""
         if isinstance(given, list) and len(given) == 3:
             return self._rows(given, address)
         return self.components(given, address, "[e0, e1, e2, e3]")
 
     def _inertia(self, given: Any, address: Address) -> Any:
-        """Return three principal moments, or the three rows of a matrix."""
         if isinstance(given, list) and any(isinstance(row, list) for row in given):
             return self._rows(given, address)
         return self.components(given, address, "[J_xi, J_eta, J_zeta]")
 
     def _rows(self, given: list[Any], address: Address) -> list[tuple[Any, ...]]:
-        """Return the rows of a matrix."""
         rows = enumerate(given)
         return [self.components(row, (*address, k), "[., ., .]") for k, row in rows]
 
@@ -132,7 +129,6 @@ class BodyReader(SketchReader):
         return self.components(row.get(key, [0] * self.words.count), (*address, key), words)
 
     def _outline(self, given: Any, address: Address) -> tuple[Scalars, ...]:
-        """Return the corners of a body's outline."""
         if not isinstance(given, list):
             self.problem(address, f"expected a list of corners [xi, eta], not {shown(given)}")
             return ()

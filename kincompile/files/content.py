@@ -28,10 +28,6 @@ def file_content(
 
     Parameters
     ----------
-    path
-        The file.
-    most
-        Largest number of bytes.
     endings
         Endings that a reader may have forgotten, for a hint where there is no such file.
     follows_links

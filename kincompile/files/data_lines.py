@@ -43,13 +43,7 @@ def json_lines(text: str) -> Iterator[tuple[Address, int]]:
 
 
 class _Outline:
-    """Follows brackets, keys and commas through one value.
-
-    Parameters
-    ----------
-    base
-        Address of the value.
-    """
+    """Follows brackets, keys and commas through one value."""
 
     def __init__(self, base: Address) -> None:
         self._stack: list[list[str | int | None]] = []
@@ -148,12 +142,10 @@ class _TomlScan:
 
 
 def _key(tokens: list[str]) -> list[str]:
-    """Return the parts of a dotted key."""
     return [_unquoted(token) for token in tokens if token != "."]
 
 
 def _unquoted(token: str) -> str:
-    """Return a key without its quotes."""
     if token[0] == '"':
         try:
             return str(json.loads(token))

@@ -57,10 +57,6 @@ class Document:
 
     Attributes
     ----------
-    file
-        Its name, for messages.
-    text
-        Its text.
     data
         Its values: dicts, lists, texts, numbers, truth values.
     is_toml
@@ -164,8 +160,6 @@ def read_json(path: Path, content: bytes, words: Mapping[str, str] | None = None
 
     Parameters
     ----------
-    path, content
-        The file, and its content.
     words
         Of a foreign format its keys, by their lower case: they are read without regard to case, and
         a number may be written 187/255, which is read as a text. None for JSON itself.

@@ -23,18 +23,7 @@ _SINGULAR = {"bodies": "body"}
 
 
 class FieldReader:
-    """Takes values from a document and collects what is wrong with them.
-
-    Parameters
-    ----------
-    document
-        The file.
-
-    Attributes
-    ----------
-    problems
-        What has been found, each with file, line and field.
-    """
+    """Takes values from a document and collects what is wrong with them."""
 
     def __init__(self, document: Document) -> None:
         self.document = document
@@ -208,7 +197,6 @@ class FieldReader:
 
 
 def _is_number(text: str) -> bool:
-    """Return whether a text is nothing but a number."""
     try:
         float(text)
     except ValueError:

@@ -30,15 +30,7 @@ SMOOTHNESS = 4
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a table.
-
-    Attributes
-    ----------
-    schema
-        JSON Schema of its value.
-    is_required
-        Whether it must be there.
-    """
+    """A field of a table."""
 
     schema: Mapping[str, Any]
     is_required: bool = True
@@ -393,12 +385,10 @@ def model_schema() -> dict[str, Any]:
 
 
 def _loads(count: int) -> list[dict[str, Any]]:
-    """Return the schemas of all loads in the plane, or in space."""
     return [_object(load_fields(item)) for item in dimensions(count).loads().values()]
 
 
 def _constraints(count: int) -> list[dict[str, Any]]:
-    """Return the schemas of all constraints in the plane, or in space."""
     kinds = dimensions(count).constraints.values()
     return [*(_object(constraint_fields(item)) for item in kinds), _object(FIELDS["Equation"])]
 

@@ -98,7 +98,6 @@ def _read(
     readers: Mapping[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]],
     what: str,
 ) -> Mechanism | ConstraintSystem:
-    """Read a file by one of the readers."""
     reader = readers.get(file.suffix.lower())
     content = file_content(file, endings=_READERS)
     if reader is None:

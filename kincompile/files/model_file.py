@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     from kincompile.files.data_lines import Address
     from kincompile.model.arguments import Argument
-    from kincompile.model.constraint import Constraint
+    from kincompile.model.constraint import Constraint, Element
     from kincompile.model.load import Load
     from kincompile.model.mechanism import Mechanism
 
@@ -60,13 +60,6 @@ Row = dict[str, Any]
 
 def read_data_model(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
     """Read a model from TOML or JSON.
-
-    Parameters
-    ----------
-    path
-        The file: its suffix, and its name in messages.
-    content
-        Its content.
 
     Returns
     -------
@@ -159,8 +152,9 @@ class _ModelReader(BodyReader):
         model = self.words.mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
         model.constraints, model.outputs = content["constraints"], content["outputs"]
-        model.loads, model.gravity = content["loads"], content["gravity"]
-        model.tasks = content["tasks"]
+        model.gravity, model.tasks = content["gravity"], content["tasks"]
+        for load in content["loads"]:
+            model.add(load)
         free = content["coordinates"]
         if self.problems and not (model.constraints and (model.bodies or free)):
             return None
@@ -187,7 +181,6 @@ class _ModelReader(BodyReader):
         return None
 
     def _analysis(self, given: Any) -> Row:
-        """Return the last time and the number of points."""
         if not isinstance(given, dict):
             self.problem(("analysis",), f"expected a table of end and points, not {shown(given)}")
             return {}
@@ -246,7 +239,6 @@ class _ModelReader(BodyReader):
         return {**self.names, **self.spins, **{item: sympy.Symbol(item) for item in rates}}
 
     def _load(self, address: Address, row: Row) -> Load | None:
-        """Return a load, None where something is wrong with it."""
         known = self.words.loads()
         before = len(self.problems)
         name = self.name(row, address, "a load")
@@ -257,17 +249,10 @@ class _ModelReader(BodyReader):
         self.remember(f"{kind} {name!r}", address)
         self.remember(f"the load {name!r}", address)
         self.has_fields(address, row, load_fields(known[kind]))
-        given = {
-            key: self._argument(item, row[key], (*address, key))
-            for key, item in known[kind].arguments().items()
-            if key in row
-        }
-        for key in given:
-            self.remember(f"{kind} {name!r}, {key}", (*address, key))
+        given = self._arguments(address, row, known[kind], name)
         return known[kind](name, **given) if len(self.problems) == before else None
 
     def _type_of(self, row: Row, address: Address, known: Collection[str]) -> str | None:
-        """Return the type of a constraint or a load."""
         kind = row.get("type")
         if isinstance(kind, str) and kind in known:
             return kind
@@ -285,7 +270,6 @@ class _ModelReader(BodyReader):
             self.names |= {contact: sympy.Symbol(contact) for contact in contacts}
 
     def _constraint(self, address: Address, row: Row) -> Constraint | Equation | None:
-        """Return a joint, a driver or a free equation, None where something is wrong with it."""
         before = len(self.problems)
         known = self.words.constraints
         kind = self._type_of(row, address, (*known, "Equation"))
@@ -321,18 +305,23 @@ class _ModelReader(BodyReader):
     ) -> Constraint | None:
         fields = constraint_fields(kind)
         self.has_fields(address, row, fields)
-        arguments = {
-            key: self._argument(item, row[key], (*address, key))
-            for key, item in kind.arguments().items()
-            if key in row
-        }
-        for key in arguments:
-            self.remember(f"{kind.__name__} {name!r}, {key}", (*address, key))
+        arguments = self._arguments(address, row, kind, name)
         if len(arguments) < len(kind.arguments()):
             return None
         if "guess" in row and "guess" in fields:
             arguments["guess"] = self._contact_guess(kind, row["guess"], (*address, "guess"))
         return kind(name, **arguments, corners=self._corners(row, address))
+
+    def _arguments(self, address: Address, row: Row, kind: type[Element], name: str) -> Row:
+        """Return the arguments that are given, whose places the checks of the system know."""
+        found = {
+            key: self._argument(item, row[key], (*address, key))
+            for key, item in kind.arguments().items()
+            if key in row
+        }
+        for key in found:
+            self.remember(f"{kind.__name__} {name!r}, {key}", (*address, key))
+        return found
 
     def _contact_guess(self, kind: type[Constraint], given: Any, address: Address) -> Any:
         if not isinstance(given, list):
@@ -341,7 +330,6 @@ class _ModelReader(BodyReader):
         return self.expressions(given, address, self.names, f"{count} start values", count)
 
     def _argument(self, item: Argument, given: Any, address: Address) -> Any:
-        """Return the value of a constraint's argument."""
         if item.kind is Kind.BODY:
             return self.body_name(given, address)
         if item.kind in (Kind.POINT, Kind.AXIS):
@@ -368,7 +356,6 @@ class _ModelReader(BodyReader):
         return self.expression(given, address, self._moving_names())
 
     def _profile(self, given: Any, address: Address) -> Any:
-        """Return a radius as a formula in alpha, or as a table."""
         if not isinstance(given, dict):
             return self.expression(given, address, {**self.names, alpha.name: alpha})
         if not self.has_fields(address, given, FIELDS["profile"]):
@@ -382,7 +369,6 @@ class _ModelReader(BodyReader):
         return tuple(self._numbers(given[key], (*address, key)) for key in ("angles", "radii"))
 
     def _corners(self, row: Row, address: Address) -> bool:
-        """Return whether a driver may have corners."""
         given = row.get("corners", False)
         if not isinstance(given, bool):
             self.problem((*address, "corners"), f"expected true or false, not {shown(given)}")

@@ -41,8 +41,6 @@ def read_python(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
     ----------
     path
         The file; its folder can be imported from while it runs, as by ``python FILE``.
-    content
-        What the file holds.
 
     Raises
     ------

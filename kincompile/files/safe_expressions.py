@@ -114,8 +114,6 @@ def parse_expression(
         ``**`` are both powers.
     names
         What each name stands for.
-    place
-        Where the text begins in its file, for messages.
     refused
         Names that exist and are not allowed here, each with the reason.
 
@@ -452,7 +450,6 @@ class _Reader:
 
 
 def _fits(value: sympy.Number) -> bool:
-    """Return whether a double can hold the number."""
     if isinstance(value, sympy.Rational):
         return max(abs(int(value.p)), int(value.q)).bit_length() <= MAX_BITS
     try:

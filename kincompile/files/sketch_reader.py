@@ -31,15 +31,7 @@ PLACE: Address = ("sketch",)
 
 
 class SketchReader(FieldReader):
-    """Reads a drawing, and motions, by the names that are known so far.
-
-    Attributes
-    ----------
-    names
-        What may occur in formulas.
-    bodies
-        Where each body is declared.
-    """
+    """Reads a drawing, and motions, by the names that are known so far."""
 
     def __init__(self, document: Document) -> None:
         super().__init__(document)

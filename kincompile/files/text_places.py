@@ -20,8 +20,6 @@ class TextPlaces:
 
     Parameters
     ----------
-    text
-        The text.
     first
         Where it begins in its file.
     """

@@ -24,7 +24,15 @@ from kincompile.ir.inline import Entry
 from kincompile.ir.observing import bound, marked, observing_program
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
-from kincompile.names import correction, force_units, listed, rate, solved, without_loads
+from kincompile.names import (
+    correction,
+    force_units,
+    listed,
+    multiplier,
+    rate,
+    solved,
+    without_loads,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -32,17 +40,11 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
 
+    Place = tuple[int, int]
+
 
 def require_masses(code: InlineProgram) -> None:
-    """Refuse a mechanism some bodies of which have no mass.
-
-    Raises
-    ------
-    InputError
-        If it has no masses and no forces.
-    StructuralError
-        With the bodies, and what to do.
-    """
+    """Refuse a mechanism some bodies of which have no mass, or that has no loads at all."""
     if not code.program.loads:
         raise InputError(without_loads(code.program.name))
     heavy = {entry.row for entry in code.entries("M") if entry.row == entry.column}
@@ -58,17 +60,8 @@ def require_masses(code: InlineProgram) -> None:
 def observing_accelerations(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
     """Return a program whose outputs are the accelerations of a mechanism that moves freely.
 
-    Parameters
-    ----------
-    code
-        A mechanism whose bodies have masses.
-    left_out
-        Rows of equations that repeat others.
-
-    Returns
-    -------
-    Program
-        Its outputs are the accelerations, and the power of loads and drivers together.
+    The power of loads and drivers together comes after them. Rows of equations that repeat others
+    are left out.
     """
     motion = _Motion(code, left_out)
     found = motion.accelerations()
@@ -98,6 +91,39 @@ def observing_corrections(code: InlineProgram, left_out: Collection[int] = ()) -
     found = motion.corrections()
     titles = [OutputColumn(correction(name, k), "") for k in range(2) for name in motion.names]
     return _program(code, "corrections", motion, found, titles, left_out)
+
+
+def observing_slopes(
+    code: InlineProgram, left_out: Collection[int] = ()
+) -> tuple[Program, tuple[Place, ...], dict[Place, float]]:
+    r"""Return a program whose outputs are the system that the derivatives by a state solve.
+
+    The equations of motion, differentiated by a coordinate or rate a, are
+
+    .. math:: M \ddot q_a + \Phi_q^T \lambda_a = Q_a - M_a \ddot q - \Phi_{q,a}^T \lambda,
+              \qquad \Phi_q \ddot q_a = \gamma_a - \Phi_{q,a} \ddot q,
+
+    and those of the power P of loads and drivers follow from the multipliers as
+    :math:`P_a + \nu^T \lambda_a` of what stands there for given multipliers.
+
+    Returns
+    -------
+    Program
+        Its outputs are the entries that vary.
+    tuple
+        Their rows and columns: of the matrix, n + m + 1 columns, then of a right side for each
+        coordinate and each rate.
+    dict
+        The entries that are plain numbers, by row and column.
+    """
+    motion = _Motion(code, left_out)
+    found = motion.slopes()
+    values = {place: motion.graph.value_of(node) for place, node in found.items()}
+    numbers = {place: float(value) for place, value in values.items() if value is not None}
+    moving = {place: node for place, node in found.items() if place not in numbers}
+    titles = [OutputColumn(f"slope_{row}_{column}", "") for row, column in moving]
+    program = _program(code, "slopes", motion, list(moving.values()), titles, left_out)
+    return program, tuple(moving), numbers
 
 
 def _program(
@@ -221,6 +247,39 @@ class _Motion:
         for factor, nu in zip(multipliers, self._column("nu", self._m), strict=True):
             total = graph.sub(total, graph.mul(factor, nu))
         return total
+
+    def slopes(self) -> dict[tuple[int, int], int]:
+        """Return the linear system of the derivatives by coordinates and rates, by place."""
+        graph, n, last, one = self.graph, self.n, self.n + self._m, self.graph.const(1)
+        names = [*map(solved, self.names), *map(multiplier, self._code.program.equations)]
+        unknown = [graph.input(name) for name in names]
+        # What is held in a derivative is an input, in whose place the solution is put afterwards.
+        rest = self._unbalanced(unknown)
+        sides: dict[Place, int] = {}
+        for k, state in enumerate((*map(graph.input, self.names), *self._q_dot), start=last + 1):
+            slopes = enumerate(tangents(graph, rest, {state: one}))
+            sides |= {(row, k): node for row, node in slopes if graph.value_of(node) != 0}
+        solution = dict(zip(names, self.solution(), strict=True))
+        known = {node[1]: k for k, node in enumerate(graph.nodes) if node[0] == "input"}
+        new = graph.instantiate(tuple(graph.nodes), known | solution)
+        matrix = {(x.row, x.column): x.node for x in self._code.entries("M")}
+        for x in self._Phi_q:
+            matrix[n + x.row, x.column] = matrix[x.column, n + x.row] = x.node
+        matrix |= {(n + row, n + row): one for row in range(self._m) if row not in self._rows}
+        matrix |= {(last, n + row): node for row, node in enumerate(self._column("nu", self._m))}
+        matrix[last, last] = one
+        return matrix | {place: new[node] for place, node in sides.items()}
+
+    def _unbalanced(self, unknown: Sequence[int]) -> list[int]:
+        """Return Q - M q_ddot - Phi_q^T lambda, gamma - Phi_q q_ddot, and the power."""
+        graph, n = self.graph, self.n
+        rest = [*self._column("Q", n), *self._column("gamma", self._m)]
+        entries = [(x.row, x.column, x.node) for x in self._code.entries("M")]
+        for x in self._Phi_q:
+            entries += (x.column, n + x.row, x.node), (n + x.row, x.column, x.node)
+        for row, column, node in entries:
+            rest[row] = graph.sub(rest[row], graph.mul(node, unknown[column]))
+        return [*rest, self._power(self._column("Q", n), unknown[n:])]
 
     def corrections(self) -> list[int]:
         """Return the corrections of coordinates and of rates."""

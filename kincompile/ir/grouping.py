@@ -8,6 +8,7 @@ constraints.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -140,26 +141,30 @@ def _classify(program: Program, groups: Sequence[FrameGroup]) -> _Nodes:
             frames |= {node: (first + entry, k) for entry, node in enumerate(body.entries)}
         first += len(item.kinds)
     nodes = program.values
-    kind = np.full(len(nodes), VALUE)
-    index = np.arange(len(nodes))
-    number = np.full(len(nodes), np.nan)
+    # Lists, since single entries of arrays cost ten times as much.
+    kinds_of = [VALUE] * len(nodes)
+    index = list(range(len(nodes)))
+    number = [math.nan] * len(nodes)
 
     def is_moving(node: int) -> bool:
-        return any(kind[k] in (Q_DOT, MOVING) for k in operands_of(nodes[node]))
+        return any(kinds_of[k] in (Q_DOT, MOVING) for k in operands_of(nodes[node]))
 
-    for node, (operation, *operands) in enumerate(nodes):
-        if operation == "input" and operands[0] in places:
-            kind[node], index[node] = places[operands[0]]
+    for node, content in enumerate(nodes):
+        operation = content[0]
+        if operation == "input" and content[1] in places:
+            kinds_of[node], index[node] = places[content[1]]
         elif operation == "const":
-            number[node] = operands[0]
+            number[node] = content[1]
         elif operation == "neg":
-            number[node] = -number[operands[0]]
+            number[node] = -number[content[1]]
         elif node in frames:
-            kind[node], index[node] = frames[node]
-        if program.loads and kind[node] == VALUE and is_moving(node):
-            kind[node] = MOVING
-    kind[~np.isnan(number)] = NUMBER
-    return _Nodes(kinds, kind, index, number, _structures(nodes, kind, len(kinds)))
+            kinds_of[node], index[node] = frames[node]
+        if program.loads and kinds_of[node] == VALUE and is_moving(node):
+            kinds_of[node] = MOVING
+    kind, numbers = np.array(kinds_of), np.array(number, dtype=float)
+    kind[~np.isnan(numbers)] = NUMBER
+    structure = _structures(nodes, kind, len(kinds))
+    return _Nodes(kinds, kind, np.array(index), numbers, structure)
 
 
 def _structures(nodes: Sequence[Node], kind: Index, first: int) -> Index:

@@ -281,7 +281,6 @@ def _is_number(value: object) -> bool:
 
 
 def _evaluated(value: sympy.Expr, at: Array) -> Array:
-    """Return an expression of t at many places."""
     written = value.replace(lambda e: isinstance(e, MotionLaw), lambda e: e.in_pieces())
     known: dict[str, Any] = {}
     for k, item in enumerate(sorted(written.atoms(PeriodicSpline), key=str)):

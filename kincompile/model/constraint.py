@@ -93,6 +93,10 @@ class Element(Shown):
         del defaults
         return points
 
+    def with_own(self) -> tuple[Element, ...]:
+        """Return what `Mechanism.add` adds: what it brings with it, then itself."""
+        return (self,)
+
     @classmethod
     @cache
     def arguments(cls) -> dict[str, Argument]:
@@ -224,8 +228,8 @@ class Constraint(Element):
     frozen_default=True,
     field_specifiers=(
         argument.angle, argument.attribute, argument.axis, argument.body, argument.cross,
-        argument.distance, argument.load, argument.loads, argument.point, argument.profile,
-        argument.radius, argument.value, argument.vector, field,
+        argument.distance, argument.load, argument.loads, argument.measured, argument.point,
+        argument.profile, argument.radius, argument.value, argument.vector, field,
     ),
 )  # fmt: skip
 def constraint_type(cls: type[Type]) -> type[Type]:
@@ -283,7 +287,7 @@ def _listed(what: str, names: Sequence[str]) -> str:
     return f"{what}s are {called}" if len(names) > 1 else f"{what} is {called}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CamConstraint(Constraint):
     """A constraint with contact parameters, whose guess it carries."""
 

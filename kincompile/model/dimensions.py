@@ -36,7 +36,8 @@ WORDS: Mapping[Dimension, str] = {
 }  # fmt: skip
 
 EXPECTED: Mapping[tuple[str, str], Dimension] = {
-    ("Mass", "m"): MASS, ("Mass", "J"): (1, 2, 0), ("Torque", "F"): TORQUE,
+    ("Mass", "m"): MASS, **{("Mass", f"J{row}"): (1, 2, 0) for row in ("", "_1", "_2", "_3")},
+    ("Torque", "F"): TORQUE, ("Torque", "f"): TORQUE, ("FollowerTorque", "f"): TORQUE,
     ("Spring", "k"): (1, 0, -2), ("Spring", "l_0"): (0, 1, 0), ("Spring", "c"): (1, 0, -1),
     ("Spring", "F"): FORCE, ("TorsionSpring", "k"): TORQUE, ("TorsionSpring", "phi_0"): (0, 0, 0),
     ("TorsionSpring", "c"): (1, 2, -1), ("TorsionSpring", "F"): TORQUE,
@@ -72,17 +73,7 @@ class _Given:
 def unit_problems(
     loads: Iterable[tuple[Load, Values]], units: Mapping[str, str], length_unit: str
 ) -> Iterator[str]:
-    """Yield what is wrong with the units of parameters that stand alone for attributes of loads.
-
-    Parameters
-    ----------
-    loads
-        Masses and loads, with the values of their attributes by symbol.
-    units
-        Units of the parameters, by name.
-    length_unit
-        That of the mechanism.
-    """
+    """Yield what is wrong with the units of parameters that stand alone for attributes of loads."""
     found = [item for load, values in loads for item in _given(load, values, units)]
     length, _ = UNITS.get(length_unit, (math.nan, MASS))
     masses: dict[str, float] = {}

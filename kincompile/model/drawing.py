@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from itertools import chain
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from kincompile.errors import ModelError
 from kincompile.model.absolute import AbsoluteX, AbsoluteY
+from kincompile.model.bodies import Body
 from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.points import BodyPoint
 from kincompile.model.relative import Distance
-from kincompile.model.sketch_parts import Drawn, Link
+from kincompile.model.sketch_parts import Drawn, Line, Link
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import sympy
 
@@ -25,9 +26,11 @@ if TYPE_CHECKING:
     from kincompile.model.scope import Point
 
 Item = TypeVar("Item", bound=Constraint | Equation)
+Made = TypeVar("Made", bound=Body)
+"""The type of bodies."""
 
 
-class Drawing:
+class Drawing(Generic[Made]):
     """Joints and links of a drawing, and the mechanism that it makes; `Sketch` is one.
 
     Nothing is refused while drawing; `mechanism` tells all mistakes together.
@@ -93,6 +96,36 @@ class Drawing:
         """Add any constraint, as `Mechanism.add` does; `place` gives its points."""
         return self._mechanism.add(constraint)
 
+    def slider(
+        self,
+        name: str,
+        joints: str | Sequence[str],
+        along: str | PointLike,
+        on: BodyLike | None = None,
+    ) -> Made:
+        """Add a body that slides along a straight guide without turning, and return it.
+
+        Parameters
+        ----------
+        name
+            Name of the slider; its guide is the constraint ``<name>_guide``.
+        joints
+            Joints that it carries, as drawn; the first is on the guide.
+        along
+            The guide: through two joints of one link, as ``"C D"``; or a direction (x, y), in space
+            (x, y, z), in the drawing, through the place where the first joint is drawn.
+        on
+            The link that has a guide given by a direction; the ground if none is named.
+        """
+        what, on = f"slider {name!r}", self._mechanism.ground if on is None else on
+        named = self._drawn.named(joints, what, 1) or ()
+        guide = self._drawn.line(named[0], along, on, what) if named else None
+        return self._sliding(name, named, guide)
+
+    def _sliding(self, name: str, joints: Sequence[str], guide: Line | None) -> Made:
+        """Return the body of a slider, without a guide where something is wrong with it."""
+        raise NotImplementedError
+
     def place(self, link: BodyLike, joint: str) -> Point:
         """Return where a joint is in the frame of a link that has it."""
         found = self._drawn.link_of(link, f"joint {joint!r}")
@@ -149,7 +182,17 @@ class Drawing:
         sizes = f"{len(self._drawn.joints)} joints, {len(self._drawn.links) - 1} links"
         return f"<Sketch {self._mechanism.name!r}: {sizes}; .mechanism() makes the model>"
 
-    def moving_joints(self, name: str, what: str, value: ValueLike) -> Constraint | None:
+    def _drive(
+        self, what: str, value: ValueLike, of_link: Callable[[str, Link], Constraint | None]
+    ) -> None:
+        """Add a driver: that of a link, by its name, or that of joints."""
+        name = "drive_" + "_".join(what.replace(".", " ").split())
+        link = self._drawn.links.get(what)
+        made = self._moving_joints(name, what, value) if link is None else of_link(name, link)
+        if made is not None:
+            self.add(made)
+
+    def _moving_joints(self, name: str, what: str, value: ValueLike) -> Constraint | None:
         """Return the driver of a joint's coordinate, or of the distance of two joints."""
         drawn, title = self._drawn, f"drive of {what!r}"
         joint, _, letter = what.partition(".")

@@ -42,10 +42,6 @@ class Outline:
         Distances of pairs of joints, as far as they are given.
     places
         Joints whose place in the frame is given.
-    values
-        Default values of the parameters.
-    unit
-        Unit of length.
     """
 
     joints: Sequence[str]

@@ -18,12 +18,11 @@ from kincompile.calculus.expressions import (
     VectorSymbol,
     dot,
 )
-from kincompile.calculus.symbols import i, j, v_i
+from kincompile.calculus.symbols import i, j
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
 from kincompile.model.load import Load
-from kincompile.model.relative import separation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -40,6 +39,21 @@ F, k, c, length_0, angle_0 = (Symbol(name) for name in ("F", "k", "c", "l_0", "p
 v_0, g, s_c = Symbol("v_0"), VectorSymbol("g"), VectorSymbol("s_C")
 m, J = Symbol("m"), Symbol("J")
 HALF = Number(Fraction(1, 2))
+
+
+def _friction_problem(numbers: Numbers) -> str | None:
+    (velocity,), (size,) = numbers("v_0"), numbers("F")
+    if velocity is not None and velocity <= 0:
+        return f"the velocity of the smoothed law is {velocity:g}; give a small positive one"
+    if size is not None and size < 0:
+        return f"friction of {size:g} would drive; give what it is when sliding, positive"
+    return None
+
+
+def _nothing_problem(numbers: Numbers) -> str | None:
+    if all(numbers(symbol) == (0,) for symbol in ("k", "c", "F")):
+        return "it has no stiffness, no damping and no force; give one of them"
+    return None
 
 
 @constraint_type
@@ -121,8 +135,27 @@ class Spring(Load):
         return _nothing_problem(numbers)
 
 
+class Turning(Load):
+    """A load of the angle between two bodies; the types are its subclasses."""
+
+    @classmethod
+    def turned(cls) -> Scalar:
+        """Return the angle of body j from body i, over whole turns."""
+        return j.phi - i.phi
+
+    @classmethod
+    def turning(cls) -> Scalar:
+        """Return its rate."""
+        return cls.rate_of(j.phi - i.phi)
+
+    @classmethod
+    def couple(cls, torque: Scalar) -> tuple[Work, ...]:
+        """Return the work of a torque on body j, and its opposite on body i."""
+        return ((torque, j.phi - i.phi),)
+
+
 @constraint_type
-class TorsionSpring(Load):
+class TorsionSpring(Turning):
     """A spring, a damper and an actuator about a hinge between two bodies.
 
     It turns body j back, towards body i, with stiffness (angle - free_angle) + damping angle_dot +
@@ -142,17 +175,13 @@ class TorsionSpring(Load):
     @classmethod
     def work(cls) -> tuple[Work, ...]:
         """Return the torque that turns back, against the angle."""
-        angle = j.phi - i.phi
-        return ((-(k * (angle - angle_0) + c * cls.rate_of(angle) + F), angle),)
+        return cls.couple(-(k * (cls.turned() - angle_0) + c * cls.turning() + F))
 
-    @staticmethod
-    def problem(numbers: Numbers) -> str | None:
-        """Refuse a spring that is none."""
-        return _nothing_problem(numbers)
+    problem = staticmethod(_nothing_problem)
 
 
 @constraint_type
-class HingeFriction(Load):
+class HingeFriction(Turning):
     """Dry friction in a hinge: Coulomb's law, smoothed where the hinge is nearly at rest.
 
     The torque is moment w/sqrt(w^2 + velocity^2) against the relative angular velocity w, so it
@@ -169,13 +198,9 @@ class HingeFriction(Load):
     @classmethod
     def work(cls) -> tuple[Work, ...]:
         """Return the torque against the sliding, and the angle."""
-        angle = j.phi - i.phi
-        return ((_against(cls.rate_of(angle)), angle),)
+        return cls.couple(_against(cls.turning()))
 
-    @staticmethod
-    def problem(numbers: Numbers) -> str | None:
-        """Refuse a velocity that is not positive, and a negative moment."""
-        return _friction_problem(numbers)
+    problem = staticmethod(_friction_problem)
 
 
 @constraint_type
@@ -199,33 +224,17 @@ class SliderFriction(Load):
     @classmethod
     def work(cls) -> tuple[Work, ...]:
         """Return the force against the sliding, and the way along the axis."""
-        way = dot(i.A(v_i), separation()) / Norm(v_i)
+        (body, _), (first, second) = cls.frames(), cls.points()
+        axis = cls.vector("v_i")
+        way = dot(body.A(axis), second - first) / Norm(axis)
         return ((_against(cls.rate_of(way)), way),)
 
-    @staticmethod
-    def problem(numbers: Numbers) -> str | None:
-        """Refuse a velocity that is not positive, and a negative force."""
-        return _friction_problem(numbers)
+    problem = staticmethod(_friction_problem)
 
 
 def _against(velocity: Scalar) -> Scalar:
     """Return the smoothed law of Coulomb, -F v/sqrt(v^2 + v_0^2)."""
     return -(F * velocity / Root(velocity**2 + v_0**2))
-
-
-def _friction_problem(numbers: Numbers) -> str | None:
-    (velocity,), (size,) = numbers("v_0"), numbers("F")
-    if velocity is not None and velocity <= 0:
-        return f"the velocity of the smoothed law is {velocity:g}; give a small positive one"
-    if size is not None and size < 0:
-        return f"friction of {size:g} would drive; give what it is when sliding, positive"
-    return None
-
-
-def _nothing_problem(numbers: Numbers) -> str | None:
-    if all(numbers(symbol) == (0,) for symbol in ("k", "c", "F")):
-        return "it has no stiffness, no damping and no force; give one of them"
-    return None
 
 
 @constraint_type

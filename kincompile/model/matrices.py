@@ -173,7 +173,6 @@ def joint_rows(joint: Joint) -> list[EquationRow]:
 
 
 def _entries(system: CheckedSystem, quantity: str) -> Iterator[tuple[int, int, sympy.Expr]]:
-    """Yield row, column and value of what each load adds to M or to Q."""
     for load in system.loads:
         yield from load_entries(system, load, quantity)
 

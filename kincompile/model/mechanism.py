@@ -200,11 +200,16 @@ class Mechanism(MatrixViews, TextViews):
 
         Its equations are the next rows of the system, its contact parameters the next coordinates.
         """
-        if isinstance(constraint, Element) and constraint.is_load:
-            self.loads.append(constraint)
-        else:
-            self.constraints.append(cast("Constraint | Equation", constraint))
-        return constraint
+        if not isinstance(constraint, Element):
+            self.constraints.append(cast("Equation", constraint))
+            return constraint
+        *others, own = constraint.with_own()
+        for item in (*others, own):
+            if item.is_load:
+                self.loads.append(item)
+            else:
+                self.constraints.append(cast("Constraint", item))
+        return cast("Item", own)
 
     def written(self) -> list[Constraint | Equation]:
         """Return the constraints in the order of their rows."""

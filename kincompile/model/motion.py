@@ -150,7 +150,6 @@ def table(
 
 
 def _items(given: Any, what: str, problems: list[str]) -> list[Any]:
-    """Return the members of a list, a tuple or an array; none of anything else."""
     if isinstance(given, list | tuple | np.ndarray):
         return list(given)
     problems.append(f"{what}: {given!r} is not a list")
@@ -158,7 +157,6 @@ def _items(given: Any, what: str, problems: list[str]) -> list[Any]:
 
 
 def _rows(points: Any, problems: list[str]) -> list[tuple[sympy.Expr, sympy.Expr]]:
-    """Return the points that are pairs, as expressions."""
     rows = []
     for k, point in enumerate(_items(points, "points", problems), 1):
         if not isinstance(point, list | tuple | np.ndarray) or len(point) != 2:
@@ -186,7 +184,6 @@ def _constant(given: Any, where: str, problems: list[str]) -> sympy.Expr:
 
 
 def _laws(given: Any, steps: int, problems: list[str]) -> list[type[Rise]]:
-    """Return the law of each step."""
     if isinstance(given, str):
         titles = [given] * max(steps, 1)
     else:
@@ -207,7 +204,6 @@ def _law_problem(title: Any) -> str | None:
 
 
 def _check_times(times: Sequence[sympy.Expr], problems: list[str]) -> None:
-    """Check that times that are numbers rise."""
     for before, after in pairwise(times):
         step = after - before
         if step.is_number and not step > 0:

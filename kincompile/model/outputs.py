@@ -59,14 +59,10 @@ class ResolvedOutput(Observed):
 
     Attributes
     ----------
-    name, unit
-        As in the columns of a solution.
     value
         In plain symbols of coordinates, rates, parameters and t, with `rate` and points in it.
     columns
         The coordinates on which it depends, or on whose rates.
-    written
-        As it was written, for files.
     """
 
     name: str
@@ -201,7 +197,6 @@ def coordinates(place: AnyPoint) -> tuple[sympy.Expr, ...]:
 
 
 def _scalar(value: object) -> sympy.Expr:
-    """Return a number or an expression; text is refused."""
     try:
         return as_sympy(as_expression(value))
     except NotAnExpressionError as error:
@@ -209,7 +204,6 @@ def _scalar(value: object) -> sympy.Expr:
 
 
 def _moving(point: object) -> tuple[sympy.Expr, ...]:
-    """Return the coordinates of a point of a body."""
     if isinstance(point, BodyPoint):
         return point.coordinates
     raise ModelError(f"{point!r} is no point of a body: give one, as m.point(...) returns it")
@@ -249,7 +243,6 @@ def resolved_point(point: BodyPoint, scope: Scope, length_unit: str) -> PlacedPo
 
 
 def _resolved(output: Output, scope: Scope, length_unit: str) -> ResolvedOutput | None:
-    """Check an output against the names that exist."""
     where, before = f"output {output.name!r}", len(scope.problems)
     unit = length_unit if output.unit is None else output.unit
     scope.problems += filter(None, [unit_problem(unit, where)])

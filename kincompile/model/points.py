@@ -165,18 +165,12 @@ class PlacedPoint(Observed):
 
     Attributes
     ----------
-    name
-        Name of the point.
     columns
         Names of the body's coordinates, None for those of the ground.
     local
         xi and eta.
-    bodies
-        The body.
     rows
         The outputs that its coordinates are.
-    frame
-        The frame of body i in the calculus.
     """
 
     name: str

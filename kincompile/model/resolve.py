@@ -48,17 +48,11 @@ class Joint:
 
     Attributes
     ----------
-    template
-        Phi of the type.
-    bodies
-        Body i, or i and j.
     scalars, points, profiles
         Attributes by their symbol in the template. The value C(t) is among the scalars; a profile
         is an expression of `alpha`.
     columns
         Names of the coordinates in the order of the template, None for those of the ground.
-    written
-        The constraint as the user wrote it.
     """
 
     written: Constraint
@@ -227,7 +221,6 @@ def title_of(constraint: Element) -> str:
 
 
 def _corners(given: Any, title: str, scope: Scope) -> bool:
-    """Return whether corners are allowed."""
     if not isinstance(given, bool):
         scope.problems.append(f"{title}, corners: {given!r} is neither True nor False")
     return given is True
@@ -347,7 +340,7 @@ def text_of(constraint: Element) -> str:
         elif item.kind is Kind.PROFILE:
             parts.append("profile table" if isinstance(given, tuple | list) else "profile")
         elif item.kind is Kind.LOADS:
-            parts.append("({}, {})".format(*given))
+            parts.append(f"({', '.join(map(str, given))})")
         elif not constraint.is_load or given != 0:  # most springs have no damper
             parts.append(f"{name} {given}")
     return " ".join(parts)

@@ -50,12 +50,6 @@ class AppliedLoad:
 
     Attributes
     ----------
-    written
-        As the user wrote it.
-    template
-        Virtual work and kinetic energy of the type.
-    bodies
-        Body i, or i and j.
     scalars, points
         Attributes and values by their symbol in the template, in plain symbols.
     columns
@@ -134,7 +128,6 @@ def resolved_loads(
 
 
 def _resolved(load: Any, scope: Scope) -> AppliedLoad | None:
-    """Check the arguments of a load."""
     if not isinstance(load, Load):
         scope.problems.append(f"{load!r} is not a load; make one with kc.Force or kc.Spring")
         return None
@@ -169,6 +162,7 @@ def _resolved(load: Any, scope: Scope) -> AppliedLoad | None:
     own = tuple(name for body in known for name in scope.columns[body.name])
     others = sorted(occurring.difference(own), key=scope.places.__getitem__)
     columns = (*own, *others)
+    points = dict(load.completed(points, scope.defaults))
     return AppliedLoad(
         load, load.template(), tuple(known), scalars, points, columns, bool(occurring)
     )
@@ -197,7 +191,6 @@ def _value(given: Any, where: str, name: str, occurring: set[str], scope: Scope)
 
 
 def _values(given: Any, where: str, name: str, occurring: set[str], scope: Scope) -> Point:
-    """Return the components of a force."""
     try:
         components = tuple(given)
     except TypeError:

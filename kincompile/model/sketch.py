@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from kincompile.model.scope import Point
 
 
-class Sketch(Drawing):
+class Sketch(Drawing[Body]):
     """A mechanism as one draws it: where the joints are, and which of them each link joins.
 
     Frames, local points, revolute joints and guesses follow. What is on the ground is where it is
@@ -85,35 +85,12 @@ class Sketch(Drawing):
             return self._added(name)
         return self._added(name, {named[0]: (0, 0)}, self._drawn.joints[named[0]])
 
-    def slider(
-        self,
-        name: str,
-        joints: str | Sequence[str],
-        along: str | PointLike,
-        on: BodyLike = GROUND,
-    ) -> Body:
-        """Add a body that slides along a straight guide without turning, and return it.
-
-        Parameters
-        ----------
-        name
-            Name of the slider; its guide is the constraint ``<name>_guide``.
-        joints
-            Joints that it carries, as drawn; the first is on the guide.
-        along
-            The guide: through two joints of one link, as ``"C D"``; or a direction (x, y) in the
-            drawing, through the place where the first joint is drawn.
-        on
-            The link that has a guide given by a direction; the ground if none is named.
-        """
-        drawn, what = self._drawn, f"slider {name!r}"
-        named = drawn.named(joints, what, 1)
-        guide = None if named is None else drawn.line(named[0], along, on, what)
-        if named is None or guide is None:
+    def _sliding(self, name: str, joints: Sequence[str], guide: Line | None) -> Body:
+        if guide is None:
             return self._added(name)
-        origin = drawn.joints[named[0]]
-        base = guide.link
-        places = {joint: base.turned(minus(drawn.joints[joint], origin)) for joint in named}
+        drawn, base = self._drawn.joints, guide.link
+        origin = drawn[joints[0]]
+        places = {joint: base.turned(minus(drawn[joint], origin)) for joint in joints}
         body = self._added(name, places, origin, base.angle, guide)
         own = (body, (0, 0), guide.axis)
         self.add(Translational(f"{name}_guide", base.body, guide.point, guide.axis, *own))
@@ -184,14 +161,9 @@ class Sketch(Drawing):
         against
             The link from which the angle of a link is counted; the x axis if none is named.
         """
-        name = "drive_" + "_".join(what.replace(".", " ").split())
-        link = self._drawn.links.get(what)
-        if link is not None:
-            constraint = self._turning_or_sliding(name, link, value, against)
-        else:
-            constraint = self.moving_joints(name, what, value)
-        if constraint is not None:
-            self.add(constraint)
+        self._drive(
+            what, value, lambda name, link: self._turning_or_sliding(name, link, value, against)
+        )
 
     def _added(
         self,

@@ -25,8 +25,6 @@ class Link:
 
     Attributes
     ----------
-    body
-        Its body.
     places
         Its joints in the frame of the body.
     angle
@@ -202,7 +200,6 @@ class Drawn:
         return lengths, places
 
     def _length(self, given: Any, what: str) -> Scalar:
-        """Return a length, which is positive."""
         value = self._scalar(given, what)
         size = number(value, self.values)
         if size > 0:

@@ -272,7 +272,6 @@ def _loads(
 
 
 def _fill(system: ConstraintSystem, values: Mapping[str, Any]) -> None:
-    """Set the attributes of a system, once."""
     for key, value in values.items():
         object.__setattr__(system, key, value)
 
@@ -284,7 +283,6 @@ def _scope(
     problems: list[str],
     ground: Body,
 ) -> Scope:
-    """Return the names that may be used in a system."""
     return Scope(
         {body.name: body for body in bodies},
         [item.name for item in coordinates],
@@ -297,7 +295,6 @@ def _scope(
 def _resolved(
     written: list[Constraint | Equation], scope: Scope
 ) -> tuple[Joint | FreeEquation, ...]:
-    """Return the valid constraints, resolved."""
     found = (
         resolve_equation(item, scope) if isinstance(item, Equation) else resolve_joint(item, scope)
         for item in written

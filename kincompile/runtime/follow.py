@@ -14,7 +14,6 @@ from kincompile.runtime.engine.engine import Point, rates_agree
 from kincompile.runtime.engine.staged import Staged
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.march import March, Outcome, State, distance
-from kincompile.runtime.memory import empty
 from kincompile.runtime.newton import give_up, start
 from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
 from kincompile.runtime.singular.events import (
@@ -68,9 +67,9 @@ class Motion:
         """Make the arrays for a time grid, with nothing reached."""
         points = inputs.t.size
         if inputs.code.stages:
-            q, q_dot, q_ddot = empty((3, points, inputs.guess.size))
+            q, q_dot, q_ddot = np.empty((3, points, inputs.guess.size))
         else:  # each coordinate contiguous in memory, as the code of a grid wants it
-            q, q_dot, q_ddot = empty((3, inputs.guess.size, points)).transpose(0, 2, 1)
+            q, q_dot, q_ddot = np.empty((3, inputs.guess.size, points)).transpose(0, 2, 1)
         return cls(
             q,
             q_dot,

@@ -66,6 +66,13 @@ and what it changes in the rates are below the error of the interpolation."""
 SMALLEST_STEP_COUNT = 8
 """No coarse step is longer than this part of the grid."""
 
+HERMITE = np.array([
+    [1, 0, 0, -10, 15, -6], [0, 1, 0, -6, 8, -3], [0, 0, 0.5, -1.5, 1.5, -0.5],
+    [0, 0, 0, 10, -15, 6], [0, 0, 0, -4, 7, -3], [0, 0, 0, 0.5, -1, 0.5],
+])  # fmt: skip
+"""The basis of quintic Hermite interpolation over [0, 1], in powers of s: rows for q, h q_dot and
+h^2 q_ddot at the left end, then at the right end."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GridResult:
@@ -81,21 +88,9 @@ class GridResult:
 
 
 def solve_grid(march: March, times: Array, first: State, result: GridResult) -> int:
-    """Solve as much of a time grid as can be trusted, into the arrays of `result`.
+    """Solve as much of a grid of times (N,) as can be trusted, into the arrays of `result`.
 
-    Parameters
-    ----------
-    march
-        That of a module with a planned solve.
-    times : ndarray, shape (N,)
-        The grid.
-    first
-        The point at its start.
-
-    Returns
-    -------
-    int
-        Number of points in the coarse march.
+    `first` is the point at its start. Returns the number of points in the coarse march.
     """
     equations, code = march.equations, march.equations.code
     assert code.lanes is not None
@@ -202,32 +197,17 @@ def _interpolate(nodes: list[_Node], times: Array, q: Array) -> None:
     counts = np.diff(index)
     h = np.repeat(steps, counts)
     s = (times[:-1] - np.repeat(at[:-1], counts)) / h
-    basis = _hermite(s)
+    basis = np.ones((len(HERMITE), s.size))
+    for power, following in itertools.pairwise(basis):
+        np.multiply(power, s, out=following)
     data = np.array([(node.q, node.q_dot, node.q_ddot) for node in nodes]).transpose(0, 2, 1)
     powers = np.vander(steps, 3, increasing=True)[:, np.newaxis]
-    coefficients = np.concatenate((data[:-1] * powers, data[1:] * powers), axis=2)
+    coefficients = np.concatenate((data[:-1] * powers, data[1:] * powers), axis=2) @ HERMITE
     for between, (start, stop) in zip(
         coefficients, itertools.pairwise(index.tolist()), strict=True
     ):
         np.matmul(between, basis[:, start:stop], out=q[:, start:stop])
     q[:, nodes[-1].index] = nodes[-1].q
-
-
-def _hermite(s: Array) -> Array:
-    """Return the basis of quintic Hermite interpolation at s in [0, 1], shape (6, N).
-
-    In the order q, h q_dot, h^2 q_ddot at the left end, then at the right end.
-    """
-    r = 1 - s
-    s3, r3 = s * s * s, r * r * r
-    return np.array((
-        r3 * (1 + s * (3 + 6 * s)),
-        r3 * s * (1 + 3 * s),
-        0.5 * r3 * s * s,
-        s3 * (1 + r * (3 + 6 * r)),
-        -s3 * r * (1 + 3 * r),
-        0.5 * s3 * r * r,
-    ))  # fmt: skip
 
 
 def _solve_block(march: March, t: Array, result: GridResult, block: slice, smallest: Array) -> None:

@@ -66,21 +66,10 @@ class _Arrays:
 
 
 def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> Solution:
-    """Solve all variants over the time grid.
+    """Solve all variants, sets of parameters (B, k), over the time grid of the inputs.
 
-    Parameters
-    ----------
-    inputs
-        Module, times, guess and tolerance; its parameters are not used.
-    sets : ndarray, shape (B, k)
-        Parameters of each variant.
-    progress : callable, optional
-        Called as ``progress(done, total)`` after each chunk of variants.
-
-    Returns
-    -------
-    Solution
-        With arrays q, q_dot, q_ddot of shape (B, N, n) and a status per variant and point.
+    `progress` is called as ``progress(done, total)`` after each chunk of variants. The arrays of
+    the solution have shape (B, N, n), and there is a status per variant and point.
     """
     count = len(sets)
     arrays, begin = _Arrays.over(inputs, count), _first_position(inputs, sets[0])

@@ -64,7 +64,6 @@ def euler_parameters(
 
 
 def _given(given: Any) -> tuple[Scalars, str]:
-    """Return the parameters of what was given alone."""
     if hasattr(given, "as_matrix"):  # of SciPy, which need not be loaded
         given = given.as_matrix()
     elif np.shape(given) == (4,) and any(isinstance(item, sympy.Expr) for item in given):
@@ -82,7 +81,6 @@ def _given(given: Any) -> tuple[Scalars, str]:
 
 
 def _normalised(p: NDArray[np.float64]) -> tuple[Scalars, str]:
-    """Return p of length one."""
     length = float(np.linalg.norm(p))
     if length == 0:
         raise OrientationError(
@@ -130,7 +128,6 @@ def _from_axes(given: Mapping[str, Any]) -> NDArray[np.float64]:
 
 
 def _of_matrix(matrix: NDArray[np.float64]) -> tuple[Scalars, str]:
-    """Return the parameters of a rotation matrix."""
     off = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
     if off > ROUNDED:
         raise OrientationError(
@@ -158,7 +155,6 @@ def _finite(half: sympy.Expr) -> float:
 
 
 def _direction(given: Any, what: str) -> NDArray[np.float64]:
-    """Return a unit vector."""
     numbers = _numbers(given, what)
     size = float(np.linalg.norm(numbers))
     if numbers.shape != (3,) or size == 0:
@@ -167,7 +163,6 @@ def _direction(given: Any, what: str) -> NDArray[np.float64]:
 
 
 def _numbers(given: Any, what: str) -> NDArray[np.float64]:
-    """Return finite numbers as an array."""
     try:
         numbers = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):

@@ -91,16 +91,22 @@ class Parallel(Axes):
 
 
 @constraint_type
-class PointOnLine(SpatialConstraint):
-    """A point on body j lies on an axis of body i."""
+class AxisAndPoint(SpatialConstraint):
+    """A constraint of an axis of body i and a point of body j; the types are its subclasses."""
 
-    source = "Haug 9.4"
-    row_names = ("f", "g")
     i: BodyLike = argument.body("i")
     point_i: PointLike = argument.point("s_i", on="i")
     axis_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
     point_j: PointLike = argument.point("s_j", on="j")
+
+
+@constraint_type
+class PointOnLine(AxisAndPoint):
+    """A point on body j lies on an axis of body i."""
+
+    source = "Haug 9.4"
+    row_names = ("f", "g")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -126,15 +132,10 @@ class InPlane(SpatialConstraint):
 
 
 @constraint_type
-class RelativeTranslation(SpatialConstraint):
+class RelativeTranslation(AxisAndPoint):
     """A point on body j is at C along an axis of body i, counted from a point on the axis."""
 
     source = "Haug 9.4"
-    i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
-    axis_i: PointLike = argument.axis("h_i", on="i")
-    j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -144,16 +145,11 @@ class RelativeTranslation(SpatialConstraint):
 
 
 @constraint_type
-class RevoluteSpherical(SpatialConstraint):
+class RevoluteSpherical(AxisAndPoint):
     """A rod of length C with a hinge on body i, about an axis, and a ball on body j."""
 
     source = "Haug 9.4"
     row_names = ("plane", "distance")
-    i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
-    axis_i: PointLike = argument.axis("h_i", on="i")
-    j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
     distance: ValueLike = argument.distance()
 
     @staticmethod
@@ -164,14 +160,9 @@ class RevoluteSpherical(SpatialConstraint):
 
 
 @constraint_type
-class PointsAndAxes(SpatialConstraint):
+class PointsAndAxes(AxisAndPoint):
     """A joint of an axis of body i and an axis of body j; the types are its subclasses."""
 
-    i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
-    axis_i: PointLike = argument.axis("h_i", on="i")
-    j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
     axis_j: PointLike = argument.axis("h_j", on="j")
 
 

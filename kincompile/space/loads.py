@@ -6,6 +6,7 @@ matrix, generalised forces with their gyroscopic terms, and Jacobians are derive
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -27,13 +28,16 @@ from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
 from kincompile.model.load import Load
 from kincompile.space.bodies import SPATIAL
-from kincompile.space.symbols import AXES, i
+from kincompile.space.constraint import SpatialConstraint
+from kincompile.space.joints import JointAngle
+from kincompile.space.symbols import AXES, f_i, f_j, g_i, g_j, i, j
+from kincompile.space.triads import with_triads
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from kincompile.derive.loads import Work
-    from kincompile.model.constraint import Numbers
+    from kincompile.model.constraint import Element, Numbers
 
 m = Symbol("m")
 f, g, s_c = (VectorSymbol(name, 3) for name in ("f", "g", "s_C"))
@@ -72,6 +76,103 @@ class Spring(loads.Spring):
     """
 
     source = SpatialLoad.source
+    bodies = SPATIAL
+
+
+class Turning(loads.Turning):
+    """A load of the angle about a hinge; the types are its subclasses."""
+
+    bodies = SPATIAL
+    completed = staticmethod(with_triads)
+
+    @classmethod
+    def turning(cls) -> Scalar:
+        """Return h_j^T omega_j - h_i^T omega_i, as the rate of f along g on either body."""
+        return dot(j.A(g_j), cls.rate_of(j.A(f_j))) - dot(i.A(g_i), cls.rate_of(i.A(f_i)))
+
+    @classmethod
+    def couple(cls, torque: Scalar) -> tuple[Work, ...]:
+        """Return the work of a torque about the hinge on body j, and its opposite on body i.
+
+        It is that of a force along g at the tip of f.
+        """
+        return (torque * j.A(g_j), j.A(f_j)), (torque * i.A(g_i), -i.A(f_i))
+
+
+@constraint_type
+class Crosses(Turning):
+    """A load of the angle of a cross from another; the types are its subclasses."""
+
+    i: BodyLike = argument.body("i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    cross_i: PointLike = argument.cross("f_i", on="i")
+    j: BodyLike = argument.body("j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
+    cross_j: PointLike = argument.cross("f_j", on="j")
+
+
+@constraint_type
+class TorsionSpring(loads.TorsionSpring, Crosses):
+    """A spring, a damper and an actuator about a hinge between two bodies.
+
+    It turns body j back with stiffness (angle - free_angle) + damping angle_dot + torque, with the
+    angle of the cross of body j from that of body i, about the axis of body i. It is counted over
+    any number of turns, by a `JointAngle` that the mechanism gets with it, ``<name>_angle``.
+    """
+
+    source = SpatialLoad.source
+    angle: ValueLike | None = argument.measured(
+        "theta",
+        "The angle over whole turns, where a coordinate has it: `theta` of a JointAngle or Screw.",
+        default=None,
+    )
+
+    @classmethod
+    def turned(cls) -> Scalar:
+        """Return the coordinate that counts whole turns."""
+        return Symbol("theta")
+
+    def with_own(self) -> tuple[Element, ...]:
+        """Return the coordinate of its angle, where none is given, and itself."""
+        if self.angle is not None:
+            return (self,)
+        first, second = (self.i, self.axis_i, self.cross_i), (self.j, self.axis_j, self.cross_j)
+        counted = JointAngle(f"{self.name}_angle", *first, *second)
+        return counted, replace(self, angle=counted.theta)
+
+    @staticmethod
+    def problem(numbers: Numbers) -> str | None:
+        """Refuse a cross along its axis, and a spring that is none."""
+        return SpatialConstraint.problem(numbers) or loads.TorsionSpring.problem(numbers)
+
+
+@constraint_type
+class Hinge(Turning):
+    """A load of a hinge, whose angle does not matter; the types are its subclasses."""
+
+    i: BodyLike = argument.body("i")
+    axis_i: PointLike = argument.axis("h_i", on="i")
+    j: BodyLike = argument.body("j")
+    axis_j: PointLike = argument.axis("h_j", on="j")
+
+
+@constraint_type
+class HingeFriction(loads.HingeFriction, Hinge):
+    """Dry friction in a hinge: Coulomb's law, smoothed where the hinge is nearly at rest.
+
+    The torque is moment w/sqrt(w^2 + velocity^2) against the angular velocity w of body j about the
+    axis of body i, so it does not hold a hinge at rest, but lets it creep.
+    """
+
+
+@constraint_type
+class SliderFriction(loads.SliderFriction):
+    """Dry friction on a guide: Coulomb's law, smoothed where the slider is nearly at rest.
+
+    The force is force v/sqrt(v^2 + velocity^2) against the velocity v with which the point of body
+    j slides along the axis of body i, so it does not hold a slider at rest, but lets it creep.
+    """
+
     bodies = SPATIAL
 
 
@@ -165,6 +266,10 @@ SMALL = 1e-9
 """Part of an inertia that may be a rounding error."""
 
 LOADS: Mapping[str, type[Load]] = {
-    item.__name__: item for item in (Force, FollowerForce, Torque, FollowerTorque, Spring)
-}
+    item.__name__: item
+    for item in (
+        Force, FollowerForce, Torque, FollowerTorque, Spring, TorsionSpring, HingeFriction,
+        SliderFriction,
+    )
+}  # fmt: skip
 """The types by name; the mass of a body is not one of them."""

@@ -11,7 +11,7 @@ from kincompile.model.expressions import as_sympy
 from kincompile.model.link_shape import number
 from kincompile.model.sketch_parts import Line, Link, minus
 from kincompile.names import listed
-from kincompile.space.bodies import GROUND, SpatialBody
+from kincompile.space.bodies import SpatialBody
 from kincompile.space.joints import (
     RelativeRotation,
     RelativeTranslation,
@@ -25,7 +25,7 @@ from kincompile.space.primitives import AbsoluteX, AbsoluteY, AbsoluteZ, Distanc
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+    from kincompile.model.arguments import PointLike, ValueLike
     from kincompile.model.constraint import Constraint
     from kincompile.model.expressions import Scalar
     from kincompile.model.scope import Point
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 ORIGIN = (0, 0, 0)
 
 
-class Sketch(Drawing):
+class Sketch(Drawing[SpatialBody]):
     """A mechanism in space as one draws it: where the joints are, and which of them a link joins.
 
         s = spatial.Sketch("swing")
@@ -89,31 +89,8 @@ class Sketch(Drawing):
         named = self._drawn.named(joints, f"link {name!r}", 2)
         return self._added(name, named or ())
 
-    def slider(
-        self,
-        name: str,
-        joints: str | Sequence[str],
-        along: str | PointLike,
-        on: BodyLike = GROUND,
-    ) -> SpatialBody:
-        """Add a body that slides along a straight guide without turning, and return it.
-
-        Parameters
-        ----------
-        name
-            Name of the slider; its guide is the constraint ``<name>_guide``.
-        joints
-            Joints that it carries, as drawn; the first is on the guide.
-        along
-            The guide: through two joints of one link, as ``"C D"``; or a direction (x, y, z) in
-            the drawing, through the place where the first joint is drawn.
-        on
-            The link that has a guide given by a direction; the ground if none is named.
-        """
-        drawn, what = self._drawn, f"slider {name!r}"
-        named = drawn.named(joints, what, 1) or ()
-        guide = drawn.line(named[0], along, on, what) if named else None
-        body = self._added(name, named, guide)
+    def _sliding(self, name: str, joints: Sequence[str], guide: Line | None) -> SpatialBody:
+        body = self._added(name, joints, guide)
         if guide is not None:
             cross = self._beside(guide.axis)
             base = (guide.link.body, guide.point, guide.axis, cross)
@@ -154,14 +131,7 @@ class Sketch(Drawing):
         value
             What it is.
         """
-        name = "drive_" + "_".join(what.replace(".", " ").split())
-        link = self._drawn.links.get(what)
-        if link is None:
-            constraint = self.moving_joints(name, what, value)
-        else:
-            constraint = self._turning_or_sliding(name, link, value)
-        if constraint is not None:
-            self.add(constraint)
+        self._drive(what, value, lambda name, link: self._turning_or_sliding(name, link, value))
 
     def point(self, joint: str) -> SpatialPoint:
         """Name a joint as a point of the first link that has it, and return it, for outputs."""
@@ -200,7 +170,6 @@ class Sketch(Drawing):
         return list(filter(None, made))
 
     def _connect(self, link: Link, other: Link, joints: Sequence[str]) -> Line | None:
-        """Connect two links by the joints that they share."""
         first, *others = joints
         if len(others) > 1:
             self._drawn.problems.append(

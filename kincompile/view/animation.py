@@ -16,7 +16,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.mechanism_plot import axes_of, draw, write_name
 from kincompile.view.svg import Timing, as_svg
 from kincompile.view.traces import described, moving_system, traced_places
-from kincompile.view.worlds import motion_file, solid_svgs
+from kincompile.view.worlds import in_space
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -217,8 +217,7 @@ def _svg_of(
     timing = Timing(length, (t[rows] - t[0]) / ((t[-1] - t[0]) or 1.0))
     description = described(shapes, f"in motion from t = {t[0]:g} to {t[-1]:g} {TIME_UNIT}")
     paths = [place.at(solution.q) for place in places]
-    in_svg: Callable[..., str] = solid_svgs().svg_in_space if shapes.is_spatial else as_svg
-    return in_svg(shapes, q[rows], description, paths=paths, timing=timing)
+    return as_svg(shapes, q[rows], description, paths=paths, timing=timing)
 
 
 def _glb_of(
@@ -234,7 +233,7 @@ def _glb_of(
     if seconds is not None and t.size > 1:
         elapsed *= _playing_time(t, seconds) / elapsed[-1]
     paths = [place.at(q) for place in places]
-    file: bytes = motion_file().as_glb(shapes, elapsed, q, length_unit, paths)
+    file: bytes = in_space("gltf").as_glb(shapes, elapsed, q, length_unit, paths)
     return file
 
 

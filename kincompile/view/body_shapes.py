@@ -65,7 +65,6 @@ def links(
 
 
 def _distinct(points: Iterable[Point]) -> list[Point]:
-    """Return the points without repetitions."""
     found: list[Point] = []
     for point in points:
         here = tuple(map(float, point))

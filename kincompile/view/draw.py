@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ from kincompile.view.drawing import drawing
 from kincompile.view.dxf import LENGTHS, as_dxf
 from kincompile.view.svg import as_svg
 from kincompile.view.traces import described, moving_system, traced_places
-from kincompile.view.worlds import solid_svgs
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -94,13 +92,10 @@ def draw(
         text = as_dxf(shapes, solution.q[row], system.length_unit, paths)
     else:
         size = millimetres(system) if true_size else None
-        when = f"at t = {solution.t[row]:g} s"
-        description = described(shapes, when)
-        in_svg = as_svg
-        if shapes.is_spatial:
-            in_svg = functools.partial(solid_svgs().svg_in_space, view=view or STANDARD[0])
+        description = described(shapes, f"at t = {solution.t[row]:g} s")
+        seen = view or STANDARD[0]
         q = solution.q[row : row + 1]
-        text = in_svg(shapes, q, description, paths=paths, millimetres=size)
+        text = as_svg(shapes, q, description, paths=paths, millimetres=size, view=seen)
     return write_atomically(file, text)
 
 

@@ -56,8 +56,6 @@ class JointLabel:
 
     Attributes
     ----------
-    name, kind
-        Its name, and the name of its type.
     place
         Where it is; on a moving body where it has one. None for a free equation.
     is_driver
@@ -82,14 +80,10 @@ class Drawing:
 
     Attributes
     ----------
-    name
-        Name of the mechanism.
     bodies, frames
         Name and frame of each body, in the order of the mechanism.
     marks
         All shapes, from back to front.
-    joints
-        The constraints, in order.
     size
         The length in which pins and blocks are measured.
     """
@@ -202,7 +196,6 @@ def drawing(
 def _labels(
     system: ConstraintSystem, places: Mapping[str, FramePoint | None], geometry: Geometry
 ) -> tuple[JointLabel, ...]:
-    """Return the labels of the constraints, in order."""
     return tuple(
         JointLabel(
             item.name,

@@ -9,9 +9,9 @@ import numpy as np
 
 from kincompile.errors import package_of_extra
 from kincompile.view.marks import GROUND_FRAME, Contour, Polygon
-from kincompile.view.polylines import Polyline, polylines
+from kincompile.view.polylines import Polyline, pieces, polylines
 from kincompile.view.shapes import HUES
-from kincompile.view.worlds import solid_pictures
+from kincompile.view.worlds import in_space
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -48,8 +48,6 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
 
     Parameters
     ----------
-    drawn
-        Its shapes.
     q : ndarray, shape (n,)
         The position.
     length_unit
@@ -97,7 +95,7 @@ def _add_solids(
     space: Any, drawn: Drawing, q: Array, layers: Sequence[str], paths: Iterable[Array]
 ) -> None:
     """Add the marks of space as faces and lines, and the paths, to the last layer."""
-    for item, part in solid_pictures().all_parts(drawn, q):
+    for item, part in in_space("solid_picture").all_parts(drawn, q):
         attributes = {"layer": _layer(item, layers)}
         if part.normal is None:
             space.add_polyline3d(part.points.tolist(), dxfattribs=attributes)
@@ -141,15 +139,8 @@ def _pieces(points: Array, is_area: bool) -> list[tuple[Array, bool]]:
     """Return the pieces of a line that NaN interrupts, each with whether it is closed."""
     if is_area:
         return [(points, True)]
-    gaps = np.flatnonzero(np.isnan(points).any(axis=1))
-    found = []
-    for piece in np.split(points, gaps):
-        kept = piece[~np.isnan(piece).any(axis=1)]
-        if len(kept) > 2 and (kept[0] == kept[-1]).all():
-            found.append((kept[:-1], True))
-        elif len(kept) > 1:
-            found.append((kept, False))
-    return found
+    found = ((kept, len(kept) > 2 and bool((kept[0] == kept[-1]).all())) for kept in pieces(points))
+    return [(kept[:-1] if is_closed else kept, is_closed) for kept, is_closed in found]
 
 
 def _add(

@@ -107,8 +107,6 @@ class AssemblyGallery:
 
     Attributes
     ----------
-    module
-        What the mechanism was compiled to.
     positions : ndarray, shape (k, n)
         The assemblies, in the order of `kc.assemblies`.
     html
@@ -218,7 +216,6 @@ def _card(data: Mapping[str, Any], name: str, sizes: str, file: str = "") -> dic
 
 
 def _sizes(data: Mapping[str, Any]) -> str:
-    """Return the sizes of a mechanism in words."""
     bodies = len(data["drawing"]["bodies"])
     sizes = f"{len(data['coordinates'])} coordinates, {len(data['equations'])} equations"
     return f"{'1 body' if bodies == 1 else f'{bodies} bodies'}, {sizes}" if bodies else sizes

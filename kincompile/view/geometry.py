@@ -49,12 +49,8 @@ class Geometry:
 
     Attributes
     ----------
-    joints
-        The constraints of known types.
     values
         Parameters by name.
-    frames
-        The frame of each body by name.
     q : ndarray, shape (N, n)
         Positions that rails must fit; all finite.
     """
@@ -149,15 +145,7 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True)
 class JointGeometry:
-    """A joint with its attributes as numbers.
-
-    Attributes
-    ----------
-    joint
-        The resolved constraint.
-    mechanism
-        The joints of the whole mechanism, this one among them.
-    """
+    """A joint with its attributes as numbers."""
 
     joint: Joint
     mechanism: Geometry

@@ -16,8 +16,8 @@ import numpy as np
 from kincompile.view.dxf import LENGTHS
 from kincompile.view.marks import GROUND_FRAME, FramePoint, Span, moves_with, shape_of
 from kincompile.view.picture import colour_of
-from kincompile.view.shapes import HUES
-from kincompile.view.solid_picture import PLATE, mixed
+from kincompile.view.shapes import HUES, mixed
+from kincompile.view.solid_picture import PLATE
 from kincompile.view.solids import InFrame, facets_of, solids
 
 if TYPE_CHECKING:
@@ -60,8 +60,6 @@ def as_glb(
 
     Parameters
     ----------
-    drawn
-        Its shapes, in space.
     t : ndarray, shape (N,)
         Times of the keyframes [s]; they rise, from any start.
     q : ndarray, shape (N, n)
@@ -89,7 +87,6 @@ def as_glb(
 
 
 def _groups(drawn: Drawing) -> dict[BodyFrame, list[Solid]]:
-    """Return the solids that are fixed in each frame."""
     found: dict[BodyFrame, list[Solid]] = {}
     for solid in solids(drawn):
         mark = solid.mark
@@ -189,13 +186,7 @@ def _continuous(turns: Array) -> Array:
 
 @dataclass
 class _File:
-    """The parts of a glTF file, as it grows.
-
-    Attributes
-    ----------
-    times : ndarray of float32, shape (N,)
-        Times of the keyframes.
-    """
+    """The parts of a glTF file, as it grows."""
 
     times: Any
     nodes: list[dict[str, Any]] = field(default_factory=list)

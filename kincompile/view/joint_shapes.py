@@ -176,15 +176,6 @@ def marks_of(
 ) -> list[Mark]:
     """Return the marks of a constraint; a type without a drawing is drawn as the one it extends.
 
-    Parameters
-    ----------
-    constraint
-        The constraint as written: its type decides.
-    joint
-        Its attributes as numbers, and the motion that its marks must fit.
-    drawings
-        The function that draws each type: those of the plane, or of space.
-
     Raises
     ------
     UnsupportedError

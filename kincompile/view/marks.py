@@ -45,8 +45,6 @@ def in_ground(q: Array, frame: BodyFrame, points: Array | Point) -> Array:
     ----------
     q : ndarray, shape (..., n)
         Positions.
-    frame
-        The frame of a body, or of the ground.
     points : array_like, shape (..., 2), in space (..., 3)
         Components in the frame; the leading axes broadcast against those of `q`.
 
@@ -125,8 +123,6 @@ class Rail:
 
     Attributes
     ----------
-    joint
-        The constraint.
     frame, base, axis
         A point of its line and the direction, of length one, in a frame.
     style
@@ -238,12 +234,8 @@ class Symbol:
 
     Attributes
     ----------
-    joint
-        The constraint.
     shape
         A name in `SOLIDS`.
-    place
-        Its origin.
     axis, cross
         Unit vectors in the frame of `place`: what it is turned about, and one at a right angle.
     follower

@@ -14,7 +14,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME
 from kincompile.view.polylines import polylines
 from kincompile.view.shapes import FILL, GROUND_COLOUR
-from kincompile.view.worlds import PLANE, solid_plots
+from kincompile.view.worlds import PLANE, in_space
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -172,10 +172,9 @@ def draw(
     The limits of the plot hold all positions, shape (N, n).
     """
     if drawn.is_spatial:
-        mover: Callable[[NDArray[np.float64]], None] = solid_plots().draw_in_space(
-            ax, model.system().length_unit, drawn, q
-        )
-        return mover
+        in_axes: Callable[..., Callable[[NDArray[np.float64]], None]]
+        in_axes = in_space("solid_plot").draw_in_space
+        return in_axes(ax, model.system().length_unit, drawn, q)
     x_low, x_high, y_low, y_high = drawn.extent(q)
     artists = [
         (polyline, _artist(ax, polyline, q[0], order))
@@ -218,7 +217,6 @@ def write_name(ax: Axes, name: str, place: Sequence[float]) -> Callable[[Sequenc
 
 
 def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
-    """Return the artist of a polyline."""
     look, points = polyline.look, polyline.at(q)
     is_ground = polyline.frame == GROUND_FRAME
     colour = look.colour or (GROUND_COLOUR if is_ground else f"C{polyline.frame.index % 10}")

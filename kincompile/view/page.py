@@ -59,8 +59,6 @@ class Page:
 
     Attributes
     ----------
-    name
-        Name of the mechanism.
     html
         The whole page: data, style sheets and scripts. It loads nothing else.
     data

@@ -48,12 +48,8 @@ def page_data(
 
     Parameters
     ----------
-    system
-        The mechanism.
     solution
         Its motion; None where the equations determine none.
-    message
-        The message of the solver or of the compiler.
     starts_there
         Whether the page itself starts from the first position of the motion, not from the guess.
     """

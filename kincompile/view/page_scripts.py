@@ -82,13 +82,6 @@ def geometry_script(system: ConstraintSystem, drawing: Mapping[str, Any]) -> str
 
     `places` are the ways to numbers in the drawing, and `numbers(0, p)` gives these. `profiles` has
     the way to each curve, and the function of an angle and p that gives its radius.
-
-    Parameters
-    ----------
-    system
-        The mechanism.
-    drawing
-        Its drawing as plain data, with live numbers.
     """
     names = [item.name for item in system.parameters]
     found = list(live_places(drawing))
@@ -112,19 +105,7 @@ def geometry_script(system: ConstraintSystem, drawing: Mapping[str, Any]) -> str
 def function_text(
     name: str, numbers: Sequence[LiveNumber], parameters: Sequence[str], tables: Sequence[str]
 ) -> str:
-    """Return a JavaScript function of an angle and of parameters that gives numbers as an array.
-
-    Parameters
-    ----------
-    name
-        Its name.
-    numbers
-        What it gives.
-    parameters
-        Names of the parameters, in order.
-    tables
-        Names of splines, which are taken.
-    """
+    """Return a JavaScript function of an angle and of parameters that gives numbers as an array."""
     table = NameTable((*RESERVED, *tables))
     graph = numbers[0].graph if numbers else Graph()
     outputs = [item.node for item in numbers]

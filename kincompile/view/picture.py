@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.view.marks import GROUND_FRAME, moves_with
-from kincompile.view.polylines import Polyline, of_mark
+from kincompile.view.polylines import Polyline, of_mark, pieces
 from kincompile.view.shapes import DASHES, FILL, GROUND_COLOUR, HUES
-from kincompile.view.worlds import PLANE, solid_pictures
+from kincompile.view.worlds import PLANE, in_space
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -95,8 +95,6 @@ class Arrow:
     ----------
     name
         Name of its symbol, such as ``"s_i"``.
-    start, end
-        Where it begins and ends.
     frame
         The frame whose colour it has.
     is_vector
@@ -135,8 +133,6 @@ def picture(
 
     Parameters
     ----------
-    drawn
-        Its shapes.
     q : ndarray, shape (n,)
         The position.
     title
@@ -148,7 +144,7 @@ def picture(
         by default.
     """
     if drawn.is_spatial:
-        seen: Picture = solid_pictures().picture_in_space(drawn, q, title, arrows, focus)
+        seen: Picture = in_space("solid_picture").picture_in_space(drawn, q, title, arrows, focus)
         return seen
     left, right, low, high = drawn.extent(q)
     ends = [np.stack((arrow.start, arrow.end)) for arrow in arrows]
@@ -230,11 +226,8 @@ def _paths(polyline: Polyline, q: Array, scale: Scale, opacity: float) -> Iterab
         fill = look.area or colour
         yield PicturePath(points, colour, fill, look.width, opacity, is_pale=not look.area)
         return
-    gaps = np.flatnonzero(np.isnan(points).any(axis=1))
-    for piece in np.split(points, gaps):
-        kept = piece[~np.isnan(piece).any(axis=1)]
-        if len(kept) > 1:
-            yield PicturePath(kept, colour, "", look.width, opacity, dash=look.dash)
+    for piece in pieces(points):
+        yield PicturePath(piece, colour, "", look.width, opacity, dash=look.dash)
 
 
 def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, PicturePath]:

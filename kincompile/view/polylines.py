@@ -98,6 +98,13 @@ def of_mark(mark: Mark, size: float) -> Iterable[Polyline]:
     return [Polyline(stroke, mark, size) for stroke in SHAPES[shape_of(mark)]]
 
 
+def pieces(points: Array) -> list[Array]:
+    """Return the pieces of a line that NaN interrupts."""
+    gaps = np.isnan(points).any(axis=1)
+    kept = (piece[~np.isnan(piece).any(axis=1)] for piece in np.split(points, np.flatnonzero(gaps)))
+    return [piece for piece in kept if len(piece) > 1]
+
+
 def owner(mark: Mark, on: str) -> BodyFrame:
     """Return the frame whose colour a stroke of a mark has."""
     match mark:
@@ -109,7 +116,6 @@ def owner(mark: Mark, on: str) -> BodyFrame:
 
 
 def _left_of(direction: Array) -> Array:
-    """Return a vector turned by a right angle, counterclockwise."""
     return np.array((-direction[1], direction[0]))
 
 

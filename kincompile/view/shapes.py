@@ -43,6 +43,13 @@ FILL = 0.22
 """Opacity of the areas of bodies."""
 
 
+def mixed(colour: str, part: float, paper: str = "#ffffff") -> str:
+    """Return a colour on paper through which a part of it is seen."""
+    over, under = ([int(text[k : k + 2], 16) for k in (1, 3, 5)] for text in (colour, paper))
+    values = (round(part * a + (1 - part) * b) for a, b in zip(over, under, strict=True))
+    return "#" + "".join(f"{value:02x}" for value in values)
+
+
 @dataclass(frozen=True, slots=True)
 class Look:
     """What a line or an area is drawn like.
@@ -162,12 +169,10 @@ _FEET = tuple(
 
 
 def _mirrored(corners: tuple[Corner, ...]) -> tuple[Corner, ...]:
-    """Return corners on the other side of the line."""
     return tuple(corner and (corner[0], corner[1], -corner[2]) for corner in corners)
 
 
 def _shifted(corners: tuple[Corner, ...], left: float) -> tuple[Corner, ...]:
-    """Return corners farther to the left of the line."""
     return tuple(corner and (corner[0], corner[1], corner[2] + left) for corner in corners)
 
 

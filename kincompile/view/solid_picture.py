@@ -18,7 +18,8 @@ from kincompile.view.picture import (
     colour_of,
     composed,
 )
-from kincompile.view.shapes import FILL, HUES, INKS
+from kincompile.view.polylines import pieces
+from kincompile.view.shapes import FILL, HUES, INKS, mixed
 from kincompile.view.solids import Position, facets_of, solids
 
 if TYPE_CHECKING:
@@ -89,12 +90,10 @@ def picture_in_space(
     title: str,
     arrows: Sequence[Arrow] = (),
     focus: Iterable[BodyFrame] | None = None,
-    *,
-    camera: Camera = ISOMETRIC,
 ) -> Picture:
     """Draw a mechanism in space; `picture` says what is given."""
-    ends = [camera.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]
-    seen = seen_paths(_about(drawn, focus) if focus else drawn, q, camera)
+    ends = [ISOMETRIC.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]
+    seen = seen_paths(_about(drawn, focus) if focus else drawn, q, ISOMETRIC)
     longest = max((len(arrow.name) for arrow in arrows), default=0)
     margin = max(MARGIN, ASIDE + LETTER / 2 * longest)
     scale = Scale([*(path.points for path in seen), *ends], margin=margin)
@@ -154,7 +153,6 @@ def is_gap(solid: Solid, part: Part) -> bool:
 
 
 def _path(solid: Solid, part: Part, camera: Camera, points: Array) -> PicturePath:
-    """Return a part as it is seen."""
     look, line = solid.look, solid.look.colour or colour_of(solid.frame)
     if part.radius:
         face = look.area or mixed(line, FILL)
@@ -173,18 +171,9 @@ def shade(colour: str, normal: Array, camera: Camera) -> str:
     return mixed(colour, 0.85 - 0.6 * lit)
 
 
-def mixed(colour: str, part: float) -> str:
-    """Return a part of a colour on white paper."""
-    channels = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    return "#" + "".join(f"{round(part * x + (1 - part) * 255):02x}" for x in channels)
-
-
 def trace(index: int, points: Array) -> Iterator[PicturePath]:
-    """Yield a path in a colour of its own, on a rim of paper, in pieces that NaN separates."""
+    """Yield a path in a colour of its own, on a rim of paper."""
     hues = HUES["light"]
-    gaps = np.flatnonzero(np.isnan(points).any(axis=1))
-    for piece in np.split(points, gaps):
-        kept = piece[~np.isnan(piece).any(axis=1)]
-        if len(kept) > 1:
-            yield PicturePath(kept, INKS["paper"], "", 3.0)
-            yield PicturePath(kept, hues[(index + 4) % len(hues)], "", 1.5)
+    for piece in pieces(points):
+        yield PicturePath(piece, INKS["paper"], "", 3.0)
+        yield PicturePath(piece, hues[(index + 4) % len(hues)], "", 1.5)

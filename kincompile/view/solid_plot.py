@@ -9,7 +9,7 @@ import numpy as np
 from kincompile.errors import InputError
 from kincompile.runtime.results.columns import titled
 from kincompile.view.marks import GROUND_FRAME
-from kincompile.view.shapes import FILL, GROUND_COLOUR
+from kincompile.view.shapes import FILL, GROUND_COLOUR, mixed
 from kincompile.view.solid_picture import (
     ISOMETRIC,
     PLATE,
@@ -17,7 +17,6 @@ from kincompile.view.solid_picture import (
     SEAM,
     VIEWS,
     all_parts,
-    mixed,
     shade,
 )
 

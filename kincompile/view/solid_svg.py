@@ -14,7 +14,7 @@ import numpy as np
 from kincompile.view.picture import Scale, svg_path
 from kincompile.view.shapes import INKS
 from kincompile.view.solid_picture import Camera, seen_paths, trace
-from kincompile.view.svg import HEIGHT, STILL, WIDTH
+from kincompile.view.svg import HEIGHT, WIDTH, document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,31 +32,12 @@ def svg_in_space(
     drawn: Drawing,
     q: Array,
     description: str,
-    *,
-    paths: Sequence[Array] = (),
-    timing: Timing | None = None,
-    millimetres: float | None = None,
-    view: str = "isometric",
+    paths: Sequence[Array],
+    timing: Timing | None,
+    millimetres: float | None,
+    view: str,
 ) -> str:
-    """Return a mechanism in space as the text of an SVG file.
-
-    Parameters
-    ----------
-    drawn
-        Its shapes.
-    q : ndarray, shape (F, n)
-        Positions.
-    description
-        What is shown, for those who cannot see it.
-    paths
-        Lines over the mechanism, each of shape (k, 3).
-    timing
-        When the positions are shown; without, the first one is.
-    millimetres
-        Length of the model's unit where the picture has its true size, across the view.
-    view
-        From where it is seen: a name in `VIEWS`.
-    """
+    """Return a mechanism in space as the text of an SVG file; `as_svg` says what is given."""
     camera = Camera.named(view)
     shown = q if timing is not None else q[:1]
     frames = [seen_paths(drawn, row, camera) for row in shown]
@@ -68,24 +49,11 @@ def svg_in_space(
         + "".join(_name(dot.name, camera.seen(dot.place.at(row)), scale) for dot in drawn.dots)
         for frame, row in zip(frames, shown, strict=True)
     ]
-    parts, style = pictures[0], ""
-    if timing is not None and len(pictures) > 1:
-        moving = "".join(_frames(pictures, timing))
-        parts = f'<g class="still" display="none">{parts}</g>\n<g class="moving">{moving}</g>'
-        style = f"<style>{STILL}</style>\n"
-    sides = (scale.width, scale.height)
-    wide, tall = (f"{side:.7g}" for side in sides)
-    if millimetres is not None:
-        wide, tall = (f"{side / scale.factor * millimetres:.7g}mm" for side in sides)
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" '
-        f'viewBox="0 0 {scale.width:.7g} {scale.height:.7g}" width="{wide}" height="{tall}" '
-        f'role="img" aria-labelledby="title description" stroke-linecap="round" '
-        f'stroke-linejoin="round" font-family="system-ui,sans-serif" font-size="{NAME}">\n'
-        f'<title id="title">{escape(drawn.name)}</title>\n'
-        f'<desc id="description">{escape(description)}</desc>\n{style}'
-        f'<rect width="100%" height="100%" fill="{INKS["paper"]}"/>\n{parts}\n</svg>\n'
-    )
+    moving = "".join(_frames(pictures, timing)) if timing and len(pictures) > 1 else ""
+    size, paper = (scale.width, scale.height), f' fill="{INKS["paper"]}"'
+    true_size = None if millimetres is None else millimetres / scale.factor
+    heading = drawn.name, description
+    return document(heading, size, NAME, paper, (pictures[0], moving), true_size=true_size)
 
 
 def _frames(pictures: Sequence[str], timing: Timing) -> list[str]:

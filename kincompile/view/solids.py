@@ -140,7 +140,6 @@ class Solid:
         return [part for line in _lines(mark, piece.on, places) for part in self._on(line)]
 
     def _on(self, line: _Line) -> Iterator[Part]:
-        """Yield the parts of a line."""
         piece = self.piece
         corners = np.array(piece.corners, dtype=np.float64)
         if not piece.sides:
@@ -174,7 +173,6 @@ class _Line:
 
 
 def _lines(mark: Mark, on: str, places: Places) -> list[_Line]:
-    """Return the lines of a piece."""
     match mark:
         case Hull():
             _, edges = wires(mark.points)

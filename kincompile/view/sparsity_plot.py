@@ -92,8 +92,6 @@ class _Pattern:
     ----------
     rows, columns
         Names, from top to bottom and from left to right.
-    entries : ndarray of int, shape (nnz, 2)
-        Row and column of each entry.
     is_unknown : ndarray of bool, shape (nnz,)
         Whether the coordinate is solved for in the step of the equation.
     """
@@ -135,7 +133,6 @@ def _squares(entries: NDArray[np.intp]) -> NDArray[np.float64]:
 
 
 def _outline_blocks(ax: Axes, found: Inspection) -> None:
-    """Draw a frame around each block on the diagonal."""
     start = -0.5
     width = min(1.5, 60 / len(found.coordinates))  # points; not to hide the entries of many
     for k, block in enumerate(found.blocks):

@@ -19,10 +19,11 @@ import numpy as np
 from kincompile.targets.templates import read
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, polylines
-from kincompile.view.shapes import DASHES, FILL, HUES
+from kincompile.view.shapes import DASHES, FILL, HUES, mixed
+from kincompile.view.worlds import in_space
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from kincompile.view.drawing import Drawing
     from kincompile.view.marks import Array, BodyFrame
@@ -124,49 +125,75 @@ def as_svg(
     paths: Sequence[Array] = (),
     timing: Timing | None = None,
     millimetres: float | None = None,
+    view: str = "isometric",
 ) -> str:
     """Return a mechanism as the text of an SVG file.
 
-    Its colours are those of the page, on light and on dark paper.
+    Its colours are those of the page, on light and on dark paper; in space on white paper.
 
     Parameters
     ----------
-    drawn
-        Its shapes.
     q : ndarray, shape (F, n)
         Positions; of several the first is shown where nothing moves.
     description
         What is shown, for those who cannot see it.
     paths
-        Lines over the mechanism, each of shape (k, 2).
+        Lines over the mechanism, each of shape (k, 2), in space (k, 3).
     timing
         When the positions are shown; without, the first one is.
     millimetres
-        Length of the model's unit where the picture has its true size.
+        Length of the model's unit where the picture has its true size, in space across the view.
+    view
+        From where a mechanism in space is seen.
     """
+    if drawn.is_spatial:
+        svg_in_space: Callable[..., str] = in_space("solid_svg").svg_in_space
+        return svg_in_space(drawn, q, description, paths, timing, millimetres, view)
     sheet = _Sheet(drawn, q, paths)
     unit = sheet.scale * drawn.size
     line = max(1.0, unit / THICK)
     traces = "".join(_trace(k, sheet.at(path), line) for k, path in enumerate(paths))
     parts = traces.join(_layers(drawn, q[:1], sheet, line, ""))
-    style = _dark_rules()
+    moving = ""
     if timing is not None and len(q) > 1:
         moving = traces.join(_layers(drawn, q, sheet, line, timing.attributes))
-        parts = f'<g class="still" display="none">{parts}</g>\n<g class="moving">{moving}</g>'
+    size = sheet.width, sheet.height
+    true_size = None if millimetres is None else millimetres / sheet.scale
+    paper = _paint("", "paper")
+    heading = drawn.name, description
+    return document(heading, size, 1.4 * unit, paper, (parts, moving), _dark_rules(), true_size)
+
+
+def document(
+    heading: tuple[str, str],
+    size: tuple[float, float],
+    font: float,
+    paper: str,
+    parts: tuple[str, str],
+    style: str = "",
+    true_size: float | None = None,
+) -> str:
+    """Return the text of a file: title and description, width and height [px], and its parts.
+
+    `parts` are a picture, and what moves in its place, "" for nothing; `paper` has the attributes
+    of the background, `true_size` is the length of a pixel [mm].
+    """
+    shown, moving = parts
+    if moving:
+        shown = f'<g class="still" display="none">{shown}</g>\n<g class="moving">{moving}</g>'
         style += STILL
-    size = (sheet.width, sheet.height)
     wide, tall = map(_number, size)
-    if millimetres is not None:
-        wide, tall = (f"{side / sheet.scale * millimetres:.7g}mm" for side in size)
+    if true_size is not None:
+        wide, tall = (f"{side * true_size:.7g}mm" for side in size)
+    rules = f"<style>{style}</style>\n" if style else ""
+    title, description = map(escape, heading)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_pair(size)}" width="{wide}" '
         f'height="{tall}" role="img" aria-labelledby="title description" '
         f'stroke-linecap="round" stroke-linejoin="round" '
-        f'font-family="system-ui,sans-serif" font-size="{_number(1.4 * unit)}">\n'
-        f'<title id="title">{escape(drawn.name)}</title>\n'
-        f'<desc id="description">{escape(description)}</desc>\n'
-        f"<style>{style}</style>\n"
-        f'<rect width="100%" height="100%"{_paint("", "paper")}/>\n{parts}\n</svg>\n'
+        f'font-family="system-ui,sans-serif" font-size="{_number(font)}">\n'
+        f'<title id="title">{title}</title>\n<desc id="description">{description}</desc>\n'
+        f'{rules}<rect width="100%" height="100%"{paper}/>\n{shown}\n</svg>\n'
     )
 
 
@@ -196,7 +223,6 @@ def _group(motion: _Motion | None, clock: str) -> str:
 
 
 def _shown(drawn: Drawing, q: Array) -> list[Polyline]:
-    """Return the strokes from back to front, without the gaps of joints that are closed."""
     return [
         item
         for item in polylines(drawn)
@@ -348,12 +374,5 @@ def _palettes() -> Mapping[str, Mapping[str, str]]:
         hues["quiet"] = palette["quiet"]
         palette |= hues
         for name, hue in hues.items():
-            palette[f"pale-{name}"] = _blended(hue, palette["paper"], part)
+            palette[f"pale-{name}"] = mixed(hue, part, palette["paper"])
     return palettes
-
-
-def _blended(colour: str, paper: str, part: float) -> str:
-    """Return a colour on paper through which a part of it is seen."""
-    over, under = ([int(text[k : k + 2], 16) for k in (1, 3, 5)] for text in (colour, paper))
-    mixed = (round(part * a + (1 - part) * b) for a, b in zip(over, under, strict=True))
-    return "#" + "".join(f"{value:02x}" for value in mixed)

@@ -27,10 +27,6 @@ def moving_system(
 
     Parameters
     ----------
-    solution
-        Its motion.
-    model
-        The model, where it cannot be known from the solution.
     what
         What shows it, for messages, such as "an animation shows".
 

@@ -10,7 +10,6 @@ from kincompile.view.shapes import tables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from types import ModuleType
 
     from kincompile.model.constraint import Constraint
     from kincompile.model.system import ConstraintSystem
@@ -29,35 +28,18 @@ def drawings_in(dimension: int) -> Mapping[type[Constraint], DrawJoint]:
     """Return the function that draws each type of constraint."""
     if dimension == PLANE:
         return DRAWINGS
-    found: Mapping[type[Constraint], DrawJoint] = import_module(
-        "kincompile.view.solid_joints"
-    ).DRAWINGS
+    found: Mapping[type[Constraint], DrawJoint] = in_space("solid_joints").DRAWINGS
     return found
 
 
-def solid_pictures() -> ModuleType:
-    """Return the module that draws still pictures in space."""
-    return import_module("kincompile.view.solid_picture")
-
-
-def solid_svgs() -> ModuleType:
-    """Return the module that draws SVG in space."""
-    return import_module("kincompile.view.solid_svg")
-
-
-def solid_plots() -> ModuleType:
-    """Return the module that draws in space by matplotlib."""
-    return import_module("kincompile.view.solid_plot")
-
-
-def motion_file() -> ModuleType:
-    """Return the module that writes a motion in space as glTF."""
-    return import_module("kincompile.view.gltf")
+def in_space(name: str) -> Any:
+    """Return a module that draws in space: solid_picture, solid_svg, solid_plot or gltf."""
+    return import_module(f"kincompile.view.{name}")
 
 
 def tables_in(dimension: int) -> dict[str, Any]:
     """Return what marks look like as plain data, for a page."""
     if dimension == PLANE:
         return tables()
-    found: dict[str, Any] = import_module("kincompile.view.solid_shapes").solid_tables()
+    found: dict[str, Any] = in_space("solid_shapes").solid_tables()
     return found

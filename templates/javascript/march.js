@@ -143,7 +143,7 @@ function cornersOf(model, times, p, guess) {
         before.forEach((x, i) => { most[i] = Math.max(most[i], Math.abs(x) || 0, Math.abs(after[i]) || 0); });
         return before.map((x, i) => Math.abs(after[i] - x));
     });
-    return times.map((_, k) => (jumps[k].some((x, i) => x > CORNER_JUMP * most[i]) ? reach : 0));
+    return times.map((_, k) => (jumps[k].some((x, i) => x > CORNER * most[i]) ? reach : 0));
 }
 
 /* The motion over times: arrays q, q_dot, q_ddot (a point after another, NaN where nothing was
@@ -199,7 +199,7 @@ function motionOver(model, times, p = model.DEFAULTS, guess = model.GUESS) {
     }
     for (let k = 0; k < count; k += 1) {
         if (!corners[k] || motion.status[k] !== CONVERGED) continue;
-        motion.status[k] = CORNER;
+        motion.status[k] = AT_CORNER;
         motion.q_ddot.fill(NaN, k * n, (k + 1) * n);
     }
     return motion;

@@ -265,7 +265,7 @@ function assemble(equations, t, guess) {
         }
     }
     const [first, ...rest] = good, reach = AS_NEAR * away(first.last.q);
-    const isOther = q => equations.distance(q, first.last.q) > SAME && away(q) <= reach;
+    const isOther = q => equations.distance(q, first.last.q) > SAME_POSITION && away(q) <= reach;
     first.other = rest.find(({ last }) => isOther(last.q))?.last ?? null;
     return first;
 }
@@ -315,7 +315,7 @@ function unwound(equations, t, at, guess) {
         for (const k of some) q[k] -= 2 * Math.PI * Math.round((q[k] - guess[k]) / (2 * Math.PI));
         if (q.every((x, k) => x === at.q[k])) continue;
         const turned = iterate(equations, t, q, MAX_CORRECTIONS);
-        if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME) at = turned.last;
+        if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME_POSITION) at = turned.last;
     }
     return at;
 }

@@ -30,17 +30,7 @@ CORRECTIONS = 8
 
 
 def dynamic_modules(module: ModuleType) -> DynamicModules:
-    """Return the compiled equations of motion of a mechanism.
-
-    Raises
-    ------
-    InputError
-        If it has no masses and forces, or was loaded from a file.
-    UnsupportedError
-        If it is in grouped form.
-    StructuralError
-        If a body has no mass, or constraints contradict each other.
-    """
+    """Return the compiled equations of motion of a mechanism; say so where there can be none."""
     found: Callable[[], DynamicModules] | None = vars(module).get(DYNAMICS)
     if found is not None:
         return found()
@@ -61,17 +51,7 @@ class Equations:
     """The equations of motion at the parameters of a simulation.
 
     A state is y = (q, q_dot, work), with the work of loads and drivers since the start.
-
-    Attributes
-    ----------
-    code
-        The kinematic module.
-    parameters : ndarray, shape (k,)
-        Its parameters.
-    joints
-        Its constraints, with the scales of coordinates and equations.
-    independent
-        Rows of equations that repeat no other.
+    `independent` are the rows of equations that repeat no other.
     """
 
     def __init__(self, inputs: Inputs, modules: DynamicModules) -> None:
@@ -83,7 +63,9 @@ class Equations:
         left_out = set(modules.redundant)
         rows = [k for k, name in enumerate(self.code.equations) if name not in left_out]
         self.independent = np.array(rows, dtype=int)
-        self.evaluations = 0
+        self.evaluations = self.jacobians = 0
+        self._modules = modules
+        self._slopes: _Slopes | None = None
         self.measure_at(inputs.guess, float(inputs.t[0]))
 
     def measure_at(self, q: Array, t: float) -> None:
@@ -101,6 +83,13 @@ class Equations:
         n = self.n
         found = self._accelerate(y, t)
         return np.concatenate((y[n : 2 * n], found))
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """Return the derivatives of the rate of a state by the state, shape (2 n + 1, 2 n + 1)."""
+        self.jacobians += 1
+        if self._slopes is None:
+            self._slopes = _Slopes(self._modules, len(self.code.equations), self.parameters, self.n)
+        return self._slopes.jacobian(t, y)
 
     def corrected(self, t: float, y: Array) -> tuple[Array, float]:
         """Return a state led back to its constraints, and by how much at most, in scales.
@@ -139,6 +128,32 @@ class Equations:
     def nu(self, q: Array, t: float) -> Array:
         """Return the right side of the velocity equation."""
         return np.asarray(self.code.nu(q, t, self.parameters))
+
+
+class _Slopes:
+    """The linear system that the derivatives of accelerations and power solve, evaluated."""
+
+    def __init__(self, modules: DynamicModules, m: int, p: Array, n: int) -> None:
+        module, places, numbers = modules.slopes()
+        self._evaluate = _evaluator(module, n, p)
+        self._n, self._size, size = n, n + m + 1, n + m + 1 + 2 * n
+        self._system = np.zeros((self._size, size))
+        for (row, column), number in numbers.items():
+            self._system[row, column] = number
+        self._places = np.array([row * size + column for row, column in places], dtype=int)
+        self._found = np.zeros((2 * n + 1, 2 * n + 1))
+        self._found[:n, n : 2 * n] = np.eye(n)
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """Return the derivatives of the rate of a state; NaN where there are none."""
+        n, system, found = self._n, self._system.copy(), self._found.copy()
+        system.put(self._places, self._evaluate(y, t))
+        try:
+            solved = np.linalg.solve(system[:, : self._size], system[:, self._size :])
+        except np.linalg.LinAlgError:  # singular: the step fails, and says why
+            return np.full_like(found, np.nan)
+        found[n:, : 2 * n] = solved[[*range(n), -1]]
+        return found
 
 
 def _evaluator(module: ModuleType, n: int, p: Array) -> Evaluate:

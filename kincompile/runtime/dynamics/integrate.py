@@ -30,9 +30,9 @@ WORDS = {
     "stopped": "{name} stopped at t = {t:.10g}: {why} The points before are good.",
     "start": "{name} cannot begin at t = {t:.10g}: {why}",
     "step": "{problem}. A load that jumps or grows without bounds does that, or a mechanism near a "
-    "singular configuration; where it is stiff, method='Radau' or 'CVODE' takes longer steps.",
+    "singular configuration; where it is stiff, method='Radau' or 'BDF' takes longer steps.",
     "many": "{most:,} steps were not enough to the next time. Where the mechanism is stiff, "
-    "method='Radau' or 'CVODE' takes longer steps; else ask for more times, or a larger rtol.",
+    "method='Radau' or 'BDF' takes longer steps; else ask for more times, or a larger rtol.",
     "drift": "its constraints cannot be held there.",
     "nothing": "a load or an equation has no finite value.",
 }
@@ -87,8 +87,13 @@ class Integration:
 
     @property
     def statistics(self) -> dict[str, int]:
-        """How many steps were taken, and how often accelerations were evaluated."""
-        return {"steps": self._total, "evaluations": self._equations.evaluations}
+        """Steps taken, and evaluations of the accelerations and of their Jacobian."""
+        equations = self._equations
+        return {
+            "steps": self._total,
+            "evaluations": equations.evaluations,
+            "jacobians": equations.jacobians,
+        }
 
     def never_began(self, why: str) -> None:
         """Note that there is no state to begin from."""
@@ -108,7 +113,8 @@ class Integration:
         self._watch.begin(t0, y)
         self._put(t0, y)
         self._method = method
-        solver = stepper(method, equations.rate, self.t[[0, -1]], y, tolerance, max_step)
+        rates = equations.rate, equations.jacobian
+        solver = stepper(method, rates, self.t[[0, -1]], y, tolerance, max_step)
         while self._index < self.t.size and self._step(solver):
             pass
         if self.message == "":

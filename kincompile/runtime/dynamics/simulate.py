@@ -89,9 +89,10 @@ def simulate(
     events, stops : mapping, optional
         Values of coordinates or outputs, ``{"slider.x": 0.35}``, at which an event is located in
         time; the motion goes on, or it ends there.
-    method : {"DOP853", "Radau", "CVODE"}
-        SciPy's explicit method of order 8 or its implicit one of order 5, or the multistep method
-        of SUNDIALS for stiff systems (``pip install 'kincompile[stiff]'``).
+    method : {"DOP853", "Radau", "BDF", "CVODE"}
+        SciPy's explicit method of order 8, or for stiff systems its implicit one of order 5, its
+        multistep method, or that of SUNDIALS (``pip install 'kincompile[stiff]'``). Implicit ones
+        are given the exact derivatives of the accelerations.
     rtol, atol : float
         Relative tolerance of a step; absolute one, in radians and sizes of the mechanism and per
         second, without it as `rtol`.
@@ -112,7 +113,7 @@ def simulate(
         what loads and drivers have done since the start; ``energy_drift``, kinetic energy less that
         at the start less the work; and ``constraint_drift``, the largest correction, in radians or
         sizes of the mechanism, that led back to the constraints since the point before. ``.events``
-        are what was located, ``.statistics`` steps and evaluations.
+        are what was located, ``.statistics`` steps, evaluations and Jacobians.
 
     Raises
     ------

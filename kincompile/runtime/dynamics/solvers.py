@@ -1,8 +1,8 @@
-"""Integrators of libraries, step by step: SciPy's DOP853 and Radau, and CVODE of SUNDIALS.
+"""Integrators of libraries, step by step: SciPy's DOP853, Radau and BDF, and CVODE of SUNDIALS.
 
-None is our own. After a step of SciPy's the state is led back to its constraints, and the next step
-goes on from there. CVODE keeps a history of states that must not be touched: its states are led
-back where they are given out.
+None is our own. After a step of a one-step method the state is led back to its constraints, and the
+next step goes on from there. BDF and CVODE keep a history of states that must not be touched: their
+states are led back where they are given out. Implicit methods get the derivatives of the rates.
 """
 
 from __future__ import annotations
@@ -19,9 +19,13 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
 
     Rate = Callable[[float, Array], Array]
+    """The rate of a state at a time, or its derivatives by the state."""
 
-METHODS = ("DOP853", "Radau", "CVODE")
+METHODS = ("DOP853", "Radau", "BDF", "CVODE")
 """Integrators: explicit of order 8, implicit of order 5, and multistep for stiff systems."""
+
+HISTORY = ("BDF", "CVODE")
+"""Those that keep a history of states."""
 
 FAILED = "the step that its tolerances ask for has become too small for floating point"
 
@@ -50,54 +54,43 @@ class Stepper(Protocol):
 
 
 def stepper(
-    method: str, rate: Rate, t: Array, y: Array, tolerance: tuple[float, Array], max_step: float
+    method: str,
+    rates: tuple[Rate, Rate],
+    t: Array,
+    y: Array,
+    tolerance: tuple[float, Array],
+    max_step: float,
 ) -> Stepper:
-    """Return an integrator at its first state.
+    """Return an integrator, one of `METHODS`, at its first state.
 
-    Parameters
-    ----------
-    method
-        One of `METHODS`.
-    rate
-        The rate of a state at a time.
-    t
-        First and last time.
-    y
-        The first state.
-    tolerance
-        Relative, and absolute for each number.
-    max_step
-        The longest step.
-
-    Raises
-    ------
-    InputError
-        If there is no such method.
-    UnsupportedError
-        If the package is not installed.
+    The rates are that of a state at a time, and the derivatives of it by the state; `t` are the
+    first and last time; the tolerance is relative, and absolute for each number.
     """
     if method not in METHODS:
         raise InputError(f"method is {method!r}: give one of {', '.join(METHODS)}.")
     make: type[_OneStep | _Multistep] = _Multistep if method == "CVODE" else _OneStep
-    return make(method, rate, t, y, tolerance, max_step)
+    return make(method, rates, t, y, tolerance, max_step)
 
 
 class _OneStep:
     """A solver of SciPy."""
 
     def __init__(
-        self, method: str, rate: Rate, t: Array, y: Array, tolerance: tuple[float, Array],
-        max_step: float,
+        self, method: str, rates: tuple[Rate, Rate], t: Array, y: Array,
+        tolerance: tuple[float, Array], max_step: float,
     ) -> None:  # fmt: skip
         from scipy import integrate
 
         rtol, atol = tolerance
         self.problem = ""
-        self._rate = rate
+        self._rate, jacobian = rates
+        self._has_history = method in HISTORY
+        given = {} if method == "DOP853" else {"jac": jacobian}
         solver = getattr(integrate, method)
         self._solver: Any = solver(
-            rate, float(t[0]), y, float(t[-1]), rtol=rtol, atol=atol, max_step=max_step
-        )
+            self._rate, float(t[0]), y, float(t[-1]), rtol=rtol, atol=atol, max_step=max_step,
+            **given,
+        )  # fmt: skip
 
     @property
     def t(self) -> float:
@@ -119,7 +112,9 @@ class _OneStep:
             self.problem = FAILED
 
     def put(self, y: Array) -> None:
-        """Go on from another state."""
+        """Go on from another state, where there is no history."""
+        if self._has_history:
+            return
         self._solver.y = y
         self._solver.f = self._rate(self._solver.t, y)
 
@@ -133,10 +128,11 @@ class _Multistep:
     """CVODE of SUNDIALS, from scikit-sundae."""
 
     def __init__(
-        self, method: str, rate: Rate, t: Array, y: Array, tolerance: tuple[float, Array],
-        max_step: float,
+        self, method: str, rates: tuple[Rate, Rate], t: Array, y: Array,
+        tolerance: tuple[float, Array], max_step: float,
     ) -> None:  # fmt: skip
         del method
+        rate, jacobian = rates
         with package_of_extra("scikit-sundae", "stiff"):
             from sksundae.cvode import CVODE
 
@@ -144,13 +140,18 @@ class _Multistep:
             found[:] = rate(t, y)
             return int(not np.isfinite(found).all())  # 1: try a smaller step
 
+        def slopes_into(t: float, y: Array, _rate: Array, found: Array) -> int:
+            found[:] = jacobian(t, y)
+            return int(not np.isfinite(found).all())
+
         rtol, atol = tolerance
         longest = max_step if np.isfinite(max_step) else 0.0
         finite = np.where(np.isfinite(atol), atol, LARGE)
         self.problem, self.t, self.y, self._end = "", float(t[0]), y, float(t[-1])
         self._solver = CVODE(
-            into, rtol=rtol, atol=finite, max_step=longest, max_num_steps=MOST_STEPS
-        )
+            into, rtol=rtol, atol=finite, max_step=longest, max_num_steps=MOST_STEPS,
+            jacfn=slopes_into,
+        )  # fmt: skip
         self._solver.init_step(self.t, y)
 
     def step(self) -> None:

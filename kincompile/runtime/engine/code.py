@@ -82,6 +82,10 @@ class ForceModules:
     joints: Mapping[str, tuple[str, ...]]
 
 
+Place = tuple[int, int]
+"""Row and column."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DynamicModules:
     """The equations of motion of a mechanism, compiled."""
@@ -92,6 +96,10 @@ class DynamicModules:
     # The same, of changes of the coordinates and then of the rates that lead a state back to its
     # constraints.
     corrections: ModuleType
+    # Compiles on request, and keeps, a module whose outputs are entries of the linear system of the
+    # derivatives of accelerations and power by q and q_dot, with their rows and columns, and the
+    # entries that are plain numbers.
+    slopes: Callable[[], tuple[ModuleType, Sequence[Place], Mapping[Place, float]]]
     redundant: tuple[str, ...]  # names of equations that repeat others and are left out
     free: tuple[str, ...]  # coordinates that may be given, as many as there are degrees of freedom
 
@@ -258,11 +266,6 @@ def require_square(code: Code) -> None:
     """Refuse a module whose equations cannot determine its coordinates.
 
     What the compiler has written into the module says why; else they are counted.
-
-    Raises
-    ------
-    StructuralError
-        With what is wrong, and what to do.
     """
     if code.unsolvable:
         raise StructuralError(code.unsolvable)

@@ -24,20 +24,11 @@ _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 def summary(solution: Solution, angle_unit: str = "rad") -> str:
     """Return the extremes of every coordinate, the measures, and a line on how the solving went.
 
-    Parameters
-    ----------
-    solution
-        A solution, complete or partial; points that were not found do not count.
-    angle_unit
-        ``"rad"`` or ``"deg"``.
-
-    Returns
-    -------
-    str
-        Of variants a part for each, under the values of its parameters. Per coordinate its unit,
-        its least and largest value with their times, and the largest absolute values of its first
-        and second derivative [unit/s, unit/s^2]; the tables of `Solution.measures`; then the points
-        by status, the Newton iterations and the largest residual.
+    Of variants there is a part for each, under the values of its parameters. Per coordinate it has
+    the unit, the least and largest value with their times, and the largest absolute values of first
+    and second derivative [unit/s, unit/s^2]; then come the tables of `Solution.measures`, the
+    points by status, the Newton iterations and the largest residual. Points that were not found do
+    not count; `angle_unit` is ``"rad"`` or ``"deg"``.
     """
     if solution.q.ndim > 2:
         return "\n\n".join(_variant(solution, k, angle_unit) for k in range(len(solution.q)))
@@ -59,7 +50,7 @@ def _variant(solution: Solution, number: int, angle_unit: str) -> str:
 def _table(solution: Solution, angle_unit: str) -> list[str]:
     """Return the lines of the table of coordinates."""
     motion = solution.q, solution.q_dot, solution.q_ddot
-    shown = [_without_noise(values).T for values in motion]
+    shown = [without_noise(values).T for values in motion]
     rows = []
     for name, q, q_dot, q_ddot in zip(solution.coordinates, *shown, strict=True):
         unit, factor = shown_unit(solution.units[name], angle_unit)
@@ -69,7 +60,7 @@ def _table(solution: Solution, angle_unit: str) -> list[str]:
     return table(header, rows, right=_NUMBERS)
 
 
-def _without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the values, with zero for those that are rounding errors of the largest."""
     largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
     return np.where(np.abs(values) < NOISE * largest, 0.0, values)

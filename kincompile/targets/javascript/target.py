@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from kincompile import criteria, quantities
 from kincompile.ir.elimination import plan_solve
-from kincompile.targets.headings import constants
 from kincompile.targets.javascript.dialect import JAVASCRIPT
 from kincompile.targets.javascript.functions import (
     WRITE,
@@ -115,11 +114,14 @@ def files(
     units |= {item.name: item.unit for item in program.parameters}
     units |= {item.name: item.unit for item in program.outputs}
     data = {
-        **constants(code, 2, "[{}, {}]"),
+        "name": program.name,
+        "format": quantities.FORMAT,
+        "fingerprint": program.fingerprint,
+        "n": len(program.coordinates),
+        "m": len(program.equations),
+        "k": len(program.parameters),
+        "lists": {name: indented(lines, 2) for name, lines in _lists(code).items()},
         "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),
-        "outputs": indented(quoted(item.name for item in program.outputs), 2),
-        "bodies": indented(wrapped(_bodies(program)), 2),
-        "redundant": indented(quoted(program.redundant), 2),
         "corners": str(program.corners).lower(),
         "matrices": indented(_matrices(code), 2),
         "header": WRITE.heading(code),
@@ -145,15 +147,28 @@ def files(
 
 def _solver() -> str:
     """Return the script that solves for the motion, with the criteria of the runtime."""
-    numbers = {name: json.dumps(getattr(criteria, name)) for name in CRITERIA}
+    numbers = wrapped(f"{name} = {json.dumps(getattr(criteria, name))}" for name in CRITERIA)
+    text = "\n".join(f"        {line}" for line in numbers).strip().rstrip(",")
     parts = "\n".join(read(f"javascript/{name}") for name in PARTS)
-    slots = {**numbers, "parts": indented(parts.rstrip().split("\n"))}
+    slots = {"criteria": text, "parts": indented(parts.rstrip().split("\n"))}
     return indented(fill("javascript/solver.js.jinja", slots).rstrip().split("\n"))
 
 
-def _bodies(program: Program) -> list[str]:
-    """Return name, first column and number of columns of each body."""
-    return [f'["{x.name}", {x.columns.start}, {len(x.columns)}]' for x in program.bodies]
+def _lists(code: InlineProgram) -> dict[str, list[str]]:
+    """Return the lines of the module's constant arrays, by name."""
+    program = code.program
+    bodies = (f'["{x.name}", {x.columns.start}, {len(x.columns)}]' for x in program.bodies)
+    lists = {
+        "COORDINATES": quoted(item.name for item in program.coordinates),
+        "EQUATIONS": quoted(program.equations),
+        "PARAMETERS": quoted(item.name for item in program.parameters),
+        "DEFAULTS": wrapped(repr(item.default) for item in program.parameters),
+        "GUESS": wrapped(repr(item.guess) for item in program.coordinates),
+        "OUTPUTS": quoted(item.name for item in program.outputs),
+        "BODIES": wrapped(bodies),
+        "PATTERN": wrapped(f"[{row}, {column}]" for row, column in code.pattern()),
+    }
+    return lists | ({"REDUNDANT": quoted(program.redundant)} if program.redundant else {})
 
 
 def _matrices(code: InlineProgram) -> list[str]:

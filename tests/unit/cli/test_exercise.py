@@ -12,7 +12,7 @@ def folder(kincompile: Any, pendulum: Path, tmp_path: Path) -> Path:
     path = tmp_path / "kit"
     result = kincompile("exercise", pendulum, "-o", path, "--students", 2, "--seed", 5, "--signs")
     assert (result.exit_code, result.stdout) == (0, "")
-    assert result.stderr.startswith(f"Wrote {path}: <ExerciseKit 'pendulum': 2 students")
+    assert result.stderr.startswith(f"Wrote {path}: 2 students")
     return path
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
+from kincompile import spatial
 from kincompile.calculus.expressions import Expression
 from kincompile.derivation.document import Display, Math, Table, Verbatim
 from kincompile.derivation.formulas import Equated
@@ -96,3 +97,16 @@ def test_that_a_mechanism_without_loads_has_no_such_part():
     bare.add(kc.Revolute("O", bare.ground, (0, 0), bar, (0, 0)))
     bare.add(kc.AbsoluteAngle("motor", bar, kc.t))
     assert "loads" not in [item.anchor for item in kc.derivation(bare).sections]
+
+
+def test_that_a_couple_about_a_hinge_reads_as_one():
+    """In space torque and rate have names, and the root of friction is one."""
+    m = spatial.Mechanism("hinge")
+    body, z, x = m.body("wheel", mass=1, inertia=(1, 1, 1)), (0, 0, 1), (1, 0, 0)
+    m.add(spatial.Revolute("O", m.ground, (0, 0, 0), z, body, (0, 0, 0), z))
+    m.add(spatial.TorsionSpring("clock", m.ground, z, x, body, z, x, 3, damping=0.1))
+    m.add(spatial.HingeFriction("dry", m.ground, z, body, z, 0.2))
+    text = kc.derivation(m).to_markdown()
+    assert r"\tau {} = {} - k \, ( \theta - {\phi}_{0} ) {} - c \, \omega {} - F" in text
+    assert r"\frac{1}{\sqrt{{\omega}^{2} + {{v}_{0}}^{2}}}" in text
+    assert "Root" not in text

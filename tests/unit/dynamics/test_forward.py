@@ -348,7 +348,7 @@ class TestBadInput:
         [
             ({"t": 1.0}, "t has no span"),
             ({"rtol": 0}, "rtol is 0: give a positive number"),
-            ({"method": "RK45"}, "method is 'RK45': give one of DOP853, Radau, CVODE"),
+            ({"method": "RK45"}, "method is 'RK45': give one of DOP853, Radau, BDF, CVODE"),
             ({"position": {"frst.phi": 0}}, "no coordinate 'frst.phi'; did you mean"),
             ({"position": {"first.phi": math.nan}}, "give a finite number"),
             ({"velocity": {"first.phi_dott": 0}}, "velocity: there is no coordinate"),

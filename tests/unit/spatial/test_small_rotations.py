@@ -61,19 +61,6 @@ def by_turns(golden: dict[str, Any]) -> Any:
     return np.hstack([rows[:, :3], turns[:, :3], rows[:, 7:10], turns[:, 3:]])
 
 
-STATE = {"q": Q, "q_dot": Q_DOT, "t": GIVEN["t"]}
-
-
-# A screw has the angle as a coordinate, and its rows are not the golden ones one by one.
-@pytest.mark.parametrize("name", [name for name in CASES if name not in ("norm", "screw")])
-def test_that_the_checker_accepts_the_golden_rows(name: str) -> None:
-    golden = ROWS[name]
-    given = {"nu": np.array(golden["nu"]), "gamma": np.array(golden["gamma_omega"])}
-    report = kc.compare(mechanism(CASES[name]()), Phi_q=by_turns(golden), **given, states=STATE)
-    assert report.equal
-    assert report.conventions[0].kind == "r-omega form"
-
-
 E0, E1, E2, E3 = P = sympy.symbols("e0_rod e1_rod e2_rod e3_rod")
 OMEGA = sympy.Matrix(sympy.symbols([f"omega_{axis}_rod" for axis in AXES]))
 POINT, DIRECTION = (-0.1, 0.2, 0.3), (0.6, 0, 0.8)
