@@ -32,7 +32,7 @@ def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
     module
         The emitted module.
     q : ndarray, shape (N, n)
-        Positions; NaN gives NaN.
+        Positions; NaN gives NaN, and so does a mechanism without equations.
     t : ndarray, shape (N,)
         Times.
     p : ndarray, shape (k,)
@@ -40,7 +40,7 @@ def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
     """
     result = np.full(t.size, np.nan)
     found = np.flatnonzero(np.isfinite(q).all(axis=1))
-    if not found.size:
+    if not (found.size and module.N_EQUATIONS):
         return result
     with np.errstate(all="ignore"):
         first = found[0]
