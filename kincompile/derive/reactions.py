@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.calculus import expressions as ex
 from kincompile.calculus.symbols import C
+from kincompile.calculus.template import Template
 from kincompile.derive.derivation import units
 from kincompile.derive.rules import along
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from kincompile.calculus.symbols import Frame
-    from kincompile.calculus.template import Template
     from kincompile.derive.rules import Direction
 
 
@@ -57,7 +57,8 @@ class Reactions:
     drive
         What the driver does, along its value C: a force or a torque; zero where there is no C.
     along_axis
-        The force on the last body along the joint's axis, in the plane across it too; none without.
+        The force on the last body along the joint's axis and, in the plane, across it; in space
+        along the axis h and along f and g, then the moment so; none without an axis.
     """
 
     bodies: tuple[Reaction, ...]
@@ -73,6 +74,18 @@ def multipliers(template: Template, size: int) -> tuple[ex.Symbol | ex.VectorSym
         else ex.Symbol(f"lambda_{k}")
         for k, Phi in enumerate(template.Phi)
     )
+
+
+@cache
+def placed(frame: Frame) -> Template:
+    """Return a template whose multipliers are the generalised forces on a body."""
+    kept: list[ex.Scalar] = []
+    for item in frame.coordinates:
+        if isinstance(item, ex.VectorSymbol):
+            kept += (-ex.dot(ex.Basis(k, item.size), item) for k in range(item.size))
+        else:
+            kept.append(-item)
+    return Template("Placed", (frame,), (), tuple(kept))
 
 
 @cache
@@ -92,30 +105,36 @@ def derive_reactions(
         _reaction(template, frame, point)
         for frame, point in zip(template.frames, points, strict=True)
     )
-    return Reactions(bodies, -_work(template, {C: ex.ONE}), _along_axis(template, axis))
+    by_axis = _along_axis(template, axis, points[-1])
+    return Reactions(bodies, -_work(template, {C: ex.ONE}), by_axis)
 
 
-def _along_axis(template: Template, axis: tuple[str, str] | None) -> tuple[ex.Scalar, ...]:
-    """Return the work for displacements of the last body along the axis, and across it."""
+def _along_axis(
+    template: Template, axis: tuple[str, str] | None, point: str | None
+) -> tuple[ex.Scalar, ...]:
+    """Return the work for displacements of the last body along the axis and across it.
+
+    In space also for turns about these, where they are fixed in that body.
+    """
     if axis is None:
         return ()
     symbol, index = axis
     (frame,) = (item for item in template.frames if item.index == index)
     v, last = ex.VectorSymbol(symbol, frame.size), template.frames[-1]
     unit = ex.Norm(v) ** -1 * frame.A(v)
-    if frame.size == SPACE:
+    if frame.size != SPACE:
+        return tuple(_work(template, {last.r: way}) for way in (unit, ex.perpendicular(unit)))
+    if not symbol.startswith("h_"):
         return (_work(template, {last.r: unit}),)
-    return tuple(_work(template, {last.r: way}) for way in (unit, ex.perpendicular(unit)))
+    triad = [ex.VectorSymbol(f"{letter}_{index}", SPACE) for letter in "hfg"]
+    force = [_work(template, {last.r: frame.A(item)}) for item in triad]
+    turns = [_turn(last, item) for item in triad] if frame == last else []
+    return (*force, *(_work(template, _about(last, point, turn)) for turn in turns))
 
 
 def _reaction(template: Template, frame: Frame, point: str | None) -> Reaction:
     force = (_work(template, {frame.r: ex.Basis(k, frame.size)}) for k in range(frame.size))
-    moment = []
-    for turn in _turns(frame):
-        direction = dict(turn)
-        if point is not None:
-            direction[frame.r] = -along(frame.A(ex.VectorSymbol(point, frame.size)), turn)
-        moment.append(_work(template, direction))
+    moment = [_work(template, _about(frame, point, turn)) for turn in _turns(frame)]
     if frame.size == SPACE:
         moment = _along_fixed_axes(frame, moment)
     return Reaction(tuple(force), tuple(moment))
@@ -131,13 +150,24 @@ def _along_fixed_axes(frame: Frame, components: list[ex.Scalar]) -> list[ex.Scal
     ]
 
 
+def _about(frame: Frame, point: str | None, turn: Direction) -> Direction:
+    """Return a turn of a body about one of its points, without one about its origin."""
+    if point is None:
+        return turn
+    return {**turn, frame.r: -along(frame.A(ex.VectorSymbol(point, frame.size)), turn)}
+
+
+def _turn(frame: Frame, axis: ex.Vector) -> Direction:
+    """Return the direction in which a body in space turns about an axis of its own."""
+    (p,) = (item for item in frame.coordinates if item != frame.r)
+    turn = ex.TimesG(p, axis, is_transposed=True)  # type: ignore[arg-type]  # p_dot = G^T omega'/2
+    return {p: ex.Number(Fraction(1, 2)) * turn}
+
+
 def _turns(frame: Frame) -> Iterator[Direction]:
     """Yield the directions in which a body turns at unit rates: in space about its own axes."""
     if frame.size == SPACE:
-        (p,) = (item for item in frame.coordinates if item != frame.r)
-        for k in range(SPACE):  # p_dot = G^T omega'/2
-            turn = ex.TimesG(p, ex.Basis(k, SPACE), is_transposed=True)  # type: ignore[arg-type]
-            yield {p: ex.Number(Fraction(1, 2)) * turn}
+        yield from (_turn(frame, ex.Basis(k, SPACE)) for k in range(SPACE))
         return
     for coordinate in frame.coordinates:
         if coordinate != frame.r:

@@ -21,13 +21,14 @@ from kincompile.calculus.expressions import (
     VectorSymbol,
     split_factor,
 )
-from kincompile.derive.reactions import derive_reactions, multipliers
+from kincompile.derive.reactions import derive_reactions, multipliers, placed
 from kincompile.derive.rules import along
 from kincompile.errors import ModelError
 from kincompile.ir.elimination import plan_solve
 from kincompile.ir.graph import Graph
 from kincompile.ir.implicit import DETERMINANT
 from kincompile.ir.kernels import KernelEnvironment, attributes
+from kincompile.ir.lower import Binder
 from kincompile.ir.observing import observing_program
 from kincompile.ir.program import Attribute
 from kincompile.ir.straight_solve import StraightSolve
@@ -48,6 +49,10 @@ if TYPE_CHECKING:
     from kincompile.ir.program import Input, Instance, Kernel, Program
 
 AXES = "xyz"
+BY_AXIS = {
+    2: ("F_along", "F_across"), 3: ("F_along", "F_f", "F_g", "T_along", "T_f", "T_g"),
+}  # fmt: skip
+"""Names of what a joint bears along its axis and across it; in space f and g are so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +179,8 @@ def _point_symbols(joint: Joint) -> tuple[str | None, ...]:
 
 def _axis_of(joint: Joint) -> tuple[str, str] | None:
     """Return the symbol of a joint's axis and the index of its body; of two that on body j."""
+    if joint.template.dimension == len(AXES) and _point_symbols(joint)[-1] is None:
+        return None  # it turns bodies alone
     given = joint.written.arguments().values()
     axes = [(item.symbol, item.on) for item in given if item.kind is Kind.AXIS]
     axes = [axis for axis in axes if axis[0].startswith("h_")] or axes  # in space, of a triad
@@ -186,10 +193,12 @@ class _Forces:
 
     def __init__(self, code: InlineProgram, graph: Graph, factors: Sequence[int]) -> None:
         self._code, self._graph, self._factors = code, graph, factors
+        self._binder = Binder(graph, None)
         body = code.program.bodies[0] if code.program.bodies else None
         length = code.program.coordinates[body.columns.start].unit if body else ""
         self._force, self._torque, self._power = force_units(length)
         self._size = len(AXES) if body and len(body.columns) > len(AXES) else len("xy")
+        self._turns = [""] if self._size == len("xy") else [f"_{axis}" for axis in AXES]
 
     def rows(self) -> Iterator[_Row]:
         """Yield the forces in order."""
@@ -211,14 +220,13 @@ class _Forces:
     def _joint(self, section: ConstraintRows, joint: Joint) -> Iterator[_Row]:
         """Yield what is not zero: force and moment on the last body, the moment on the first.
 
-        Of a joint with an axis the force along and across it follow, of a driver, or what holds a
-        value, what it does.
+        Of a joint with an axis the force along and across it follow, in space the moment too, of a
+        driver, or what holds a value, what it does.
         """
         kernel = _reaction_kernel(joint.template, _point_symbols(joint), _axis_of(joint))
-        known = _bound(section.instance) | self._multipliers(section, joint)
+        known = self._inputs(section.instance) | self._multipliers(section, joint)
         found = kernel.bound(self._graph, known)
-        size = joint.template.frames[0].size
-        turns = [""] if size == len("xy") else [f"_{axis}" for axis in AXES]
+        size, turns = self._size, self._turns
         each = size + len(turns)
         own = each * len(joint.bodies)
         numbers, drive, by_axis = found[:own], found[own], found[own + 1 :]
@@ -226,7 +234,7 @@ class _Forces:
         rows = [*zip(names, numbers[-each:], strict=True)]
         if len(joint.bodies) > 1:
             rows += zip([f"T_i{turn}" for turn in turns], numbers[size:each], strict=True)
-        rows += zip(("F_along", "F_across"), by_axis, strict=False)
+        rows += zip(BY_AXIS[size], by_axis, strict=False)
         has_value = "C" in joint.scalars
         skipped = {self._graph.const(0), *([drive] if has_value else [])}
         for name, node in rows:
@@ -260,27 +268,42 @@ class _Forces:
         return total
 
     def _on_ground(self) -> Iterator[_Row]:
-        """Yield what shakes the ground: weight and applied forces less the rate of momentum.
-
-        In space the force alone.
-        """
+        """Yield what shakes the ground: weight and applied forces less the rate of momentum."""
         graph, size = self._graph, self._size
-        force, moment = [graph.const(0)] * size, graph.const(0)
+        total = [graph.const(0)] * (size + len(self._turns))
         for instance in self._code.program.loads:
             if len(instance.bodies) > 1:  # what it does to one body it does to the other, reversed
                 continue
-            found = self._effective(instance)
-            pairs = zip(force, found[:size], strict=True)
-            force = [graph.add(total, own) for total, own in pairs]
-            if size == len("xy"):
-                x, y, turn = found
-                place = [self._named(column) for column in instance.columns[:2]]
-                lever = graph.sub(graph.mul(place[0], y), graph.mul(place[1], x))
-                moment = graph.add(moment, graph.add(turn, lever))
-        for axis, node in zip(AXES, force, strict=False):
+            found = self._on_body(instance)
+            place = [self._named(column) for column in instance.columns[:size]]
+            for k in range(len(self._turns)):  # about the origin
+                a, b = (0, 1) if size == len("xy") else (k - 2, k - 1)
+                force = found[:size]
+                lever = graph.sub(graph.mul(place[a], force[b]), graph.mul(place[b], force[a]))
+                found[size + k] = graph.add(found[size + k], lever)
+            total = [graph.add(item, own) for item, own in zip(total, found, strict=True)]
+        for axis, node in zip(AXES, total[:size], strict=False):
             yield _Row(f"F_{axis}_ground", self._force, node)
-        if size == len("xy"):
-            yield _Row("T_ground", self._torque, moment)
+        for turn, node in zip(self._turns, total[size:], strict=True):
+            yield _Row(f"T{turn}_ground", self._torque, node)
+
+    def _on_body(self, instance: Instance) -> list[int]:
+        """Return force and moment about its origin that a load and inertia have on a body."""
+        load = instance.constraint
+        assert isinstance(load, AppliedLoad)
+        template = placed(load.template.frames[0])
+        kernel = _reaction_kernel(template, (None,), None)
+        known = self._inputs(instance)
+        for k, node in enumerate(self._effective(instance)):
+            known[Attribute(f"lambda_{k}", 0, "")] = node
+        return kernel.bound(self._graph, known)[: self._size + len(self._turns)]
+
+    def _inputs(self, instance: Instance) -> dict[Input | str, int]:
+        """Return the nodes of all that may occur in a formula of a constraint or a load."""
+        about = instance.constraint
+        assert isinstance(about, Joint | AppliedLoad)
+        known = zip(self._binder.inputs_of(about), self._binder.known(about), strict=True)
+        return {**dict(known), **_bound(instance)}
 
     def _effective(self, instance: Instance) -> list[int]:
         """Return the generalised forces of a load on its body less those of inertia."""

@@ -161,7 +161,7 @@ def _classify(program: Program, groups: Sequence[FrameGroup]) -> _Nodes:
             kinds_of[node], index[node] = frames[node]
         if program.loads and kinds_of[node] == VALUE and is_moving(node):
             kinds_of[node] = MOVING
-    kind, numbers = np.array(kinds_of), np.array(number)
+    kind, numbers = np.array(kinds_of), np.array(number, dtype=float)
     kind[~np.isnan(numbers)] = NUMBER
     structure = _structures(nodes, kind, len(kinds))
     return _Nodes(kinds, kind, np.array(index), numbers, structure)

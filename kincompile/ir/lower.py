@@ -48,7 +48,7 @@ def lower(system: ConstraintSystem, *, share_equations: bool = False) -> Program
     """
     columns = {item.name: column for column, item in enumerate(system.coordinates)}
     graph = Graph()
-    binder = _Binder(graph, EquationShapes(columns) if share_equations else None)
+    binder = Binder(graph, EquationShapes(columns) if share_equations else None)
     instances = []
     for first_row, constraint in zip(system.row_offsets, system.constraints, strict=True):
         try:
@@ -159,7 +159,7 @@ def _tables_in(values: Iterable[Scalar]) -> dict[str, SplineTable]:
     return found
 
 
-class _Binder:
+class Binder:
     """Gives the nodes of kernels' inputs; those of a body are made once for all its joints."""
 
     def __init__(self, graph: Graph, shapes: EquationShapes | None) -> None:
@@ -205,7 +205,7 @@ class _Binder:
 
         kernel = load_kernel(load.template, load.others, varies=load.varies)
         known: dict[Input | str, int] = {}
-        known |= zip(self._inputs_of(load), self._known(load), strict=True)
+        known |= zip(self.inputs_of(load), self.known(load), strict=True)
         known |= slopes(load, self._graph, self._value)
         own = tuple(None if name is None else columns[name] for name in load.columns)
         bindings = tuple(known[entry] for entry in kernel.inputs)
@@ -213,7 +213,7 @@ class _Binder:
 
     def bind(self, joint: Joint, kernel: Kernel) -> tuple[int, ...]:
         """Return the node of each of the kernel's inputs."""
-        known = self._known(joint)
+        known = self.known(joint)
         places, functions = self._order(joint, kernel)
         known += [self._function(joint, item) for item in functions]
         return tuple(map(known.__getitem__, places))
@@ -248,7 +248,7 @@ class _Binder:
         """Return the node of a symbol by name, or of a number or expression."""
         return self._graph.input(value) if isinstance(value, str) else self._convert(value)
 
-    def _known(self, joint: Joint | AppliedLoad) -> list[int]:
+    def known(self, joint: Joint | AppliedLoad) -> list[int]:
         """Return the nodes of coordinates, rates and frames, then of scalars and points."""
         known = [node for body in joint.bodies for node in self._body(body)]
         for name in joint.columns[len(joint.columns) - len(joint.template.contacts) :]:
@@ -259,12 +259,12 @@ class _Binder:
         return known
 
     def _order(self, joint: Joint, kernel: Kernel) -> tuple[tuple[int, ...], list[Function]]:
-        """Return where each of the kernel's inputs stands in `_known`, and the functions after it.
+        """Return where each of the kernel's inputs stands in `known`, and the functions after it.
 
         What stands there is the same for all joints of a type.
         """
         if id(kernel) not in self._orders:
-            known = self._inputs_of(joint)
+            known = self.inputs_of(joint)
             functions = [item for item in kernel.inputs if isinstance(item, Function)]
             places: dict[Input | str, int] = {
                 item: place for place, item in enumerate((*known, *functions))
@@ -274,8 +274,8 @@ class _Binder:
         return self._orders[id(kernel)][1]
 
     @staticmethod
-    def _inputs_of(joint: Joint | AppliedLoad) -> list[Input]:
-        """Return the inputs whose nodes `_known` gives."""
+    def inputs_of(joint: Joint | AppliedLoad) -> list[Input]:
+        """Return the inputs whose nodes `known` gives."""
         template = joint.template
         known: list[Input] = []
         for owner, item in enumerate(template.owners):

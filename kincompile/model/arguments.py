@@ -9,7 +9,7 @@ declares a field, its symbol in the textbook's formula, and the line that docume
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field
 from enum import Enum
 from typing import Any, TypeAlias
 
@@ -82,8 +82,11 @@ class Argument:
 _DRIVEN = "a number or an expression of parameters; with `t` in it, a driver."
 
 
-def _declared(kind: Kind, symbol: str, text: str, on: str = "", unit: str = "length") -> Any:
-    return field(metadata={"argument": Argument(kind, symbol, text, on, unit)})
+def _declared(
+    kind: Kind, symbol: str, text: str, on: str = "", unit: str = "length", default: Any = MISSING
+) -> Any:
+    made = Argument(kind, symbol, text, on, unit)
+    return field(default=default, metadata={"argument": made})
 
 
 def body(symbol: str) -> Any:
@@ -147,29 +150,24 @@ def profile(symbol: str) -> Any:
 
 def attribute(symbol: str, text: str, unit: str = "", default: ValueLike | None = None) -> Any:
     """Declare a number or an expression of parameters; with a default it may be left out."""
-    made = Argument(
-        Kind.SCALAR, symbol, f"{text}, a number or an expression of parameters.", "", unit
-    )
-    if default is None:
-        return field(metadata={"argument": made})
-    return field(default=default, metadata={"argument": made})
+    about = f"{text}, a number or an expression of parameters."
+    given = MISSING if default is None else default
+    return _declared(Kind.SCALAR, symbol, about, unit=unit, default=given)
 
 
 def load(symbol: str, text: str, default: ValueLike | None = None) -> Any:
     """Declare a force or a torque; with a default it may be left out."""
     about = f"{text}, a number or an expression of parameters, t, coordinates and rates."
-    made = Argument(Kind.LOAD, symbol, about)
-    if default is None:
-        return field(metadata={"argument": made})
-    return field(default=default, metadata={"argument": made})
+    given = MISSING if default is None else default
+    return _declared(Kind.LOAD, symbol, about, unit="", default=given)
 
 
 def measured(symbol: str, text: str, default: None) -> Any:
     """Declare a coordinate that may be left out: the mechanism then gets one."""
-    return field(default=default, metadata={"argument": Argument(Kind.LOAD, symbol, text)})
+    return _declared(Kind.LOAD, symbol, text, unit="", default=default)
 
 
 def loads(symbol: str, text: str) -> Any:
     """Declare the components of a force."""
     about = f"{text}, numbers or expressions of parameters, t, coordinates and rates."
-    return field(metadata={"argument": Argument(Kind.LOADS, symbol, about)})
+    return _declared(Kind.LOADS, symbol, about, unit="")

@@ -41,6 +41,21 @@ m, J = Symbol("m"), Symbol("J")
 HALF = Number(Fraction(1, 2))
 
 
+def _friction_problem(numbers: Numbers) -> str | None:
+    (velocity,), (size,) = numbers("v_0"), numbers("F")
+    if velocity is not None and velocity <= 0:
+        return f"the velocity of the smoothed law is {velocity:g}; give a small positive one"
+    if size is not None and size < 0:
+        return f"friction of {size:g} would drive; give what it is when sliding, positive"
+    return None
+
+
+def _nothing_problem(numbers: Numbers) -> str | None:
+    if all(numbers(symbol) == (0,) for symbol in ("k", "c", "F")):
+        return "it has no stiffness, no damping and no force; give one of them"
+    return None
+
+
 @constraint_type
 class Force(Load):
     """A force on a point of a body, whose components are along the fixed axes."""
@@ -162,10 +177,7 @@ class TorsionSpring(Turning):
         """Return the torque that turns back, against the angle."""
         return cls.couple(-(k * (cls.turned() - angle_0) + c * cls.turning() + F))
 
-    @staticmethod
-    def problem(numbers: Numbers) -> str | None:
-        """Refuse a spring that is none."""
-        return _nothing_problem(numbers)
+    problem = staticmethod(_nothing_problem)
 
 
 @constraint_type
@@ -188,10 +200,7 @@ class HingeFriction(Turning):
         """Return the torque against the sliding, and the angle."""
         return cls.couple(_against(cls.turning()))
 
-    @staticmethod
-    def problem(numbers: Numbers) -> str | None:
-        """Refuse a velocity that is not positive, and a negative moment."""
-        return _friction_problem(numbers)
+    problem = staticmethod(_friction_problem)
 
 
 @constraint_type
@@ -220,30 +229,12 @@ class SliderFriction(Load):
         way = dot(body.A(axis), second - first) / Norm(axis)
         return ((_against(cls.rate_of(way)), way),)
 
-    @staticmethod
-    def problem(numbers: Numbers) -> str | None:
-        """Refuse a velocity that is not positive, and a negative force."""
-        return _friction_problem(numbers)
+    problem = staticmethod(_friction_problem)
 
 
 def _against(velocity: Scalar) -> Scalar:
     """Return the smoothed law of Coulomb, -F v/sqrt(v^2 + v_0^2)."""
     return -(F * velocity / Root(velocity**2 + v_0**2))
-
-
-def _friction_problem(numbers: Numbers) -> str | None:
-    (velocity,), (size,) = numbers("v_0"), numbers("F")
-    if velocity is not None and velocity <= 0:
-        return f"the velocity of the smoothed law is {velocity:g}; give a small positive one"
-    if size is not None and size < 0:
-        return f"friction of {size:g} would drive; give what it is when sliding, positive"
-    return None
-
-
-def _nothing_problem(numbers: Numbers) -> str | None:
-    if all(numbers(symbol) == (0,) for symbol in ("k", "c", "F")):
-        return "it has no stiffness, no damping and no force; give one of them"
-    return None
 
 
 @constraint_type

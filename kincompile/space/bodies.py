@@ -14,41 +14,24 @@ if TYPE_CHECKING:
 
     from kincompile.model.expressions import Scalars
 
+ALIKE = (
+    "AbsoluteX", "AbsoluteY", "AbsoluteDistance", "RelativeX", "RelativeY", "Distance", "Revolute",
+    "Translational", "Force", "FollowerForce", "Torque", "Spring", "TorsionSpring", "HingeFriction",
+    "SliderFriction",
+)  # fmt: skip
+"""Types of constraints and loads that have the names of planar ones."""
+
 SPATIAL = BodyKind(
     frame=SpatialFrame,
     units=(None, None, None, "", "", "", ""),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteZ", *("AbsoluteOrientation",) * 4),
     elsewhere={
-        **{
-            name: f"spatial.{name}"
-            for name in (
-                "AbsoluteX",
-                "AbsoluteY",
-                "AbsoluteDistance",
-                "RelativeX",
-                "RelativeY",
-                "Distance",
-                "Revolute",
-                "Translational",
-            )
-        },
+        **{name: f"spatial.{name}" for name in ALIKE},
         "AbsoluteAngle": "spatial.RelativeRotation from the ground",
         "RelativeAngle": "spatial.RelativeRotation",
         "RevoluteTranslational": "spatial.PointOnLine",
         "TranslationalDistance": "spatial.RelativeTranslation",
         "Gear": "an Equation between two spatial.JointAngle",
-        **{
-            name: f"spatial.{name}"
-            for name in (
-                "Force",
-                "FollowerForce",
-                "Torque",
-                "Spring",
-                "TorsionSpring",
-                "HingeFriction",
-                "SliderFriction",
-            )
-        },
         "RackAndPinion": "an Equation between a spatial.JointAngle and a way",
     },
     masses="kincompile.space.masses",

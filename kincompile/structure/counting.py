@@ -40,14 +40,8 @@ def counting_problem(
     """Return what is wrong with the numbers of equations and coordinates, "" where nothing is.
 
     It has the counts, the coordinates that nothing determines or the equations that are too many,
-    and what to do.
-
-    Parameters
-    ----------
-    system, pattern
-        A checked system, and where its Phi_q is not identically zero.
-    dependent
-        Equations known to depend on others, to be named before those that a matching leaves over.
+    and what to do. Equations known to depend on others are named before those that a matching
+    leaves over.
     """
     n, m = len(system.coordinates), len(system.equations)
     equations, coordinates = unmatched(system, pattern)

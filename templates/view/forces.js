@@ -88,7 +88,7 @@ const reactions = {
     if (forces === null || !state.isFound) return [];
     const values = this.at(state);
     return forces.OUTPUTS.flatMap((name, k) => {
-      const joint = names.find(own => name.endsWith(`_${own}`) && /^(F_.|T|T_i|F_along|F_across|drive|P|load)$/.test(name.slice(0, -own.length - 1)));
+      const joint = names.find(own => name.endsWith(`_${own}`) && /^(F_.|T(_i)?(_.)?|[FT]_along|F_across|drive|P|load)$/.test(name.slice(0, -own.length - 1)));
       return joint ? [`${name.slice(0, -joint.length - 1)} = ${units.full(values[k], forces.UNITS[name])}`] : [];
     });
   },

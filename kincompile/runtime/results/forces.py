@@ -56,14 +56,18 @@ class Reaction:
         On body j, about the joint's point of it.
     moment_on_i : ndarray, shape (N,), in space (N, 3)
         On body i, about the joint's point of that.
-    along_axis : ndarray, shape (N, 2)
-        The force on body j along the joint's axis and, in the plane, across it; else NaN.
+    along_axis : ndarray, shape (N, 2), in space (N, 3)
+        The force on body j along the joint's axis and across it, in space along f and g of the
+        joint's triad, which turns with body j; NaN without an axis.
+    moment_along_axis : ndarray, in space of shape (N, 3)
+        The moment on body j along the same axes; in the plane `moment`.
     """
 
     force: Array
     moment: Array
     moment_on_i: Array
     along_axis: Array
+    moment_along_axis: Array
 
     @property
     def size(self) -> Array:
@@ -152,14 +156,20 @@ class Forces(Shown):
         if axes == "xy" and drive in self.names and f"T_{name}" not in self.names:
             moment = moment if has_forces else self._column(drive)
         on_i = self._moment("T_i", name) if len(bodies) > 1 else np.full_like(moment, np.nan)
-        ways = [f"F_along_{name}"]
         if axes == "xy":
-            ways.append(f"F_across_{name}")
-        by_axis = np.full((*force.shape[:-1], 2), np.nan)
-        if any(way in self.names for way in ways):
-            for k, way in enumerate(ways):
-                by_axis[..., k] = self._column(way)
-        return Reaction(force, moment, on_i, by_axis)
+            return Reaction(
+                force, moment, on_i, self._by_axis(name, ["F_along", "F_across"]), moment
+            )
+        ways = [f"{letter}_{way}" for letter in "FT" for way in ("along", "f", "g")]
+        along_axis, about_axis = np.split(self._by_axis(name, ways), 2, axis=-1)
+        return Reaction(force, moment, on_i, along_axis, about_axis)
+
+    def _by_axis(self, name: str, ways: Sequence[str]) -> Array:
+        """Return what a joint bears along its axis and across it, NaN where it has no axis."""
+        columns = [f"{way}_{name}" for way in ways]
+        if not any(column in self.names for column in columns):
+            return np.full((*self.multipliers.shape[:-1], len(ways)), np.nan)
+        return np.stack([self._column(column) for column in columns], axis=-1)
 
     @property
     def drivers(self) -> dict[str, Drive]:
@@ -177,9 +187,9 @@ class Forces(Shown):
     def ground(self) -> Reaction:
         """What shakes the ground: force and moment about the origin."""
         force = np.stack([self._column(f"F_{axis}_ground") for axis in self._axes], axis=-1)
-        nothing = np.full(force.shape[:-1], np.nan)
-        moment = self._column("T_ground") if self._axes == "xy" else nothing
-        return Reaction(force, moment, nothing, np.full((*nothing.shape, 2), np.nan))
+        moment = self._moment("T", "ground")
+        nothing, no_axis = np.full_like(moment, np.nan), np.full_like(force, np.nan)
+        return Reaction(force, moment, nothing, no_axis, nothing)
 
     def in_axes_of(self, body: str, force: Array) -> Array:
         """Return forces (N, 2), in space (N, 3), in the axes of a body, which turn with it."""
