@@ -106,7 +106,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "bodies": _optional(_list("body")),
         "coordinates": _optional(_list("coordinate")),
         "sketch": _optional(_ref("sketch")),
-        "constraints": Field(_list("constraint")),
+        "constraints": _optional(_list("constraint")),
         "gravity": _optional(_POINT),
         "loads": _optional(_list("load")),
         "points": _optional(_list("point")),
@@ -212,7 +212,7 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         **{key: item for key, item in FIELDS["model"].items() if key != "sketch"},
         "space": Field({"const": SPACE}),
         "bodies": _optional(_list("spatial_body")),
-        "constraints": Field(_list("spatial_constraint")),
+        "constraints": _optional(_list("spatial_constraint")),
         "points": _optional(_list("spatial_point")),
         "gravity": _optional(_TRIPLE),
         "loads": _optional(_list("spatial_load")),
@@ -349,8 +349,6 @@ def model_schema() -> dict[str, Any]:
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
     parts[0]["additionalProperties"] = _any_of(_EXPRESSION, _POINT)
-    model = _object(FIELDS["model"])
-    model["required"].remove("constraints")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Mechanism for kincompile, format {VERSION}",
@@ -359,10 +357,7 @@ def model_schema() -> dict[str, Any]:
         "then": _ref("in_space"),
         "else": _ref("in_the_plane"),
         "$defs": {
-            "in_the_plane": {
-                **model,
-                "anyOf": [{"required": ["constraints"]}, {"required": ["sketch"]}],
-            },
+            "in_the_plane": _object(FIELDS["model"]),
             "in_space": _object(IN_SPACE["model"]),
             "expression": {
                 "description": "a number, or a formula such as -a/2 + sin(omega*t)",
