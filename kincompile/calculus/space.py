@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
-from kincompile.calculus.expand import cross_product
 from kincompile.calculus.expressions import (
     Number,
     Rotated,
@@ -23,7 +23,7 @@ from kincompile.calculus.symbols import Frame
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Sequence
 
     from kincompile.calculus.expressions import (
         Components,
@@ -79,19 +79,10 @@ class EulerRotation:
     ) -> Components:
         """Return the nine entries of A, row by row."""
         del call
-        ((e0, e1, e2, e3),) = coordinates
-        if self.is_back:
-            e1, e2, e3 = -e1, -e2, -e3
-        f1, f2, f3 = e1 + e1, e2 + e2, e3 + e3
-        same, other = e0**2 - e3**2, e1**2 - e2**2
-        p12, p13, p23 = f1 * e2, f1 * e3, f2 * e3
-        p01, p02, p03 = e0 * f1, e0 * f2, e0 * f3
-        last = e0**2 + e3**2 - (e1**2 + e2**2)
-        return (
-            same + other, p12 - p03, p13 + p02,
-            p12 + p03, same - other, p23 - p01,
-            p13 - p02, p23 + p01, last,
-        )  # fmt: skip
+        (p,) = coordinates
+        twice = _twice(p)
+        pairs = (p[i] * twice[k] for i, k in _PAIRS)
+        return _matrix([item**2 for item in p], pairs, self.is_back)
 
     def components(
         self,
@@ -101,20 +92,43 @@ class EulerRotation:
         expand: Callable[[Expression], Components],
     ) -> Components:
         """Return A v, or its derivative: twice the form of p and a direction, or of two."""
-        if not along:
-            rows = entries[:3], entries[3:6], entries[6:]
-            return tuple(_dot(row, vector) for row in rows)
-        p, w = along if len(along) == 2 else (expand(self.p), *along)
-        if self.is_back:
-            p, w = ((x[0], *(-item for item in x[1:])) for x in (p, w))
-        p0, w0 = p[0], w[0] + w[0]
-        e, f = p[1:], tuple(item + item for item in w[1:])
-        same, by_e, by_f = p0 * w0 - _dot(e, f), _dot(f, vector), _dot(e, vector)
-        turns = zip(cross_product(e, vector), cross_product(f, vector), strict=True)
-        return tuple(
-            same * v + a * by_e + b * by_f + (w0 * c + p0 * d)
-            for v, a, b, (c, d) in zip(vector, e, f, turns, strict=True)
-        )
+        if along:
+            p, w = along if len(along) == 2 else (expand(self.p), *along)
+            entries = _slopes(p, w, self.is_back)
+        rows = entries[:3], entries[3:6], entries[6:]
+        return tuple(_dot(row, vector) for row in rows)
+
+
+_PAIRS = tuple(itertools.combinations(range(4), 2))
+
+
+def _slopes(p: Components, w: Components, is_back: bool) -> Components:
+    """Return the derivative of A along w, twice the form of p and w, row by row."""
+    twice = _twice(w)
+    if p is w:
+        doubled = _twice(twice)
+        pairs = (p[i] * doubled[k] for i, k in _PAIRS)
+    else:
+        pairs = (p[i] * twice[k] + twice[i] * p[k] for i, k in _PAIRS)
+    return _matrix([a * b for a, b in zip(p, twice, strict=True)], pairs, is_back)
+
+
+def _matrix(squares: Sequence[Value], pairs: Iterable[Value], is_back: bool) -> Components:
+    """Return the matrix of the form: squares e_i e_i, and pairs 2 e_i e_k in the order of i, k."""
+    p00, p11, p22, p33 = squares
+    p01, p02, p03, p12, p13, p23 = pairs
+    if is_back:
+        p01, p02, p03 = -p01, -p02, -p03
+    same, other = p00 - p33, p11 - p22
+    return (
+        same + other, p12 - p03, p13 + p02,
+        p12 + p03, same - other, p23 - p01,
+        p13 - p02, p23 + p01, p00 + p33 - (p11 + p22),
+    )  # fmt: skip
+
+
+def _twice(vector: Components) -> Components:
+    return tuple(item + item for item in vector)
 
 
 def _dot(left: Components, right: Components) -> Value:

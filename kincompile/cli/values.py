@@ -39,12 +39,8 @@ def set_values(
 ) -> dict[str, float]:
     """Return the numbers that are set, angles in radians; the last counts of a name set twice.
 
-    Names are those of parameters or of columns, ``crank.phi`` or ``crank.phi_dot``.
-
-    Raises
-    ------
-    InputError
-        With every value that is no number, or in degrees where it is no angle.
+    Names are those of parameters or of columns, ``crank.phi`` or ``crank.phi_dot``. Every value
+    that is none is told.
     """
     units: dict[str, str] = {item.name: str(item.unit) for item in model.parameters}
     pairs = [item.partition("=")[::2] for item in given]
@@ -68,21 +64,8 @@ def set_values(
 def number(text: str, what: str, names: Mapping[str, float], unit: str = "") -> float:
     """Return the number that a text is: plain, in degrees, or a formula of names.
 
-    Parameters
-    ----------
-    text
-        For instance ``0.25``, ``30deg``, ``pi/6`` or ``60/n``.
-    what
-        The option and what is expected, for messages.
-    names
-        The numbers of names that may occur.
-    unit
-        The unit of the number; degrees become radians, and what is in degrees stays.
-
-    Raises
-    ------
-    InputError
-        If it is no finite number, or in degrees where it is no angle.
+    As ``0.25``, ``30deg``, ``pi/6`` or ``60/n``; `what` says for messages which option it is, and
+    what is expected. Degrees become radians where `unit` is not that of degrees itself.
     """
     try:
         return float(text)
@@ -107,13 +90,7 @@ def time_grid(
     points: int | None,
     values: dict[str, float],
 ) -> NDArray[np.float64]:
-    """Return equally spaced times: the options before the model's own.
-
-    Raises
-    ------
-    InputError
-        If a time is no finite number at the values of the parameters, or there is no point.
-    """
+    """Return equally spaced times: the options before the model's own."""
     names = default_values(model.parameters) | values
     first, last = number(start, f"--start {start}: give a time", names), _last(model, end, names)
     try:
@@ -151,13 +128,7 @@ def times_on_grid(
     times: NDArray[np.float64],
     values: dict[str, float],
 ) -> NDArray[np.float64]:
-    """Return the times at which a coordinate has equally spaced values.
-
-    Raises
-    ------
-    InputError
-        If the grid is not written as NAME=FIRST:LAST:STEP, or the motion does not reach it.
-    """
+    """Return the times at which a coordinate has equally spaced values, NAME=FIRST:LAST:STEP."""
     module = kc.compile(model)
     name, _, text = grid.partition("=")
     parts = text.split(":")

@@ -37,19 +37,7 @@ RUN = (
 def follow(model: str, options: Sequence[str]) -> None:
     """Serve the page of a model, anew when a file is saved that it reads, until interrupted.
 
-    Parameters
-    ----------
-    model
-        The file of the model.
-    options
-        Those of `kincompile view` for its motion.
-
-    Raises
-    ------
-    UnsupportedError
-        If watchfiles is not installed.
-    InputError
-        If there is no such file.
+    The options are those of `kincompile view` for its motion.
     """
     with package_of_extra("watchfiles", "watch"):
         import watchfiles

@@ -31,13 +31,7 @@ class Column:
 
 
 def column_of(module: ModuleType, name: str) -> Column:
-    """Return the column that a name means.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it would need a third derivative of coordinates.
-    """
+    """Return the column that a name means; refuse one that would need a third derivative of q."""
     known = (*module.COORDINATES, *getattr(module, "OUTPUTS", ()))
     wanted = column_name(str(name))
     for of in known:
@@ -71,13 +65,7 @@ def _require_rate(module: ModuleType, of: str, order: int) -> None:
 
 
 def columns_of(module: ModuleType, names: Iterable[str] | str | None) -> list[Column]:
-    """Return the columns that are named; without names the outputs, or else the coordinates.
-
-    Raises
-    ------
-    InputError
-        With every name that is none.
-    """
+    """Return the columns that are named; without names the outputs, or else the coordinates."""
     if names is None:
         names = getattr(module, "OUTPUTS", ()) or module.COORDINATES
     found: list[Column] = []

@@ -95,13 +95,7 @@ class Demands:
 def read_demands(
     module: ModuleType, system: ConstraintSystem, targets: Sequence[Target]
 ) -> Demands:
-    """Return the targets with their columns.
-
-    Raises
-    ------
-    InputError
-        With every name that is none, and every target that cannot be asked for.
-    """
+    """Return the targets with their columns; refuse what cannot be asked for, all at once."""
     problems: list[str] = []
 
     def column(name: str, title: str = "", further: int = 0) -> Column:

@@ -134,10 +134,7 @@ def _is_number(value: object) -> bool:
 def read_deviation(given: Any, where: str) -> Deviation:
     """Return a deviation that is given as one, as a number for both limits, or as two limits.
 
-    Raises
-    ------
-    InputError
-        If it is none; `where` begins the message.
+    `where` begins the message where it is none.
     """
     if isinstance(given, Deviation):
         return given
@@ -155,13 +152,7 @@ def read_deviation(given: Any, where: str) -> Deviation:
 
 
 def read_clearance(given: Any, where: str) -> Clearance:
-    """Return the clearance of a joint that is given as a number.
-
-    Raises
-    ------
-    InputError
-        If it is none; `where` begins the message.
-    """
+    """Return the clearance of a joint that is given as a number; `where` begins a message."""
     if _is_number(given) and given > 0:
         return Clearance(float(given))
     raise InputError(f"{where} is {given!r}: give the radial clearance, a positive length")

@@ -147,13 +147,7 @@ def _rank(trial: Trial) -> tuple[bool, float]:
 
 
 def _targets(given: Any) -> list[Target]:
-    """Return the targets as a list.
-
-    Raises
-    ------
-    InputError
-        If something is none, or nothing is to be reached.
-    """
+    """Return the targets as a list; refuse what is none."""
     kinds = (Passing, TimeRatio, Limit, Moves)
     found = [given] if isinstance(given, kinds) else list(given)
     problems = [
@@ -171,13 +165,7 @@ def _targets(given: Any) -> list[Target]:
 def _read_bounds(
     model: Mechanism, parameters: Any, bounds: Any, fixed: Mapping[str, float]
 ) -> tuple[tuple[str, ...], Array]:
-    """Return the parameters that may change, and their bounds, shape (k, 2).
-
-    Raises
-    ------
-    InputError
-        With all that is wrong.
-    """
+    """Return the parameters that may change, and their bounds, shape (k, 2)."""
     given = dict(bounds or {})
     names = (
         tuple(given)
@@ -232,13 +220,7 @@ def _checked_bounds(name: str, limits: Any, problems: list[str]) -> tuple[float,
 
 
 def _check_options(samples: Any, starts: Any, search: str, minimizer: str) -> None:
-    """Check what says how to search.
-
-    Raises
-    ------
-    InputError
-        With all that is wrong.
-    """
+    """Check what says how to search."""
     problems = [
         f"{name} is {value!r}: give a whole number from 1 to {most:,}"
         for name, value, most in (("samples", samples, 2**20), ("starts", starts, 10_000))
@@ -274,13 +256,7 @@ def _with_limits(model: Mechanism, targets: Sequence[Target]) -> Mechanism:
 
 
 def _require_plan(module: ModuleType) -> None:
-    """Check that many sets of parameters can be solved together.
-
-    Raises
-    ------
-    UnsupportedError
-        If the module is in grouped form.
-    """
+    """Check that many sets of parameters can be solved together."""
     if code_of(module).lanes is None:
         raise UnsupportedError(
             f"{module.NAME} is large: kc.fit takes mechanisms that are compiled in the inline form."

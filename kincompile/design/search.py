@@ -294,17 +294,8 @@ class _Columns:
 def in_order(off: Array) -> tuple[Array, NDArray[np.intp]]:
     """Choose times for points so that their order is kept and the sum of deviations is least.
 
-    Parameters
-    ----------
-    off : ndarray, shape (B, N, K)
-        Deviation of point k at time i; N is at least K.
-
-    Returns
-    -------
-    error : ndarray, shape (B,)
-        The sums; infinite where there are too few times.
-    chosen : ndarray of int, shape (B, K)
-        The number of the time of each point, rising.
+    Of deviations (B, N, K) of point k at time i, with N at least K, these are the sums (B,),
+    infinite where there are too few times, and the rising numbers of the times (B, K).
     """
     sets, count, points = off.shape
     chosen = np.zeros((sets, points), dtype=np.intp)

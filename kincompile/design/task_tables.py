@@ -44,30 +44,14 @@ MOST_SEED = 2**32 - 1
 
 
 def read_tolerance(path: str | os.PathLike[str]) -> Arguments:
-    """Return the arguments of `kc.tolerance` that the table `tolerance` of a model file says.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it has no such table.
-    ModelError
-        If the table cannot be used; every problem with line and field.
-    """
+    """Return the arguments of `kc.tolerance` that the table `tolerance` of a model file says."""
     reader = _reader(path, "tolerance")
     found = reader.tolerance()
     return reader.checked(found)
 
 
 def read_fit(path: str | os.PathLike[str], model: Mechanism) -> Arguments:
-    """Return the arguments of `kc.fit` that the table `fit` of a model file says.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it has no such table.
-    ModelError
-        If the table cannot be used; every problem with line and field.
-    """
+    """Return the arguments of `kc.fit` that the table `fit` of a model file says."""
     reader = _reader(path, "fit")
     found = reader.fit(model)
     return reader.checked(found)

@@ -139,13 +139,7 @@ def tolerance(
 def _sources(
     model: Mechanism, tolerances: Mapping[str, Any], clearances: Mapping[str, Any]
 ) -> Sources:
-    """Return what deviates by its title: its parameters, and how.
-
-    Raises
-    ------
-    InputError
-        With all that is wrong.
-    """
+    """Return what deviates by its title: its parameters, and how."""
     known = [item.name for item in model.parameters]
     found: Sources = {}
     problems = []
@@ -210,13 +204,7 @@ def _effects(gradients: Array, curvatures: Array, sources: Sources) -> Bands:
 def _require_effect(
     name: str, sources: Sources, columns: Sequence[Column], bands: Sequence[Array], values: Array
 ) -> None:
-    """Check that every tolerance moves one of the columns.
-
-    Raises
-    ------
-    InputError
-        With every tolerance that does not.
-    """
+    """Check that every tolerance moves one of the columns."""
     size = np.maximum(np.nanmax(np.abs(values), axis=0), np.finfo(float).tiny)
     moved = np.nanmax(bands[2] - bands[1], axis=0) / size[:, np.newaxis]
     still = [title for k, title in enumerate(sources) if not (moved[:, k] > STILL).any()]

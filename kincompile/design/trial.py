@@ -76,16 +76,10 @@ class Workbench:
     _found: Sensitivities | None = field(default=None, init=False)
 
     def solved(self, x: Array, guess: Array | None, branch: Any = None) -> Trial | None:
-        """Return the trial of some variables; None where the mechanism does not get through.
+        """Return the trial of some variables (nx,); None where the mechanism does not get through.
 
-        Parameters
-        ----------
-        x : ndarray, shape (nx,)
-            The variables.
-        guess : ndarray, shape (n,)
-            The position at the first time, nearly.
-        branch
-            The signs that the determinants must have there, if one is to be kept.
+        The guess (n,) is nearly its position at the first time. The determinants there must have
+        the signs of the branch, if one is given.
         """
         p = self.fixed | dict(zip(self.names, x.tolist(), strict=False))
         instants = self.demands.instants(x[len(self.names) :])

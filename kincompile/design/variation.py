@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 
 
 def require_mechanism(model: object, what: str) -> Mechanism:
-    """Return the model if it is a mechanism of bodies and joints.
-
-    Raises
-    ------
-    InputError
-        If it is another thing; `what` says who asks.
-    """
+    """Return the model if it is a mechanism of bodies and joints; `what` says who asks."""
     if isinstance(model, Mechanism):
         return model
     kind = type(model).__name__
@@ -41,11 +35,6 @@ def with_clearances(model: Mechanism, joints: Iterable[str]) -> Mechanism:
     """Return a mechanism in which a small vector shifts the point of body i of each joint.
 
     Its components are parameters, zero by default.
-
-    Raises
-    ------
-    InputError
-        With every joint that there is not, or that has no point on a body i in the plane.
     """
     loose = set(joints)
     if not loose:
@@ -96,14 +85,7 @@ def with_values(
 ) -> Mechanism:
     """Return a mechanism whose parameters have these defaults, and whose bodies are guessed here.
 
-    Parameters
-    ----------
-    model
-        The mechanism; it is not changed.
-    values
-        Defaults of parameters by name; the others keep theirs.
-    guess
-        Guesses of coordinates by name; bodies of which one is missing keep theirs.
+    Parameters without a value keep theirs, and so do bodies of which a coordinate is missing.
     """
     changed = copy.copy(model)
     changed.parameters = [_valued(item, values) for item in model.parameters]

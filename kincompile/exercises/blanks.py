@@ -50,13 +50,7 @@ class Blank:
 
 
 def choose_blanks(system: ConstraintSystem, seed: int) -> tuple[Blank, ...]:
-    """Choose entries that a student must derive: those that vary, of all joints in turn.
-
-    Raises
-    ------
-    InputError
-        If the model has no joint with such an entry.
-    """
+    """Choose entries that a student must derive: those that vary, of all joints in turn."""
     random = Random(f"blanks-{seed}")
     entries: list[list[tuple[str, str, int, int | None]]] = []
     rows: list[list[tuple[str, str, int, int | None]]] = []

@@ -182,13 +182,7 @@ def exercise(
 
 
 def require_new_folder(folder: Path) -> None:
-    """Refuse a folder that exists and is not empty, or whose place does not exist.
-
-    Raises
-    ------
-    InputError
-        Says which, and what to do.
-    """
+    """Refuse a folder that exists and is not empty, or whose place does not exist."""
     if folder.is_dir() and not any(folder.iterdir()):
         return
     if folder.exists():

@@ -63,11 +63,6 @@ def variants(mechanism: Mechanism, count: int, seed: int, choices: Choices) -> l
     """Return variants of a mechanism that all differ, assemble and move; the same for a seed.
 
     Their parameters are numbers, so that formulas by hand are written with these.
-
-    Raises
-    ------
-    InputError
-        If nothing in the model can vary, or no variant is found that assembles.
     """
     found: dict[_Change, Mechanism] = {}
     for student in range(1, count + 1):

@@ -86,7 +86,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "bodies": Field(_list("body"), is_required=False),
         "coordinates": Field(_list("coordinate"), is_required=False),
         "sketch": Field({"$ref": "#/$defs/sketch"}, is_required=False),
-        "constraints": Field(_list("constraint")),
+        "constraints": Field(_list("constraint"), is_required=False),
         "gravity": Field(_POINT, is_required=False),
         "loads": Field(_list("load"), is_required=False),
         "points": Field(_list("point"), is_required=False),
@@ -215,7 +215,7 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         "space": Field({"const": SPACE}),
         "sketch": Field({"$ref": "#/$defs/spatial_sketch"}, is_required=False),
         "bodies": Field(_list("spatial_body"), is_required=False),
-        "constraints": Field(_list("spatial_constraint")),
+        "constraints": Field(_list("spatial_constraint"), is_required=False),
         "points": Field(_list("spatial_point"), is_required=False),
         "gravity": Field(_TRIPLE, is_required=False),
         "loads": Field(_list("spatial_load"), is_required=False),
@@ -389,8 +389,8 @@ def model_schema() -> dict[str, Any]:
         "then": {"$ref": "#/$defs/in_space"},
         "else": {"$ref": "#/$defs/in_the_plane"},
         "$defs": {
-            "in_the_plane": _model(FIELDS["model"]),
-            "in_space": _model(IN_SPACE["model"]),
+            "in_the_plane": _object(FIELDS["model"]),
+            "in_space": _object(IN_SPACE["model"]),
             "expression": {
                 "description": "a number, or a formula such as -a/2 + sin(omega*t)",
                 "type": ["number", "string"],
@@ -406,13 +406,6 @@ def model_schema() -> dict[str, Any]:
             "spatial_load": {"oneOf": _loads(SPACE)},
         },
     }
-
-
-def _model(fields: Mapping[str, Field]) -> dict[str, Any]:
-    """Return the schema of a file, which has constraints, or a drawing that makes them."""
-    model = _object(fields)
-    model["required"].remove("constraints")
-    return {**model, "anyOf": [{"required": ["constraints"]}, {"required": ["sketch"]}]}
 
 
 def _loads(count: int) -> list[dict[str, Any]]:

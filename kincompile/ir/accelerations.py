@@ -44,15 +44,7 @@ if TYPE_CHECKING:
 
 
 def require_masses(code: InlineProgram) -> None:
-    """Refuse a mechanism some bodies of which have no mass.
-
-    Raises
-    ------
-    InputError
-        If it has no masses and no forces.
-    StructuralError
-        With the bodies, and what to do.
-    """
+    """Refuse a mechanism some bodies of which have no mass, or that has no loads at all."""
     if not code.program.loads:
         raise InputError(without_loads(code.program.name))
     heavy = {entry.row for entry in code.entries("M") if entry.row == entry.column}
@@ -68,17 +60,8 @@ def require_masses(code: InlineProgram) -> None:
 def observing_accelerations(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
     """Return a program whose outputs are the accelerations of a mechanism that moves freely.
 
-    Parameters
-    ----------
-    code
-        A mechanism whose bodies have masses.
-    left_out
-        Rows of equations that repeat others.
-
-    Returns
-    -------
-    Program
-        Its outputs are the accelerations, and the power of loads and drivers together.
+    The power of loads and drivers together comes after them. Rows of equations that repeat others
+    are left out.
     """
     motion = _Motion(code, left_out)
     found = motion.accelerations()

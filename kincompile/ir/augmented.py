@@ -36,23 +36,12 @@ if TYPE_CHECKING:
 def plan_augmented(
     n: int, m: int, M: Entries, Phi_q: Entries, left_out: Collection[int] = ()
 ) -> SolvePlan:
-    """Plan the solve for accelerations and multipliers.
+    """Plan the solve for n accelerations and m multipliers, which has as many right sides.
 
-    Parameters
-    ----------
-    n, m
-        Numbers of coordinates and equations.
-    M, Phi_q
-        Entries of the matrices: row, column and the number, None where it varies. M is positive
-        definite for all movements that the equations with plain numbers allow.
-    left_out
-        Rows of Phi_q that repeat others; their multipliers are zero.
-
-    Returns
-    -------
-    SolvePlan
-        Its unknowns are n accelerations and m multipliers, and so are its right sides; its
-        determinants are the pivots that vary, whose signs never change.
+    Entries of a matrix are row, column and the number, None where it varies; M is positive definite
+    for all movements that the equations with plain numbers allow. Multipliers of rows that are left
+    out, since they repeat others, are zero. Determinants are the pivots that vary; their signs
+    never change.
     """
     graph = Graph()
     kept = [entry for entry in Phi_q if entry[0] not in left_out]

@@ -29,20 +29,10 @@ if TYPE_CHECKING:
 def tangents(graph: Graph, outputs: Sequence[int], direction: Mapping[int, int]) -> list[int]:
     r"""Return the derivatives :math:`\sum_k f_{x_k} d_k` of nodes f along a direction d.
 
-    Parameters
-    ----------
-    graph
-        The code; derivatives are added to it.
-    outputs
-        Nodes to be differentiated.
-    direction
-        Rate :math:`d_k` of each input :math:`x_k` that changes, both nodes; 1 for a partial
-        derivative. Any node may stand in it, and is then taken for an input.
-
-    Returns
-    -------
-    list of int
-        The node of each derivative; a plain zero where an output does not depend on the direction.
+    Derivatives are added to the graph. The direction is the rate :math:`d_k` of each input
+    :math:`x_k` that changes, both nodes; 1 for a partial derivative. Any node may stand in it, and
+    is then taken for an input. A derivative is a plain zero where an output does not depend on the
+    direction.
     """
     zero = graph.const(0)
     found = dict(direction)

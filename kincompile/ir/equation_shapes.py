@@ -42,10 +42,7 @@ class SharedEquation:
 class EquationShapes:
     """The kernels of free equations and the derivatives of functions, one a structure.
 
-    Parameters
-    ----------
-    coordinates
-        Names of the coordinates; any other name but t is a parameter.
+    Any name but t and those of the coordinates is a parameter.
     """
 
     def __init__(self, coordinates: Collection[str]) -> None:

@@ -58,23 +58,10 @@ def observing_sensitivities(
 ) -> Program | None:
     """Return a program without equations whose outputs are derivatives of a motion.
 
-    Parameters
-    ----------
-    code
-        The mechanism.
-    names
-        Its parameters by which columns are differentiated.
-    of
-        Those columns: names of coordinates and outputs.
-    second
-        Whether second derivatives are wanted too, by each pair of parameters.
-
-    Returns
-    -------
-    Program or None
-        Its outputs are determinants or pivots of the blocks of Phi_q, then by parameter,
-        and by pair of parameters, the derivatives of the columns; their rates are the derivatives
-        of the rates. None where the equations are structurally singular.
+    They are those of the columns `of`, coordinates and outputs, by the parameters `names`, and of
+    `second` ones also by each pair of them, after the determinants or pivots of the blocks of
+    Phi_q; their rates are the derivatives of the rates. None where the equations are structurally
+    singular.
     """
     check_names(code.program, names)
     plan = plan_solve(code, is_straight=True)

@@ -49,24 +49,12 @@ def interpret(
     p: Array | None = None,
     q_ddot: Array | None = None,
 ) -> tuple[Array, ...]:
-    """Evaluate the quantities.
+    """Evaluate the quantities, in the order of the table, at q, q_dot and q_ddot of shape (..., n).
 
-    Parameters
-    ----------
-    q, q_dot
-        Coordinates and rates, shape (..., n), real or complex.
-    t
-        Time, a scalar or of shape (...).
-    p
-        Parameters, shape (k,), or (k, ...) with one set for each point; the defaults where None.
-    q_ddot
-        Second rates, for outputs, shape (..., n); zero where None.
-
-    Returns
-    -------
-    tuple of arrays
-        In the order of the table: Phi (..., m), Phi_q (..., m, n), nu (..., m), gamma (..., m), the
-        outputs where there are any, and M, Q and its Jacobians where there are loads.
+    They may be complex. t is a scalar or of shape (...), p of shape (k,), or (k, ...) with a set
+    for each point; without it the defaults are taken. Without q_ddot, for outputs, it is zero. Phi
+    is (..., m), Phi_q (..., m, n), and so on; outputs, or M, Q and its Jacobians, come where there
+    are any.
     """
     q, q_dot = np.asarray(q), np.asarray(q_dot)
     q_ddot = 0 * q if q_ddot is None else np.asarray(q_ddot)

@@ -29,24 +29,10 @@ def observing_program(
     key: object = (),
     added: Sequence[Parameter] = (),
 ) -> Program:
-    """Return a program without equations and loads, with these outputs.
+    """Return a program without equations and loads, with these outputs, by quantity, of a graph.
 
-    Parameters
-    ----------
-    program
-        The mechanism.
-    name
-        What the outputs are, such as ``forces``.
-    graph
-        The mechanism's code, with that of the outputs.
-    outputs
-        Nodes by quantity, ``outputs`` and perhaps their rates.
-    titles
-        Name and unit of each output.
-    key
-        What else tells one such program from another.
-    added
-        Further parameters.
+    The name says what the outputs are, titles have the name and unit of each, the key is what else
+    tells one such program from another; further parameters are added.
     """
     instance, values = bound(program, name, graph, outputs, titles)
     return replace(

@@ -85,12 +85,8 @@ def small_rotations(
 class Samples:
     """Values of a graph's nodes at the states, and the sizes of the terms they are made of.
 
-    Parameters
-    ----------
-    graph
-        Code of sums, products and quotients of inputs; it may grow.
-    values
-        Inputs by name, (K,) each; others, the right sides, are not numbers.
+    The graph has sums, products and quotients of inputs, and may grow. Inputs have values by name,
+    (K,) each; others, the right sides, are not numbers.
     """
 
     def __init__(self, graph: Graph, values: Mapping[str, Array]) -> None:

@@ -70,14 +70,9 @@ def _rows(system: ConstraintSystem, wanted: Callable[[Joint | FreeEquation], boo
 def redundant_equations(
     system: ConstraintSystem, program: Program, pattern: Pattern
 ) -> tuple[tuple[Surplus, ...], str]:
-    """Return the redundant ones of more equations than coordinates.
+    """Return the redundant ones of more equations than coordinates, and what is wrong with them.
 
-    Returns
-    -------
-    found : tuple of Surplus
-        The constraints with equations that depend on others at every assembled position.
-    problem : str
-        What is wrong where they do not agree with the others; "" where they do.
+    They depend on others at every assembled position; nothing is wrong where they agree with those.
     """
     report = rank_report(system, program)
     found = surpluses(system, report)
@@ -95,13 +90,7 @@ def redundant_equations(
 def independence(
     system: ConstraintSystem, program: Program
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return equations that repeat others, and free coordinates, of a mechanism that may move.
-
-    Raises
-    ------
-    StructuralError
-        If equations contradict each other.
-    """
+    """Return equations that repeat others, and free coordinates; refuse what contradicts others."""
     report = rank_report(system, program)
     if report.conflicting:
         found = [item for item in surpluses(system, report) if item.conflicting]

@@ -51,20 +51,10 @@ class _Rows(FreeEquation):
 
 
 def with_sensitivities(program: Program, names: Sequence[str]) -> Program:
-    """Return the program of a mechanism with its sensitivities to parameters.
+    """Return the program of a mechanism with its sensitivities to k of its parameters.
 
-    Parameters
-    ----------
-    program
-        That of the mechanism, with n coordinates, m equations and r outputs.
-    names
-        Its parameters, k of them.
-
-    Returns
-    -------
-    Program
-        With n (1 + k) coordinates, m (1 + k) equations and r (1 + k) outputs: the mechanism's own,
-        then those of each parameter in turn. It has no loads.
+    It has n (1 + k) coordinates, m (1 + k) equations and r (1 + k) outputs: the mechanism's own,
+    then those of each parameter in turn. It has no loads.
     """
     given = {item.name: item for item in program.parameters}
     check_names(program, names)

@@ -18,19 +18,8 @@ if TYPE_CHECKING:
 class StraightSolve:
     """Code that solves linear systems of one matrix, Phi_q or that of the equations of motion.
 
-    Parameters
-    ----------
-    graph
-        The mechanism's code, to which that of the solves is added.
-    entries
-        Those of the matrix, with nodes of the graph.
-    plan
-        The planned solve, without calls of LAPACK.
-
-    Attributes
-    ----------
-    determinants
-        Nodes of the determinants of the blocks.
+    The plan makes no calls of LAPACK; its code is added to the graph in which the entries are
+    nodes.
     """
 
     def __init__(self, graph: Graph, entries: Iterable[Entry], plan: SolvePlan) -> None:

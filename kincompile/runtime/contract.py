@@ -61,15 +61,7 @@ def functions(module: ModuleType) -> tuple[str, ...]:
 def check(module: ModuleType) -> None:
     """Check that a module keeps the contract, and make it raise the package's `InputError`.
 
-    Parameters
-    ----------
-    module
-        A module that was just run.
-
-    Raises
-    ------
-    ContractError
-        With all that is wrong, and what to do.
+    A `ContractError` has all that is wrong, and what to do.
     """
     if getattr(module, "FORMAT", None) == 1 and not hasattr(module, "BODIES"):
         module.__dict__["BODIES"] = _bodies(getattr(module, "COORDINATES", ()))

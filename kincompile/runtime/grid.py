@@ -88,21 +88,9 @@ class GridResult:
 
 
 def solve_grid(march: March, times: Array, first: State, result: GridResult) -> int:
-    """Solve as much of a time grid as can be trusted, into the arrays of `result`.
+    """Solve as much of a grid of times (N,) as can be trusted, into the arrays of `result`.
 
-    Parameters
-    ----------
-    march
-        That of a module with a planned solve.
-    times : ndarray, shape (N,)
-        The grid.
-    first
-        The point at its start.
-
-    Returns
-    -------
-    int
-        Number of points in the coarse march.
+    `first` is the point at its start. Returns the number of points in the coarse march.
     """
     equations, code = march.equations, march.equations.code
     assert code.lanes is not None

@@ -81,13 +81,7 @@ class Variants:
 
 
 def _read_variants(module: ModuleType, p: Values, product: bool) -> Variants:
-    """Read parameters that may be those of several sets: see `solve`.
-
-    Raises
-    ------
-    InputError
-        When an array of sets has the wrong size or a value is not finite.
-    """
+    """Read parameters that may be those of several sets: see `solve`."""
     if isinstance(p, Mapping):
         return read_sweep(p, product)
     if not isinstance(p, np.ndarray) or p.ndim != 3:

@@ -98,14 +98,8 @@ class Corrected:
 class March:
     """Takes a motion, or a batch of motions with parameter sets of their own, from time to time.
 
-    Parameters
-    ----------
-    equations
-        The scales by which all is judged.
-    engine
-        What solves: the equations' own, or one for a batch.
-    tolerance
-        Bound of the last correction, in scales of the coordinates.
+    The engine is that of the equations, or one for a batch; the tolerance bounds the last
+    correction, in scales of the coordinates.
     """
 
     def __init__(self, equations: Problem, engine: Engine, tolerance: float) -> None:

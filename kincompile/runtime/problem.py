@@ -276,16 +276,7 @@ class Dense:
     Signs and sizes of blocks come from the planned solve, in one piece or in stages, where the
     module has one. Where redundant equations forbid a determinant, that of the equations'
     independent combinations takes its place: these turn slowly along a motion, and are those of the
-    point before.
-
-    Parameters
-    ----------
-    code
-        A module.
-    p : ndarray, shape (k,)
-        Parameters.
-    is_written
-        Whether Phi and Phi_q are evaluated by code in Python also where the module is compiled.
+    point before. With `is_written` code in Python evaluates Phi and Phi_q of a compiled module too.
     """
 
     def __init__(self, code: Code, p: Array, *, is_written: bool = False) -> None:
@@ -388,19 +379,9 @@ class Dense:
 def solve_linear(matrix: Array, sides: Array) -> Array:
     """Return x of matrix x = sides; of more equations than unknowns in the sense of least squares.
 
-    Redundant equations that agree change nothing. That they do agree is for the caller to check.
-
-    Parameters
-    ----------
-    matrix : ndarray, shape (m, n)
-        With m >= n.
-    sides : ndarray, shape (m,) or (m, k)
-        Right-hand sides.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        When the rank is less than n.
+    `matrix` (m, n) has m >= n and rank n, else `numpy.linalg.LinAlgError` is raised; `sides` are
+    (m,) or (m, k). Redundant equations that agree change nothing, and the caller checks that they
+    do.
     """
     m, n = matrix.shape
     if m == n:

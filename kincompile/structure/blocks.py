@@ -94,17 +94,8 @@ def _reached(
 def matching(pattern: Sequence[tuple[int, int]] | Index, shape: tuple[int, int]) -> Index:
     """Match equations with coordinates, one to one and as many as possible.
 
-    Parameters
-    ----------
-    pattern
-        Row and column of each entry that is not identically zero.
-    shape
-        Numbers of equations and of coordinates.
-
-    Returns
-    -------
-    ndarray of int, shape (m,)
-        The column matched with each row, -1 where there is none.
+    For the row and column of each entry that is not identically zero, and the shape of the matrix,
+    it is the column matched with each row, shape (m,), -1 where there is none.
     """
     rows, columns = np.array(pattern, dtype=np.intp).reshape(-1, 2).T
     if max(shape) > SMALL:
@@ -144,10 +135,7 @@ def _match(
 def components(heads: Index, tails: Index, count: int) -> Index:
     """Return the number of the strongly connected component of each node, shape (count,).
 
-    Parameters
-    ----------
-    heads, tails : ndarray of int, shape (edges,)
-        Ends of each edge, nodes from 0 to count - 1.
+    Heads and tails (edges,) are the ends of each edge, nodes from 0 to count - 1.
     """
     if count > SMALL:
         from scipy.sparse.csgraph import connected_components
@@ -214,18 +202,9 @@ def block_triangular(
 ) -> tuple[Block, ...] | None:
     """Split a square system into blocks in an order in which they can be solved.
 
-    Parameters
-    ----------
-    rows, columns
-        The equations and coordinates of the system, equally many, in increasing order.
-    pattern
-        Row and column of each entry that is not identically zero.
-
-    Returns
-    -------
-    tuple of Block or None
-        None where the equations cannot be matched with the coordinates: the system is structurally
-        singular.
+    Rows and columns, equally many, are increasing; the pattern has the row and column of each entry
+    that is not identically zero. None where the system is structurally singular: the equations
+    cannot be matched with the coordinates.
     """
     if not rows:
         return ()

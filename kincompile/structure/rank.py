@@ -117,27 +117,11 @@ def generic_rank(
 ) -> RankReport:
     """Find the rank of Phi_q at generic assembled states, and the rows that depend on others.
 
-    Parameters
-    ----------
-    evaluate
-        The equations.
-    guess : ndarray, shape (n,)
-        Where the mechanism is meant to be assembled.
-    angular : ndarray of bool, shape (n,)
-        Which coordinates are angles.
-    drivers
-        Rows that are functions of time.
-    own
-        Rows of bodies themselves: they come first, so that no joint makes them redundant.
-    end
-        The motion lasts from 0 to this time.
-    names
-        Of the equations, for messages.
-
-    Raises
-    ------
-    InputError
-        If an equation has no finite value, or derivative, anywhere near the guess.
+    The mechanism is meant to be assembled at the guess (n,), and moves from t = 0 to the end.
+    `angular` (n,) says which coordinates are angles, `drivers` are the rows that are functions of
+    time, `own` those of bodies themselves: these come first, so that no joint makes them redundant.
+    An equation that has no finite value, or derivative, anywhere near the guess is refused by its
+    name.
     """
     with np.errstate(all="ignore"):
         analysis = _Analysis(evaluate, guess, angular, drivers, own, end)

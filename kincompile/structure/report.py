@@ -32,17 +32,7 @@ class Inspection(Shown, Findings):
 
 
 def inspect_system(system: ConstraintSystem, pattern: Pattern, ranks: RankReport) -> Inspection:
-    """Count what there is in a system.
-
-    Parameters
-    ----------
-    system
-        A checked system, with as many equations as it may have.
-    pattern
-        Row and column of each entry of Phi_q that is not identically zero, row by row.
-    ranks
-        Its generic rank.
-    """
+    """Count what there is in a checked system, given the pattern of its Phi_q and its rank."""
     equations, coordinates = unmatched(system, pattern)
     names, columns = system.equations, [item.name for item in system.coordinates]
     entries = sorted((int(row), int(column)) for row, column in pattern)

@@ -75,21 +75,10 @@ SHARED = 4
 def plan_stages(
     rows: Index, columns: Index, constants: Values, size: int
 ) -> tuple[Stage, ...] | None:
-    """Split a large square system into stages.
+    """Split a large square system of this size into stages in the order of solution.
 
-    Parameters
-    ----------
-    rows, columns : ndarray of int, shape (nnz,)
-        Place of each entry that is not identically zero, row by row.
-    constants : ndarray, shape (nnz,)
-        Its value where it is a plain number, NaN where it varies.
-    size
-        Number of equations, and of coordinates.
-
-    Returns
-    -------
-    tuple of Stage or None
-        In the order of solution; None where the system is structurally singular.
+    Rows, columns and constants (nnz,) are of each entry that is not identically zero, row by row;
+    of one that varies the constant is NaN. None where the system is structurally singular.
     """
     blocks = BlockForm.of(rows, columns, size)
     if blocks is None:

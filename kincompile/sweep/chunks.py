@@ -36,16 +36,8 @@ def solved(
 ) -> Iterator[tuple[int, Values]]:
     """Give the number of each chunk when it is done, with its values if nobody has written them.
 
-    Parameters
-    ----------
-    job, plan
-        What is to be done, and the variants of each chunk.
-    numbers
-        The chunks.
-    executor
-        Where they are solved; None for this process.
-    pending
-        How many are under way at a time; None for twice as many as there are workers.
+    Without an executor they are solved in this process; without `pending` twice as many are under
+    way as there are workers.
     """
     if executor is None:
         for number in numbers:
@@ -76,13 +68,7 @@ def solved(
 
 @contextmanager
 def _of_executor() -> Iterator[None]:
-    """Turn what an executor raises, which may be anything, into one exception.
-
-    Raises
-    ------
-    StoppedError
-        Where it is not an error that says itself what to do.
-    """
+    """Turn what an executor raises, which may be anything, into a `StoppedError`."""
     try:
         yield
     except KincompileError:

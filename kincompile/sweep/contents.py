@@ -205,13 +205,7 @@ def _digest(*parts: bytes) -> str:
 
 
 def require_same(path: Path, found: object, marks: Mapping[str, str]) -> None:
-    """Refuse a store that has the results of another sweep.
-
-    Raises
-    ------
-    InputError
-        With what is different.
-    """
+    """Refuse a store that has the results of another sweep, with what is different."""
     shown = escaped(path)
     if not isinstance(found, dict):
         raise InputError(

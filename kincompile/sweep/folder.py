@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def kept_in(path: Path) -> Iterator[None]:
-    """Turn an error of the system, while results are written, into one that says what to do.
-
-    Raises
-    ------
-    InputError
-        When they cannot be written.
-    """
+    """Turn an error of the system, while results are written, into one that says what to do."""
     try:
         yield
     except OSError as error:
@@ -35,13 +29,7 @@ def kept_in(path: Path) -> Iterator[None]:
 
 @contextmanager
 def made_whole(path: Path) -> Iterator[Path]:
-    """Give a temporary folder that takes the place of `path` at the end.
-
-    Raises
-    ------
-    InputError
-        When it cannot be made.
-    """
+    """Give a temporary folder that takes the place of `path` at the end."""
     folder = path.with_name(f".{path.name}.{os.urandom(4).hex()}")
     with kept_in(path):
         try:

@@ -91,22 +91,10 @@ class Layout:
 def read_layout(
     solution: Solution, columns: Sequence[str] | None, measures: Sequence[str]
 ) -> Layout:
-    """Read what is to be kept.
+    """Read what is to be kept of a solution, which has one position and knows its columns.
 
-    Parameters
-    ----------
-    solution
-        One position of the mechanism, which knows its columns.
-    columns
-        Names of columns; None for all outputs, of a model without any all coordinates, unless there
-        are measures.
-    measures
-        Of outputs, as ``"foot.x.stroke"``.
-
-    Raises
-    ------
-    InputError
-        With every name that means nothing.
+    Without names of columns they are all outputs, of a model without any all coordinates, unless
+    there are measures of outputs, as ``"foot.x.stroke"``. Every name that means nothing is told.
     """
     problems: list[str] = []
     if columns is None:

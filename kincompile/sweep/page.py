@@ -30,14 +30,7 @@ MOST_AXES = 4
 def sweep_page(sweep: Sweep, angle_unit: str = "rad") -> str:
     """Return the page of a sweep as one HTML file, which needs no network.
 
-    Plots are there where matplotlib is installed.
-
-    Parameters
-    ----------
-    sweep
-        What `kc.sweep` gives.
-    angle_unit
-        ``"rad"`` or ``"deg"``: what angles are shown in.
+    Plots are there where matplotlib is installed; angles are in ``"rad"`` or ``"deg"``.
     """
     seen = overview(sweep)
     plots = "\n".join(_plots(item, seen, angle_unit) for item in seen.found)

@@ -20,11 +20,6 @@ def values_of(table: SweepTable) -> dict[str, Array]:
 
     Spans without a count are filled by the Halton sequence, whose points are the same on every
     machine, and spread evenly for every number of them.
-
-    Raises
-    ------
-    InputError
-        If samples are to be combined with a product.
     """
     spans = {name: item for name, item in table.parameters.items() if isinstance(item, Span)}
     filled = [name for name, item in spans.items() if item.count is None]

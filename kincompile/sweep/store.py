@@ -64,15 +64,7 @@ STORES: dict[str, type[ZarrStore | ParquetStore]] = {".zarr": ZarrStore, ".parqu
 
 
 def open_store(path: str | os.PathLike[str] | None, contents: Contents) -> Store:
-    """Return the store of a sweep: begun now, or as an earlier run has left it.
-
-    Raises
-    ------
-    InputError
-        If the path does not say which kind it is, holds something else, or cannot be written to.
-    UnsupportedError
-        If the package that writes it is not installed.
-    """
+    """Return the store of a sweep: begun now, or as an earlier run has left it."""
     form = contents.form
     if len(form.grid) > MOST_CHUNKS:
         raise InputError(

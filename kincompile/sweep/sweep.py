@@ -190,13 +190,7 @@ def _solve_missing(
 
 
 def _require_all(result: Sweep) -> None:
-    """Refuse results that are not where they should be.
-
-    Raises
-    ------
-    SweepError
-        If chunks are missing though no worker failed.
-    """
+    """Refuse results of which chunks are missing though no worker failed."""
     missing, total = np.count_nonzero(~result.store.done()), len(result.contents.plan.grid)
     if missing:
         raise SweepError(

@@ -16,13 +16,7 @@ if TYPE_CHECKING:
 
 
 def emit_program(name: str, code: InlineProgram | GroupedProgram) -> Emitted:
-    """Return the files of a program.
-
-    Raises
-    ------
-    UnsupportedError
-        If the target cannot print the program.
-    """
+    """Return the files of a program."""
     if not isinstance(code, InlineProgram):
         return load_grouped_form(name)(code)
     target, program = load_target(name), code.program

@@ -63,16 +63,10 @@ def schedule(
     input_names: Mapping[str, str],
     table: NameTable,
 ) -> Listing:
-    """Arrange the code of a function.
+    """Arrange the code of a function that returns the quantities `computed`.
 
-    Parameters
-    ----------
-    computed
-        The quantities that it returns.
-    input_names
-        Names of coordinates, rates and parameters in the target.
-    table
-        Names that are taken; this function's own names do not leave it.
+    `input_names` are the target's names of coordinates, rates and parameters; `table` has names
+    that are taken, and this function's own names do not leave it.
     """
     results = tuple(
         (name, tuple((section, varying(inline, section, name)) for section in inline.sections))

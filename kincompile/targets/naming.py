@@ -10,13 +10,7 @@ if TYPE_CHECKING:
 
 
 class NameTable:
-    """Gives out names; the first who asks for a name gets it, later ones get it with a number.
-
-    Parameters
-    ----------
-    reserved
-        Names that the target or its template uses.
-    """
+    """Gives out names; the first who asks for a name gets it, later ones get it with a number."""
 
     def __init__(self, reserved: Iterable[str]) -> None:
         self._taken = set(reserved)

@@ -61,14 +61,7 @@ class Dialect:
 class Printer:
     """Prints nodes as expressions; a node with a name is printed as its name.
 
-    Parameters
-    ----------
-    dialect
-        The language.
-    nodes, names
-        The code, and names of nodes by number.
-    mechanism
-        Name of the mechanism, with which those of tables begin in some languages.
+    In some languages the names of tables begin with that of the mechanism.
     """
 
     def __init__(

@@ -33,16 +33,9 @@ class Assignment:
 class Scheduler:
     """Names the values of a function that are used more than once, operands before their users.
 
-    Parameters
-    ----------
-    nodes, outputs
-        The code, and what the function returns.
-    names, table
-        Names of the inputs by node, and all that are taken; those of the values are added.
-    labels
-        Names that say what a value is.
-    kept
-        Nodes that get a name however often they are used.
+    Names, by node, are first those of the inputs; those of the values are added, there and to the
+    table of all that are taken. Labels say what a value is; a node that is kept gets a name however
+    often it is used.
     """
 
     def __init__(

@@ -24,14 +24,7 @@ def factorization(
 ) -> list[str]:
     """Return the statements that take Phi_q, in the order of its pattern, to F and determinants.
 
-    Parameters
-    ----------
-    write
-        How the language writes statements; `element` is an element of a point's vector.
-    code, listing, printer
-        The program, its planned solve, and what prints that.
-    call
-        Gives the statements that solve a larger block, or take its determinant.
+    `call` gives the statements that solve a larger block, or take its determinant.
     """
     plan, names = listing.plan, listing.names
     numbers = {place: k for k, place in enumerate(code.pattern())}

@@ -130,14 +130,4 @@ class Target(Protocol):
     def files(
         self, code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
     ) -> Mapping[str, str]:
-        """Return the files, the main one first.
-
-        Parameters
-        ----------
-        code
-            The program, for constants and whatever else the files say of it.
-        functions
-            Lines of the functions, by name.
-        called
-            Elementary functions that they call.
-        """
+        """Return the files, the main one first, given the lines of the functions by name."""

@@ -48,13 +48,7 @@ def _environment() -> Environment:
 
 
 def read(name: str) -> str:
-    """Return the text of a file below the folder of templates, as it is: a script, a style sheet.
-
-    Raises
-    ------
-    TemplateError
-        If there is no such file.
-    """
+    """Return the text of a file below the folder of templates, as it is: a script, for instance."""
     path = template_root()
     for part in name.split("/"):
         path = path / part
@@ -74,19 +68,9 @@ def _template(name: str) -> tuple[Template, frozenset[str]]:
 
 
 def fill(name: str, data: Mapping[str, Any]) -> str:
-    """Fill a template.
+    """Fill a template, a path below their folder such as ``numpy/module.py.jinja``, with data.
 
-    Parameters
-    ----------
-    name
-        Path below the folder of templates, for instance ``numpy/module.py.jinja``.
-    data
-        What goes into its slots.
-
-    Raises
-    ------
-    TemplateError
-        If a slot has no data, data has no slot, or the template is malformed.
+    A `TemplateError` says where a slot has no data, or data no slot.
     """
     try:
         template, slots = _template(name)

@@ -39,13 +39,7 @@ SEED = 1990
 
 
 class PlannedSolve:
-    """The solves of a module at those of its states where Phi_q is regular.
-
-    Parameters
-    ----------
-    samples
-        States of a module with a planned solve.
-    """
+    """The solves of a module with a planned solve, at its states where Phi_q is regular."""
 
     def __init__(self, samples: Samples) -> None:
         self._at = samples.only(_regular(samples))

@@ -114,13 +114,7 @@ def dense(module: ModuleType, nonzeros: Array) -> Array:
 
 
 def samples_of(module: ModuleType) -> Samples:
-    """Return the states of a module, seeded.
-
-    Raises
-    ------
-    InputError
-        If the equations have no finite value near the guess.
-    """
+    """Return the states of a module, seeded; refuse equations without a value near the guess."""
     random = np.random.default_rng(SEED)
     guess, defaults = module.GUESS, module.DEFAULTS
     reference = problem(module, defaults, guess, 0.0).reference

@@ -1,4 +1,4 @@
-"""The committed files of generated/ are what four examples emit today; what all emit runs alone.
+"""The committed files of generated/ are what some examples emit today; what all emit runs alone.
 
 `pytest -k golden --update-goldens` rewrites them and fails the run, so that nothing passes by
 updating. The bytes are those of the pinned SymPy; on another one the numbers must agree.
@@ -29,15 +29,18 @@ EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
 PINNED = re.search(
     r"^sympy==(\S+)$", (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE
 )
-SUFFIXES = {
-    "numpy": (".py",),
-    "c": (".c", ".h"),
-    "octave": (".m", "_assemble.m", "_Phi.m", "_Phi_q.m", "_gamma.m", "_nu.m"),
-    "javascript": (".js",),
-}
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 GOLDEN = ("cam_by_table", "four_bar", "problem_3_5_6", "slider_crank")
 """Few enough for a review: bodies and joints, a slider, a cam by table, free equations."""
+IN_SPACE = tuple(sorted(path.stem for path in (ROOT / "examples" / "space").glob("*.py")))
+SMALL_IN_SPACE = "spatial_slider_crank"
+WRITTEN = {
+    target: (*GOLDEN, *(IN_SPACE if target == "numpy" else (SMALL_IN_SPACE,))) for target in TARGETS
+}
+"""Whose files are committed, by target: of those in space one is enough but in NumPy."""
+FILES = [(target, name) for target, names in WRITTEN.items() for name in names]
+
+pytestmark = pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
 
 # Runs a golden in an interpreter in which neither kincompile nor SymPy can be imported.
 ALONE = """
@@ -106,8 +109,7 @@ def rewritten(request, example_named):
         return []
     wanted = {
         f"{target}/{file}": text
-        for target in SUFFIXES
-        for name in GOLDEN
+        for target, name in FILES
         for file, text in example_named(name).files(target).items()
     }
     return update(GENERATED, wanted)
@@ -133,25 +135,25 @@ def test_that_this_run_does_not_rewrite_them(rewritten):
     assert not rewritten, "--update-goldens fails by design: " + "; ".join(rewritten)
 
 
-def test_that_nothing_is_missing_and_nothing_extra():
-    assert sorted(path.name for path in GENERATED.iterdir()) == sorted(SUFFIXES) == sorted(TARGETS)
-    for target, suffixes in SUFFIXES.items():
+def test_that_nothing_is_missing_and_nothing_extra(example_named):
+    assert sorted(path.name for path in GENERATED.iterdir()) == sorted(TARGETS)
+    for target, names in WRITTEN.items():
         found = [path for path in (GENERATED / target).iterdir() if path.name != "__pycache__"]
-        wanted = [f"{name}{suffix}" for name in GOLDEN for suffix in suffixes]
-        wanted += ["cam_by_table_rho_j_contact.m"] if target == "octave" else []
+        wanted = [file for name in names for file in example_named(name).files(target)]
         assert sorted(path.name for path in found) == sorted(wanted)
 
 
 @pytest.mark.skipif(not is_pinned(), reason="the bytes are those of the pinned SymPy")
-@pytest.mark.parametrize("target", SUFFIXES)
-@pytest.mark.parametrize("golden_name", GOLDEN)
+@pytest.mark.parametrize(("target", "golden_name"), FILES)
 def test_that_the_text_is_what_is_emitted_today(example_named, golden_name, target):
     for name, text in example_named(golden_name).files(target).items():
         golden = read_text(GENERATED / target / name)
         assert golden == text, "make update-goldens rewrites it, if it is meant"
 
 
-@pytest.mark.parametrize("golden_name", GOLDEN)
+@pytest.mark.parametrize(
+    "golden_name", [*GOLDEN, *(pytest.param(name, marks=pytest.mark.slow) for name in IN_SPACE)]
+)
 def test_that_the_numbers_are_those_of_today(example_named, golden_name):
     golden = kc.load(NUMPY / f"{golden_name}.py")
     module = example_named(golden_name).module
@@ -176,12 +178,17 @@ def test_that_every_example_has_the_numbers_of_the_interpreter(example):
         np.testing.assert_allclose(there, here, rtol=1e-12, atol=1e-12)
 
 
-def test_that_modules_run_where_kincompile_and_sympy_cannot_be_imported(example_named, tmp_path):
-    for name in EXAMPLES:
+@pytest.mark.parametrize(
+    "names", [EXAMPLES, pytest.param([*IN_SPACE], marks=pytest.mark.slow)], ids=["plane", "space"]
+)
+def test_that_modules_run_where_kincompile_and_sympy_cannot_be_imported(
+    example_named, tmp_path, names
+):
+    for name in names:
         kc.emit(example_named(name).model).write(tmp_path)
-    paths = [str(tmp_path / f"{name}.py") for name in EXAMPLES]
+    paths = [str(tmp_path / f"{name}.py") for name in names]
     results = json.loads(run("-I", "-c", ALONE, *paths))
-    assert sorted(results) == EXAMPLES
+    assert sorted(results) == names
     for name, values in results.items():
         module = example_named(name).module
         q, q_dot = np.random.default_rng(7).uniform(-1, 1, (2, module.N_COORDINATES))
@@ -201,11 +208,12 @@ def test_that_the_block_on_imports_does_block():
 )
 @pytest.mark.slow
 def test_that_the_bytes_do_not_depend_on_the_hash_seed(example_named, seed):
-    paths = [str(example_named(name).path) for name in EXAMPLES]
+    names = [*EXAMPLES, *IN_SPACE]
+    paths = [str(example_named(name).path) for name in names]
     printed = run("-c", EMIT, *paths, PYTHONHASHSEED=seed)
     digests = dict(line.rsplit(" ", 1) for line in printed.splitlines())
-    for target in SUFFIXES:
-        for name, path in zip(EXAMPLES, paths, strict=True):
+    for target in TARGETS:
+        for name, path in zip(names, paths, strict=True):
             text = "".join(example_named(name).files(target).values())
             here = hashlib.sha256(text.encode()).hexdigest()
             assert digests[f"{target} {path}"] == here, name

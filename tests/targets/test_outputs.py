@@ -80,7 +80,7 @@ def expected(model, states):
     ]
     found = {}
     for name, expressions in derived.items():
-        function = sympy.lambdify(symbols, expressions, "math")
+        function = sympy.lambdify(symbols, expressions, "math", cse=True)
         found[name] = np.array([function(*row) for row in rows], dtype=float)
     return found
 

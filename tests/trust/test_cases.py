@@ -1,6 +1,7 @@
 """Mechanisms that cannot be analysed, or not assembled, or look as if they could not."""
 
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,17 @@ from kincompile.runtime.status import Status
 TARGETS = ("numpy", "c", "grouped")
 
 
+@cache
+def compiled(model, target):
+    options = {"grouped": {"form": "grouped"}}.get(target, {"target": target})
+    return kc.compile(model, **options)
+
+
 @pytest.fixture(params=TARGETS)
 def compiled_for(request):
-    """Return a function that compiles for a target, or in grouped form."""
+    """Return a function that compiles for a target, or in grouped form, each model once."""
     request.getfixturevalue("quick_compiler")
-    options = {"grouped": {"form": "grouped"}}.get(request.param, {"target": request.param})
-    return lambda model: kc.compile(model, **options)
+    return lambda model: compiled(model, request.param)
 
 
 def the_event(solution):

@@ -9,6 +9,7 @@ import graphlib
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -70,6 +71,7 @@ DEFERRED = {
 Sources = Mapping[str, str]  # module name -> source
 
 
+@cache
 def package_sources() -> dict[str, str]:
     """Return the source of every module of the package, by dotted name."""
     sources = {}
@@ -105,6 +107,17 @@ def resolve(name: str, modules: Sources) -> str | None:
     return name
 
 
+parsed = cache(ast.parse)
+"""Every check reads all of the package."""
+
+
+@cache
+def imports_of(source: str, module: str) -> list[ast.Import | ast.ImportFrom]:
+    """Return the import statements of a module, those in functions too."""
+    nodes = ast.walk(parsed(source, module))
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
 def import_graph(modules: Sources) -> dict[str, set[str]]:
     """Return, for every module, the modules of the package that it imports."""
     graph: dict[str, set[str]] = {}
@@ -112,7 +125,7 @@ def import_graph(modules: Sources) -> dict[str, set[str]]:
         is_package = any(other.startswith(f"{module}.") for other in modules)
         names = {
             name
-            for node in ast.walk(ast.parse(source, module))
+            for node in imports_of(source, module)
             for name in imported(node, module, is_package)
         }
         graph[module] = {found for name in names if (found := resolve(name, modules))} - {module}
@@ -191,7 +204,7 @@ def deferred_imports(modules: Sources) -> list[str]:
             f"{module}, line {node.lineno}"
             for module, source in modules.items()
             if module not in DEFERRED
-            for function in ast.walk(ast.parse(source, module))
+            for function in ast.walk(parsed(source, module))
             if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
             for node in ast.walk(function)
             if isinstance(node, ast.stmt | ast.expr) and is_deferred_import(node, module)
@@ -205,7 +218,7 @@ def sympy_imports(modules: Sources) -> list[str]:
         module
         for module, source in modules.items()
         if part(module) in GROUND | {RUNTIME}
-        for node in ast.walk(ast.parse(source, module))
+        for node in imports_of(source, module)
         for name in imported(node, module, is_package=False)
         if name.split(".")[0] == "sympy"
     ]

@@ -30,17 +30,7 @@ CORRECTIONS = 8
 
 
 def dynamic_modules(module: ModuleType) -> DynamicModules:
-    """Return the compiled equations of motion of a mechanism.
-
-    Raises
-    ------
-    InputError
-        If it has no masses and forces, or was loaded from a file.
-    UnsupportedError
-        If it is in grouped form.
-    StructuralError
-        If a body has no mass, or constraints contradict each other.
-    """
+    """Return the compiled equations of motion of a mechanism; say so where there can be none."""
     found: Callable[[], DynamicModules] | None = vars(module).get(DYNAMICS)
     if found is not None:
         return found()
@@ -61,17 +51,7 @@ class Equations:
     """The equations of motion at the parameters of a simulation.
 
     A state is y = (q, q_dot, work), with the work of loads and drivers since the start.
-
-    Attributes
-    ----------
-    code
-        The kinematic module.
-    parameters : ndarray, shape (k,)
-        Its parameters.
-    joints
-        Its constraints, with the scales of coordinates and equations.
-    independent
-        Rows of equations that repeat no other.
+    `independent` are the rows of equations that repeat no other.
     """
 
     def __init__(self, inputs: Inputs, modules: DynamicModules) -> None:

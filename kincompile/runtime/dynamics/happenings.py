@@ -58,16 +58,10 @@ LARGEST_POWER = 700.0
 
 
 class Rank:
-    """Phi_q of a state, scaled, with its singular values.
+    """Phi_q of a state, scaled, shape (m, n), with its singular values.
 
-    Attributes
-    ----------
-    matrix : ndarray, shape (m, n)
-        Phi_q.
-    free : ndarray, shape (n - m, n)
-        Movements that it leaves free, a row each.
-    movement : ndarray, shape (n,)
-        The movement that it hinders least of all others.
+    `free`, shape (n - m, n), are the movements that it leaves free, `movement` is the one that it
+    hinders least of all others.
     """
 
     def __init__(self, matrix: Array) -> None:
@@ -87,16 +81,9 @@ def signed(matrix: Array, rows: Array) -> float:
 
 
 class Watch:
-    """Looks for events in each step.
+    """Looks for events in each step: values of coordinates or outputs, and singular configurations.
 
-    Parameters
-    ----------
-    equations, inputs
-        The mechanism.
-    events, stops
-        Values of coordinates or outputs to be located; at stops the motion ends.
-    smooth
-        Whether the motion goes on through singular configurations.
+    At `stops` the motion ends; with `smooth` it goes on through singular configurations.
     """
 
     def __init__(

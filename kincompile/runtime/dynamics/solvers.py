@@ -61,29 +61,10 @@ def stepper(
     tolerance: tuple[float, Array],
     max_step: float,
 ) -> Stepper:
-    """Return an integrator at its first state.
+    """Return an integrator, one of `METHODS`, at its first state.
 
-    Parameters
-    ----------
-    method
-        One of `METHODS`.
-    rates
-        The rate of a state at a time, and the derivatives of that by the state.
-    t
-        First and last time.
-    y
-        The first state.
-    tolerance
-        Relative, and absolute for each number.
-    max_step
-        The longest step.
-
-    Raises
-    ------
-    InputError
-        If there is no such method.
-    UnsupportedError
-        If the package is not installed.
+    The rates are that of a state at a time, and the derivatives of it by the state; `t` are the
+    first and last time; the tolerance is relative, and absolute for each number.
     """
     if method not in METHODS:
         raise InputError(f"method is {method!r}: give one of {', '.join(METHODS)}.")

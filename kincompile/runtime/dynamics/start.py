@@ -35,13 +35,7 @@ LARGEST_TURN = 1.0
 def given_values(
     known: Sequence[str], given: Mapping[str, Any], order: int, what: str
 ) -> dict[str, float]:
-    """Return values by name, of rates with or without ``_dot``.
-
-    Raises
-    ------
-    InputError
-        With every name that is none, and every value that is no finite number.
-    """
+    """Return values by name, of rates with or without ``_dot``; refuse other names and values."""
     found: dict[str, float] = {}
     problems = []
     for key, value in given.items():
@@ -68,10 +62,7 @@ class NotAssembledError(Exception):
 def position_at(equations: Equations, guess: Array, t: float, given: Mapping[str, float]) -> Point:
     """Return the position near a guess at which the constraints hold and some values are given.
 
-    Raises
-    ------
-    NotAssembledError
-        Where there is none.
+    A `NotAssembledError` says what is missed where there is none.
     """
     q, names = guess.copy(), equations.code.coordinates
     held = {names.index(name): value for name, value in given.items()}
@@ -112,21 +103,10 @@ def _unmet(equations: Equations, point: Point | None, fixed: Sequence[str]) -> s
 def velocity_at(
     equations: Equations, point: Point, given: Mapping[str, float], wanted: Values
 ) -> Array:
-    """Return velocities that the constraints allow, some of them given.
+    """Return velocities that the constraints allow, nearest to those wanted (n,), or else to rest.
 
-    Parameters
-    ----------
-    equations, point
-        The mechanism, at its position.
-    given
-        Velocities that are given, by name: rates of coordinates, or columns of `moving`.
-    wanted
-        Velocities to be near to, shape (n,); None for rest.
-
-    Raises
-    ------
-    NotAssembledError
-        Where those given contradict the constraints.
+    Those that are given by name, rates of coordinates or columns of `moving`, are held; a
+    `NotAssembledError` says where they contradict the constraints.
     """
     q, t, n = point.q, point.t, point.q.size
     scale, weights = equations.scale, equations.joints.weights()

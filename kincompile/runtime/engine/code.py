@@ -266,11 +266,6 @@ def require_square(code: Code) -> None:
     """Refuse a module whose equations cannot determine its coordinates.
 
     What the compiler has written into the module says why; else they are counted.
-
-    Raises
-    ------
-    StructuralError
-        With what is wrong, and what to do.
     """
     if code.unsolvable:
         raise StructuralError(code.unsolvable)

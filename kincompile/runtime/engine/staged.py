@@ -14,15 +14,7 @@ if TYPE_CHECKING:
 
 
 class Staged:
-    """An engine of one point at a time, whose Phi_q is the entries of its pattern.
-
-    Parameters
-    ----------
-    code
-        A module in grouped form with stages.
-    p : ndarray, shape (k,)
-        Parameters.
-    """
+    """An engine of one point at a time, in grouped form: Phi_q is the entries of its pattern."""
 
     def __init__(self, code: Code, p: Array) -> None:
         assert code.evaluate is not None

@@ -301,11 +301,8 @@ of the largest: rounding errors go from large equations to small ones."""
 class StagedSolver:
     """Factors and solves Phi_q of a grouped module, again and again with one pattern.
 
-    Attributes
-    ----------
-    pivoted : int
-        How often the stages lost too many digits, and a factorization of the whole matrix with
-        pivoting took their place.
+    `pivoted` counts how often the stages lost too many digits, and a factorization of the whole
+    matrix with pivoting took their place.
     """
 
     def __init__(self, code: Code) -> None:
@@ -316,13 +313,7 @@ class StagedSolver:
         self._size = size
 
     def factor(self, nonzeros: Array) -> StagedFactors:
-        """Factor Phi_q, given by its entries in the order of PATTERN.
-
-        Raises
-        ------
-        RuntimeError
-            Where a sparse stage is exactly singular.
-        """
+        """Factor Phi_q, given by its entries in the order of PATTERN."""
         return StagedFactors(nonzeros, [stage.factor(nonzeros) for stage in self._stages])
 
     def determinants(self, factors: StagedFactors) -> Array:

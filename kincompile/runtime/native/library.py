@@ -61,19 +61,8 @@ REPAIR = f"repair or reinstall it, name another by the environment variable CC, 
 def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDLL:
     """Return the library of emitted C code, from the cache or newly built.
 
-    Parameters
-    ----------
-    name
-        Name of the mechanism.
-    files
-        Text by file name, the source first.
-    fingerprint
-        What the library must say of itself.
-
-    Raises
-    ------
-    UnsupportedError
-        If there is no C compiler, or it does not do its work.
+    Of the files, text by name, the source comes first; the fingerprint is what the library must say
+    of itself. An `UnsupportedError` says what is wrong with the compiler.
     """
     source = next(iter(files.values()))
     is_large = len(source) + ANGLE * source.count("cos_sin(") > LARGEST_VECTORIZED

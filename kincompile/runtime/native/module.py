@@ -55,25 +55,10 @@ BATCH_LAST = ("Phi", "nonzeros", "nu", "gamma")
 
 
 def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
-    """Replace the functions of an emitted NumPy module by compiled ones.
+    """Replace the functions of an emitted NumPy module by compiled ones, from what C emitted.
 
-    Parameters
-    ----------
-    module
-        The NumPy module of a mechanism, loaded; it is changed.
-    files
-        What the C target emitted for the same mechanism.
-
-    Returns
-    -------
-    module
-        The same module. Where the mechanism has a planned solve it has two functions more,
-        ``march`` and ``march_variants``.
-
-    Raises
-    ------
-    UnsupportedError
-        If there is no C compiler, or it does not do its work.
+    Where the mechanism has a planned solve the module gets two more, ``march`` and
+    ``march_variants``. An `UnsupportedError` says what is wrong with the compiler.
     """
     loaded = library(module.NAME, files, module.FINGERPRINT)
     functions = _Functions(module, loaded)

@@ -56,17 +56,7 @@ class Column:
 def shown_unit(unit: str, angle_unit: str) -> tuple[str, float]:
     """Return the unit in which numbers are shown, and the factor to it from their own.
 
-    Parameters
-    ----------
-    unit
-        Their own, as in ``rad/s``.
-    angle_unit
-        ``"rad"`` or ``"deg"``: what angles and their rates are shown in. All else stays.
-
-    Raises
-    ------
-    InputError
-        If there is no such unit of angles.
+    Angles and their rates are shown in `angle_unit`, ``"rad"`` or ``"deg"``; all else stays.
     """
     if angle_unit not in ANGLE_UNITS:
         raise InputError(f"angle_unit is {angle_unit!r}: angles are shown in 'rad' or in 'deg'.")
@@ -302,20 +292,7 @@ class MotionTable:
         return np.asarray((self.status == Status.CONVERGED) | (self.status == Status.CORNER))
 
     def require_one_motion(self, what: str, remedy: str) -> None:
-        """Check that the motion is not one of variants.
-
-        Parameters
-        ----------
-        what
-            What is asked for, with its verb, for instance ``"a table holds"``.
-        remedy
-            What to do instead.
-
-        Raises
-        ------
-        InputError
-            If several parameter sets were solved.
-        """
+        """Refuse variants, where `what` is asked for, as ``"a table holds"``; say what to do."""
         if self.q.ndim > 2:
             raise InputError(
                 f"{self.name}: {what} one motion, and these are {len(self.q)} variants; {remedy}"

@@ -55,13 +55,7 @@ class ForceMeasures(Shown):
     items: tuple[ForceMeasure, ...]
 
     def __getitem__(self, name: str) -> ForceMeasure:
-        """Return the measures of a force.
-
-        Raises
-        ------
-        InputError
-            When there is none of this name.
-        """
+        """Return the measures of a force."""
         known = {item.name: item for item in self.items}
         wanted = name if name in known else column_name(name)
         if wanted not in known:
@@ -88,13 +82,7 @@ class ForceMeasures(Shown):
 
 
 def force_measures(name: str, t: Array, columns: Mapping[str, tuple[Array, str]]) -> ForceMeasures:
-    """Measure columns of forces, each given by values (N,) and unit.
-
-    Raises
-    ------
-    InputError
-        If no point has forces.
-    """
+    """Measure columns of forces, each given by values (N,) and unit; refuse what has no forces."""
     good = np.isfinite([values for values, _ in columns.values()]).any(axis=0)
     if not good.any():
         raise InputError(f"{name} has no point at which forces were found: see .motion.message.")

@@ -74,19 +74,9 @@ def _first_rows(name: str, title: str, header: tuple[str, ...], rows: list[tuple
 def figure_html(title: str, size: tuple[float, float], draw: Callable[[Figure], object]) -> str:
     """Return a matplotlib figure as an image element that carries its own bytes.
 
-    Parameters
-    ----------
-    title
-        What the image shows, for those who cannot see it.
-    size
-        Width and height [inch].
-    draw
-        Draws into the empty figure, which pyplot does not know.
-
-    Returns
-    -------
-    str
-        HTML; "" where matplotlib is not installed.
+    It is "" where matplotlib is not installed. `title` says what it shows, for those who cannot see
+    it; `size` is width and height [inch]; `draw` draws into the empty figure, which pyplot does not
+    know.
     """
     try:
         from matplotlib.figure import Figure

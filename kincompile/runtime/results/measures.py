@@ -126,13 +126,7 @@ class Measures:
     drivers: tuple[DriverRange, ...]
 
     def __getitem__(self, name: str) -> OutputMeasures | DriverRange:
-        """Return the measures of an output, or the range of a driver.
-
-        Raises
-        ------
-        InputError
-            When none has this name; the message lists those that exist.
-        """
+        """Return the measures of an output, or the range of a driver, by name."""
         known: dict[str, OutputMeasures | DriverRange] = {x.name: x for x in self.drivers}
         known |= {item.name: item for item in self.outputs}
         found = known.get(name) or known.get(column_name(name))

@@ -18,14 +18,7 @@ FIRST = "e0_"
 
 
 def orientation(solution: MotionTable, body: object) -> Rotation:
-    """Return the orientation of a body in space at every point of a motion.
-
-    Parameters
-    ----------
-    solution
-        A solution of one motion.
-    body
-        The body, or its name.
+    """Return the orientation of a body in space, or of this name, at every point of a motion.
 
     Returns
     -------

@@ -262,13 +262,7 @@ class Solution(MotionTable):
 
 
 def require_solution(value: object) -> None:
-    """Check that a value is a Solution.
-
-    Raises
-    ------
-    InputError
-        If it is not; says what was given, and how to get a solution.
-    """
+    """Check that a value is a Solution; else say what was given, and how to get a solution."""
     if not isinstance(value, Solution):
         raise InputError(
             f"expected a Solution, got {type(value).__name__}: solve first, "

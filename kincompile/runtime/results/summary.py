@@ -24,20 +24,11 @@ _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 def summary(solution: Solution, angle_unit: str = "rad") -> str:
     """Return the extremes of every coordinate, the measures, and a line on how the solving went.
 
-    Parameters
-    ----------
-    solution
-        A solution, complete or partial; points that were not found do not count.
-    angle_unit
-        ``"rad"`` or ``"deg"``.
-
-    Returns
-    -------
-    str
-        Of variants a part for each, under the values of its parameters. Per coordinate its unit,
-        its least and largest value with their times, and the largest absolute values of its first
-        and second derivative [unit/s, unit/s^2]; the tables of `Solution.measures`; then the points
-        by status, the Newton iterations and the largest residual.
+    Of variants there is a part for each, under the values of its parameters. Per coordinate it has
+    the unit, the least and largest value with their times, and the largest absolute values of first
+    and second derivative [unit/s, unit/s^2]; then come the tables of `Solution.measures`, the
+    points by status, the Newton iterations and the largest residual. Points that were not found do
+    not count; `angle_unit` is ``"rad"`` or ``"deg"``.
     """
     if solution.q.ndim > 2:
         return "\n\n".join(_variant(solution, k, angle_unit) for k in range(len(solution.q)))

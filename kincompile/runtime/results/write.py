@@ -62,13 +62,7 @@ def write(solution: Solution, path: str | os.PathLike[str], *, angle_unit: str =
 
 
 def require_known_suffix(path: str | os.PathLike[str]) -> None:
-    """Check that the suffix names a format; to be called before long work.
-
-    Raises
-    ------
-    InputError
-        When the suffix is not one that `write` knows.
-    """
+    """Check that the suffix names a format that `write` knows; to be called before long work."""
     if Path(path).suffix.lower() not in _WRITERS:
         raise InputError(f"cannot write {path}: end its name in {', '.join(_WRITERS)}.")
 

@@ -114,13 +114,7 @@ def assembled_positions(inputs: Inputs) -> Vector:
 
 
 def assembly_guess(inputs: Inputs, number: object) -> Vector:
-    """Return one of the assemblies at the first time, as a guess; they are counted from 1.
-
-    Raises
-    ------
-    InputError
-        When there is none of this number.
-    """
+    """Return one of the assemblies at the first time, as a guess; they are counted from 1."""
     count = "no integer"
     if isinstance(number, int | np.integer) and not isinstance(number, bool):
         found = assembled_positions(inputs)
@@ -134,16 +128,9 @@ def assembly_guess(inputs: Inputs, number: object) -> Vector:
 
 
 def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
-    """Say that a start does not choose between ways to assemble, and how to; "" where it does.
+    """Say that a start q (n,) does not choose between ways to assemble; "" where it does.
 
-    Parameters
-    ----------
-    inputs
-        What was to be solved.
-    q : ndarray, shape (n,)
-        The position that was found at the first time.
-    is_folded
-        Whether a determinant is zero at the guess, so that it shows no branch.
+    Where a determinant is zero at the guess, `is_folded`, it shows no branch.
     """
     without = inputs.without_guess
     if q.size > MOST_COORDINATES or not (is_folded or _is_open(inputs, q, without)):

@@ -29,18 +29,9 @@ BLOCK = 2048
 
 
 def signatures(module: ModuleType, q: Array, t: Array, p: Sequence[float]) -> Signs:
-    """Return the signature of every point of a motion, shape (N, blocks); 0 where q is NaN.
+    """Return the signature of each point of a motion, shape (N, blocks), for q (N, n) at t (N,).
 
-    Parameters
-    ----------
-    module
-        The emitted module.
-    q : ndarray, shape (N, n)
-        Positions.
-    t : ndarray, shape (N,)
-        Times.
-    p
-        Parameters.
+    It is 0 where q is NaN.
     """
     known = np.flatnonzero(np.isfinite(q).all(axis=1))
     with np.errstate(all="ignore"):
@@ -66,18 +57,10 @@ def _signs(code: Code, q: Array, t: Array, p: Array) -> Iterator[Array]:
 
 
 def counted_signatures(q: Array, t: Array, passed: Sequence[float]) -> Signs:
-    """Return the signature of a motion with redundant equations, shape (N, 1).
+    """Return the signature of a motion with redundant equations, shape (N, 1); 0 where q is NaN.
 
-    They have no determinant; the sign is that of the start, and changes with every bifurcation.
-
-    Parameters
-    ----------
-    q : ndarray, shape (N, n)
-        Positions; NaN gives 0.
-    t : ndarray, shape (N,)
-        Times.
-    passed
-        Times of the bifurcations that were passed.
+    They have no determinant; the sign is that of the start, and changes with every bifurcation that
+    was passed, at these times.
     """
     way = np.abs(t - t[0])
     count = sum(((way > abs(time - t[0])).astype(int) for time in passed), np.zeros(t.size, int))

@@ -25,22 +25,12 @@ def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
     """Return the condition number of the scaled Phi_q at every point of a motion, shape (N,).
 
     Lengths count in sizes of the mechanism, angles in radians, and each equation in what its terms
-    contribute at a generic position: the number is the same in metres and in millimetres.
-
-    Parameters
-    ----------
-    module
-        The emitted module.
-    q : ndarray, shape (N, n)
-        Positions; NaN gives NaN.
-    t : ndarray, shape (N,)
-        Times.
-    p : ndarray, shape (k,)
-        Parameters.
+    contribute at a generic position: the number is the same in metres and in millimetres. For
+    positions q (N, n) at t (N,); NaN where q is, and without equations.
     """
     result = np.full(t.size, np.nan)
     found = np.flatnonzero(np.isfinite(q).all(axis=1))
-    if not found.size:
+    if not (found.size and module.N_EQUATIONS):
         return result
     with np.errstate(all="ignore"):
         first = found[0]

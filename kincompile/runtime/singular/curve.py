@@ -70,17 +70,7 @@ class Bracket:
 
 
 class Curve:
-    """The curve through a point of a motion.
-
-    Parameters
-    ----------
-    equations
-        A module with its parameters set.
-    state
-        A good point of the motion.
-    duration
-        A time that is long for the motion.
-    """
+    """The curve through a good point of a motion, for which `duration` is a long time."""
 
     def __init__(self, equations: Problem, state: State, duration: float) -> None:
         self.equations = equations

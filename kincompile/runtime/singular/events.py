@@ -144,22 +144,10 @@ _QUINTIC = np.array([
 
 
 def locate(march: March, state: State, latest: float) -> tuple[Event, Passage | None] | None:
-    """Find the singular configuration that a motion cannot pass.
+    """Find the singular configuration that a motion cannot pass between a good state and `latest`.
 
-    Parameters
-    ----------
-    march
-        What follows the motion.
-    state
-        The last good point of the motion.
-    latest
-        The time that was not reached.
-
-    Returns
-    -------
-    tuple or None
-        The event, and for a bifurcation the motion on both sides of it. None where the curve goes
-        on to that time, or nowhere.
+    Returns the event, and for a bifurcation the motion on both sides of it; None where the curve
+    goes on to that time, or nowhere.
     """
     equations = march.equations
     # A time that belongs to the motion, whatever span was asked for.
@@ -182,17 +170,7 @@ def locate(march: March, state: State, latest: float) -> tuple[Event, Passage | 
 
 
 def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
-    """Tell what a position is from which no motion is known: a lock-up or a bifurcation.
-
-    Parameters
-    ----------
-    equations
-        The module with its parameters and scales.
-    point
-        A position that is assembled and at which Phi_q is singular.
-    t
-        Its time.
-    """
+    """Tell what a position is from which no motion is known: a lock-up or a bifurcation."""
     try:
         nu = equations.code.nu(point.q, t, equations.p)
     except (ArithmeticError, ValueError):
@@ -222,19 +200,7 @@ def status_after(event: Event, outcome: Outcome, t: float) -> Status:
 
 
 def branch_switch(code: Code, state: State, t: float, q: Vector, reference: Vector) -> Event:
-    """Return the event of a position that the mechanism could only jump to.
-
-    Parameters
-    ----------
-    code
-        The module.
-    state
-        The last good point of the motion.
-    t, q
-        The time that was not reached, and the position found there.
-    reference
-        The scale of each coordinate.
-    """
+    """Return the event of a position q at t that a mechanism could only jump to from a state."""
     jump = (q - state.point.q) / reference
     bodies = involved(code, jump)
     text = SENTENCES[BRANCH_SWITCH].format(

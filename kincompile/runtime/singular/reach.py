@@ -134,19 +134,8 @@ def missed(equations: Problem, point: Point, row: int) -> str:
 def impossible(equations: Problem, q: Array, t: float) -> list[str]:
     """Say of drivers and distances what they ask for, and what the others can give at most.
 
-    Parameters
-    ----------
-    equations
-        The module, with its parameters and scales.
-    q : ndarray, shape (n,)
-        The position nearest to an assembled one.
-    t
-        The time.
-
-    Returns
-    -------
-    list of str
-        A sentence for each equation that asks for what is impossible, as far as that was found.
+    A sentence for each equation that asks for what is impossible, as far as that was found from the
+    position nearest to an assembled one.
     """
     code = equations.code
     if q.size > MOST_COORDINATES or len(code.equations) != q.size:

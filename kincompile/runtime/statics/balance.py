@@ -58,18 +58,7 @@ class Place:
 
 
 class Balance:
-    """A mechanism with loads, its parameters set.
-
-    Parameters
-    ----------
-    inputs
-        Module, parameters and guess.
-
-    Attributes
-    ----------
-    equations
-        The joints, with the scales of coordinates and equations.
-    """
+    """A mechanism with loads, its parameters set; `equations` are its joints, with their scales."""
 
     def __init__(self, inputs: Inputs) -> None:
         self.code, self._p = inputs.code, inputs.p
@@ -145,13 +134,7 @@ class Balance:
         return forces, -np.asarray(self.code.nu(q, t, self._p))
 
     def gradients(self, names: Sequence[str], q: Array, t: float) -> Array:
-        """Return the derivatives of coordinates or outputs, shape (k, n).
-
-        Raises
-        ------
-        InputError
-            When there is no coordinate or output of a name.
-        """
+        """Return the derivatives of coordinates or outputs of these names, shape (k, n)."""
         outputs = getattr(self.module, "OUTPUTS", ())
         known = (*self.code.coordinates, *outputs)
         rows = np.eye(q.size)

@@ -123,17 +123,7 @@ class _Way:
 
 
 class Path:
-    """The equilibria near one, over time, as the curve of a mechanism.
-
-    Parameters
-    ----------
-    balance
-        The mechanism.
-    place
-        An equilibrium.
-    duration
-        A time that is long for the loads.
-    """
+    """The equilibria near one, over time, as the curve of a mechanism."""
 
     def __init__(self, balance: Balance, place: Place, duration: float) -> None:
         self.balance, self._duration = balance, duration

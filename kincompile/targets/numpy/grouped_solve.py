@@ -47,19 +47,10 @@ class PlannedStage:
 def plan_solving(
     program: Program, rows: Index, columns: Index, constants: NDArray[np.float64]
 ) -> tuple[PlannedStage, ...]:
-    """Plan the solve.
+    """Plan the solve, stages in order; nothing where equations are dependent for every position.
 
-    Parameters
-    ----------
-    program
-        As many equations as coordinates, or more that agree.
-    rows, columns, constants : ndarray, shape (nnz,)
-        Place of each entry of Phi_q row by row, and its value, NaN where it varies.
-
-    Returns
-    -------
-    tuple of PlannedStage
-        In the order of solution; nothing where equations are dependent for every position.
+    Rows, columns and constants (nnz,) are of each entry of Phi_q row by row; of one that varies the
+    constant is NaN. There may be more equations than coordinates, if they agree.
     """
     size = len(program.equations)
     if size != len(program.coordinates):

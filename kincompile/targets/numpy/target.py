@@ -269,12 +269,9 @@ def function_body(
 ) -> list[str]:
     """Return the lines of a function whose inputs have their names already.
 
-    Parameters
-    ----------
-    style
-        ``"titled"``: an entry a line, under comments that name constraints; ``"plain"``: without
-        such comments, since the code is for many constraints; ``"packed"``: entries that stand
-        elsewhere with comments, as many a line as fit.
+    The style is ``"titled"``: an entry a line, under comments that name constraints; ``"plain"``:
+    without such comments, since the code is for many constraints; ``"packed"``: entries that stand
+    elsewhere with comments, as many a line as fit.
     """
     body = []
     is_first = style == "titled" and listing.results[0][0] == "Phi"  # where a reader begins

@@ -74,13 +74,7 @@ def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return the lines of a function.
-
-    Raises
-    ------
-    UnsupportedError
-        If a name is longer than MATLAB reads, or a function does not exist there.
-    """
+    """Return the lines of a function; refuse names longer than MATLAB reads."""
     _require_short(listing.names.values())
     rows, columns = (*code.program.shape_of(quantities.quantity_named(name)), 1)[:2]
     lines = WRITE.inputs(code.program, listing)
@@ -93,15 +87,7 @@ def function(name: str, code: InlineProgram, listing: Listing, printer: Printer)
 def files(
     code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
 ) -> Mapping[str, str]:
-    """Return the .m files, the script first.
-
-    Raises
-    ------
-    UnsupportedError
-        If a file's name is longer than MATLAB reads.
-    InputError
-        If the mechanism's time grid is none.
-    """
+    """Return the .m files, the script first; refuse names longer than MATLAB reads."""
     program = code.program
     found = {NameTable((*KEYWORDS, *CALLED)).take(program.name): _script(code)}
     if not program.unsolvable and not program.motion:

@@ -1,5 +1,6 @@
 """A sign is forgiven where the author's own Phi or Phi_q has it, or where it is stated."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,13 @@ from tests.pendulum import pendulum
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
 
+@cache
+def derived(model: kc.Mechanism) -> dict[str, sympy.ImmutableMatrix]:
+    return {name: getattr(model, name) for name in QUANTITIES}
+
+
 def right(model: kc.Mechanism) -> dict[str, sympy.Matrix]:
-    return {name: getattr(model, name).as_mutable() for name in QUANTITIES}
+    return {name: matrix.as_mutable() for name, matrix in derived(model).items()}
 
 
 def nonzero(matrix: sympy.Matrix) -> list[int]:

@@ -198,6 +198,7 @@ def test_target_out_of_reach_says_how_near_and_where():
     assert "(far)" in str(found)
 
 
+@pytest.mark.slow
 def test_search_by_differential_evolution_reaches_the_same():
     m = fourbar()
     motion = kc.solve(kc.compile(m), [0.5, 1.0, 1.5])

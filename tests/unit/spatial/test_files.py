@@ -12,6 +12,7 @@ import kincompile as kc
 from kincompile import spatial
 from kincompile.cli import cli
 from kincompile.files.model_file import read_data_model
+from kincompile.ir.lower import lower
 from kincompile.space.catalogue import CONSTRAINTS
 from kincompile.spatial import outputs
 from tests.unit.spatial.test_double_cover import crossed_cranks
@@ -61,17 +62,18 @@ def test_that_every_constraint_can_be_written_and_read(form: str) -> None:
     again = read(m.to_toml() if form == "toml" else m.to_json(), form)
     assert isinstance(again, spatial.Mechanism)
     assert again.to_toml() == m.to_toml()
-    assert kc.emit(again).source == kc.emit(m).source
+    assert lower(again.system()).fingerprint == lower(m.system()).fingerprint
 
 
 def test_that_the_schema_agrees() -> None:
     jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed")
+    schema = kc.model_schema()
+    validator = jsonschema.validators.validator_for(schema)(schema)
     for model in (everything(), slider_crank()):
         data = json.loads(model.to_json())
-        jsonschema.validate(data, kc.model_schema())
+        validator.validate(data)
         for key, wrong in (("space", 2), ("space", 4), ("bodies", [{"name": "a", "guess": O}])):
-            with pytest.raises(jsonschema.ValidationError):
-                jsonschema.validate({**data, key: wrong}, kc.model_schema())
+            assert not validator.is_valid({**data, key: wrong})
 
 
 def test_that_free_coordinates_stand_beside_bodies() -> None:

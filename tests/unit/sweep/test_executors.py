@@ -19,7 +19,10 @@ STARTED = {
 }
 
 
-@pytest.mark.parametrize("kind", STARTED)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[] if kind == "loky" else [pytest.mark.slow]) for kind in STARTED],
+)
 def test_an_executor_writes_the_bytes_of_a_sweep_in_turn(kind, tmp_path):
     alone, found = tmp_path / "alone.zarr", tmp_path / "found.zarr"
     executors.main("none", str(alone))
