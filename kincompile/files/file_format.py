@@ -209,8 +209,9 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
 
 IN_SPACE: Mapping[str, Mapping[str, Field]] = {
     "model": {
-        **{key: item for key, item in FIELDS["model"].items() if key != "sketch"},
+        **FIELDS["model"],
         "space": Field({"const": SPACE}),
+        "sketch": _optional(_ref("spatial_sketch")),
         "bodies": _optional(_list("spatial_body")),
         "constraints": _optional(_list("spatial_constraint")),
         "points": _optional(_list("spatial_point")),
@@ -228,6 +229,11 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         "centre": _optional(_TRIPLE),
     },
     "point": {**FIELDS["point"], "local": Field(_TRIPLE)},
+    "sketch": {
+        **FIELDS["sketch"],
+        **{name: _optional(_map(_TRIPLE)) for name in ("ground", "joints", "hinges")},
+        "parts": Field(_list("spatial_part")),
+    },
 }
 """Fields of what is different in a file with ``space = 3``."""
 
@@ -238,11 +244,14 @@ def fields_of(table: str, count: int = PLANE) -> Mapping[str, Field]:
 
 
 _MOTIONS = [_ref("sequence"), _ref("table")]
-_VALUE: dict[str, Any] = _any_of(_EXPRESSION, *_MOTIONS)
-_LINE: Mapping[str, Field] = {
-    "along": Field(_any_of(_TEXT, _POINT)),
-    "on": _optional(_NAME),
-}
+VALUE: dict[str, Any] = _any_of(_EXPRESSION, *_MOTIONS)
+
+
+def _line(place: Mapping[str, Any]) -> dict[str, Field]:
+    """Return the fields of a guide, through two joints or along a direction, and of its link."""
+    along = Field(_any_of(_TEXT, place))
+    return {"along": along, "on": _optional(_NAME)}
+
 
 _WEIGHT: Mapping[str, Field] = {"weight": _optional(_EXPRESSION)}
 _PASSING: Mapping[str, Field] = {
@@ -283,8 +292,8 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
         "length": _optional(_EXPRESSION),
     },
     "wheel": {"wheel": Field(_NAME), "joint": Field(_NAME)},
-    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_LINE},
-    "slot": {"slot": Field(_NAME), **_LINE},
+    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_line(_POINT)},
+    "slot": {"slot": Field(_NAME), **_line(_POINT)},
     "gear": {
         "gear": Field(_NAME),
         "i": Field(_NAME), "centre_i": Field(_NAME), "radius_i": Field(_EXPRESSION),
@@ -292,16 +301,32 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
     },
     "drive": {
         "drive": Field(_TEXT),
-        "value": Field(_VALUE),
+        "value": Field(VALUE),
         "against": _optional(_NAME),
     },
 }  # fmt: skip
 """Parts of a drawing: the methods of `Sketch`, and their arguments in order."""
 
+SPATIAL_PARTS: Mapping[str, Mapping[str, Field]] = {
+    "link": {"link": Field(_NAME), "joints": Field(_TEXT)},
+    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_line(_TRIPLE)},
+    "rod": {
+        "rod": Field(_NAME), "joints": Field(_TEXT), "length": _optional(VALUE),
+    },
+    "drive": {"drive": Field(_TEXT), "value": Field(VALUE)},
+}  # fmt: skip
+"""Those of `spatial.Sketch`."""
+
+
+def parts_of(count: int) -> Mapping[str, Mapping[str, Field]]:
+    """Return the parts of a drawing in the plane, or in space."""
+    return SPATIAL_PARTS if count == SPACE else PARTS
+
+
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
-    Kind.VALUE: _VALUE,
-    Kind.LOAD: _VALUE,
-    Kind.DISTANCE: _VALUE,
+    Kind.VALUE: VALUE,
+    Kind.LOAD: VALUE,
+    Kind.DISTANCE: VALUE,
     Kind.BODY: _NAME,
     Kind.PROFILE: _any_of(_EXPRESSION, _ref("profile")),
 }
@@ -312,7 +337,7 @@ def _kind(kind: Kind, count: int) -> Mapping[str, Any]:
     if kind in (Kind.POINT, Kind.AXIS):
         return _components(count)
     if kind is Kind.LOADS:
-        return {"type": "array", "items": _VALUE, "minItems": count, "maxItems": count}
+        return {"type": "array", "items": VALUE, "minItems": count, "maxItems": count}
     return _KINDS.get(kind, _EXPRESSION)
 
 
@@ -345,7 +370,7 @@ def model_schema() -> dict[str, Any]:
     Whether a formula can be read and a body exists is checked by `kincompile inspect`.
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
-    in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in ("body", "point")}
+    in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in IN_SPACE if name != "model"}
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
     parts[0]["additionalProperties"] = _any_of(_EXPRESSION, _POINT)
@@ -366,6 +391,7 @@ def model_schema() -> dict[str, Any]:
             **tables,
             **in_space,
             "part": {"oneOf": parts},
+            "spatial_part": {"oneOf": [_object(item) for item in SPATIAL_PARTS.values()]},
             "target": {"oneOf": [_object(item) for item in TARGETS.values()]},
             "constraint": {"oneOf": _constraints(PLANE)},
             "spatial_constraint": {"oneOf": _constraints(SPACE)},

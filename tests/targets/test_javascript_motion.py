@@ -60,7 +60,7 @@ def compare(found, event, solution):
     outputs = observed(module, motion, solution.t, p)
     if np.isfinite(solution.q[0]).all():
         equations = problem(module, p, solution.q[0].copy(), solution.t[0])
-        scales = [equations.size], equations.magnitude, equations.noise
+        scales = np.array([equations.size]), equations.magnitude, equations.noise
         for values, known in zip(found["scales"], scales, strict=True):
             np.testing.assert_allclose(values, known, rtol=1e-6)
     names = ("q", "q_dot", "q_ddot", "y", "y_dot", "y_ddot")
