@@ -216,7 +216,7 @@ def attach(module: ModuleType) -> Code:
         unsolvable=names.get("UNSOLVABLE", ""),
         corners=names.get("CORNERS", False),
         lanes=LaneFunctions(
-            *(lanes[name] for name in ("position", "nu", "gamma", "factor", "solve")),
+            **{name: lanes[name] for name in ("position", "nu", "gamma", "factor", "solve")},
             floats=names["FLOATS"],
             arrays=names["ARRAYS"],
         )
