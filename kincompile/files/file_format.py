@@ -86,7 +86,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "bodies": Field(_list("body"), is_required=False),
         "coordinates": Field(_list("coordinate"), is_required=False),
         "sketch": Field({"$ref": "#/$defs/sketch"}, is_required=False),
-        "constraints": Field(_list("constraint")),
+        "constraints": Field(_list("constraint"), is_required=False),
         "gravity": Field(_POINT, is_required=False),
         "loads": Field(_list("load"), is_required=False),
         "points": Field(_list("point"), is_required=False),
@@ -214,7 +214,7 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         **{key: item for key, item in FIELDS["model"].items() if key != "sketch"},
         "space": Field({"const": SPACE}),
         "bodies": Field(_list("spatial_body"), is_required=False),
-        "constraints": Field(_list("spatial_constraint")),
+        "constraints": Field(_list("spatial_constraint"), is_required=False),
         "points": Field(_list("spatial_point"), is_required=False),
         "gravity": Field(_TRIPLE, is_required=False),
         "loads": Field(_list("spatial_load"), is_required=False),
@@ -353,8 +353,6 @@ def model_schema() -> dict[str, Any]:
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
     parts[0]["additionalProperties"] = {"anyOf": [_EXPRESSION, _POINT]}
-    model = _object(FIELDS["model"])
-    model["required"].remove("constraints")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Mechanism for kincompile, format {VERSION}",
@@ -363,10 +361,7 @@ def model_schema() -> dict[str, Any]:
         "then": {"$ref": "#/$defs/in_space"},
         "else": {"$ref": "#/$defs/in_the_plane"},
         "$defs": {
-            "in_the_plane": {
-                **model,
-                "anyOf": [{"required": ["constraints"]}, {"required": ["sketch"]}],
-            },
+            "in_the_plane": _object(FIELDS["model"]),
             "in_space": _object(IN_SPACE["model"]),
             "expression": {
                 "description": "a number, or a formula such as -a/2 + sin(omega*t)",

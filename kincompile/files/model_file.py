@@ -32,7 +32,6 @@ from kincompile.files.file_format import (
     SMOOTHNESS,
     TASKS,
     VERSION,
-    Field,
     constraint_fields,
     fields_of,
     load_fields,
@@ -51,7 +50,7 @@ if TYPE_CHECKING:
 
     from kincompile.files.data_lines import Address
     from kincompile.model.arguments import Argument
-    from kincompile.model.constraint import Constraint
+    from kincompile.model.constraint import Constraint, Element
     from kincompile.model.load import Load
     from kincompile.model.mechanism import Mechanism
 
@@ -87,10 +86,7 @@ class _ModelReader(BodyReader):
         data = self.document.data
         if not self._is_model(data):
             return None
-        fields = dict(fields_of("model", self.words.count))
-        if "sketch" in data:  # it has constraints of its own
-            fields["constraints"] = Field(fields["constraints"].schema, is_required=False)
-        self.has_fields((), data, fields)
+        self.has_fields((), data, fields_of("model", self.words.count))
         name = self.name(data, (), "the model") or "model"
         given = [self._parameter(*item) for item in self.rows(data, "parameters")]
         parameters = [item for item in given if item]
@@ -249,13 +245,7 @@ class _ModelReader(BodyReader):
         self.remember(f"{kind} {name!r}", address)
         self.remember(f"the load {name!r}", address)
         self.has_fields(address, row, load_fields(known[kind]))
-        given = {
-            key: self._argument(item, row[key], (*address, key))
-            for key, item in known[kind].arguments().items()
-            if key in row
-        }
-        for key in given:
-            self.remember(f"{kind} {name!r}, {key}", (*address, key))
+        given = self._arguments(address, row, known[kind], name)
         return known[kind](name, **given) if len(self.problems) == before else None
 
     def _type_of(self, row: Row, address: Address, known: Collection[str]) -> str | None:
@@ -311,18 +301,23 @@ class _ModelReader(BodyReader):
     ) -> Constraint | None:
         fields = constraint_fields(kind)
         self.has_fields(address, row, fields)
-        arguments = {
-            key: self._argument(item, row[key], (*address, key))
-            for key, item in kind.arguments().items()
-            if key in row
-        }
-        for key in arguments:
-            self.remember(f"{kind.__name__} {name!r}, {key}", (*address, key))
+        arguments = self._arguments(address, row, kind, name)
         if len(arguments) < len(kind.arguments()):
             return None
         if "guess" in row and "guess" in fields:
             arguments["guess"] = self._contact_guess(kind, row["guess"], (*address, "guess"))
         return kind(name, **arguments, corners=self._corners(row, address))
+
+    def _arguments(self, address: Address, row: Row, kind: type[Element], name: str) -> Row:
+        """Return the arguments that are given, whose places the checks of the system know."""
+        found = {
+            key: self._argument(item, row[key], (*address, key))
+            for key, item in kind.arguments().items()
+            if key in row
+        }
+        for key in found:
+            self.remember(f"{kind.__name__} {name!r}, {key}", (*address, key))
+        return found
 
     def _contact_guess(self, kind: type[Constraint], given: Any, address: Address) -> Any:
         if not isinstance(given, list):

@@ -12,7 +12,7 @@ from kincompile.errors import ModelError
 from kincompile.files.dimensions import SPACE
 from kincompile.files.file_format import SMOOTHNESS, TASKS, VERSION, load_fields
 from kincompile.model.arguments import Kind
-from kincompile.model.constraint import CamConstraint, Constraint
+from kincompile.model.constraint import CamConstraint, Constraint, Element
 from kincompile.model.directions import VectorFunction
 from kincompile.model.expressions import as_expression, as_sympy, deg, t
 from kincompile.model.laws import TableLaw
@@ -140,6 +140,17 @@ def _constraint(item: Joint | FreeEquation) -> dict[str, Any]:
     if not isinstance(item, Joint):
         expressions = [value(expression) for expression in item.expressions]
         return {"type": "Equation", "name": item.name, "expressions": expressions, **_corners(item)}
+    return _row(item) | _corners(item) | _guess(item.written)
+
+
+def _load(item: AppliedLoad) -> dict[str, Any]:
+    """Return a load; arguments that are zero, as their defaults are, are left out."""
+    fields = load_fields(type(item.written))
+    return {key: x for key, x in _row(item).items() if x != 0 or fields[key].is_required}
+
+
+def _row(item: Joint | AppliedLoad) -> dict[str, Any]:
+    """Return type, name and arguments."""
     written = item.written
     row: dict[str, Any] = {"type": type(written).__name__, "name": written.name}
     bodies = iter(item.bodies)
@@ -150,27 +161,11 @@ def _constraint(item: Joint | FreeEquation) -> dict[str, Any]:
             row[name] = [value(number) for number in getattr(written, name)]
         elif argument.kind is Kind.PROFILE:
             row[name] = _profile(written, name, item.profiles[argument.symbol])
-        else:
-            row[name] = _scalar(item.scalars[argument.symbol])
-    return row | _corners(item) | _guess(written)
-
-
-def _load(item: AppliedLoad) -> dict[str, Any]:
-    """Return a load; arguments that are zero, as their defaults are, are left out."""
-    written = item.written
-    row: dict[str, Any] = {"type": type(written).__name__, "name": written.name}
-    bodies = iter(item.bodies)
-    for name, argument in written.arguments().items():
-        if argument.kind is Kind.BODY:
-            row[name] = next(bodies).name
-        elif argument.kind in (Kind.POINT, Kind.AXIS):
-            row[name] = [value(number) for number in getattr(written, name)]
         elif argument.kind is Kind.LOADS:
             row[name] = [_scalar(number) for number in item.points[argument.symbol]]
         else:
             row[name] = _scalar(item.scalars[argument.symbol])
-    fields = load_fields(type(written))
-    return {key: x for key, x in row.items() if x != 0 or fields[key].is_required}
+    return row
 
 
 def _corners(item: Joint | FreeEquation) -> dict[str, Any]:
@@ -185,7 +180,7 @@ def _scalar(given: Scalar) -> Any:
     return value(given)
 
 
-def _profile(written: Constraint, name: str, rho: sympy.Expr) -> Any:
+def _profile(written: Element, name: str, rho: sympy.Expr) -> Any:
     given = getattr(written, name)
     if isinstance(given, tuple | list):
         angles, radii = ([float(number) for number in column] for column in given)

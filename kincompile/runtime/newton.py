@@ -47,7 +47,7 @@ from kincompile.runtime.status import Status
 from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -175,10 +175,10 @@ def newton(
     return _result(attempt, inputs.guess)
 
 
-def start(march: March, t: float, inputs: Inputs) -> Outcome:
+def start(march: March, t: float, inputs: Inputs, *, is_in_vain: bool = False) -> Outcome:
     """Assemble the mechanism at the first time, from the guess."""
     limits = inputs.tolerance, inputs.max_iterations
-    attempt = assemble(march.equations, t, inputs.guess, *limits)
+    attempt = assemble(march.equations, t, inputs.guess, *limits, is_in_vain=is_in_vain)
     iterations = len(attempt.corrections)
     if attempt.status is not Status.CONVERGED:
         return Outcome(attempt.status, iterations, None, nearest=attempt.found)
@@ -201,13 +201,16 @@ def start(march: March, t: float, inputs: Inputs) -> Outcome:
     return replace(found, state=state)
 
 
-def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome:
+def give_up(
+    march: March, outcome: Outcome, t: float, inputs: Inputs, *, is_in_vain: bool = False
+) -> Outcome:
     """Find out what is there at a time that the motion does not reach."""
     assert outcome.state is not None
     if outcome.exhausted:
         return outcome
     limits = inputs.tolerance, inputs.max_iterations
-    attempt = assemble(march.equations, t, outcome.state.point.q, *limits)
+    start, equations = outcome.state.point.q, march.equations
+    attempt = assemble(equations, t, start, *limits, is_in_vain=is_in_vain)
     # What is wrong there, rather than on the way.
     jumps = attempt.status is Status.CONVERGED
     return replace(
@@ -220,13 +223,20 @@ def give_up(march: March, outcome: Outcome, t: float, inputs: Inputs) -> Outcome
 
 
 def assemble(
-    equations: Problem, t: float, guess: Vector, tolerance: float, max_iterations: int
+    equations: Problem,
+    t: float,
+    guess: Vector,
+    tolerance: float,
+    max_iterations: int,
+    *,
+    is_in_vain: bool = False,
 ) -> Attempt:
     """Find a position from a guess: plain Newton, and safeguarded where that fails or strays.
 
     What is near the guess comes first, the nearest of it; then what is not far, then what is on the
     branch that the guess shows, then the nearer. Angles that the equations leave free by whole
-    turns are those nearest to the guess.
+    turns are those nearest to the guess. Where safeguarded attempts are known to be in vain, none
+    is made.
     """
     limits = tolerance, max_iterations
     plain = iterate(equations, t, guess, *limits)
@@ -234,12 +244,14 @@ def assemble(
     if not plain.points or (found and equations.is_settled(plain.points)):
         return plain
     if not equations.is_careful:
-        return assemble(equations.careful(), t, guess, *limits)
+        return assemble(equations.careful(), t, guess, *limits, is_in_vain=is_in_vain)
+    if is_in_vain and not found:
+        plain.status = Status.NOT_CONVERGED
+        return plain
     good = [plain]
     if not found or equations.strays(plain.points[0], plain.last):
         attempts = [plain]
-        # With all bodies on a line no equation tells which way to bend: so it is for zeros.
-        for begin in (guess, *(() if found else _restarts(equations, guess))):
+        for begin in (guess,) if found else begins(equations, guess):
             attempts.append(iterate(equations, t, begin, *limits, safeguarded_step))
             if attempts[-1].status is Status.CONVERGED:
                 break
@@ -322,11 +334,14 @@ def _covered(equations: Problem, t: float, point: Point, guess: Vector, toleranc
     return point
 
 
-def _restarts(equations: Problem, guess: Vector) -> Iterator[Vector]:
-    """Yield starts around a guess, further and further away."""
-    for k in range(1, RESTARTS + 1):
-        bend = np.roll(equations.probe, k - 1)[: guess.size]
-        yield guess + k * NUDGE * equations.reference * bend
+def begins(equations: Problem, guess: Vector) -> list[Vector]:
+    """Return where safeguarded attempts begin: a guess, and further and further away around it.
+
+    With all bodies on a line no equation tells which way to bend: so it is for zeros.
+    """
+    bends = (np.roll(equations.probe, k)[: guess.size] for k in range(RESTARTS))
+    nudges = (k * NUDGE * equations.reference * bend for k, bend in enumerate(bends, start=1))
+    return [guess, *(guess + nudge for nudge in nudges)]
 
 
 def _missed(equations: Problem, attempt: Attempt) -> float:

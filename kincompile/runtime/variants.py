@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import MAX_CORRECTIONS, SETTLED, TOO_NEAR
+from kincompile.runtime.attempts import in_vain
 from kincompile.runtime.engine.engine import rates_agree
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.follow import follow
@@ -24,6 +25,8 @@ from kincompile.runtime.singular.events import locate, status_after
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
@@ -31,6 +34,8 @@ if TYPE_CHECKING:
     from kincompile.runtime.inputs import Inputs
 
     Mask = NDArray[np.bool_]
+    _Lost = tuple[int, March, State, Outcome]
+    """A variant with its march, where it came from, and how far it got."""
 
 CHUNK = 2048
 """Variants at a time, so that intermediate arrays stay in the cache and memory is bounded."""
@@ -170,10 +175,13 @@ class _Chunk:
         good = all_hold(found.good, checks) & ~self.strays(found.point.q)
         good &= state.sensitivity <= TOO_NEAR
         self._record(0, state, good, found.iterations)
-        for variant in np.flatnonzero(~good).tolist():
-            alone = self._alone(variant, inputs.guess)
+        bad = np.flatnonzero(~good).tolist()
+        alone = [self._alone(variant, inputs.guess) for variant in bad]
+        guesses = [inputs.guess] * len(bad)
+        vain = in_vain([x.equations for x in alone], time, guesses, inputs.max_iterations)
+        for variant, march, is_in_vain in zip(bad, alone, vain.tolist(), strict=True):
             own = replace(inputs, p=self._sets[variant])
-            self._take(0, state, variant, start(alone, time, own))
+            self._take(0, state, variant, start(march, time, own, is_in_vain=is_in_vain))
         for index in range(1, len(self._times)):
             state = self._step(index, state)
 
@@ -183,22 +191,34 @@ class _Chunk:
         following, good, iterations = self._march.step_together(state, t, MAX_CORRECTIONS)
         good &= self._alive
         self._record(index, following, good, iterations)
+        lost: list[_Lost] = []
         for variant in np.flatnonzero(self._alive & ~good).tolist():
             alone = self._alone(variant, state.point.q[:, variant])
             point = alone.equations.at(np.ascontiguousarray(state.point.q[:, variant]), state.t)
             known = Status.NOT_FINITE if point is None else alone.state(point)
             if isinstance(known, Status):
-                outcome = Outcome(known, 0, None)
+                self._take(index, following, variant, Outcome(known, 0, None))
+                continue
+            outcome = alone.advance(known, t, self._inputs.max_iterations)
+            if outcome.position is None:
+                lost.append((variant, alone, known, outcome))
             else:
-                outcome = alone.advance(known, t, self._inputs.max_iterations)
-                if outcome.position is None:
-                    own = replace(self._inputs, p=self._sets[variant])
-                    outcome = give_up(alone, outcome, t, own)
-                    if outcome.jumps and (found := locate(alone, known, t)):
-                        status = status_after(found[0], outcome, t)
-                        outcome = replace(outcome, status=status)
-            self._take(index, following, variant, outcome)
+                self._take(index, following, variant, outcome)
+        self._give_up(index, following, lost)
         return following
+
+    def _give_up(self, index: int, following: State, lost: Sequence[_Lost]) -> None:
+        """Find out why variants do not get to a time."""
+        t, inputs = self._times[index], self._inputs
+        places = [end.state.point.q for *_, end in lost if end.state is not None]
+        problems = [alone.equations for _, alone, _, _ in lost]
+        vain = in_vain(problems, t, places, inputs.max_iterations).tolist()
+        for (variant, alone, known, end), is_in_vain in zip(lost, vain, strict=True):
+            own = replace(inputs, p=self._sets[variant])
+            outcome = give_up(alone, end, t, own, is_in_vain=is_in_vain)
+            if outcome.jumps and (found := locate(alone, known, t)):
+                outcome = replace(outcome, status=status_after(found[0], outcome, t))
+            self._take(index, following, variant, outcome)
 
     def _alone(self, variant: int, q: Array) -> March:
         """Return the march of one variant."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from kincompile.calculus.expressions import Basis, Expression, dot
 from kincompile.calculus.symbols import C
 from kincompile.model import arguments as argument
@@ -61,42 +63,40 @@ class Dot2(SpatialConstraint):
 
 
 @constraint_type
-class RelativeX(SpatialPoints):
+class RelativeCoordinate(SpatialPoints):
+    """A constraint of a global component, the k-th; the types are its subclasses."""
+
+    k: ClassVar[int]
+    value: ValueLike = argument.value()
+
+    @classmethod
+    def Phi(cls) -> tuple[Expression, ...]:
+        """Return e_k^T d - C."""
+        return (dot(AXES[cls.k], separation()) - C,)
+
+
+@constraint_type
+class RelativeX(RelativeCoordinate):
     """The global x component from a point on body i to a point on body j is C."""
 
     source = "Haug 9.4"
-    value: ValueLike = argument.value()
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return e_x^T d - C."""
-        return (dot(AXES[0], separation()) - C,)
+    k = 0
 
 
 @constraint_type
-class RelativeY(SpatialPoints):
+class RelativeY(RelativeCoordinate):
     """The global y component from a point on body i to a point on body j is C."""
 
     source = "Haug 9.4"
-    value: ValueLike = argument.value()
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return e_y^T d - C."""
-        return (dot(AXES[1], separation()) - C,)
+    k = 1
 
 
 @constraint_type
-class RelativeZ(SpatialPoints):
+class RelativeZ(RelativeCoordinate):
     """The global z component from a point on body i to a point on body j is C."""
 
     source = "Haug 9.4"
-    value: ValueLike = argument.value()
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return e_z^T d - C."""
-        return (dot(AXES[2], separation()) - C,)
+    k = 2
 
 
 @constraint_type
@@ -122,42 +122,40 @@ class OnePoint(SpatialConstraint):
 
 
 @constraint_type
-class AbsoluteX(OnePoint):
+class AbsoluteCoordinate(OnePoint):
+    """A constraint of a global component, the k-th; the types are its subclasses."""
+
+    k: ClassVar[int]
+    value: ValueLike = argument.value()
+
+    @classmethod
+    def Phi(cls) -> tuple[Expression, ...]:
+        """Return e_k^T (r_i + A_i s_i) - C."""
+        return (dot(AXES[cls.k], i.point(s_i)) - C,)
+
+
+@constraint_type
+class AbsoluteX(AbsoluteCoordinate):
     """The global x coordinate of a point on a body is C."""
 
     source = "Haug 9.4"
-    value: ValueLike = argument.value()
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return e_x^T (r_i + A_i s_i) - C."""
-        return (dot(AXES[0], i.point(s_i)) - C,)
+    k = 0
 
 
 @constraint_type
-class AbsoluteY(OnePoint):
+class AbsoluteY(AbsoluteCoordinate):
     """The global y coordinate of a point on a body is C."""
 
     source = "Haug 9.4"
-    value: ValueLike = argument.value()
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return e_y^T (r_i + A_i s_i) - C."""
-        return (dot(AXES[1], i.point(s_i)) - C,)
+    k = 1
 
 
 @constraint_type
-class AbsoluteZ(OnePoint):
+class AbsoluteZ(AbsoluteCoordinate):
     """The global z coordinate of a point on a body is C."""
 
     source = "Haug 9.4"
-    value: ValueLike = argument.value()
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return e_z^T (r_i + A_i s_i) - C."""
-        return (dot(AXES[2], i.point(s_i)) - C,)
+    k = 2
 
 
 @constraint_type

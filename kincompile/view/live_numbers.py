@@ -24,6 +24,18 @@ ANGLE = "alpha"
 """The input of a profile beside parameters."""
 
 
+def _operators(name: str) -> tuple[Any, Any]:
+    """Return the methods of an operation: with a number behind, and with one in front."""
+
+    def before(self: LiveNumber, other: Any) -> Any:
+        return self._combined(name, self, other)
+
+    def after(self: LiveNumber, other: Any) -> Any:
+        return self._combined(name, other, self)
+
+    return before, after
+
+
 class LiveNumber(float):
     """A number and the node that computes it; sums, products and sizes of such know theirs."""
 
@@ -47,33 +59,10 @@ class LiveNumber(float):
         nodes = node_of(self.graph, first), node_of(self.graph, second)
         return LiveNumber.of(value, self.graph, getattr(self.graph, operation)(*nodes))
 
-    def __add__(self, other: Any) -> Any:
-        """Add."""
-        return self._combined("add", self, other)
-
-    def __radd__(self, other: Any) -> Any:
-        """Add to another one."""
-        return self._combined("add", other, self)
-
-    def __sub__(self, other: Any) -> Any:
-        """Subtract."""
-        return self._combined("sub", self, other)
-
-    def __rsub__(self, other: Any) -> Any:
-        """Subtract from another one."""
-        return self._combined("sub", other, self)
-
-    def __mul__(self, other: Any) -> Any:
-        """Multiply."""
-        return self._combined("mul", self, other)
-
-    def __rmul__(self, other: Any) -> Any:
-        """Multiply another one."""
-        return self._combined("mul", other, self)
-
-    def __truediv__(self, other: Any) -> Any:
-        """Divide."""
-        return self._combined("div", self, other)
+    __add__, __radd__ = _operators("add")
+    __sub__, __rsub__ = _operators("sub")
+    __mul__, __rmul__ = _operators("mul")
+    __truediv__, _ = _operators("div")
 
     def __abs__(self) -> Any:
         """Return the size."""

@@ -90,12 +90,10 @@ def picture_in_space(
     title: str,
     arrows: Sequence[Arrow] = (),
     focus: Iterable[BodyFrame] | None = None,
-    *,
-    camera: Camera = ISOMETRIC,
 ) -> Picture:
     """Draw a mechanism in space; `picture` says what is given."""
-    ends = [camera.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]
-    seen = seen_paths(_about(drawn, focus) if focus else drawn, q, camera)
+    ends = [ISOMETRIC.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]
+    seen = seen_paths(_about(drawn, focus) if focus else drawn, q, ISOMETRIC)
     longest = max((len(arrow.name) for arrow in arrows), default=0)
     margin = max(MARGIN, ASIDE + LETTER / 2 * longest)
     scale = Scale([*(path.points for path in seen), *ends], margin=margin)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import kincompile as kc
+from kincompile.runtime import newton
+from kincompile.runtime.status import Status
 
 
 @pytest.fixture(scope="module")
@@ -123,3 +125,24 @@ def test_that_redundant_equations_are_solved_together_as_alone(target):
         np.testing.assert_array_equal(together.status[k], alone.status)
         np.testing.assert_allclose(together.q[k], alone.q, atol=1e-12)
         np.testing.assert_allclose(together.q_ddot[k], alone.q_ddot, atol=1e-9)
+
+
+def test_that_sets_that_cannot_be_assembled_are_found_out_together(four_bar, monkeypatch):
+    rng = np.random.default_rng(1)
+    sets = {name: rng.uniform(0.1, 5, 48) for name in "abcd"}
+    alone = [kc.newton(four_bar, 0.0, None, {k: x[n] for k, x in sets.items()}) for n in range(48)]
+    failed = [result.status != Status.CONVERGED for result in alone]
+    steps = []
+    one_step = newton.safeguarded_step
+
+    def counted(*arguments):
+        steps.append(arguments)
+        return one_step(*arguments)
+
+    monkeypatch.setattr(newton, "safeguarded_step", counted)
+    together = kc.solve(four_bar, 0.0, sets)
+    assert (~together.good[:, 0]).tolist() == failed
+    assert 10 < sum(failed) < 40
+    assert len(steps) < 20 * sum(failed)  # one by one they take a hundred each
+    for k in np.flatnonzero(failed).tolist():
+        assert together.status[k, 0] == alone[k].status
