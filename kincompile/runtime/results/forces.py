@@ -193,6 +193,9 @@ class Forces(Shown):
 
     def in_axes_of(self, body: str, force: Array) -> Array:
         """Return forces (N, 2), in space (N, 3), in the axes of a body, which turn with it."""
+        expected = (*self.motion.t.shape, len(self._axes))
+        if np.shape(force)[-2:] != expected:
+            raise InputError(f"the force has shape {np.shape(force)}, expected {expected}.")
         if self._axes == "xyz":
             turned = orientation(self.motion, body).as_matrix()
             return np.asarray(np.einsum("...ji,...j->...i", turned, force))
