@@ -10,7 +10,7 @@ import numpy as np
 from kincompile.errors import InputError
 from kincompile.names import listed, suggestion
 from kincompile.runtime.results.columns import TIME_UNIT
-from kincompile.runtime.results.measures import output_measures
+from kincompile.runtime.results.measures import measures_together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,10 +72,10 @@ class Layout:
         for item in measured:
             found[item.name] = np.full(len(solution.q), np.nan)
         names = {item.column for item in measured}
-        for number in np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else ():
-            one = solution.variant(number)
-            p = np.array(list(one.parameters.values()))
-            for own in output_measures(one, one.require_module("its measures"), p, names):
+        whole = np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else []
+        measures = measures_together(solution, whole, names)
+        for number, several in zip(whole, measures, strict=True):
+            for own in several:
                 for item in measured:
                     value = getattr(own, item.measure) if item.column == own.name else None
                     if value is not None:
