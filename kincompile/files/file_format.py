@@ -86,7 +86,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "bodies": Field(_list("body"), is_required=False),
         "coordinates": Field(_list("coordinate"), is_required=False),
         "sketch": Field({"$ref": "#/$defs/sketch"}, is_required=False),
-        "constraints": Field(_list("constraint")),
+        "constraints": Field(_list("constraint"), is_required=False),
         "gravity": Field(_POINT, is_required=False),
         "loads": Field(_list("load"), is_required=False),
         "points": Field(_list("point"), is_required=False),
@@ -211,10 +211,11 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
 
 IN_SPACE: Mapping[str, Mapping[str, Field]] = {
     "model": {
-        **{key: item for key, item in FIELDS["model"].items() if key != "sketch"},
+        **FIELDS["model"],
         "space": Field({"const": SPACE}),
+        "sketch": Field({"$ref": "#/$defs/spatial_sketch"}, is_required=False),
         "bodies": Field(_list("spatial_body"), is_required=False),
-        "constraints": Field(_list("spatial_constraint")),
+        "constraints": Field(_list("spatial_constraint"), is_required=False),
         "points": Field(_list("spatial_point"), is_required=False),
         "gravity": Field(_TRIPLE, is_required=False),
         "loads": Field(_list("spatial_load"), is_required=False),
@@ -232,6 +233,14 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
         "centre": Field(_TRIPLE, is_required=False),
     },
     "point": {**FIELDS["point"], "local": Field(_TRIPLE)},
+    "sketch": {
+        **FIELDS["sketch"],
+        **{
+            name: Field({"type": "object", "additionalProperties": _TRIPLE}, is_required=False)
+            for name in ("ground", "joints", "hinges")
+        },
+        "parts": Field(_list("spatial_part")),
+    },
 }
 """Fields of what is different in a file with ``space = 3``."""
 
@@ -242,11 +251,14 @@ def fields_of(table: str, count: int = PLANE) -> Mapping[str, Field]:
 
 
 _MOTIONS = [{"$ref": "#/$defs/sequence"}, {"$ref": "#/$defs/table"}]
-_VALUE: dict[str, Any] = {"anyOf": [_EXPRESSION, *_MOTIONS]}
-_LINE: Mapping[str, Field] = {
-    "along": Field({"anyOf": [_TEXT, _POINT]}),
-    "on": Field(_NAME, is_required=False),
-}
+VALUE: dict[str, Any] = {"anyOf": [_EXPRESSION, *_MOTIONS]}
+
+
+def _line(place: Mapping[str, Any]) -> dict[str, Field]:
+    """Return the fields of a guide, through two joints or along a direction, and of its link."""
+    along = Field({"anyOf": [_TEXT, place]})
+    return {"along": along, "on": Field(_NAME, is_required=False)}
+
 
 _WEIGHT: Mapping[str, Field] = {"weight": Field(_EXPRESSION, is_required=False)}
 _PASSING: Mapping[str, Field] = {
@@ -287,8 +299,8 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
         "length": Field(_EXPRESSION, is_required=False),
     },
     "wheel": {"wheel": Field(_NAME), "joint": Field(_NAME)},
-    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_LINE},
-    "slot": {"slot": Field(_NAME), **_LINE},
+    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_line(_POINT)},
+    "slot": {"slot": Field(_NAME), **_line(_POINT)},
     "gear": {
         "gear": Field(_NAME),
         "i": Field(_NAME), "centre_i": Field(_NAME), "radius_i": Field(_EXPRESSION),
@@ -296,16 +308,32 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
     },
     "drive": {
         "drive": Field(_TEXT),
-        "value": Field(_VALUE),
+        "value": Field(VALUE),
         "against": Field(_NAME, is_required=False),
     },
 }  # fmt: skip
 """Parts of a drawing: the methods of `Sketch`, and their arguments in order."""
 
+SPATIAL_PARTS: Mapping[str, Mapping[str, Field]] = {
+    "link": {"link": Field(_NAME), "joints": Field(_TEXT)},
+    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_line(_TRIPLE)},
+    "rod": {
+        "rod": Field(_NAME), "joints": Field(_TEXT), "length": Field(VALUE, is_required=False),
+    },
+    "drive": {"drive": Field(_TEXT), "value": Field(VALUE)},
+}  # fmt: skip
+"""Those of `spatial.Sketch`."""
+
+
+def parts_of(count: int) -> Mapping[str, Mapping[str, Field]]:
+    """Return the parts of a drawing in the plane, or in space."""
+    return SPATIAL_PARTS if count == SPACE else PARTS
+
+
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
-    Kind.VALUE: _VALUE,
-    Kind.LOAD: _VALUE,
-    Kind.DISTANCE: _VALUE,
+    Kind.VALUE: VALUE,
+    Kind.LOAD: VALUE,
+    Kind.DISTANCE: VALUE,
     Kind.BODY: _NAME,
     Kind.PROFILE: {"anyOf": [_EXPRESSION, {"$ref": "#/$defs/profile"}]},
 }
@@ -316,7 +344,7 @@ def _kind(kind: Kind, count: int) -> Mapping[str, Any]:
     if kind in (Kind.POINT, Kind.AXIS):
         return _components(count)
     if kind is Kind.LOADS:
-        return {"type": "array", "items": _VALUE, "minItems": count, "maxItems": count}
+        return {"type": "array", "items": VALUE, "minItems": count, "maxItems": count}
     return _KINDS.get(kind, _EXPRESSION)
 
 
@@ -349,12 +377,10 @@ def model_schema() -> dict[str, Any]:
     Whether a formula can be read and a body exists is checked by `kincompile inspect`.
     """
     tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
-    in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in ("body", "point")}
+    in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in IN_SPACE if name != "model"}
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
     parts[0]["additionalProperties"] = {"anyOf": [_EXPRESSION, _POINT]}
-    model = _object(FIELDS["model"])
-    model["required"].remove("constraints")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Mechanism for kincompile, format {VERSION}",
@@ -363,10 +389,7 @@ def model_schema() -> dict[str, Any]:
         "then": {"$ref": "#/$defs/in_space"},
         "else": {"$ref": "#/$defs/in_the_plane"},
         "$defs": {
-            "in_the_plane": {
-                **model,
-                "anyOf": [{"required": ["constraints"]}, {"required": ["sketch"]}],
-            },
+            "in_the_plane": _object(FIELDS["model"]),
             "in_space": _object(IN_SPACE["model"]),
             "expression": {
                 "description": "a number, or a formula such as -a/2 + sin(omega*t)",
@@ -375,6 +398,7 @@ def model_schema() -> dict[str, Any]:
             **tables,
             **in_space,
             "part": {"oneOf": parts},
+            "spatial_part": {"oneOf": [_object(item) for item in SPATIAL_PARTS.values()]},
             "target": {"oneOf": [_object(item) for item in TARGETS.values()]},
             "constraint": {"oneOf": _constraints(PLANE)},
             "spatial_constraint": {"oneOf": _constraints(SPACE)},

@@ -32,7 +32,6 @@ from kincompile.files.file_format import (
     SMOOTHNESS,
     TASKS,
     VERSION,
-    Field,
     constraint_fields,
     fields_of,
     load_fields,
@@ -87,10 +86,7 @@ class _ModelReader(BodyReader):
         data = self.document.data
         if not self._is_model(data):
             return None
-        fields = dict(fields_of("model", self.words.count))
-        if "sketch" in data:  # it has constraints of its own
-            fields["constraints"] = Field(fields["constraints"].schema, is_required=False)
-        self.has_fields((), data, fields)
+        self.has_fields((), data, fields_of("model", self.words.count))
         name = self.name(data, (), "the model") or "model"
         given = [self._parameter(*item) for item in self.rows(data, "parameters")]
         parameters = [item for item in given if item]
@@ -99,7 +95,7 @@ class _ModelReader(BodyReader):
             **self._analysis(data.get("analysis", {})),
         }
         drawn = self.words.mechanism(name)
-        if "sketch" in data and self.words.count == PLANE:
+        if "sketch" in data:
             drawn = self.drawn(name, options, parameters, data["sketch"])
         bodies = [self.body(*item) for item in self.rows(data, "bodies")]
         free = [self._coordinate(*item) for item in self.rows(data, "coordinates")]

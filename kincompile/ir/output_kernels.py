@@ -200,9 +200,16 @@ def _vector_code(kind: type[VectorFunction], count: int) -> tuple[list[Node], in
 
 def output_kernel(output: ResolvedOutput) -> tuple[Kernel, Mapping[Input | str, Scalar | str]]:
     """Return the kernel of an output, and the name or value that each of its inputs stands for."""
+    return _kernel_of_value(output.value, output.columns)
+
+
+@lru_cache(maxsize=1024)
+def _kernel_of_value(
+    value: sympy.Expr, columns: tuple[str, ...]
+) -> tuple[Kernel, Mapping[Input | str, Scalar | str]]:
     graph = Graph()
-    converter = _OutputConverter(graph, output.columns)
-    y = converter.convert(output.value)
+    converter = _OutputConverter(graph, columns)
+    y = converter.convert(value)
     by_column = (tuple(own.items()) for own in converter.by_column.values())
     motion = tuple(converter.motion.items())
     # 0.5 and 1/2 are equal, and printed differently.

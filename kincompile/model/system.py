@@ -166,7 +166,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         applied = _loads(
             bodies, members(loads, "loads", problems), gravity, scope, written, length_unit
         )
-        if not written:
+        if not written and not applied:
             problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
         if not found and not bodies:
             problems.append(f"{name!r} has no coordinates; add a body, or name coordinates")

@@ -18,6 +18,13 @@ Pattern = Sequence[tuple[int, int]] | NDArray[np.intp]
 """Row and column of each entry of Phi_q that is not identically zero."""
 
 
+LEFT_FREE = (
+    "; or leave them free: kc.simulate gives the motion that follows from its masses and forces, "
+    "kc.equilibrium where it rests"
+)
+"""What else is to be done with a mechanism that has loads."""
+
+
 def unmatched(system: ConstraintSystem, pattern: Pattern) -> tuple[list[str], list[str]]:
     """Return the names of equations and coordinates that a maximum matching leaves over."""
     names = [item.name for item in system.coordinates]
@@ -44,7 +51,7 @@ def counting_problem(
     drivers = [item.name for item in system.constraints if item.is_driver]
     counted = f"{count} (drivers: {listed(drivers)}; {_counts(system)})"
     if m < n:
-        return _too_few(counted, n - m, coordinates)
+        return _too_few(counted, n - m, coordinates) + (LEFT_FREE if system.loads else "")
     if m > n:
         return _too_many(counted, m - n, dependent or equations)
     return _mismatch(counted, equations, coordinates)

@@ -165,7 +165,7 @@ def residuals(Phi: Array, shapes: Drawing) -> Array:
         np.linalg.norm(Phi[..., first : first + count], axis=-1)
         for first, count in (joint.rows for joint in shapes.joints)
     ]
-    return np.stack(norms, axis=-1)
+    return np.stack(norms, axis=-1) if norms else np.zeros((*Phi.shape[:-1], 0))
 
 
 def _at_guess(

@@ -194,7 +194,7 @@ class Scale:
         most: tuple[float, float] = (WIDTH, TALLEST),
         margin: float = MARGIN,
     ) -> None:
-        points = np.concatenate(shown)
+        points = np.concatenate(shown) if shown else np.array([[-1.0, -1.0], [1.0, 1.0]])
         self._margin, self._low = margin, np.nanmin(points, axis=0)
         wide, tall = np.nanmax(points, axis=0) - self._low
         self.factor = min((most[0] - 2 * margin) / wide, (most[1] - 2 * margin) / tall)

@@ -193,6 +193,9 @@ class Forces(Shown):
 
     def in_axes_of(self, body: str, force: Array) -> Array:
         """Return forces (N, 2), in space (N, 3), in the axes of a body, which turn with it."""
+        expected = (*self.motion.t.shape, len(self._axes))
+        if np.shape(force)[-2:] != expected:
+            raise InputError(f"the force has shape {np.shape(force)}, expected {expected}.")
         if self._axes == "xyz":
             turned = orientation(self.motion, body).as_matrix()
             return np.asarray(np.einsum("...ji,...j->...i", turned, force))
@@ -441,7 +444,8 @@ class _Points:
         own = self.code.module
         matrix = self.code.Phi_q(self.q, self.t, self.p)
         inertia = np.einsum("lij,lj->li", own.M(self.q, self.t, self.p), self.q_ddot)
-        sides = own.Q(*states[:2], self.t, self.p) - inertia
+        loads = own.Q(*states[:2], self.t, self.p)
+        sides = loads - inertia
         left, values, right = np.linalg.svd(matrix, full_matrices=True)
         zero = values <= RANK * values[:, :1]
         inverse = np.where(zero, 0.0, 1 / np.where(zero, 1.0, values))
@@ -454,9 +458,9 @@ class _Points:
         loose = np.einsum("lij,lj->li", left, mixed)
         moved = np.abs(self._given(module, loose) - self._given(module, 0 * loose))
         found = self._given(module, factors)
-        is_shared = moved > MOVED * np.abs(loose).max(axis=-1, keepdims=True)
+        is_shared = moved > MOVED * np.abs(loose).max(axis=-1, keepdims=True, initial=0.0)
         rest = np.abs(np.einsum("lij,li->lj", matrix, factors) - sides).max(axis=-1)
-        off = rest > BALANCED * np.abs(sides).max(axis=-1, initial=1e-300)
+        off = rest > BALANCED * (np.abs(loads) + np.abs(inertia)).max(axis=-1, initial=1e-300)
         found[is_shared] = np.nan
         found[off] = np.nan
         return found, np.asarray(is_shared[~off].any(axis=0))

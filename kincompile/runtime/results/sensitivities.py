@@ -30,6 +30,7 @@ from kincompile.names import (
 from kincompile.runtime.engine.code import SENSITIVITIES, code_of
 from kincompile.runtime.engine.engine import agree
 from kincompile.runtime.engine.planned import trusted
+from kincompile.runtime.inputs import names_of
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import rate_unit
 from kincompile.runtime.results.observed import observed
@@ -231,14 +232,14 @@ def sensitivities(
         If the mechanism is so large that its module is in grouped form.
     """
     require_solution(solution)
-    names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
+    names = names_of(parameters, "parameters")
     if problem := parameters_problem(names, tuple(solution.parameters), solution.name):
         raise InputError(problem)
     code = code_of(solution.require_module("its sensitivities"))
     outputs = getattr(code.module, "OUTPUTS", ())
     columns = (*code.coordinates, *outputs)
     if of is not None:
-        columns = _columns((of,) if isinstance(of, str) else of, columns, solution.name)
+        columns = _columns(names_of(of, "of"), columns, solution.name)
     found = _over_motion(solution, code, names, columns, second)
     found, pairs = found[:, : len(names)], found[:, len(names) :]
     size = len(set(columns) & set(code.coordinates))
@@ -268,6 +269,8 @@ def _symmetric(pairs: Array, count: int) -> Array:
 
 def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[str, ...]:
     """Return the names of columns, the coordinates first."""
+    if not of:
+        raise InputError(f"no column of {mechanism} is asked for: name one.")
     wanted = [column_name(name) for name in of]
     for given, name in zip(of, wanted, strict=True):
         if name not in known:

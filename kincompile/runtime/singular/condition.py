@@ -26,11 +26,11 @@ def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
 
     Lengths count in sizes of the mechanism, angles in radians, and each equation in what its terms
     contribute at a generic position: the number is the same in metres and in millimetres. For
-    positions q (N, n) at t (N,); NaN where q is.
+    positions q (N, n) at t (N,); NaN where q is, and without equations.
     """
     result = np.full(t.size, np.nan)
     found = np.flatnonzero(np.isfinite(q).all(axis=1))
-    if not found.size:
+    if not (found.size and module.N_EQUATIONS):
         return result
     with np.errstate(all="ignore"):
         first = found[0]

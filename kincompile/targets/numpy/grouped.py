@@ -189,7 +189,7 @@ class _Module:
         frames: tuple[tuple[int, ...], ...] = (),
     ) -> InlineProgram:
         """Return code as that of one constraint, which is not named in it."""
-        rows = ConstraintRows(self.program.instances[0], entries)
+        rows = ConstraintRows(self.program.parts[0], entries)
         return InlineProgram(self.program, nodes, (rows,), hints, frames)
 
     def _body(
