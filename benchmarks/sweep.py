@@ -184,15 +184,15 @@ def print_measures() -> None:
     *lengths, _ = FOUR_BAR.parameters.items()
     p = {name: x * (1 + SPREAD * rng.uniform(-1, 1, MEASURED)) for name, x in lengths}
     several = kc.solve(module, FOUR_BAR.times(TIMES), p)
+    sets = np.array(list(several.parameters.values())).T
     seconds: dict[str, list[float]] = {"together": [], "each alone": []}
     for _ in range(ROUNDS):
         start = process_time()
-        measures_together(several, range(MEASURED), ("swing",))
+        measures_together([several.variant(k) for k in range(MEASURED)], module, sets, ("swing",))
         seconds["together"].append(process_time() - start)
         start = process_time()
         for number in range(MEASURED):
-            one = several.variant(number)
-            output_measures(one, module, np.array(list(one.parameters.values())), ("swing",))
+            output_measures(several.variant(number), module, sets[number], ("swing",))
         seconds["each alone"].append(process_time() - start)
     least = {name: min(runs) for name, runs in seconds.items()}
     rows = [[name, f"{x / MEASURED * 1e3:.3g}"] for name, x in least.items()]

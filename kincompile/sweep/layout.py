@@ -74,7 +74,10 @@ class Layout:
             found[item.name] = np.full(len(solution.q), np.nan)
         names = {item.column for item in measured}
         whole = np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else []
-        measures = measures_together(solution, whole, names)
+        motions = [solution.variant(number) for number in whole]
+        sets = np.array(list(solution.parameters.values())).T[whole]
+        module = solution.require_module("its measures")
+        measures = measures_together(motions, module, sets, names)
         for number, several in zip(whole, measures, strict=True):
             for own in several:
                 for item in measured:

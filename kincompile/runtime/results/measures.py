@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.results.between import Between
     from kincompile.runtime.results.columns import MotionTable
-    from kincompile.runtime.results.solution import Solution
 
 STILL = 1e-11
 """Movement, relative to the largest number of the same unit, that is a rounding error."""
@@ -161,14 +160,11 @@ def output_measures(
 
 
 def measures_together(
-    solution: Solution, variants: Sequence[int], names: Container[str]
+    solutions: Sequence[MotionTable], module: ModuleType, sets: Array, names: Container[str]
 ) -> list[tuple[OutputMeasures, ...]]:
-    """Measure the outputs of these names over the motions of some variants, as each alone."""
-    module = solution.require_module("its measures")
-    motions = []
-    for number in variants:
-        one = solution.variant(number)
-        motions.append(ObservedMotion(one, module, np.array(list(one.parameters.values()))))
+    """Measure the outputs of these names over motions with parameters (B, k), as each alone."""
+    pairs = zip(solutions, sets, strict=True)
+    motions = [ObservedMotion(one, module, p) for one, p in pairs]
     return together(motions, [_all_measured(motion, names) for motion in motions])
 
 

@@ -273,7 +273,9 @@ def test_measures_of_variants_together_are_those_of_each_alone(monkeypatch):
         look(motion, t)
 
     monkeypatch.setattr(between.ObservedMotion, "look", counted)
-    found = measures_together(several, range(7), ("travel", "speed", "pull"))
+    ones = [several.variant(number) for number in range(7)]
+    sets = starts[:, np.newaxis]
+    found = measures_together(ones, several.require_module(""), sets, ("travel", "speed", "pull"))
     count = len(looks)
     for number, start in enumerate(starts.tolist()):
         alone = slider_crank(1.3, 53, start=start).measures().outputs
