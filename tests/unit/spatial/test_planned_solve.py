@@ -1,5 +1,6 @@
 """The planned solve with small rotations: the same x as LAPACK's, from blocks of three at most."""
 
+import mpmath
 import numpy as np
 import pytest
 import sympy
@@ -57,6 +58,42 @@ def test_that_x_is_that_of_lapack(make, target: str) -> None:
     wanted = np.linalg.solve(Phi_q, b[..., np.newaxis])[..., 0]
     size = np.linalg.cond(Phi_q)[:, np.newaxis] * np.abs(wanted).max(axis=1, keepdims=True)
     assert np.max(np.abs(found - wanted) / size) < 1e-13
+
+
+def before_dead_centre(module, seed: int, away: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return Phi_q at a distance before it becomes singular along a random line, and b."""
+    random = np.random.default_rng(seed)
+    n = len(module.COORDINATES)
+    start, line = module.GUESS + random.uniform(-0.3, 0.3, n), random.uniform(-1, 1, n)
+
+    def sign(s: float) -> float:
+        return float(np.linalg.slogdet(module.Phi_q(start + s * line, 0.3))[0])
+
+    low, high = next(
+        (s, s + 0.05) for s in np.linspace(-5, 5, 201).tolist() if sign(s) != sign(s + 0.05)
+    )
+    before = sign(low)
+    for _ in range(45):
+        middle = (low + high) / 2
+        low, high = (middle, high) if sign(middle) == before else (low, middle)
+    return start + (low - away) * line, random.uniform(-1, 1, n)
+
+
+@pytest.mark.parametrize("away", [1e-2, 1e-5, 1e-8])
+@pytest.mark.parametrize("make", MECHANISMS[:2], ids=["rssr", "wishbone"])
+def test_that_before_a_dead_centre_x_is_as_right_as_lapacks(make, away: float) -> None:
+    """A plan without pivots loses nothing there: what is lost any method loses."""
+    module, errors = kc.compile(make()), []
+    for seed in range(6):
+        q, b = before_dead_centre(module, seed, away)
+        Phi_q = module.Phi_q(q, 0.3)
+        with mpmath.workdps(40):
+            exact = mpmath.lu_solve(mpmath.matrix(Phi_q.tolist()), mpmath.matrix(b.tolist()))
+        right = np.array([float(x) for x in exact])
+        found = module.solve(module.Phi_q_nonzeros(q, 0.3), b), np.linalg.solve(Phi_q, b)
+        errors.append([np.abs(x - right).max() / np.abs(right).max() for x in found])
+    ours, lapacks = np.max(errors, axis=0)
+    assert ours < 10 * lapacks
 
 
 @pytest.mark.parametrize("linkage", LINKAGES, ids=lambda item: item.name)
