@@ -106,6 +106,7 @@ def rate(name: str, order: int = 1) -> str:
 
 def column_name(name: str) -> str:
     """Return the column that is meant by ``"rod.phi_dot"``, here ``"phi_rod_dot"``, or as given."""
+    name = str(name)
     owner, point, quantity = name.partition(".")
     if not point:
         return name
@@ -127,7 +128,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
     Of long names the beginning is compared, of many the first 1000, which takes a few milliseconds.
     """
-    close = get_close_matches(name[:40], list(islice(known, 1000)), n=1)
+    close = get_close_matches(str(name)[:40], list(islice(known, 1000)), n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 

@@ -1242,8 +1242,8 @@ const spatial_slider_crank = (() => {
             SHORTEST_ARC = 1e-09, SHORTEST_STEP = 9.5367431640625e-07,
             SINGULAR_SENSITIVITY = 10000000.0, SMALLEST_PART = 9.5367431640625e-07,
             SMALL_CORRECTION = 1e-12, SMALL_ERROR = 0.05, SMALL_PART = 1e-08, SMOOTH = 1e-09,
-            STEEP = 1000000.0, STRAIGHT = 0.98, SUFFICIENT = 0.0001, TOLERABLE_CORRECTION = 1e-07,
-            TOLERANCE = 1e-10, TOO_NEAR = 100000.0, WILD = 1000.0;
+            SPATIAL_COORDINATES = 7, STEEP = 1000000.0, STRAIGHT = 0.98, SUFFICIENT = 0.0001,
+            TOLERABLE_CORRECTION = 1e-07, TOLERANCE = 1e-10, TOO_NEAR = 100000.0, WILD = 1000.0;
         const ASSEMBLED = RESIDUAL_FACTOR * TOLERANCE;
 
         const norm = vector => Math.hypot(...vector);
@@ -1433,7 +1433,11 @@ const spatial_slider_crank = (() => {
             constructor(model, p, q, t) {
                 const { N_COORDINATES: n, N_EQUATIONS: m } = model;
                 Object.assign(this, { model, p, n, m });
-                this.angular = model.COORDINATES.map(name => model.UNITS[name] === "rad");
+                // Euler parameters, the last of a body in space, are cosines and sines of half angles.
+                const ofEuler = ([, first, count], k) => count === SPATIAL_COORDINATES && k >= first + 3 && k < first + count;
+                this.angular = model.COORDINATES.map((name, k) => {
+                    return model.UNITS[name] === "rad" || model.BODIES.some(body => ofEuler(body, k));
+                });
                 const isOwned = k => model.BODIES.some(([, first, count]) => k >= first && k < first + count);
                 this.mayTurn = model.COORDINATES.map((name, k) => {
                     return this.angular[k] || (model.UNITS[name] === "" && !isOwned(k));

@@ -20,9 +20,8 @@ sides of velocity and acceleration, gamma = -(Phi_q q_dot)_q q_dot - 2 Phi_qt q_
 `_kinematics` is all of it once more, for batches. From `_Quantity` on all modules are alike.
 The functions take one point, q of shape (7,), or batches: q (..., 7), t (...), p (..., 4).
 What begins with an underscore runs on floats (f = FLOATS) and on arrays (f = ARRAYS), whose last
-axis is the batch. Of a joint J on a body b, c_b and s_b are cosine and sine of phi_b, J_b_x and
-J_b_y its point's vector A s, J_b_w2_x that times phi_b_dot squared (_sq), J_axis_b_x an axis A v,
-J_d_x the vector d between its points, J_d_dot_x the rate of that.
+axis is the batch. A11_b to A33_b are the rotation matrix of a body b; of a joint J, J_d_x to J_d_z
+are the vector d between its points, J_d_dot_x the rate of that.
 """
 
 import math

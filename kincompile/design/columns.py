@@ -10,6 +10,7 @@ import numpy as np
 from kincompile.criteria import probe_of
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import rate_unit
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def columns_of(module: ModuleType, names: Iterable[str] | str | None) -> list[Co
         names = getattr(module, "OUTPUTS", ()) or module.COORDINATES
     found: list[Column] = []
     problems: list[str] = []
-    for name in (names,) if isinstance(names, str) else names:
+    for name in names_of(names, "of"):
         try:
             found.append(column_of(module, name))
         except InputError as error:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+MOST = 1e100
+"""The largest deviation: its square is a number still."""
+
 _LAWS: Any = stats
 """SciPy makes its distributions at run time, where a type checker does not see them."""
 
@@ -45,7 +48,8 @@ class Deviation:
     Raises
     ------
     InputError
-        If the limits are not finite or in the wrong order, or there is no such distribution.
+        If the limits are not finite or in the wrong order, there is no such distribution, or it has
+        no mean between them and no finite variance.
     """
 
     low: float
@@ -74,8 +78,19 @@ class Deviation:
                 f"there is no distribution {shown(self.distribution)}; there are "
                 f"{listed(DISTRIBUTIONS)}, and frozen ones of scipy.stats"
             )
+        if not problems and not self._has_moments():
+            problems.append(
+                f"the distribution between {self.low:g} and {self.high:g} has no mean between "
+                f"them, or no standard deviation up to {MOST:g}: give another"
+            )
         if problems:
             raise InputError(problems)
+
+    def _has_moments(self) -> bool:
+        """Say whether mean and standard deviation are what may be computed with."""
+        with np.errstate(all="ignore"):
+            mean, sigma = self.law.mean(), self.law.std()
+        return bool(self.low <= mean <= self.high and sigma <= MOST)
 
     @property
     def law(self) -> Any:
@@ -128,7 +143,7 @@ class Clearance:
 def _is_number(value: object) -> bool:
     """Say whether a value is a finite number."""
     is_real = isinstance(value, int | float | np.integer | np.floating)
-    return is_real and not isinstance(value, bool) and math.isfinite(float(str(value)))
+    return is_real and not isinstance(value, bool) and abs(float(str(value))) <= MOST
 
 
 def read_deviation(given: Any, where: str) -> Deviation:

@@ -13,6 +13,7 @@ import copy
 import math
 import time
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from scipy import optimize
 
 from kincompile.compiler import compile as compile_model
 from kincompile.design.demands import limit_name, read_demands
+from kincompile.design.deviation import MOST
 from kincompile.design.fitted import Counts, Fit, fitted
 from kincompile.design.search import Search
 from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
@@ -32,6 +34,7 @@ from kincompile.files.file_format import MINIMIZERS, SEARCHES
 from kincompile.model.outputs import Output
 from kincompile.names import listed, suggestion
 from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.inputs import mapping_of, require_seed
 from kincompile.runtime.singular.assemblies import assemblies
 
 if TYPE_CHECKING:
@@ -114,15 +117,17 @@ def fit(
     begun = time.perf_counter()
     model = require_mechanism(model, "kc.fit")
     wanted = _targets(targets)
-    names, limits = _read_bounds(model, parameters, bounds, dict(p or {}))
+    fixed = dict(mapping_of(p, "p"))
+    names, limits = _read_bounds(model, parameters, bounds, fixed)
     _check_options(samples, starts, search, minimizer)
+    require_seed(seed)
     extended = _with_limits(model, wanted)
     module = compile_model(extended)
     _require_plan(module)
     demands = read_demands(module, extended.system(), wanted)
-    bench = Workbench(module, demands, names, dict(p or {}))
+    bench = Workbench(module, demands, names, fixed)
     guesses = _guesses(module, demands.first_time, p)
-    finder = Search(module, demands, names, dict(p or {}), limits, guesses)
+    finder = Search(module, demands, names, fixed, limits, guesses)
     (finder.spread if search == "sobol" else finder.breed)(samples, seed)
     chosen = finder.ranked(starts)
     every = np.concatenate((limits, np.reshape(demands.time_bounds(), (-1, 2))))
@@ -149,7 +154,7 @@ def _rank(trial: Trial) -> tuple[bool, float]:
 def _targets(given: Any) -> list[Target]:
     """Return the targets as a list; refuse what is none."""
     kinds = (Passing, TimeRatio, Limit, Moves)
-    found = [given] if isinstance(given, kinds) else list(given)
+    found = [given] if isinstance(given, kinds) or not isinstance(given, Iterable) else list(given)
     problems = [
         f"{item!r} is not a target: make one with kc.targets.path, value, pose, time_ratio or limit"
         for item in found
@@ -212,6 +217,11 @@ def _checked_bounds(name: str, limits: Any, problems: list[str]) -> tuple[float,
         return 0.0, 1.0
     if not (math.isfinite(low) and math.isfinite(high)):
         problems.append(f"the bounds of {name!r} are {low:g} and {high:g}: give finite numbers")
+    elif max(-low, high) > MOST or 0 < low < 1 / MOST:
+        problems.append(
+            f"the bounds of {name!r} are {low:g} and {high:g}: give sizes from {1 / MOST:g} to "
+            f"{MOST:g}"
+        )
     elif not low < high:
         problems.append(
             f"the bounds of {name!r} go from {low:g} to {high:g}: give the least value first"

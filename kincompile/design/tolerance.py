@@ -26,6 +26,7 @@ from kincompile.design.tolerance_analysis import Drawn, ToleranceAnalysis
 from kincompile.design.variation import clearance_names, require_mechanism, with_clearances
 from kincompile.errors import InputError
 from kincompile.names import listed, suggestion
+from kincompile.runtime.inputs import mapping_of, require_seed
 from kincompile.runtime.results.sensitivities import sensitivities
 from kincompile.runtime.solve import solve
 
@@ -108,7 +109,8 @@ def tolerance(
         If the nominal mechanism does not move through all times.
     """
     model = require_mechanism(model, "kc.tolerance")
-    loose = clearances or {}
+    loose = mapping_of(clearances, "clearances")
+    require_seed(seed)
     sources = _sources(model, tolerances, loose)
     wanted: Any = samples  # whatever its type says
     if not isinstance(wanted, int | np.integer) or not 0 <= wanted <= MOST_SAMPLES:
@@ -143,7 +145,7 @@ def _sources(
     known = [item.name for item in model.parameters]
     found: Sources = {}
     problems = []
-    for name, given in tolerances.items():
+    for name, given in mapping_of(tolerances, "tolerances").items():
         if name not in known:
             near = suggestion(str(name), known) or "."
             problems.append(

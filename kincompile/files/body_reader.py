@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from kincompile.files.dimensions import PLANE, Dimensions, dimensions
+from kincompile.files.dimensions import PLANE
 from kincompile.files.file_format import fields_of
 from kincompile.files.sketch_reader import SketchReader
 from kincompile.model.bodies import GROUND, Body
@@ -22,20 +22,10 @@ Row = dict[str, Any]
 
 
 class BodyReader(SketchReader):
-    """Reads bodies and points, by the names that are known so far.
-
-    Attributes
-    ----------
-    words
-        Whether bodies are in the plane or in space.
-    spins
-        Angular velocities of bodies by name, which may occur in outputs.
-    """
+    """Reads bodies and points, by the names that are known so far."""
 
     def __init__(self, document: Document) -> None:
         super().__init__(document)
-        self.words: Dimensions = dimensions(PLANE)
-        self.spins: dict[str, sympy.Expr] = {}
         self._taken: dict[tuple[str, str], Address] = {}
 
     def is_free(self, name: str, address: Address, kind: str = "symbol") -> bool:

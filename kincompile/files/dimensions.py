@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.model.mechanism import Mechanism
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.bodies import Body
     from kincompile.model.constraint import Constraint
+    from kincompile.model.drawing import Drawing
     from kincompile.model.load import Load
 
 PLANE, SPACE = 2, 3
@@ -49,6 +50,16 @@ class Dimensions:
     def count(self) -> int:
         """Two in the plane, three in space."""
         return len(self.ground.kind.axes)
+
+    def sketch(self) -> type[Drawing[Any]]:
+        """Return what draws a mechanism, which only a model with a drawing needs."""
+        if self.count == PLANE:
+            from kincompile.model.sketch import Sketch
+
+            return Sketch
+        from kincompile.space.sketch import Sketch as InSpace
+
+        return InSpace
 
     def loads(self) -> Mapping[str, type[Load]]:
         """Return the types of loads by name, which only a model that has any needs."""

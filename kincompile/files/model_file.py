@@ -95,7 +95,7 @@ class _ModelReader(BodyReader):
             **self._analysis(data.get("analysis", {})),
         }
         drawn = self.words.mechanism(name)
-        if "sketch" in data and self.words.count == PLANE:
+        if "sketch" in data:
             drawn = self.drawn(name, options, parameters, data["sketch"])
         bodies = [self.body(*item) for item in self.rows(data, "bodies")]
         free = [self._coordinate(*item) for item in self.rows(data, "coordinates")]

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from kincompile.errors import ModelError
+from kincompile.files.dimensions import PLANE, SPACE, Dimensions, dimensions
 from kincompile.files.file_fields import FieldReader
-from kincompile.files.file_format import FIELDS, MOST_DRAWN, MOST_JOINTS, PARTS
+from kincompile.files.file_format import FIELDS, MOST_DRAWN, MOST_JOINTS, VALUE, fields_of, parts_of
 from kincompile.model import motion
-from kincompile.model.bodies import Body
 from kincompile.model.expressions import t
-from kincompile.model.mechanism import Mechanism
 from kincompile.model.points import BodyPoint
-from kincompile.model.sketch import Sketch
 from kincompile.names import listed, name_problem, shown
 
 if TYPE_CHECKING:
@@ -24,6 +22,7 @@ if TYPE_CHECKING:
     from kincompile.files.data_text import Document
     from kincompile.files.file_format import Field
     from kincompile.model.bodies import Parameter
+    from kincompile.model.mechanism import Mechanism
 
 Row = dict[str, Any]
 
@@ -37,34 +36,36 @@ class SketchReader(FieldReader):
         super().__init__(document)
         self.names: dict[str, sympy.Expr] = {"t": t}
         self.bodies: dict[str, Address] = {}
+        self.words: Dimensions = dimensions(PLANE)
+        self.spins: dict[str, sympy.Expr] = {}
 
     def drawn(
         self, name: str, options: Row, parameters: Sequence[Parameter], given: Any
     ) -> Mechanism:
         """Return what a drawing makes; as far as it is good an empty mechanism."""
-        sketch = Sketch(name, **options)
+        sketch: Any = self.words.sketch()(name, **options)
         for item in parameters:
-            sketch.parameter(item.name, item.default, item.unit)
+            sketch.parameter(item.name, item.default, item.unit, item.range)
         if not isinstance(given, dict):
             self.problem(PLACE, f"expected a table, not {shown(given)}")
-            return Mechanism(name)
-        self.has_fields(PLACE, given, FIELDS["sketch"])
+            return self.words.mechanism(name)
+        self.has_fields(PLACE, given, fields_of("sketch", self.words.count))
         for key, address, value in self._named(given, "lengths"):
             sketch.length(key, self.number(value, address))
             self.names[key] = sympy.Symbol(key)
             self.remember(f"parameter {key!r}", address)
-        for section, draw in (("ground", sketch.ground), ("joints", sketch.joints)):
+        for section in ("ground", "joints", *(("hinges",) if self.words.count == SPACE else ())):
             for key, address, value in self._named(given, section):
-                draw(**{key: self._pair(value, address)})
-                self.remember(f"joint {key!r}", address)
+                getattr(sketch, section)(**{key: self._place(value, address)})
+                self.remember(f"{'hinge' if section == 'hinges' else 'joint'} {key!r}", address)
         self.remember("no link has the joint", (*PLACE, "joints"))
         for k, row in enumerate(self._within(given, "parts", [])):
             self._part(sketch, (*PLACE, "parts", k), row)
         try:
-            mechanism = sketch.mechanism()
+            mechanism: Mechanism = sketch.mechanism()
         except ModelError as error:
             self.problems += [self.located(problem) for problem in error.problems]
-            return Mechanism(name)
+            return self.words.mechanism(name)
         for point in mechanism.outputs:
             if isinstance(point, BodyPoint):
                 self.names |= dict(zip(point.output_names, point.coordinates, strict=True))
@@ -95,19 +96,22 @@ class SketchReader(FieldReader):
                 self.problem(address, problem)
         return entries
 
-    def _pair(self, value: Any, address: Address) -> tuple[Any, ...]:
-        return tuple(self.expressions(value, address, self.names, "[x, y]", 2))
+    def _place(self, value: Any, address: Address) -> tuple[Any, ...]:
+        what = "[x, y]" if self.words.count == PLANE else "[x, y, z]"
+        return tuple(self.expressions(value, address, self.names, what, self.words.count))
 
-    def _part(self, sketch: Sketch, address: Address, row: Any) -> None:
-        """Draw a part: a link, a wheel, a slider, a slot, a gear, a drive."""
-        kind = next((kind for kind in PARTS if isinstance(row, dict) and kind in row), None)
+    def _part(self, sketch: Any, address: Address, row: Any) -> None:
+        """Draw a part: a link, a wheel, a slider, a slot, a gear, a rod, a drive."""
+        parts = parts_of(self.words.count)
+        kind = next((kind for kind in parts if isinstance(row, dict) and kind in row), None)
         if kind is None:
-            self.problem(address, f"expected a table with one of {listed(PARTS, 20)}")
+            self.problem(address, f"expected a table with one of {listed(parts, 20)}")
             return
-        fields, before = PARTS[kind], len(self.problems)
-        # What else a link has are lengths and places, by the names of its joints.
+        fields, before = parts[kind], len(self.problems)
+        # What else a link of the plane has are lengths and places, by the names of its joints.
+        is_open = kind == "link" and self.words.count == PLANE
         self.has_fields(
-            address, {key: row[key] for key in row if kind != "link" or key in fields}, fields
+            address, {key: row[key] for key in row if not is_open or key in fields}, fields
         )
         given = {
             key: self._value(value, (*address, key), fields.get(key)) for key, value in row.items()
@@ -125,23 +129,25 @@ class SketchReader(FieldReader):
         if kind in ("link", "wheel", "slider"):
             self.bodies[name] = address
             self.remember(f"there is a link {name!r} already", address)
-            for coordinate in Body(name).coordinates:
+            body = type(self.words.ground)(name)
+            for coordinate in body.coordinates:
                 self.names[coordinate] = sympy.Symbol(coordinate)
                 self.remember(f"guess of {coordinate}", address)
+            self.spins |= {key: spin for key, spin, _ in body.on_request}
         arguments = [given.pop(key) for key in fields if key in given and key != "on"]
         getattr(sketch, kind)(*arguments, **given)
 
     def _value(self, value: Any, address: Address, field: Field | None) -> Any:
         """Return a text, a place, a motion or an expression: what the field wants."""
         schema = field.schema if field else {}
-        is_line = field is PARTS["slot"]["along"]
+        is_line = address[-1] == "along"
         if schema.get("type") == "string" or (is_line and isinstance(value, str)):
             if not isinstance(value, str):
                 self.problem(address, f"expected a text, not {shown(value)}")
             return value
         if is_line or (field is None and isinstance(value, list)):
-            return self._pair(value, address)
-        return self.driven(value, address) if address[-1] == "value" else self._free(value, address)
+            return self._place(value, address)
+        return self.driven(value, address) if schema is VALUE else self._free(value, address)
 
     def _free(self, value: Any, address: Address) -> Any:
         return self.expression(value, address, self.names)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
+from functools import lru_cache
 from numbers import Integral, Rational, Real
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
@@ -161,16 +162,18 @@ def _functions_of_time(expression: sympy.Expr) -> set[AppliedUndef]:
     return {applied for applied in expression.atoms(AppliedUndef) if str(applied.args) == "(t,)"}
 
 
-def symbol_names(value: Scalar) -> set[str]:
+@lru_cache(maxsize=1024)
+def symbol_names(value: Scalar) -> frozenset[str]:
     """Return the names of the symbols in an expression."""
     if not isinstance(value, sympy.Expr):
-        return set()
-    return {symbol.name for symbol in _symbols(value)}
+        return frozenset()
+    return frozenset(symbol.name for symbol in _symbols(value))
 
 
 _ELEMENTARY = "write it with elementary functions"
 
 
+@lru_cache(maxsize=1024)
 def smoothness_problem(
     value: Scalar, *, corners: bool = False, known: tuple[type[sympy.Function], ...] = ()
 ) -> str | None:

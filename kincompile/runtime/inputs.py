@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -22,6 +22,46 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Values: TypeAlias = ArrayLike | Mapping[str, ArrayLike] | None
+
+
+def names_of(given: Any, what: str) -> tuple[Any, ...]:
+    """Return names that are given as one text, or as a list of them.
+
+    Raises
+    ------
+    InputError
+        If it is neither; `what` begins the message.
+    """
+    if isinstance(given, str):
+        return (given,)
+    if not isinstance(given, Iterable):
+        raise InputError(f"{what} is {given!r}: give a name, or a list of names.")
+    return tuple(given)
+
+
+def mapping_of(given: Any, what: str) -> Mapping[str, Any]:
+    """Return values by name; without any none.
+
+    Raises
+    ------
+    InputError
+        If it is no mapping; `what` begins the message.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise InputError(f"{what} is {given!r}: give values by name, such as {{'a': 0.1}}.")
+    return given or {}
+
+
+def require_seed(seed: Any) -> None:
+    """Check that a seed is a whole number that is not negative.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed is {seed!r}: give a whole number of at least 0.")
 
 
 SMALLEST_GRID = 32

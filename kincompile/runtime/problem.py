@@ -73,7 +73,7 @@ class Problem:
     probe: Array  # (m,): numbers of size 1/2 to 1 and either sign without a pattern
     magnitude: Array  # (m,): what the terms of each equation contribute at a generic position
     # (m,): what rounding errors of so large coordinates leave of each equation
-    noise: Array | float = 0.0
+    noise: Array
     limit: Array | float = np.inf  # (m,): what they contribute at most, wherever they are
 
     def at(self, q: Array, t: float) -> Point | None:
@@ -202,7 +202,7 @@ class Problem:
         """
         if point.q.ndim == 1 and within(point.Phi, tolerance * self.magnitude):
             return True  # nearly always; the terms are never less, and cost a pass over Phi_q
-        noise = column(np.asarray(self.noise), point.q)
+        noise = column(self.noise, point.q)
         return within(point.Phi, tolerance * self.terms(point, self.reference) + noise)
 
     def holds_to_rounding(self, point: Point) -> Any:
@@ -239,7 +239,8 @@ def problem(
     reference = np.where(angular, 1.0, size)
     place, probe = np.abs(q), probe_of(m)
     floor = float(ROUNDING * (place[~angular] / size).max(initial=0.0))
-    equations = Problem(code, engine, p, angular, size, reference, place, floor, probe, np.zeros(m))
+    none = np.zeros(m)
+    equations = Problem(code, engine, p, angular, size, reference, place, floor, probe, none, none)
     generic = equations.at(q + reference * probe_of(q.size), t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
         equations.magnitude = rounded(equations.terms(generic, reference))

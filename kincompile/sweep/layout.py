@@ -9,6 +9,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import listed, suggestion
+from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.measures import output_measures
 
@@ -100,14 +101,14 @@ def read_layout(
     if columns is None:
         columns = () if measures else solution.observed.names or solution.coordinates
     kept: dict[str, Kept] = {}
-    for name in columns:
+    for name in names_of(columns, "columns"):
         try:
             column = solution.column(name)
         except InputError as error:
             problems += error.problems
         else:
             kept[column.name] = Kept(column.name, column.unit, column.name)
-    for name in measures:
+    for name in names_of(measures, "measures"):
         try:
             item = _measure(solution, name)
         except InputError as error:
@@ -127,7 +128,7 @@ def read_layout(
 
 def _measure(solution: Solution, given: str) -> Kept:
     """Read a measure, such as ``foot.x.stroke``."""
-    output, _, measure = given.rpartition(".")
+    output, _, measure = str(given).rpartition(".")
     if measure not in MEASURES or not output:
         near = suggestion(measure, MEASURES) or "."
         raise InputError(

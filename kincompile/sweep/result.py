@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.errors import InputError
 from kincompile.names import column_name, escaped, listed
 from kincompile.runtime.status import Status
 from kincompile.sweep.layout import PENDING, STATUS
@@ -55,8 +56,20 @@ class Sweep:
         return self.store.to_xarray()
 
     def __getitem__(self, name: str) -> Any:
-        """Return a column or a measure as an `xarray.DataArray`: ``sweep["foot.x"]``."""
-        return self.to_xarray()[column_name(name)]
+        """Return a column or a measure: ``sweep["foot.x"]``, ``sweep["foot.x.stroke"]``.
+
+        Raises
+        ------
+        InputError
+            If nothing of this name is kept.
+        """
+        data = self.to_xarray()
+        column, _, measure = str(name).rpartition(".")
+        of_output = f"{column_name(column)}_{measure}"
+        found = next((own for own in (column_name(name), of_output) if own in data), None)
+        if found is None:
+            raise InputError(f"there is no {name!r} in the sweep; there are {listed(data)}.")
+        return data[found]
 
     def statuses(self) -> dict[str, int]:
         """Return how many points, or motions where no columns are kept, have each status."""

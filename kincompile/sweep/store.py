@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,6 @@ from kincompile.sweep.parquet_store import ParquetStore
 from kincompile.sweep.zarr_store import ZarrStore
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping
 
     import xarray
@@ -78,9 +78,10 @@ def open_store(path: str | os.PathLike[str] | None, contents: Contents) -> Store
                 "too much for memory: give a store, such as store='NAME.zarr', or keep less."
             )
         return Memory(contents)
-    kind = STORES.get(Path(path).suffix)
+    given: Any = path  # whatever its type says
+    kind = STORES.get(Path(path).suffix) if isinstance(given, str | os.PathLike) else None
     if kind is None:
         raise InputError(
-            f"cannot keep a sweep in {escaped(path)}: end its name in {listed(STORES)}."
+            f"cannot keep a sweep in {escaped(str(path))}: end its name in {listed(STORES)}."
         )
     return kind.opened(Path(path).absolute(), contents)

@@ -10,7 +10,7 @@ chunks     -> executor    those that are missing, a few at a time             ch
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import InputError, SweepError
 from kincompile.model.mechanism import system_of
 from kincompile.names import escaped
-from kincompile.runtime.inputs import read_inputs, read_sweep
+from kincompile.runtime.inputs import mapping_of, read_inputs, read_sweep
 from kincompile.runtime.solve import solve
 from kincompile.sweep.chunks import StoppedError, solved
 from kincompile.sweep.contents import Contents, marks_of
@@ -114,9 +114,10 @@ def sweep(
     UnsupportedError
         If a package or the C compiler is not installed.
     """
-    for name, count in (("chunk", chunk), ("pending", pending)):
-        if count is not None and count < 1:
-            raise InputError(f"{name} is {count!r}: give a number of at least 1.")
+    counts: dict[str, Any] = {"chunk": chunk, "pending": pending}  # whatever their types say
+    for name, count in counts.items():
+        if count is not None and not (isinstance(count, int | np.integer) and count >= 1):
+            raise InputError(f"{name} is {count!r}: give a whole number of at least 1.")
     sources = Sources(*emit_loadable(model, target))
     module = sources.module()
     plan, inputs = _planned(module, p, _times(model) if t is None else t, guess, product, chunk)
@@ -153,7 +154,7 @@ def _planned(
     chunk: int | None,
 ) -> tuple[Plan, Inputs]:
     """Read parameters and times: the variants in chunks, and what all of them have in common."""
-    given = read_sweep(p, product)
+    given = read_sweep(mapping_of(p, "p"), product)
     if given.problems:
         raise InputError(given.problems)
     inputs = read_inputs(module, t, given.common, guess, TOLERANCE, MAX_ITERATIONS)

@@ -134,11 +134,11 @@ def _turning(joint: JointGeometry) -> list[Mark]:
 
 def _hinge(joint: JointGeometry) -> FramePoint:
     """Return the point on body j of the hinge of the same two bodies, or the body's origin."""
-    bodies = set(joint.joint.bodies)
+    names = {item.name for item in joint.joint.bodies}
     body = joint.joint.bodies[1]
     frame = joint.mechanism.frames.get(body.name, GROUND_FRAME)
     for other in joint.mechanism.joints:
-        if isinstance(other.written, HINGES) and set(other.bodies) == bodies:
+        if isinstance(other.written, HINGES) and {item.name for item in other.bodies} == names:
             return joint.mechanism.point(other, f"s_{'ij'[other.bodies.index(body)]}")
     return FramePoint(frame, ORIGIN)
 

@@ -56,7 +56,11 @@ class Problem {
     constructor(model, p, q, t) {
         const { N_COORDINATES: n, N_EQUATIONS: m } = model;
         Object.assign(this, { model, p, n, m });
-        this.angular = model.COORDINATES.map(name => model.UNITS[name] === "rad");
+        // Euler parameters, the last of a body in space, are cosines and sines of half angles.
+        const ofEuler = ([, first, count], k) => count === SPATIAL_COORDINATES && k >= first + 3 && k < first + count;
+        this.angular = model.COORDINATES.map((name, k) => {
+            return model.UNITS[name] === "rad" || model.BODIES.some(body => ofEuler(body, k));
+        });
         const isOwned = k => model.BODIES.some(([, first, count]) => k >= first && k < first + count);
         this.mayTurn = model.COORDINATES.map((name, k) => {
             return this.angular[k] || (model.UNITS[name] === "" && !isOwned(k));

@@ -11,7 +11,7 @@ import kincompile as kc
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.observed import observed
 
-from .conftest import CHROMIUM, NODE, in_chromium, in_node
+from .conftest import CHROMIUM, NODE, SPACE, in_chromium, in_node
 
 FACTORS = ((1.0, 1.0), (0.9, 1.1), (0.6, 1.5), (0.3, 2.0))
 """Between which parts of its default each parameter is drawn, for one motion after the other."""
@@ -60,7 +60,7 @@ def compare(found, event, solution):
     outputs = observed(module, motion, solution.t, p)
     if np.isfinite(solution.q[0]).all():
         equations = problem(module, p, solution.q[0].copy(), solution.t[0])
-        scales = [equations.size], equations.magnitude, equations.noise
+        scales = np.array([equations.size]), equations.magnitude, equations.noise
         for values, known in zip(found["scales"], scales, strict=True):
             np.testing.assert_allclose(values, known, rtol=1e-6)
     names = ("q", "q_dot", "q_ddot", "y", "y_dot", "y_ddot")
@@ -93,6 +93,19 @@ def test_that_motions_of_examples_are_those_of_the_runtime(solved, example):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", kc.AssemblyWarning)
             compare(found, event, kc.solve(example.module, t, p))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::kincompile.errors.SingularConfigurationWarning")
+@pytest.mark.parametrize("path", SPACE, ids=lambda path: path.stem)
+def test_that_motions_in_space_are_those_of_the_runtime(solved, path):
+    model = kc.read_model(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        module = kc.compile(model)
+        jobs = [[x[0][::10], *x[1:]] for x in jobs_of(model, module)[:4]]
+        for (t, p, _), (found, event) in zip(jobs, solved(model, jobs), strict=True):
+            compare(found, event, kc.solve(module, t, p))
 
 
 @pytest.mark.slow

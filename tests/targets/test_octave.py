@@ -18,7 +18,7 @@ from tests.adversary.test_starts import (
     near_start,
     solved,
 )
-from tests.targets.conftest import NEEDED, OCTAVE
+from tests.targets.conftest import NEEDED, OCTAVE, SPACE
 
 # One process evaluates each target once for all of them.
 pytestmark = pytest.mark.xdist_group("targets")
@@ -33,6 +33,21 @@ def test_that_the_script_finds_the_same_motion(example, results_of):
         # Two solvers stop at two points within the tolerance; Phi_q magnifies the difference.
         rows = found[quantity].reshape(expected.shape)
         np.testing.assert_allclose(rows, expected, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", SPACE, ids=lambda path: path.stem)
+def test_that_the_script_in_space_finds_the_same_motion(octave, tmp_path, path):
+    model = kc.read_model(path)
+    kc.emit(model, "octave").write(tmp_path)
+    shown = {"T": "t", "Q": "q", "Q_dot": "q_dot", "Q_ddot": "q_ddot"}
+    found = octave([model.name, *(f"show('{name}', {name});" for name in shown)])
+    solution = kc.solve(kc.compile(model), np.array(found["T"][0]))
+    for name, quantity in shown.items():
+        expected = getattr(solution, quantity)
+        rows = np.reshape(found[name][0], expected.shape)
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-9 * size)
 
 
 def test_that_from_a_guess_at_which_phi_q_is_singular_a_position_is_one(octave, tmp_path):

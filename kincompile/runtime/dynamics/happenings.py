@@ -9,6 +9,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
+from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.singular import events as singular
 from kincompile.runtime.singular.events import LOCK_UP, Event, involved
 
@@ -90,16 +91,19 @@ class Watch:
         self,
         equations: Equations,
         inputs: Inputs,
-        events: Mapping[str, float],
-        stops: Mapping[str, float],
+        events: Mapping[str, float] | None,
+        stops: Mapping[str, float] | None,
         *,
         smooth: bool,
     ) -> None:
         self._equations, self._inputs, self._smooth = equations, inputs, smooth
         module = inputs.code.module
         self._outputs: tuple[str, ...] = getattr(module, "OUTPUTS", ())
-        given = [*((PASSAGE, *item) for item in events.items()),
-                 *((STOP, *item) for item in stops.items())]  # fmt: skip
+        given = [*((PASSAGE, *item) for item in mapping_of(events, "events").items()),
+                 *((STOP, *item) for item in mapping_of(stops, "stops").items())]  # fmt: skip
+        for _, name, value in given:
+            if not (isinstance(value, int | float | np.number) and np.isfinite(value)):
+                raise InputError(f"the event at {name!r} is {value!r}: give a finite number.")
         self._kinds = [kind for kind, _, _ in given]
         self._names = self._checked([name for _, name, _ in given])
         self._values = np.array([float(value) for _, _, value in given])

@@ -132,7 +132,7 @@ def simulate(
     modules = dynamic_modules(module)
     names = inputs.code.coordinates
     _check(inputs, rtol, atol, max_step)
-    held = given_values(names, position or {}, 0, "position")
+    held = given_values(names, position, 0, "position")
     rates = {}
     if isinstance(velocity, Mapping):
         known = (*names, *moving(module)[1]) if inputs.code.covers() else names
@@ -145,7 +145,7 @@ def simulate(
         )
     with np.errstate(all="ignore"):
         equations = Equations(inputs, modules)
-        watch = Watch(equations, inputs, events or {}, stops or {}, smooth=through is not None)
+        watch = Watch(equations, inputs, events, stops, smooth=through is not None)
         integration = Integration(equations, inputs, watch, progress)
         try:
             first = float(inputs.t[0])

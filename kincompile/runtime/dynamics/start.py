@@ -14,6 +14,7 @@ from kincompile.criteria import MAX_ITERATIONS, RANK, TOLERANCE
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, rate, suggestion
 from kincompile.runtime.engine.code import JOINT_POINTS
+from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.singular.reach import missed
 
 if TYPE_CHECKING:
@@ -33,12 +34,12 @@ LARGEST_TURN = 1.0
 
 
 def given_values(
-    known: Sequence[str], given: Mapping[str, Any], order: int, what: str
+    known: Sequence[str], given: Mapping[str, Any] | None, order: int, what: str
 ) -> dict[str, float]:
     """Return values by name, of rates with or without ``_dot``; refuse other names and values."""
     found: dict[str, float] = {}
     problems = []
-    for key, value in given.items():
+    for key, value in mapping_of(given, what).items():
         name = column_name(str(key))
         if order and name not in known:
             name = name.removesuffix(rate("", order))

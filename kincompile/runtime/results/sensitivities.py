@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from kincompile.errors import InputError, UnsupportedError
+from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.names import (
     column_name,
@@ -27,9 +27,10 @@ from kincompile.names import (
     rate,
     suggestion,
 )
-from kincompile.runtime.engine.code import SENSITIVITIES, code_of
+from kincompile.runtime.engine.code import SENSITIVITIES, code_of, on_request
 from kincompile.runtime.engine.engine import agree
 from kincompile.runtime.engine.planned import trusted
+from kincompile.runtime.inputs import names_of
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import rate_unit
 from kincompile.runtime.results.observed import observed
@@ -231,14 +232,14 @@ def sensitivities(
         If the mechanism is so large that its module is in grouped form.
     """
     require_solution(solution)
-    names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
+    names = names_of(parameters, "parameters")
     if problem := parameters_problem(names, tuple(solution.parameters), solution.name):
         raise InputError(problem)
     code = code_of(solution.require_module("its sensitivities"))
     outputs = getattr(code.module, "OUTPUTS", ())
     columns = (*code.coordinates, *outputs)
     if of is not None:
-        columns = _columns((of,) if isinstance(of, str) else of, columns, solution.name)
+        columns = _columns(names_of(of, "of"), columns, solution.name)
     found = _over_motion(solution, code, names, columns, second)
     found, pairs = found[:, : len(names)], found[:, len(names) :]
     size = len(set(columns) & set(code.coordinates))
@@ -268,6 +269,8 @@ def _symmetric(pairs: Array, count: int) -> Array:
 
 def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[str, ...]:
     """Return the names of columns, the coordinates first."""
+    if not of:
+        raise InputError(f"no column of {mechanism} is asked for: name one.")
     wanted = [column_name(name) for name in of]
     for given, name in zip(of, wanted, strict=True):
         if name not in known:
@@ -281,17 +284,9 @@ def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[s
 
 def _modules(module: ModuleType) -> SensitiveModules:
     """Return what compiles a mechanism's sensitivities."""
-    found: SensitiveModules | None = vars(module).get(SENSITIVITIES)
-    if found is None and code_of(module).evaluate is not None:
-        raise UnsupportedError(
-            f"{module.NAME} is in grouped form, as large mechanisms are, and that has no "
-            "sensitivities: differentiate a part of it, or use form='inline'."
-        )
-    if found is None:
-        raise InputError(
-            f"the module of {module.NAME} was loaded from a file, which knows no more than its "
-            "own functions: compile the model, solve with that, then ask for sensitivities."
-        )
+    grouped = "and that has no sensitivities: differentiate a part of it, or"
+    then = "solve with that, then ask for sensitivities"
+    found: SensitiveModules = on_request(module, SENSITIVITIES, grouped, then)
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -120,7 +120,7 @@ def flywheel(found: Forces, driver: str, fluctuation: float) -> Flywheel:
     )  # fmt: skip
 
 
-def _checked(found: Forces, driver: str, fluctuation: float) -> tuple[Array, Array]:
+def _checked(found: Forces, driver: str, fluctuation: Any) -> tuple[Array, Array]:
     """Return torque and power of a driver, after all that was given was looked at."""
     if not isinstance(found, Forces):
         raise InputError(
@@ -132,7 +132,7 @@ def _checked(found: Forces, driver: str, fluctuation: float) -> tuple[Array, Arr
     if driver not in drivers:
         near = suggestion(str(driver), drivers) or "."
         problems.append(f"there is no driver {driver!r}{near} There are {listed(drivers)}.")
-    if not 0 < fluctuation < 1:
+    if not (isinstance(fluctuation, int | float | np.number) and 0 < fluctuation < 1):
         problems.append(f"the fluctuation is {fluctuation!r}: give a part of the speed, as 0.02.")
     if found.motion.t.size < FEWEST:
         problems.append(f"a cycle has {found.motion.t.size} points: solve at {FEWEST} or more.")

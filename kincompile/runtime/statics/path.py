@@ -187,7 +187,7 @@ class Path:
             reference=np.concatenate((equations.reference, added)),
             place=np.concatenate((equations.place, 0 * added)),
             magnitude=ones,
-            noise=0.0,
+            noise=0 * ones,
             limit=np.inf,
         )
 

@@ -126,6 +126,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "coordinates": tuple_text(f'"{name}"' for name in names),
         "equations": tuple_text(f'"{name}"' for name in program.equations),
         "solvability": solvability_text(program),
+        "in_space": any("e0" in body.kernel.letters for body in program.bodies),
         "has_outputs": bool(program.outputs),
         "has_motion": bool(program.motion),
         "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),

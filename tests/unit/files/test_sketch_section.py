@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import kincompile as kc
+from kincompile import spatial
 from kincompile.files.file_format import MOST_DRAWN, model_schema
 from kincompile.files.model_file import read_data_model
 
@@ -84,6 +85,52 @@ unit = "m"
 """.replace("RING", 'j = "small", centre_j = "F", radius_j = 0.04')
 
 
+IN_SPACE = """
+kincompile = 1
+name = "press"
+space = 3
+parameters = [{ name = "w", default = 2.0, unit = "rad/s", range = [1, 3] }]
+outputs = [{ name = "rise", expression = "z_ram*omega_y_rocker" }]
+
+[sketch]
+lengths = { r = 0.1, lift = 0.4 }
+ground = { O = [0, 0, 0], P = [0.3, 0, -0.1], Q = [0.3, 0.2, -0.1], T = [1, 1, 0], V = [1, 1, 2] }
+joints = { A = ["r", 0, 0], B = [0.3, 0.1, 0.2], S = [0.4, 0.3, 0], U = [1, 1, "lift"] }
+hinges = { O = [0, 0, 1] }
+parts = [
+    { link = "crank", joints = "O A" },
+    { link = "rocker", joints = "P Q B" },
+    { rod = "coupler", joints = "A B" },
+    { slider = "ram", joints = "S", along = [0, 0, 1] },
+    { rod = "push", joints = "B S", length = 0.3 },
+    { slider = "lift_bar", joints = "U", along = "T V" },
+    { drive = "crank", value = "w*t" },
+    { drive = "lift_bar", value = { points = [[0, 0], [1, "lift/4"]], law = "modified sine" } },
+]
+"""
+
+
+def in_space():
+    """Return what `IN_SPACE` says, by calls."""
+    s = spatial.Sketch("press")
+    w = s.parameter("w", 2.0, "rad/s", (1, 3))
+    r, lift = s.length("r", 0.1), s.length("lift", 0.4)
+    s.ground(O=(0, 0, 0), P=(0.3, 0, -0.1), Q=(0.3, 0.2, -0.1), T=(1, 1, 0), V=(1, 1, 2))
+    s.joints(A=(r, 0, 0), B=(0.3, 0.1, 0.2), S=(0.4, 0.3, 0), U=(1, 1, lift))
+    s.hinges(O=(0, 0, 1))
+    s.link("crank", "O A")
+    rocker = s.link("rocker", "P Q B")
+    s.rod("coupler", "A B")
+    ram = s.slider("ram", "S", along=(0, 0, 1))
+    s.rod("push", "B S", 0.3)
+    s.slider("lift_bar", "U", along="T V")
+    s.drive("crank", w * kc.t)
+    s.drive("lift_bar", kc.motion.sequence([(0, 0), (1, lift / 4)], law="modified sine"))
+    m = s.mechanism()
+    m.output("rise", ram.z * rocker.omega[1])
+    return m
+
+
 def toml(text):
     return read_data_model(Path("model.toml"), text.encode())
 
@@ -115,8 +162,12 @@ def everything():
 
 @pytest.mark.parametrize(
     ("text", "by_calls"),
-    [(JANSEN, lambda: kc.read_model("examples/jansen.py")), (EVERYTHING, everything)],
-    ids=["jansen", "everything"],
+    [
+        (JANSEN, lambda: kc.read_model("examples/jansen.py")),
+        (EVERYTHING, everything),
+        (IN_SPACE, in_space),
+    ],
+    ids=["jansen", "everything", "in space"],
 )
 def test_that_a_drawing_in_a_file_is_the_drawing_in_python(text, by_calls):
     found, expected = toml(text), by_calls()
@@ -128,7 +179,7 @@ def test_that_the_schema_has_a_drawing():
     jsonschema = pytest.importorskip("jsonschema")
     tomllib = pytest.importorskip("tomllib")
     validator = jsonschema.Draft202012Validator(model_schema())
-    for text in (JANSEN, EVERYTHING):
+    for text in (JANSEN, EVERYTHING, IN_SPACE):
         assert not list(validator.iter_errors(tomllib.loads(text)))
     bad = tomllib.loads(JANSEN)
     bad["sketch"]["parts"][0] = {"rope": "O A"}
@@ -186,3 +237,20 @@ def test_that_a_drawing_without_end_is_refused_at_once():
     }
     with pytest.raises(kc.ModelError, match="at most 30 joints"):
         read_data_model(Path("x.json"), json.dumps(data).encode())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ('"P Q B"', '"P Q X"', 15, "link 'rocker': nobody drew the joints X"),
+        ("O = [0, 0, 1]", "Z = [0, 0, 1]", 12, "hinge 'Z': nobody drew the joints Z"),
+        ("O = [0, 0, 1]", "O = [0, 1]", 12, "[x, y, z]"),
+        ('joints = "A B"', 'joints = "A B", width = 2', 16, "width"),
+        ('{ rod = "coupler"', '{ gear = "coupler"', 16, "one of link, slider, rod, drive"),
+    ],
+)
+def test_that_a_wrong_drawing_in_space_is_told_with_its_line(old, new, line, said):
+    assert old in IN_SPACE
+    with pytest.raises(kc.ModelError) as caught:
+        toml(IN_SPACE.replace(old, new))
+    assert any(said in text and f"line {line}" in text for text in caught.value.problems)

@@ -155,7 +155,13 @@ def test_module(name: str) -> None:
     np.testing.assert_allclose(gamma, golden["gamma"], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["revolute", "screw", "relative_rotation", "universal"])
+QUICK = ("revolute", "screw", "relative_rotation", "universal")
+"""Constraints whose matrices are compared in every run."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(x, marks=[] if x in QUICK else [pytest.mark.slow]) for x in CASES]
+)
 def test_system_matrices(name: str) -> None:
     m, golden = mechanism(CASES[name]()), ROWS[name]
     symbols = [*m.q.flat(), *m.q_dot.flat()]
