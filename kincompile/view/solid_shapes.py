@@ -106,6 +106,7 @@ SOLIDS: Mapping[str, tuple[Piece, ...]] = {
         _solid("body", "axis", _about(0.8, 1.4, 2.2), 8),
     ),
     "shaft": (_solid("body", "axis", _about(0.7, -2.2, 2.2)),),
+    "stub": (_solid("body", "axis", _about(0.5, -5.0, 5.0), 8),),
     "screw": (
         _solid("body", "reach", _tube(0.45), 8),
         Piece("body", "reach", _THREAD, is_area=True, every=0.6, sides=8),

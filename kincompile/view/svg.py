@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import Array, BodyFrame
+    from kincompile.view.marks import Array
 
 WIDTH, HEIGHT = 960.0, 720.0
 """Largest sides of a picture [px]."""
@@ -274,7 +274,7 @@ def _rigid(
 def _path(shape: str, item: Polyline, line: float, inside: str = "") -> str:
     """Return the element of a stroke, in the colours of its look."""
     look = item.look
-    hue = "quiet" if item.frame == GROUND_FRAME else _hue(item.frame)
+    hue = "quiet" if item.frame == GROUND_FRAME else f"body{item.frame.index % len(HUES['light'])}"
     stroke = look.line or hue
     fill = (look.face or f"pale-{hue}") if item.is_area else ""
     width = f' stroke-width="{_number(line * look.width)}"' if look.width else ""
@@ -338,10 +338,6 @@ def _dash(dash: str, line: float) -> str:
 
 
 # ---- colours ----
-
-
-def _hue(frame: BodyFrame) -> str:
-    return f"body{frame.index % len(HUES['light'])}"
 
 
 def _paint(stroke: str, fill: str) -> str:
