@@ -115,10 +115,6 @@ def read_layout(
             problems += error.problems
         else:
             kept[item.name] = item
-    if STATUS in kept:
-        problems.append(
-            f"{STATUS!r} is what the statuses are called in the results: rename the output."
-        )
     if not kept and not problems:
         problems.append("nothing is kept: name columns, or measures such as 'foot.x.stroke'.")
     if problems:
