@@ -11,8 +11,8 @@ import numpy as np
 import kincompile as kc
 from kincompile.cli.motion import set_values
 from kincompile.cli.shared import (
-    NOT_CONVERGED,
     deg_option,
+    end_unsolved,
     output_option,
     print_data,
     read_model,
@@ -68,8 +68,7 @@ def command(
         drawn = kc.assembly_gallery(read, at, numbers)
         module, found = drawn.module, drawn.positions
     if not len(found):
-        click.echo(f"Error: {module.NAME} cannot be assembled at t = {at:g}", err=True)
-        context.exit(NOT_CONVERGED)
+        end_unsolved(context, f"{module.NAME} cannot be assembled at t = {at:g}")
     print_data("\n".join(_listed(module, found, at, angle_unit)) + "\n")
     if output is not None:
         click.echo(f"Wrote {drawn.write(output)}", err=True)

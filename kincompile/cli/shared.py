@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -87,6 +87,12 @@ def print_data(text: str) -> None:
         raise InputError(f"cannot write to stdout: {error.strerror}") from error
 
 
+def end_unsolved(context: click.Context, message: str) -> NoReturn:
+    """Say what was not solved, and end the command with the exit code of that."""
+    click.echo(f"Error: {message}", err=True)
+    context.exit(NOT_CONVERGED)
+
+
 def give_motion(
     context: click.Context,
     solution: Solution,
@@ -109,5 +115,4 @@ def give_motion(
         kc.write(written, output, angle_unit=angle_unit)
         click.echo(f"{text}\nWrote {output}", err=True)
     if not solution.success:
-        click.echo(f"Error: {solution.message}", err=True)
-        context.exit(NOT_CONVERGED)
+        end_unsolved(context, solution.message)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_times, set_values, time_options
+from kincompile.cli.motion import Motion, set_values, time_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     deg_option,
@@ -54,16 +54,12 @@ from kincompile.runtime.results.write import require_known_suffix
 def command(
     context: click.Context,
     model: str,
-    start: str,
-    end: str | None,
-    points: int | None,
-    values: tuple[str, ...],
+    motion: Motion,
     positions: tuple[str, ...],
     velocities: tuple[str, ...],
     stops: tuple[str, ...],
     method: str,
     rtol: float,
-    through: str | None,
     angle_unit: str,
     has_forces: bool,
     output: str | None,
@@ -78,8 +74,8 @@ def command(
         require_known_suffix(output)
         require_output(output, model, "the model itself")
     mechanism = read_model(model)
-    numbers = set_values(mechanism, values)
-    times = motion_times(mechanism, start, end, points, None, numbers)
+    numbers = motion.numbers(mechanism)
+    times = motion.times(mechanism, numbers)
     if times.size < 2:
         raise InputError("a simulation takes time: give --end and --points of at least 2.")
     module = kc.compile(mechanism)
@@ -93,7 +89,7 @@ def command(
             stops=set_values(mechanism, stops, "--stop"),
             method=method,
             rtol=rtol,
-            through=through,
+            through=motion.through,
             progress=progress,
         )
     text = f"{summary(solution, angle_unit)}\n{solution.message}"

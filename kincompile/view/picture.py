@@ -49,31 +49,16 @@ ALONG = (0.5, 0.65, 0.35, 0.8, 0.2)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PicturePath:
-    """A line or an area on the picture.
+    """A line or an area on the picture."""
 
-    Attributes
-    ----------
-    points
-        Corners [points], y upwards.
-    stroke, fill
-        Colours; "" for none.
-    width
-        Of the line.
-    opacity
-        Of the whole; the area of a body is paler by `FILL`.
-    is_pale
-        Whether the area has the pale colour of its line.
-    dash
-        "--", ":" or "" for an unbroken line.
-    """
-
-    points: Array
+    points: Array  # corners [points], y upwards
+    # stroke, fill: colours; "" for none.
     stroke: str
     fill: str
-    width: float
-    opacity: float = 1.0
-    is_pale: bool = False
-    dash: str = ""
+    width: float  # of the line
+    opacity: float = 1.0  # of the whole; the area of a body is paler by `FILL`
+    is_pale: bool = False  # whether the area has the pale colour of its line
+    dash: str = ""  # "--", ":" or "" for an unbroken line
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,26 +74,14 @@ class PictureLabel:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """A vector to be drawn, in the axes of the ground.
+    """A vector to be drawn, in the axes of the ground."""
 
-    Attributes
-    ----------
-    name
-        Name of its symbol, such as ``"s_i"``.
-    frame
-        The frame whose colour it has.
-    is_vector
-        Whether its symbol is bold; an axis of a frame is not.
-    is_direction
-        Whether it is drawn at a length of its own.
-    """
-
-    name: str
+    name: str  # name of its symbol, such as ``"s_i"``
     start: Array
     end: Array
-    frame: BodyFrame
-    is_vector: bool = True
-    is_direction: bool = False
+    frame: BodyFrame  # the frame whose colour it has
+    is_vector: bool = True  # whether its symbol is bold; an axis of a frame is not
+    is_direction: bool = False  # whether it is drawn at a length of its own
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import RANK, probe_of
-from kincompile.errors import InputError, SingularConfigurationWarning, UnsupportedError
+from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.html import Shown
 from kincompile.names import listed, multiplier
-from kincompile.runtime.engine.code import FORCES, code_of
+from kincompile.runtime.engine.code import FORCES, code_of, on_request
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.force_measures import ForceMeasures, force_measures
@@ -332,23 +332,14 @@ def no_value(name: str, bodies: Sequence[str], t: float) -> str:
 
 def _modules(module: ModuleType) -> ForceModules:
     """Return what compiles the forces of a mechanism."""
-    found: ForceModules | None = vars(module).get(FORCES)
-    if found is not None:
-        return found
     if not hasattr(module, "LOADS"):
         raise InputError(
             f"{module.NAME} has no masses and no forces, so that nothing bears a load: give its "
             "bodies masses, m.body(..., mass=..., inertia=...), or add forces such as kc.Force."
         )
-    if code_of(module).evaluate is not None:
-        raise UnsupportedError(
-            f"{module.NAME} is in grouped form, as large mechanisms are, whose forces are not "
-            "compiled: use form='inline'."
-        )
-    raise InputError(
-        f"the module of {module.NAME} was loaded from a file, which knows no more than its own "
-        "functions: compile the model, solve with that, then ask for forces."
-    )
+    wanted = "whose forces are not compiled:", "solve with that, then ask for forces"
+    found: ForceModules = on_request(module, FORCES, *wanted)
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

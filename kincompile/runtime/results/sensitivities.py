@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from kincompile.errors import InputError, UnsupportedError
+from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.names import (
     column_name,
@@ -27,7 +27,7 @@ from kincompile.names import (
     rate,
     suggestion,
 )
-from kincompile.runtime.engine.code import SENSITIVITIES, code_of
+from kincompile.runtime.engine.code import SENSITIVITIES, code_of, on_request
 from kincompile.runtime.engine.engine import agree
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.inputs import names_of
@@ -284,17 +284,9 @@ def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[s
 
 def _modules(module: ModuleType) -> SensitiveModules:
     """Return what compiles a mechanism's sensitivities."""
-    found: SensitiveModules | None = vars(module).get(SENSITIVITIES)
-    if found is None and code_of(module).evaluate is not None:
-        raise UnsupportedError(
-            f"{module.NAME} is in grouped form, as large mechanisms are, and that has no "
-            "sensitivities: differentiate a part of it, or use form='inline'."
-        )
-    if found is None:
-        raise InputError(
-            f"the module of {module.NAME} was loaded from a file, which knows no more than its "
-            "own functions: compile the model, solve with that, then ask for sensitivities."
-        )
+    grouped = "and that has no sensitivities: differentiate a part of it, or"
+    then = "solve with that, then ask for sensitivities"
+    found: SensitiveModules = on_request(module, SENSITIVITIES, grouped, then)
     return found
 
 
