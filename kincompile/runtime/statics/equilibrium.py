@@ -38,8 +38,11 @@ STARTS = 60
 """Starts from which other equilibria are looked for."""
 
 STABLE, NEUTRAL, UNSTABLE = "stable", "neutral", "unstable"
+FLUTTER, UNDECIDED = "flutter", "undecided"
 """Kinds of equilibrium."""
 
+GROWTH = 1e-6
+"""Rate at which swings grow, as a part of the fastest rate, up to which they do not."""
 
 INDEPENDENT = 1e-9
 """Part of a movement up to which there is none."""
@@ -61,7 +64,9 @@ class Equilibrium(Shown):
         mechanism; NaN where there is no equilibrium. Of an unsymmetric one their real parts.
     stability : tuple of str
         ``"stable"`` where all are positive, ``"unstable"`` where one is negative, ``"neutral"``
-        where some vanish and none is negative; "" where there is no equilibrium.
+        where some vanish and none is negative; "" where there is no equilibrium. ``"flutter"``
+        where none is negative, and swings grow nevertheless, with the masses and dampers that there
+        are; ``"undecided"`` where an unsymmetric stiffness allows that, and a body has no mass.
     """
 
     motion: Solution
@@ -256,9 +261,10 @@ def equilibrium(
 
     Notes
     -----
-    Dampers and friction, which is smooth here, do nothing at rest. Stability is that of small slow
-    movements, the signs of the eigenvalues of the reduced stiffness: a load that follows its body
-    may make a mechanism flutter where all are positive.
+    Dampers and friction, which is smooth here, do nothing at rest. Stability is first that of small
+    slow movements, the signs of the eigenvalues of the reduced stiffness. A load that follows its
+    body, or pushes along with velocities, may make a mechanism flutter where none is negative: so
+    the eigenvalues of small swings are looked at too, with masses and dampers.
     """
     inputs = _inputs(module, t, p, guess, through)
     with np.errstate(all="ignore"):
@@ -383,14 +389,21 @@ def _equilibrium(
         message=_message(inputs, balance, found, events), statistics={}, events=events,
         **about(inputs),
     )  # fmt: skip
-    kinds = tuple(map(_kind, good)) + ("",) * (count - len(good))
+    kinds = tuple(_kind(balance, rest) for rest in good) + ("",) * (count - len(good))
     return Equilibrium(motion, eigenvalues, kinds, tuple(good), balance)
 
 
-def _kind(rest: Rest) -> str:
+def _kind(balance: Balance, rest: Rest) -> str:
     """Return the stability of an equilibrium."""
-    signs = rest.signs
-    return UNSTABLE if -1 in signs else NEUTRAL if 0 in signs else STABLE
+    signs, skew = rest.signs, rest.stiffness - rest.stiffness.T
+    if -1 in signs:
+        return UNSTABLE
+    growth = balance.growth(rest.place, rest.stiffness)
+    if growth is None and np.abs(skew).max(initial=0.0) > rest.place.nothing:
+        return UNDECIDED
+    if growth is not None and growth > GROWTH:
+        return FLUTTER
+    return NEUTRAL if 0 in signs else STABLE
 
 
 def _message(inputs: Inputs, balance: Balance, found: list[Rest], events: list[Event]) -> str:
