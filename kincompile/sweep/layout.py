@@ -11,7 +11,7 @@ from kincompile.errors import InputError
 from kincompile.names import listed, suggestion
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import TIME_UNIT
-from kincompile.runtime.results.measures import output_measures
+from kincompile.runtime.results.measures import measures_together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,22 +35,13 @@ OF_TIME = ("t_least", "t_greatest", "period")
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A number that is kept: a column, or a measure of an output.
+    """A number that is kept: a column, or a measure of an output."""
 
-    Attributes
-    ----------
-    name, unit
-        What it is called in the results, for instance ``x_foot_stroke``, and its unit.
-    column
-        The column, or the output that is measured.
-    measure
-        One of `MEASURES`; "" of a column over time.
-    """
-
+    # name, unit: what it is called in the results, for instance ``x_foot_stroke``, and its unit
     name: str
     unit: str
-    column: str
-    measure: str = ""
+    column: str  # the column, or the output that is measured
+    measure: str = ""  # one of `MEASURES`; "" of a column over time
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +64,13 @@ class Layout:
         for item in measured:
             found[item.name] = np.full(len(solution.q), np.nan)
         names = {item.column for item in measured}
-        for number in np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else ():
-            one = solution.variant(number)
-            p = np.array(list(one.parameters.values()))
-            for own in output_measures(one, one.require_module("its measures"), p, names):
+        whole = np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else []
+        motions = [solution.variant(number) for number in whole]
+        sets = np.array(list(solution.parameters.values())).T[whole]
+        module = solution.require_module("its measures")
+        measures = measures_together(motions, module, sets, names)
+        for number, several in zip(whole, measures, strict=True):
+            for own in several:
                 for item in measured:
                     value = getattr(own, item.measure) if item.column == own.name else None
                     if value is not None:
@@ -115,10 +109,6 @@ def read_layout(
             problems += error.problems
         else:
             kept[item.name] = item
-    if STATUS in kept:
-        problems.append(
-            f"{STATUS!r} is what the statuses are called in the results: rename the output."
-        )
     if not kept and not problems:
         problems.append("nothing is kept: name columns, or measures such as 'foot.x.stroke'.")
     if problems:
