@@ -195,8 +195,7 @@ def _paths(polyline: Polyline, q: Array, scale: Scale, opacity: float) -> Iterab
 
 def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, PicturePath]:
     """Return line and head of a vector between two points of the picture."""
-    colour, length = colour_of(arrow.frame), float(np.hypot(*(end - start)))
-    along = (end - start) / length
+    colour, length, along = colour_of(arrow.frame), *_way(start, end)
     left = np.array((-along[1], along[0]))
     head = min(HEAD, 0.6 * length)
     neck = end - head * along
@@ -205,12 +204,18 @@ def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, Picture
     return line, PicturePath(corners, "", colour, 0.0)
 
 
+def _way(start: Array, end: Array) -> tuple[float, Array]:
+    """Return length and direction; to the right where the viewer looks along a vector."""
+    length = float(np.hypot(*(end - start)))
+    return length, (end - start) / length if length > 1e-6 * WIDTH else np.array((1.0, 0.0))
+
+
 def _places(arrow: Arrow, start: Array, end: Array) -> list[Array]:
     """Return where the label of a vector may stand; that of an axis is at its end.
 
     So is that of a direction in space, where six of them may begin at one point.
     """
-    along = (end - start) / float(np.hypot(*(end - start)))
+    _, along = _way(start, end)
     aside = ASIDE * np.array((-along[1], along[0]))
     if not arrow.is_vector or (arrow.is_direction and len(arrow.start) > PLANE):
         return [end + ASIDE * along, end + aside, end - aside]
