@@ -68,20 +68,12 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class Fault(Generic[Result]):
-    """A fault and its result.
-
-    Attributes
-    ----------
-    result
-        The faulty formula, formulas by part, or numbers by entry.
-    detail
-        The right formula of the faulty term or entry, for those who may see it.
-    """
+    """A fault and its result."""
 
     kind: str
     text: str
-    result: Result
-    detail: str = ""
+    result: Result  # the faulty formula, formulas by part, or numbers by entry
+    detail: str = ""  # the right formula of the faulty term or entry, for those who may see it
 
 
 def whole_faults(

@@ -49,32 +49,20 @@ _NO_ACCELERATIONS = "accelerations are the unknowns of Phi_q q_ddot = gamma; no 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """One quantity as its author has it.
+    """One quantity as its author has it."""
 
-    Attributes
-    ----------
-    texts
-        The text of each entry; empty for functions and for arrays of values at states.
-    evaluate
-        Gives the values and the sizes of their terms at states, both (N, rows, columns).
-    expressions
-        The formulas, row by row; None for functions and arrays.
-    lost
-        Gives what rounding may have taken from values at states, of the same shape.
-    rounding
-        What rounding that is, in words.
-    takes_parameters
-        Whether it may be evaluated at other parameters than the default ones.
-    takes_states
-        Whether it may be evaluated at any states, not only those its author gave.
-    """
-
-    texts: Texts
+    texts: Texts  # the text of each entry; empty for functions and for arrays of values at states
+    # Gives the values and the sizes of their terms at states, both (N, rows, columns).
     evaluate: Callable[[States], tuple[Array, Array]]
+    # The formulas, row by row; None for functions and arrays.
     expressions: tuple[sympy.Expr, ...] | None = None
+    # Gives what rounding may have taken from values at states, of the same shape.
     lost: Callable[[States, Array], Array] | None = None
+    # What rounding that is, in words.
     rounding: str = "numbers are rounded; they count to half of their last digit"
+    # Whether it may be evaluated at other parameters than the default ones.
     takes_parameters: bool = True
+    # Whether it may be evaluated at any states, not only those its author gave.
     takes_states: bool = True
 
     @property

@@ -45,20 +45,12 @@ PITCH_LINE = ("s_P", "s_Q")
 
 @dataclass(frozen=True)
 class Geometry:
-    """The joints of a mechanism, with what turns their attributes into numbers.
-
-    Attributes
-    ----------
-    values
-        Parameters by name.
-    q : ndarray, shape (N, n)
-        Positions that rails must fit; all finite.
-    """
+    """The joints of a mechanism, with what turns their attributes into numbers."""
 
     joints: Sequence[Joint]
-    values: Mapping[str, float]
+    values: Mapping[str, float]  # parameters by name
     frames: Mapping[str, BodyFrame]
-    q: Array
+    q: Array  # shape (N, n): positions that rails must fit; all finite
 
     @cached_property
     def _code(self) -> tuple[Graph, Converter]:

@@ -49,18 +49,10 @@ STILL = "@media(prefers-reduced-motion:reduce){.moving{display:none}.still{displ
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """When the frames of a motion are shown.
+    """When the frames of a motion are shown."""
 
-    Attributes
-    ----------
-    seconds
-        Playing time.
-    parts : ndarray, shape (F,)
-        The part of it at which each frame is shown, from 0 to 1.
-    """
-
-    seconds: float
-    parts: Array
+    seconds: float  # playing time
+    parts: Array  # shape (F,): the part of it at which each frame is shown, from 0 to 1
 
     @property
     def attributes(self) -> str:
