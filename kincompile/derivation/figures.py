@@ -136,8 +136,7 @@ class Figures:
                 continue
             direction = np.array(self._geometry.numbers(joint.points[symbol]), dtype=np.float64)
             start = last.get(frame, self._place(frame))
-            sizes = OF_TRIAD if self._drawn.is_spatial else DIRECTION
-            length = sizes * self._drawn.size
+            length = self._drawn.size * (OF_TRIAD if self._drawn.is_spatial else DIRECTION)
             way = self._place(frame, *(length / norm(direction) * direction)) - self._place(frame)
             ray = np.concatenate((start, way)) / length
             if any(norm(ray - other) < ALIKE for other in taken):

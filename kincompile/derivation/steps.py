@@ -52,24 +52,15 @@ Derived = TypeVar("Derived", bound="RowBlock | EquationDerivatives")
 
 @dataclass(frozen=True, slots=True)
 class Steps(ABC, Generic[Derived]):
-    """The steps of a constraint.
-
-    Attributes
-    ----------
-    rows
-        The rows of the constraint in the emitted program.
-    derivatives
-        What follows from Phi, for each row block of a joint or each expression of an equation.
-    level
-        Level of the steps that are derived: "vector" or "expanded".
-    """
+    """The steps of a constraint."""
 
     evaluation: Evaluation
-    rows: Rows
+    rows: Rows  # the rows of the constraint in the emitted program
     name: str
     columns: Sequence[str]
+    # What follows from Phi, for each row block of a joint or each expression of an equation.
     derivatives: Sequence[Derived]
-    level: str
+    level: str  # level of the steps that are derived: "vector" or "expanded"
 
     @abstractmethod
     def symbol(self, letter: str, k: int) -> Glyph:

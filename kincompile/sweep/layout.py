@@ -35,22 +35,13 @@ OF_TIME = ("t_least", "t_greatest", "period")
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A number that is kept: a column, or a measure of an output.
+    """A number that is kept: a column, or a measure of an output."""
 
-    Attributes
-    ----------
-    name, unit
-        What it is called in the results, for instance ``x_foot_stroke``, and its unit.
-    column
-        The column, or the output that is measured.
-    measure
-        One of `MEASURES`; "" of a column over time.
-    """
-
+    # name, unit: what it is called in the results, for instance ``x_foot_stroke``, and its unit
     name: str
     unit: str
-    column: str
-    measure: str = ""
+    column: str  # the column, or the output that is measured
+    measure: str = ""  # one of `MEASURES`; "" of a column over time
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +109,6 @@ def read_layout(
             problems += error.problems
         else:
             kept[item.name] = item
-    if STATUS in kept:
-        problems.append(
-            f"{STATUS!r} is what the statuses are called in the results: rename the output."
-        )
     if not kept and not problems:
         problems.append("nothing is kept: name columns, or measures such as 'foot.x.stroke'.")
     if problems:
