@@ -328,13 +328,7 @@ def _over_motion(
 
 
 def _require_agreement(points: _Points, mechanism: str) -> None:
-    """Check that redundant equations go on to agree when a parameter changes.
-
-    Raises
-    ------
-    InputError
-        With each parameter that would take the mechanism apart.
-    """
+    """Refuse parameters that would take apart a mechanism with redundant equations."""
     matrices, sides = points.slopes()
     moved = np.linalg.pinv(matrices)[:, np.newaxis] @ sides[..., np.newaxis]
     is_met = np.mean(agree(matrices[:, np.newaxis], moved[..., 0], sides), axis=0) > 1 / 2
