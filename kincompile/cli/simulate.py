@@ -42,7 +42,7 @@ from kincompile.runtime.results.write import require_known_suffix
     "stops",
     multiple=True,
     metavar="NAME=VALUE",
-    help="End where a coordinate or output has this value.",
+    help="End where a coordinate or output has this value; a name may have several.",
 )
 @click.option("--method", type=click.Choice(METHODS), default="DOP853", help="The integrator.")
 @click.option("--rtol", type=float, default=1e-9, help="Relative tolerance of a step.")
@@ -78,6 +78,10 @@ def command(
     times = motion.times(mechanism, numbers)
     if times.size < 2:
         raise InputError("a simulation takes time: give --end and --points of at least 2.")
+    limits: dict[str, list[float]] = {}
+    for text in stops:
+        for name, value in set_values(mechanism, [text], "--stop").items():
+            limits.setdefault(name, []).append(value)
     module = kc.compile(mechanism)
     with progress_bar() as progress:
         solution = kc.simulate(
@@ -86,7 +90,7 @@ def command(
             numbers,
             position=set_values(mechanism, positions, "--position"),
             velocity=set_values(mechanism, velocities, "--velocity"),
-            stops=set_values(mechanism, stops, "--stop"),
+            stops=limits,
             method=method,
             rtol=rtol,
             through=motion.through,

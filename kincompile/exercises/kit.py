@@ -7,7 +7,7 @@ import shutil
 import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.derivation.to_html import as_html
 from kincompile.errors import InputError
@@ -174,8 +174,9 @@ def exercise(
             f"{model.name} is a mechanism in space, and exercises are of those in the plane; "
             "compare checks what somebody derived for it"
         )
-    if not 1 <= students <= MOST_STUDENTS:
-        raise InputError(f"{students} students: give a number from 1 to {MOST_STUDENTS}")
+    wanted: Any = students  # whatever its type says
+    if not isinstance(wanted, int) or not 1 <= wanted <= MOST_STUDENTS:
+        raise InputError(f"{students!r} students: give a number from 1 to {MOST_STUDENTS}")
     made = variants(model, students, seed, Choices(signs, lengths))
     blanks = choose_blanks(made[0].system(), seed)
     return ExerciseKit(model.name, blanks, tuple(made))

@@ -215,7 +215,7 @@ def _require_module(module: object) -> None:
 
 def _times(t: ArrayLike, problems: list[str]) -> NDArray[np.float64]:
     """Read a time or a grid of times."""
-    times = _numbers("t", t, problems)
+    times = real_numbers("t", t, problems)
     if times is None:
         return np.empty(0)
     if times.ndim > 1 or times.size == 0:
@@ -244,7 +244,7 @@ def _values(
         return defaults
     if isinstance(given, Mapping):
         return _overridden(what, names, defaults, given, problems)
-    values = _numbers(f"the {what} vector", given, problems)
+    values = real_numbers(f"the {what} vector", given, problems)
     if values is None:
         return defaults
     if values.shape != defaults.shape:
@@ -273,7 +273,7 @@ def _overridden(
             near = suggestion(str(name), names) or "."
             problems.append(f"there is no {what} {name!r}{near} The {what}s are {listed(names)}.")
             continue
-        number = _numbers(f"{what} {name!r}", value, problems)
+        number = real_numbers(f"{what} {name!r}", value, problems)
         if number is None:
             continue
         if number.ndim:
@@ -284,7 +284,7 @@ def _overridden(
     return values
 
 
-def _numbers(what: str, given: object, problems: list[str]) -> NDArray[np.float64] | None:
+def real_numbers(what: str, given: object, problems: list[str]) -> NDArray[np.float64] | None:
     """Turn anything into a new array of real numbers, or note why that is impossible."""
     try:
         array = np.asarray(given)
