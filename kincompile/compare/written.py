@@ -266,8 +266,6 @@ def read_written(
         Text, rows of `Cell`, nested lists of numbers, texts and SymPy expressions, a SymPy matrix,
         a NumPy array, or a function ``f(q, t)`` (of gamma and Q: ``f(q, q_dot, t)``), which
         may also take the parameters as a last argument.
-    at_states
-        Whether an array holds values at given states.
     shape_problems
         Says what is wrong with a number of rows and columns. It is asked before any formula is
         read: a file can hold more of them than anyone could wait for.

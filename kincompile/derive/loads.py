@@ -61,15 +61,7 @@ def slope_of(leaf: Leaf, column: int, *, by_rate: bool) -> Leaf:
 
 @cache
 def derive_load(template: LoadTemplate, others: int, *, varies: bool) -> LoadDerivatives:
-    """Derive M, Q and its Jacobians of a type of load.
-
-    Parameters
-    ----------
-    others
-        How many coordinates of others its values depend on.
-    varies
-        Whether its values depend on coordinates or rates at all.
-    """
+    """Derive M, Q and its Jacobians of a type of load."""
     motion: Direction = dict(zip(template.coordinates, template.rates, strict=True))
     by_q, by_rate = _columns(template.coordinates), _columns(template.rates)
     momenta = [along(template.energy, direction) for direction in by_rate]

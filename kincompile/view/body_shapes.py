@@ -48,12 +48,6 @@ def links(
 
     Parameters
     ----------
-    frames
-        The frames of the bodies.
-    attached
-        Points that joints hold.
-    marks
-        All other marks, outlines included.
     dimension
         2, or 3 in space, where a hull keeps all its points: its faces are found where it is drawn.
     """

@@ -229,10 +229,6 @@ class JointGeometry:
             What slides or rolls on it.
         style
             As for `Rail`; without, a guide on the ground, and a slot of a body.
-        offset
-            Distance of the rail from the line, to its left.
-        at_least
-            Distances along the axis that it covers in any case.
         """
         ways = along(self.mechanism.q, base, axis, follower)
         ends = [float(ways.min()), float(ways.max()), *at_least]

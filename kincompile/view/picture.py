@@ -108,8 +108,6 @@ def picture(
     ----------
     q : ndarray, shape (n,)
         The position.
-    title
-        What is shown, for those who cannot see it.
     arrows
         Vectors over it.
     focus
@@ -151,15 +149,7 @@ def composed(
 
 
 class Scale:
-    """From the lengths of a model to points of a picture that shows some points.
-
-    Attributes
-    ----------
-    factor
-        Points for a unit of length.
-    width, height
-        Of the picture.
-    """
+    """From the lengths of a model to points of a picture that shows some points."""
 
     def __init__(
         self,

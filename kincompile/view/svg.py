@@ -127,16 +127,12 @@ def as_svg(
     ----------
     q : ndarray, shape (F, n)
         Positions; of several the first is shown where nothing moves.
-    description
-        What is shown, for those who cannot see it.
     paths
         Lines over the mechanism, each of shape (k, 2), in space (k, 3).
     timing
         When the positions are shown; without, the first one is.
     millimetres
         Length of the model's unit where the picture has its true size, in space across the view.
-    view
-        From where a mechanism in space is seen.
     """
     if drawn.is_spatial:
         svg_in_space: Callable[..., str] = in_space("solid_svg").svg_in_space
