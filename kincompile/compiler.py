@@ -184,15 +184,13 @@ def _with_redundancy(
     system: ConstraintSystem, code: InlineProgram | GroupedProgram
 ) -> InlineProgram | GroupedProgram:
     """Return a program that knows which of its equations repeat others, and warn of them."""
-    from kincompile.ir.redundancy import redundancy_warning, redundant_equations
+    from kincompile.ir.redundancy import redundant_equations
 
-    found, problem = redundant_equations(system, code.program, code.pattern())
+    left_out, warning, problem = redundant_equations(system, code.program, code.pattern())
     if problem:
         return replace(code, program=replace(code.program, unsolvable=problem))
-    redundant = tuple(name for item in found for name in item.equations)
-    text = redundancy_warning(system, found)
-    warnings.warn(text, RedundantConstraintWarning, stacklevel=4)
-    return replace(code, program=replace(code.program, redundant=redundant))
+    warnings.warn(warning, RedundantConstraintWarning, stacklevel=4)
+    return replace(code, program=replace(code.program, redundant=left_out))
 
 
 def compile(  # noqa: A001 - the public name kc.compile

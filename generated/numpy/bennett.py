@@ -48,7 +48,7 @@ EQUATIONS = (
     "second", "norm_link_1", "norm_link_2", "norm_link_3",
 )
 # equations that repeat others at every assembled position; a solve leaves them out
-REDUNDANT = ("hinge_4.z", "hinge_4.f", "hinge_4.g")
+REDUNDANT = ("hinge_4.x", "hinge_4.z", "hinge_4.g")
 PARAMETERS = ()
 # name, first column and number of columns of each body
 BODIES = (("link_1", 0, 7), ("link_2", 7, 7), ("link_3", 14, 7))
@@ -1189,12 +1189,12 @@ def _kinematics(f, q, q_dot, t, p):
 
 def _factor(f, J):
     """Return what a solve needs of Phi_q, and the determinants of its blocks."""
-    # eliminated: z_link_3 by hinge_3.z, z_link_2 by hinge_2.z, z_link_1 by hinge_1.z
-    # x_link_3 by hinge_4.x, y_link_3 by hinge_4.y, x_link_1 by hinge_1.x, y_link_1 by hinge_1.y
-    # x_link_2 by hinge_3.x, y_link_2 by hinge_3.y
+    # eliminated: x_link_3 by hinge_3.x, x_link_2 by hinge_2.x, x_link_1 by hinge_1.x
+    # z_link_3 by hinge_3.z, z_link_2 by hinge_2.z, z_link_1 by hinge_1.z, y_link_3 by hinge_4.y
+    # y_link_1 by hinge_1.y, y_link_2 by hinge_3.y
     # block: pi_f_link_1, pi_g_link_1 by hinge_1.f, hinge_1.g
     # block: pi_h_link_1 by motor
-    # block: pi_f_link_2, pi_g_link_2, pi_h_link_2, pi_f_link_3, pi_g_link_3, pi_h_link_3 by hinge_2.x, hinge_2.y, hinge_2.f, hinge_2.g, hinge_3.f, hinge_3.g
+    # block: pi_f_link_2, pi_g_link_2, pi_h_link_2, pi_f_link_3, pi_g_link_3, pi_h_link_3 by hinge_2.y, hinge_2.f, hinge_2.g, hinge_3.f, hinge_3.g, hinge_4.f
     # block: theta_second by second
     where = f.where
     (
@@ -1283,327 +1283,311 @@ def _factor(f, J):
     k_19, k_20 = k_18 * norm_link_2_e1_link_2, k_18 * norm_link_2_e0_link_2
     k_21, k_22 = k_18 * norm_link_2_e3_link_2, k_18 * norm_link_2_e2_link_2
     k_23 = (
-        hinge_2_x_e0_link_2 * norm_link_2_e0_link_2
-        + hinge_2_x_e1_link_2 * norm_link_2_e1_link_2
-        + hinge_2_x_e2_link_2 * norm_link_2_e2_link_2
-        + hinge_2_x_e3_link_2 * norm_link_2_e3_link_2
-    )
-    k_24 = (
-        hinge_2_x_e2_link_2 * norm_link_2_e0_link_2
-        - (hinge_2_x_e0_link_2 * norm_link_2_e2_link_2
-            + hinge_2_x_e1_link_2 * norm_link_2_e3_link_2)
-        + hinge_2_x_e3_link_2 * norm_link_2_e1_link_2
-    )
-    k_25 = (
-        hinge_2_x_e1_link_2 * norm_link_2_e2_link_2
-        - hinge_2_x_e0_link_2 * norm_link_2_e3_link_2
-        - hinge_2_x_e2_link_2 * norm_link_2_e1_link_2
-        + hinge_2_x_e3_link_2 * norm_link_2_e0_link_2
-    )
-    k_26 = (
         hinge_2_y_e0_link_2 * norm_link_2_e0_link_2
         + hinge_2_y_e1_link_2 * norm_link_2_e1_link_2
         + hinge_2_y_e2_link_2 * norm_link_2_e2_link_2
         + hinge_2_y_e3_link_2 * norm_link_2_e3_link_2
     )
-    k_27 = (
+    k_24 = (
         hinge_2_y_e2_link_2 * norm_link_2_e0_link_2
         - (hinge_2_y_e0_link_2 * norm_link_2_e2_link_2
             + hinge_2_y_e1_link_2 * norm_link_2_e3_link_2)
         + hinge_2_y_e3_link_2 * norm_link_2_e1_link_2
     )
-    k_28 = (
+    k_25 = (
         hinge_2_y_e1_link_2 * norm_link_2_e2_link_2
         - hinge_2_y_e0_link_2 * norm_link_2_e3_link_2
         - hinge_2_y_e2_link_2 * norm_link_2_e1_link_2
         + hinge_2_y_e3_link_2 * norm_link_2_e0_link_2
     )
-    k_29 = (
+    k_26 = (
         hinge_2_f_e0_link_2 * norm_link_2_e0_link_2
         + hinge_2_f_e1_link_2 * norm_link_2_e1_link_2
         + hinge_2_f_e2_link_2 * norm_link_2_e2_link_2
         + hinge_2_f_e3_link_2 * norm_link_2_e3_link_2
     )
-    k_30 = (
+    k_27 = (
         hinge_2_f_e2_link_2 * norm_link_2_e0_link_2
         - (hinge_2_f_e0_link_2 * norm_link_2_e2_link_2
             + hinge_2_f_e1_link_2 * norm_link_2_e3_link_2)
         + hinge_2_f_e3_link_2 * norm_link_2_e1_link_2
     )
-    k_31 = (
+    k_28 = (
         hinge_2_f_e1_link_2 * norm_link_2_e2_link_2
         - hinge_2_f_e0_link_2 * norm_link_2_e3_link_2
         - hinge_2_f_e2_link_2 * norm_link_2_e1_link_2
         + hinge_2_f_e3_link_2 * norm_link_2_e0_link_2
     )
-    k_32 = (
+    k_29 = (
         hinge_2_f_e1_link_2 * k_20 - hinge_2_f_e0_link_2 * k_19 + hinge_2_f_e2_link_2 * k_21
         - hinge_2_f_e3_link_2 * k_22
     )
-    k_33 = (
+    k_30 = (
         hinge_2_g_e0_link_2 * norm_link_2_e0_link_2
         + hinge_2_g_e1_link_2 * norm_link_2_e1_link_2
         + hinge_2_g_e2_link_2 * norm_link_2_e2_link_2
         + hinge_2_g_e3_link_2 * norm_link_2_e3_link_2
     )
-    k_34 = (
+    k_31 = (
         hinge_2_g_e2_link_2 * norm_link_2_e0_link_2
         - (hinge_2_g_e0_link_2 * norm_link_2_e2_link_2
             + hinge_2_g_e1_link_2 * norm_link_2_e3_link_2)
         + hinge_2_g_e3_link_2 * norm_link_2_e1_link_2
     )
-    k_35 = (
+    k_32 = (
         hinge_2_g_e1_link_2 * norm_link_2_e2_link_2
         - hinge_2_g_e0_link_2 * norm_link_2_e3_link_2
         - hinge_2_g_e2_link_2 * norm_link_2_e1_link_2
         + hinge_2_g_e3_link_2 * norm_link_2_e0_link_2
     )
-    k_36 = (
+    k_33 = (
         hinge_2_g_e1_link_2 * k_20 - hinge_2_g_e0_link_2 * k_19 + hinge_2_g_e2_link_2 * k_21
         - hinge_2_g_e3_link_2 * k_22
     )
-    k_37 = (
+    k_34 = (
         hinge_3_f_e0_link_2 * norm_link_2_e0_link_2
         + hinge_3_f_e1_link_2 * norm_link_2_e1_link_2
         + hinge_3_f_e2_link_2 * norm_link_2_e2_link_2
         + hinge_3_f_e3_link_2 * norm_link_2_e3_link_2
     )
-    k_38 = (
+    k_35 = (
         hinge_3_f_e2_link_2 * norm_link_2_e0_link_2
         - (hinge_3_f_e0_link_2 * norm_link_2_e2_link_2
             + hinge_3_f_e1_link_2 * norm_link_2_e3_link_2)
         + hinge_3_f_e3_link_2 * norm_link_2_e1_link_2
     )
-    k_39 = (
+    k_36 = (
         hinge_3_f_e1_link_2 * norm_link_2_e2_link_2
         - hinge_3_f_e0_link_2 * norm_link_2_e3_link_2
         - hinge_3_f_e2_link_2 * norm_link_2_e1_link_2
         + hinge_3_f_e3_link_2 * norm_link_2_e0_link_2
     )
-    k_40 = (
+    k_37 = (
         hinge_3_g_e0_link_2 * norm_link_2_e0_link_2
         + hinge_3_g_e1_link_2 * norm_link_2_e1_link_2
         + hinge_3_g_e2_link_2 * norm_link_2_e2_link_2
         + hinge_3_g_e3_link_2 * norm_link_2_e3_link_2
     )
-    k_41 = (
+    k_38 = (
         hinge_3_g_e1_link_2 * norm_link_2_e2_link_2
         - hinge_3_g_e0_link_2 * norm_link_2_e3_link_2
         - hinge_3_g_e2_link_2 * norm_link_2_e1_link_2
         + hinge_3_g_e3_link_2 * norm_link_2_e0_link_2
     )
-    k_42 = (
+    k_39 = (
         hinge_3_g_e1_link_2 * k_20 - hinge_3_g_e0_link_2 * k_19 + hinge_3_g_e2_link_2 * k_21
         - hinge_3_g_e3_link_2 * k_22
     )
-    k_43 = (
+    k_40 = (
         1 / (norm_link_3_e0_link_3**2 + norm_link_3_e1_link_3**2 + norm_link_3_e2_link_3**2
             + norm_link_3_e3_link_3**2)
     )
-    k_44, k_45 = k_43 * norm_link_3_e1_link_3, k_43 * norm_link_3_e0_link_3
-    k_46, k_47 = k_43 * norm_link_3_e3_link_3, k_43 * norm_link_3_e2_link_3
-    k_48 = (
-        hinge_3_x_e0_link_3 * norm_link_3_e0_link_3
-        + hinge_3_x_e1_link_3 * norm_link_3_e1_link_3
-        + hinge_3_x_e2_link_3 * norm_link_3_e2_link_3
-        + hinge_3_x_e3_link_3 * norm_link_3_e3_link_3
-    )
-    k_49 = (
-        hinge_3_x_e2_link_3 * norm_link_3_e0_link_3
-        - (hinge_3_x_e0_link_3 * norm_link_3_e2_link_3
-            + hinge_3_x_e1_link_3 * norm_link_3_e3_link_3)
-        + hinge_3_x_e3_link_3 * norm_link_3_e1_link_3
-    )
-    k_50 = (
-        hinge_3_x_e1_link_3 * norm_link_3_e2_link_3
-        - hinge_3_x_e0_link_3 * norm_link_3_e3_link_3
-        - hinge_3_x_e2_link_3 * norm_link_3_e1_link_3
-        + hinge_3_x_e3_link_3 * norm_link_3_e0_link_3
-    )
-    k_51 = (
+    k_41, k_42 = k_40 * norm_link_3_e1_link_3, k_40 * norm_link_3_e0_link_3
+    k_43, k_44 = k_40 * norm_link_3_e3_link_3, k_40 * norm_link_3_e2_link_3
+    k_45 = (
         hinge_3_y_e0_link_3 * norm_link_3_e0_link_3
         + hinge_3_y_e1_link_3 * norm_link_3_e1_link_3
         + hinge_3_y_e2_link_3 * norm_link_3_e2_link_3
         + hinge_3_y_e3_link_3 * norm_link_3_e3_link_3
     )
-    k_52 = (
+    k_46 = (
         hinge_3_y_e2_link_3 * norm_link_3_e0_link_3
         - (hinge_3_y_e0_link_3 * norm_link_3_e2_link_3
             + hinge_3_y_e1_link_3 * norm_link_3_e3_link_3)
         + hinge_3_y_e3_link_3 * norm_link_3_e1_link_3
     )
-    k_53 = (
+    k_47 = (
         hinge_3_y_e1_link_3 * norm_link_3_e2_link_3
         - hinge_3_y_e0_link_3 * norm_link_3_e3_link_3
         - hinge_3_y_e2_link_3 * norm_link_3_e1_link_3
         + hinge_3_y_e3_link_3 * norm_link_3_e0_link_3
     )
-    k_54 = (
+    k_48 = (
         hinge_3_f_e0_link_3 * norm_link_3_e0_link_3
         + hinge_3_f_e1_link_3 * norm_link_3_e1_link_3
         + hinge_3_f_e2_link_3 * norm_link_3_e2_link_3
         + hinge_3_f_e3_link_3 * norm_link_3_e3_link_3
     )
-    k_55 = (
+    k_49 = (
         hinge_3_f_e2_link_3 * norm_link_3_e0_link_3
         - (hinge_3_f_e0_link_3 * norm_link_3_e2_link_3
             + hinge_3_f_e1_link_3 * norm_link_3_e3_link_3)
         + hinge_3_f_e3_link_3 * norm_link_3_e1_link_3
     )
-    k_56 = (
+    k_50 = (
         hinge_3_f_e1_link_3 * norm_link_3_e2_link_3
         - hinge_3_f_e0_link_3 * norm_link_3_e3_link_3
         - hinge_3_f_e2_link_3 * norm_link_3_e1_link_3
         + hinge_3_f_e3_link_3 * norm_link_3_e0_link_3
     )
-    k_57 = (
-        hinge_3_f_e1_link_3 * k_45 - hinge_3_f_e0_link_3 * k_44 + hinge_3_f_e2_link_3 * k_46
-        - hinge_3_f_e3_link_3 * k_47
+    k_51 = (
+        hinge_3_f_e1_link_3 * k_42 - hinge_3_f_e0_link_3 * k_41 + hinge_3_f_e2_link_3 * k_43
+        - hinge_3_f_e3_link_3 * k_44
     )
-    k_58 = (
+    k_52 = (
         hinge_3_g_e0_link_3 * norm_link_3_e0_link_3
         + hinge_3_g_e1_link_3 * norm_link_3_e1_link_3
         + hinge_3_g_e2_link_3 * norm_link_3_e2_link_3
         + hinge_3_g_e3_link_3 * norm_link_3_e3_link_3
     )
-    k_59 = (
+    k_53 = (
         hinge_3_g_e2_link_3 * norm_link_3_e0_link_3
         - (hinge_3_g_e0_link_3 * norm_link_3_e2_link_3
             + hinge_3_g_e1_link_3 * norm_link_3_e3_link_3)
         + hinge_3_g_e3_link_3 * norm_link_3_e1_link_3
     )
-    k_60 = (
+    k_54 = (
         hinge_3_g_e1_link_3 * norm_link_3_e2_link_3
         - hinge_3_g_e0_link_3 * norm_link_3_e3_link_3
         - hinge_3_g_e2_link_3 * norm_link_3_e1_link_3
         + hinge_3_g_e3_link_3 * norm_link_3_e0_link_3
     )
-    k_61 = (
-        hinge_3_g_e1_link_3 * k_45 - hinge_3_g_e0_link_3 * k_44 + hinge_3_g_e2_link_3 * k_46
-        - hinge_3_g_e3_link_3 * k_47
+    k_55 = (
+        hinge_3_g_e1_link_3 * k_42 - hinge_3_g_e0_link_3 * k_41 + hinge_3_g_e2_link_3 * k_43
+        - hinge_3_g_e3_link_3 * k_44
+    )
+    k_56 = (
+        hinge_4_f_e0_link_3 * norm_link_3_e0_link_3
+        + hinge_4_f_e1_link_3 * norm_link_3_e1_link_3
+        + hinge_4_f_e2_link_3 * norm_link_3_e2_link_3
+        + hinge_4_f_e3_link_3 * norm_link_3_e3_link_3
+    )
+    k_57 = (
+        hinge_4_f_e2_link_3 * norm_link_3_e0_link_3
+        - (hinge_4_f_e0_link_3 * norm_link_3_e2_link_3
+            + hinge_4_f_e1_link_3 * norm_link_3_e3_link_3)
+        + hinge_4_f_e3_link_3 * norm_link_3_e1_link_3
+    )
+    k_58 = (
+        hinge_4_f_e1_link_3 * norm_link_3_e2_link_3
+        - hinge_4_f_e0_link_3 * norm_link_3_e3_link_3
+        - hinge_4_f_e2_link_3 * norm_link_3_e1_link_3
+        + hinge_4_f_e3_link_3 * norm_link_3_e0_link_3
     )
     determinant_ = k_11 * k_15 - k_12 * k_14
-    k_63, k_64 = 1 / determinant_, 1 / determinant
-    k_65 = (k_24**2 < k_27**2)
-    k_66, k_67 = where(k_65, k_27, k_24), where(k_65, k_28, k_25)
-    k_68, k_69 = where(k_65, k_52, k_49), where(k_65, k_53, k_50)
-    k_70, k_71 = where(k_65, -1, 1), (k_66**2 < k_30**2)
-    k_72, k_73 = where(k_71, k_30, k_66), where(k_71, k_31, k_67)
-    k_74, k_75 = where(k_71, k_32, 0), where(k_71, 0, k_68)
-    k_76, k_77 = where(k_71, 0, k_69), where(k_71, -k_70, k_70)
-    k_78 = (k_72**2 < k_34**2)
-    k_79, k_80 = where(k_78, k_34, k_72), where(k_78, k_35, k_73)
-    k_81, k_82 = where(k_78, k_36, k_74), where(k_78, 0, k_75)
-    k_83, k_84 = where(k_78, 0, k_76), where(k_78, -k_77, k_77)
-    k_85 = (k_79**2 < k_38**2)
-    k_86, k_87 = where(k_85, k_38, k_79), where(k_85, k_39, k_80)
-    k_88, k_89 = where(k_85, 0, k_81), where(k_85, k_55, k_82)
-    k_90, k_91 = where(k_85, k_56, k_83), where(k_85, k_57, 0)
-    k_92, k_93 = where(k_85, -k_84, k_84), (k_86**2 < 0)
-    k_94, k_95 = where(k_93, 0, k_86), where(k_93, k_41, k_87)
-    k_96, k_97 = where(k_93, k_42, k_88), where(k_93, k_59, k_89)
-    k_98, k_99 = where(k_93, k_60, k_90), where(k_93, k_61, k_91)
-    k_100, k_101 = where(k_93, -k_92, k_92) * k_94, 1 / k_94
-    k_102 = where(k_65, k_24, k_27) * k_101
-    k_103, k_104 = where(k_65, k_25, k_28) - k_102 * k_95, k_102 * k_96
-    k_105 = where(k_65, k_49, k_52) - k_102 * k_97
-    k_106, k_107 = where(k_65, k_50, k_53) - k_102 * k_98, k_102 * k_99
-    k_108 = where(k_71, k_66, k_30) * k_101
-    k_109, k_110 = where(k_71, k_67, k_31) - k_108 * k_95, where(k_71, 0, k_32) - k_108 * k_96
-    k_111, k_112 = where(k_71, k_68, 0) - k_108 * k_97, where(k_71, k_69, 0) - k_108 * k_98
-    k_113, k_114 = k_108 * k_99, where(k_78, k_72, k_34) * k_101
-    k_115 = where(k_78, k_73, k_35) - k_114 * k_95
-    k_116, k_117 = where(k_78, k_74, k_36) - k_114 * k_96, where(k_78, k_75, 0) - k_114 * k_97
-    k_118, k_119 = where(k_78, k_76, 0) - k_114 * k_98, k_114 * k_99
-    k_120 = where(k_85, k_79, k_38) * k_101
-    k_121, k_122 = where(k_85, k_80, k_39) - k_120 * k_95, where(k_85, k_81, 0) - k_120 * k_96
-    k_123 = where(k_85, k_82, k_55) - k_120 * k_97
-    k_124, k_125 = where(k_85, k_83, k_56) - k_120 * k_98, where(k_85, 0, k_57) - k_120 * k_99
-    k_126 = where(k_93, k_86, 0) * k_101
-    k_127 = where(k_93, k_87, k_41) - k_126 * k_95
-    k_128 = where(k_93, k_88, k_42) - k_126 * k_96
-    k_129 = where(k_93, k_89, k_59) - k_126 * k_97
-    k_130 = where(k_93, k_90, k_60) - k_126 * k_98
-    k_131, k_132 = where(k_93, k_91, k_61) - k_126 * k_99, (k_103**2 < k_109**2)
-    k_133, k_134 = where(k_132, k_109, k_103), where(k_132, k_110, -k_104)
-    k_135, k_136 = where(k_132, k_111, k_105), where(k_132, k_112, k_106)
-    k_137, k_138 = where(k_132, -k_113, -k_107), where(k_132, -k_100, k_100)
-    k_139 = (k_133**2 < k_115**2)
-    k_140, k_141 = where(k_139, k_115, k_133), where(k_139, k_116, k_134)
-    k_142, k_143 = where(k_139, k_117, k_135), where(k_139, k_118, k_136)
-    k_144, k_145 = where(k_139, -k_119, k_137), where(k_139, -k_138, k_138)
-    k_146 = (k_140**2 < k_121**2)
-    k_147, k_148 = where(k_146, k_121, k_140), where(k_146, k_122, k_141)
-    k_149, k_150 = where(k_146, k_123, k_142), where(k_146, k_124, k_143)
-    k_151, k_152 = where(k_146, k_125, k_144), where(k_146, -k_145, k_145)
-    k_153 = (k_147**2 < k_127**2)
-    k_154, k_155 = where(k_153, k_127, k_147), where(k_153, k_128, k_148)
-    k_156, k_157 = where(k_153, k_129, k_149), where(k_153, k_130, k_150)
-    k_158, k_159 = where(k_153, k_131, k_151), where(k_153, -k_152, k_152) * k_154
-    k_160 = 1 / k_154
-    k_161 = where(k_132, k_103, k_109) * k_160
-    k_162 = where(k_132, -k_104, k_110) - k_161 * k_155
-    k_163 = where(k_132, k_105, k_111) - k_161 * k_156
-    k_164 = where(k_132, k_106, k_112) - k_161 * k_157
-    k_165 = where(k_132, -k_107, -k_113) - k_161 * k_158
-    k_166 = where(k_139, k_133, k_115) * k_160
-    k_167 = where(k_139, k_134, k_116) - k_166 * k_155
-    k_168 = where(k_139, k_135, k_117) - k_166 * k_156
-    k_169 = where(k_139, k_136, k_118) - k_166 * k_157
-    k_170 = where(k_139, k_137, -k_119) - k_166 * k_158
-    k_171 = where(k_146, k_140, k_121) * k_160
-    k_172 = where(k_146, k_141, k_122) - k_171 * k_155
-    k_173 = where(k_146, k_142, k_123) - k_171 * k_156
-    k_174 = where(k_146, k_143, k_124) - k_171 * k_157
-    k_175 = where(k_146, k_144, k_125) - k_171 * k_158
-    k_176 = where(k_153, k_147, k_127) * k_160
-    k_177 = where(k_153, k_148, k_128) - k_176 * k_155
-    k_178 = where(k_153, k_149, k_129) - k_176 * k_156
-    k_179 = where(k_153, k_150, k_130) - k_176 * k_157
-    k_180, k_181 = where(k_153, k_151, k_131) - k_176 * k_158, (k_162**2 < k_167**2)
-    k_182, k_183 = where(k_181, k_167, k_162), where(k_181, k_168, k_163)
-    k_184, k_185 = where(k_181, k_169, k_164), where(k_181, k_170, k_165)
-    k_186, k_187 = where(k_181, -k_159, k_159), (k_182**2 < k_172**2)
-    k_188, k_189 = where(k_187, k_172, k_182), where(k_187, k_173, k_183)
-    k_190, k_191 = where(k_187, k_174, k_184), where(k_187, k_175, k_185)
-    k_192, k_193 = where(k_187, -k_186, k_186), (k_188**2 < k_177**2)
-    k_194, k_195 = where(k_193, k_177, k_188), where(k_193, k_178, k_189)
-    k_196, k_197 = where(k_193, k_179, k_190), where(k_193, k_180, k_191)
-    k_198, k_199 = where(k_193, -k_192, k_192) * k_194, 1 / k_194
-    k_200 = where(k_181, k_162, k_167) * k_199
-    k_201 = where(k_181, k_163, k_168) - k_200 * k_195
-    k_202 = where(k_181, k_164, k_169) - k_200 * k_196
-    k_203 = where(k_181, k_165, k_170) - k_200 * k_197
-    k_204 = where(k_187, k_182, k_172) * k_199
-    k_205 = where(k_187, k_183, k_173) - k_204 * k_195
-    k_206 = where(k_187, k_184, k_174) - k_204 * k_196
-    k_207 = where(k_187, k_185, k_175) - k_204 * k_197
-    k_208 = where(k_193, k_188, k_177) * k_199
-    k_209 = where(k_193, k_189, k_178) - k_208 * k_195
-    k_210 = where(k_193, k_190, k_179) - k_208 * k_196
-    k_211, k_212 = where(k_193, k_191, k_180) - k_208 * k_197, (k_201**2 < k_205**2)
-    k_213, k_214 = where(k_212, k_205, k_201), where(k_212, k_206, k_202)
-    k_215, k_216 = where(k_212, k_207, k_203), where(k_212, -k_198, k_198)
-    k_217 = (k_213**2 < k_209**2)
-    k_218, k_219 = where(k_217, k_209, k_213), where(k_217, k_210, k_214)
-    k_220, k_221 = where(k_217, k_211, k_215), where(k_217, -k_216, k_216) * k_218
-    k_222 = 1 / k_218
-    k_223 = where(k_212, k_201, k_205) * k_222
-    k_224 = where(k_212, k_202, k_206) - k_223 * k_219
-    k_225 = where(k_212, k_203, k_207) - k_223 * k_220
-    k_226 = where(k_217, k_213, k_209) * k_222
-    k_227 = where(k_217, k_214, k_210) - k_226 * k_219
-    k_228, k_229 = where(k_217, k_215, k_211) - k_226 * k_220, (k_224**2 < k_227**2)
-    k_230, k_231 = where(k_229, k_227, k_224), where(k_229, k_228, k_225)
-    k_232 = 1 / k_230
-    k_233 = where(k_229, k_224, k_227) * k_232
-    k_234 = where(k_229, k_225, k_228) - k_233 * k_231
-    determinant_2, k_236 = where(k_229, -k_221, k_221) * k_230 * k_234, 1 / k_234
-    k_237 = 1 / second_theta_second
+    k_60, k_61 = 1 / determinant_, 1 / determinant
+    k_62 = (k_24**2 < k_27**2)
+    k_63, k_64 = where(k_62, k_27, k_24), where(k_62, k_28, k_25)
+    k_65, k_66 = where(k_62, k_29, 0), where(k_62, 0, k_46)
+    k_67, k_68 = where(k_62, 0, k_47), where(k_62, -1, 1)
+    k_69 = (k_63**2 < k_31**2)
+    k_70, k_71 = where(k_69, k_31, k_63), where(k_69, k_32, k_64)
+    k_72, k_73 = where(k_69, k_33, k_65), where(k_69, 0, k_66)
+    k_74, k_75 = where(k_69, 0, k_67), where(k_69, -k_68, k_68)
+    k_76 = (k_70**2 < k_35**2)
+    k_77, k_78 = where(k_76, k_35, k_70), where(k_76, k_36, k_71)
+    k_79, k_80 = where(k_76, 0, k_72), where(k_76, k_49, k_73)
+    k_81, k_82 = where(k_76, k_50, k_74), where(k_76, k_51, 0)
+    k_83, k_84 = where(k_76, -k_75, k_75), (k_77**2 < 0)
+    k_85, k_86 = where(k_84, 0, k_77), where(k_84, k_38, k_78)
+    k_87, k_88 = where(k_84, k_39, k_79), where(k_84, k_53, k_80)
+    k_89, k_90 = where(k_84, k_54, k_81), where(k_84, k_55, k_82)
+    k_91, k_92 = where(k_84, -k_83, k_83), (k_85**2 < 0)
+    k_93, k_94 = where(k_92, 0, k_85), where(k_92, 0, k_86)
+    k_95, k_96 = where(k_92, 0, k_87), where(k_92, k_57, k_88)
+    k_97, k_98 = where(k_92, k_58, k_89), where(k_92, 0, k_90)
+    k_99, k_100 = where(k_92, -k_91, k_91) * k_93, 1 / k_93
+    k_101 = where(k_62, k_24, k_27) * k_100
+    k_102, k_103 = where(k_62, k_25, k_28) - k_101 * k_94, where(k_62, 0, k_29) - k_101 * k_95
+    k_104, k_105 = where(k_62, k_46, 0) - k_101 * k_96, where(k_62, k_47, 0) - k_101 * k_97
+    k_106, k_107 = k_101 * k_98, where(k_69, k_63, k_31) * k_100
+    k_108 = where(k_69, k_64, k_32) - k_107 * k_94
+    k_109, k_110 = where(k_69, k_65, k_33) - k_107 * k_95, where(k_69, k_66, 0) - k_107 * k_96
+    k_111, k_112 = where(k_69, k_67, 0) - k_107 * k_97, k_107 * k_98
+    k_113 = where(k_76, k_70, k_35) * k_100
+    k_114, k_115 = where(k_76, k_71, k_36) - k_113 * k_94, where(k_76, k_72, 0) - k_113 * k_95
+    k_116 = where(k_76, k_73, k_49) - k_113 * k_96
+    k_117, k_118 = where(k_76, k_74, k_50) - k_113 * k_97, where(k_76, 0, k_51) - k_113 * k_98
+    k_119 = where(k_84, k_77, 0) * k_100
+    k_120 = where(k_84, k_78, k_38) - k_119 * k_94
+    k_121 = where(k_84, k_79, k_39) - k_119 * k_95
+    k_122 = where(k_84, k_80, k_53) - k_119 * k_96
+    k_123 = where(k_84, k_81, k_54) - k_119 * k_97
+    k_124, k_125 = where(k_84, k_82, k_55) - k_119 * k_98, where(k_92, k_85, 0) * k_100
+    k_126, k_127 = where(k_92, k_86, 0) - k_125 * k_94, where(k_92, k_87, 0) - k_125 * k_95
+    k_128 = where(k_92, k_88, k_57) - k_125 * k_96
+    k_129, k_130 = where(k_92, k_89, k_58) - k_125 * k_97, where(k_92, k_90, 0) - k_125 * k_98
+    k_131 = (k_102**2 < k_108**2)
+    k_132, k_133 = where(k_131, k_108, k_102), where(k_131, k_109, k_103)
+    k_134, k_135 = where(k_131, k_110, k_104), where(k_131, k_111, k_105)
+    k_136, k_137 = where(k_131, -k_112, -k_106), where(k_131, -k_99, k_99)
+    k_138 = (k_132**2 < k_114**2)
+    k_139, k_140 = where(k_138, k_114, k_132), where(k_138, k_115, k_133)
+    k_141, k_142 = where(k_138, k_116, k_134), where(k_138, k_117, k_135)
+    k_143, k_144 = where(k_138, k_118, k_136), where(k_138, -k_137, k_137)
+    k_145 = (k_139**2 < k_120**2)
+    k_146, k_147 = where(k_145, k_120, k_139), where(k_145, k_121, k_140)
+    k_148, k_149 = where(k_145, k_122, k_141), where(k_145, k_123, k_142)
+    k_150, k_151 = where(k_145, k_124, k_143), where(k_145, -k_144, k_144)
+    k_152 = (k_146**2 < k_126**2)
+    k_153, k_154 = where(k_152, k_126, k_146), where(k_152, k_127, k_147)
+    k_155, k_156 = where(k_152, k_128, k_148), where(k_152, k_129, k_149)
+    k_157, k_158 = where(k_152, k_130, k_150), where(k_152, -k_151, k_151) * k_153
+    k_159 = 1 / k_153
+    k_160 = where(k_131, k_102, k_108) * k_159
+    k_161 = where(k_131, k_103, k_109) - k_160 * k_154
+    k_162 = where(k_131, k_104, k_110) - k_160 * k_155
+    k_163 = where(k_131, k_105, k_111) - k_160 * k_156
+    k_164 = where(k_131, -k_106, -k_112) - k_160 * k_157
+    k_165 = where(k_138, k_132, k_114) * k_159
+    k_166 = where(k_138, k_133, k_115) - k_165 * k_154
+    k_167 = where(k_138, k_134, k_116) - k_165 * k_155
+    k_168 = where(k_138, k_135, k_117) - k_165 * k_156
+    k_169 = where(k_138, k_136, k_118) - k_165 * k_157
+    k_170 = where(k_145, k_139, k_120) * k_159
+    k_171 = where(k_145, k_140, k_121) - k_170 * k_154
+    k_172 = where(k_145, k_141, k_122) - k_170 * k_155
+    k_173 = where(k_145, k_142, k_123) - k_170 * k_156
+    k_174 = where(k_145, k_143, k_124) - k_170 * k_157
+    k_175 = where(k_152, k_146, k_126) * k_159
+    k_176 = where(k_152, k_147, k_127) - k_175 * k_154
+    k_177 = where(k_152, k_148, k_128) - k_175 * k_155
+    k_178 = where(k_152, k_149, k_129) - k_175 * k_156
+    k_179, k_180 = where(k_152, k_150, k_130) - k_175 * k_157, (k_161**2 < k_166**2)
+    k_181, k_182 = where(k_180, k_166, k_161), where(k_180, k_167, k_162)
+    k_183, k_184 = where(k_180, k_168, k_163), where(k_180, k_169, k_164)
+    k_185, k_186 = where(k_180, -k_158, k_158), (k_181**2 < k_171**2)
+    k_187, k_188 = where(k_186, k_171, k_181), where(k_186, k_172, k_182)
+    k_189, k_190 = where(k_186, k_173, k_183), where(k_186, k_174, k_184)
+    k_191, k_192 = where(k_186, -k_185, k_185), (k_187**2 < k_176**2)
+    k_193, k_194 = where(k_192, k_176, k_187), where(k_192, k_177, k_188)
+    k_195, k_196 = where(k_192, k_178, k_189), where(k_192, k_179, k_190)
+    k_197, k_198 = where(k_192, -k_191, k_191) * k_193, 1 / k_193
+    k_199 = where(k_180, k_161, k_166) * k_198
+    k_200 = where(k_180, k_162, k_167) - k_199 * k_194
+    k_201 = where(k_180, k_163, k_168) - k_199 * k_195
+    k_202 = where(k_180, k_164, k_169) - k_199 * k_196
+    k_203 = where(k_186, k_181, k_171) * k_198
+    k_204 = where(k_186, k_182, k_172) - k_203 * k_194
+    k_205 = where(k_186, k_183, k_173) - k_203 * k_195
+    k_206 = where(k_186, k_184, k_174) - k_203 * k_196
+    k_207 = where(k_192, k_187, k_176) * k_198
+    k_208 = where(k_192, k_188, k_177) - k_207 * k_194
+    k_209 = where(k_192, k_189, k_178) - k_207 * k_195
+    k_210, k_211 = where(k_192, k_190, k_179) - k_207 * k_196, (k_200**2 < k_204**2)
+    k_212, k_213 = where(k_211, k_204, k_200), where(k_211, k_205, k_201)
+    k_214, k_215 = where(k_211, k_206, k_202), where(k_211, -k_197, k_197)
+    k_216 = (k_212**2 < k_208**2)
+    k_217, k_218 = where(k_216, k_208, k_212), where(k_216, k_209, k_213)
+    k_219, k_220 = where(k_216, k_210, k_214), where(k_216, -k_215, k_215) * k_217
+    k_221 = 1 / k_217
+    k_222 = where(k_211, k_200, k_204) * k_221
+    k_223 = where(k_211, k_201, k_205) - k_222 * k_218
+    k_224 = where(k_211, k_202, k_206) - k_222 * k_219
+    k_225 = where(k_216, k_212, k_208) * k_221
+    k_226 = where(k_216, k_213, k_209) - k_225 * k_218
+    k_227, k_228 = where(k_216, k_214, k_210) - k_225 * k_219, (k_223**2 < k_226**2)
+    k_229, k_230 = where(k_228, k_226, k_223), where(k_228, k_227, k_224)
+    k_231 = 1 / k_229
+    k_232 = where(k_228, k_223, k_226) * k_231
+    k_233 = where(k_228, k_224, k_227) - k_232 * k_230
+    determinant_2, k_235 = where(k_228, -k_220, k_220) * k_229 * k_233, 1 / k_233
+    k_236 = 1 / second_theta_second
     return (
         hinge_1_x_e0_link_1, hinge_1_x_e1_link_1, hinge_1_x_e2_link_1, hinge_1_x_e3_link_1,
         hinge_1_y_e0_link_1, hinge_1_y_e1_link_1, hinge_1_y_e2_link_1, hinge_1_y_e3_link_1,
         hinge_1_z_e0_link_1, hinge_1_z_e1_link_1, hinge_1_z_e2_link_1, hinge_1_z_e3_link_1,
+        hinge_2_x_e0_link_2, hinge_2_x_e1_link_2, hinge_2_x_e2_link_2, hinge_2_x_e3_link_2,
         hinge_2_z_e0_link_2, hinge_2_z_e1_link_2, hinge_2_z_e2_link_2, hinge_2_z_e3_link_2,
         hinge_2_f_e0_link_1, hinge_2_f_e1_link_1, hinge_2_f_e2_link_1, hinge_2_f_e3_link_1,
         hinge_2_g_e0_link_1, hinge_2_g_e1_link_1, hinge_2_g_e2_link_1, hinge_2_g_e3_link_1,
@@ -1616,12 +1600,11 @@ def _factor(f, J):
         norm_link_2_e1_link_2, norm_link_2_e2_link_2, norm_link_2_e3_link_2, norm_link_3_e0_link_3,
         norm_link_3_e1_link_3, norm_link_3_e2_link_3, norm_link_3_e3_link_3, k_1, k_2, k_3, k_4,
         k_5, k_6, k_7, k_8, k_9, k_10, k_11, k_12, k_13, k_14, k_15, k_16, k_18, k_19, k_20, k_21,
-        k_22, k_23, k_26, k_29, k_33, k_37, k_40, k_43, k_44, k_45, k_46, k_47, k_48, k_51, k_54,
-        k_58, k_63, k_64, k_65, k_71, k_78, k_85, k_93, k_95, k_96, k_97, k_98, k_99, k_101, k_102,
-        k_108, k_114, k_120, k_126, k_132, k_139, k_146, k_153, k_155, k_156, k_157, k_158, k_160,
-        k_161, k_166, k_171, k_176, k_181, k_187, k_193, k_195, k_196, k_197, k_199, k_200, k_204,
-        k_208, k_212, k_217, k_219, k_220, k_222, k_223, k_226, k_229, k_231, k_232, k_233, k_236,
-        k_237,
+        k_22, k_23, k_26, k_30, k_34, k_37, k_40, k_41, k_42, k_43, k_44, k_45, k_48, k_52, k_56,
+        k_60, k_61, k_62, k_69, k_76, k_84, k_92, k_94, k_95, k_96, k_97, k_98, k_100, k_101, k_107,
+        k_113, k_119, k_125, k_131, k_138, k_145, k_152, k_154, k_155, k_156, k_157, k_159, k_160,
+        k_165, k_170, k_175, k_180, k_186, k_192, k_194, k_195, k_196, k_198, k_199, k_203, k_207,
+        k_211, k_216, k_218, k_219, k_221, k_222, k_225, k_228, k_230, k_231, k_232, k_235, k_236,
     ), (determinant_, determinant, determinant_2, second_theta_second)
 
 
@@ -1632,6 +1615,7 @@ def _solve(f, F, b):
         hinge_1_x_e0_link_1, hinge_1_x_e1_link_1, hinge_1_x_e2_link_1, hinge_1_x_e3_link_1,
         hinge_1_y_e0_link_1, hinge_1_y_e1_link_1, hinge_1_y_e2_link_1, hinge_1_y_e3_link_1,
         hinge_1_z_e0_link_1, hinge_1_z_e1_link_1, hinge_1_z_e2_link_1, hinge_1_z_e3_link_1,
+        hinge_2_x_e0_link_2, hinge_2_x_e1_link_2, hinge_2_x_e2_link_2, hinge_2_x_e3_link_2,
         hinge_2_z_e0_link_2, hinge_2_z_e1_link_2, hinge_2_z_e2_link_2, hinge_2_z_e3_link_2,
         hinge_2_f_e0_link_1, hinge_2_f_e1_link_1, hinge_2_f_e2_link_1, hinge_2_f_e3_link_1,
         hinge_2_g_e0_link_1, hinge_2_g_e1_link_1, hinge_2_g_e2_link_1, hinge_2_g_e3_link_1,
@@ -1644,12 +1628,11 @@ def _solve(f, F, b):
         norm_link_2_e1_link_2, norm_link_2_e2_link_2, norm_link_2_e3_link_2, norm_link_3_e0_link_3,
         norm_link_3_e1_link_3, norm_link_3_e2_link_3, norm_link_3_e3_link_3, k_1, k_2, k_3, k_4,
         k_5, k_6, k_7, k_8, k_9, k_10, k_11, k_12, k_13, k_14, k_15, k_16, k_18, k_19, k_20, k_21,
-        k_22, k_23, k_26, k_29, k_33, k_37, k_40, k_43, k_44, k_45, k_46, k_47, k_48, k_51, k_54,
-        k_58, k_63, k_64, k_65, k_71, k_78, k_85, k_93, k_95, k_96, k_97, k_98, k_99, k_101, k_102,
-        k_108, k_114, k_120, k_126, k_132, k_139, k_146, k_153, k_155, k_156, k_157, k_158, k_160,
-        k_161, k_166, k_171, k_176, k_181, k_187, k_193, k_195, k_196, k_197, k_199, k_200, k_204,
-        k_208, k_212, k_217, k_219, k_220, k_222, k_223, k_226, k_229, k_231, k_232, k_233, k_236,
-        k_237,
+        k_22, k_23, k_26, k_30, k_34, k_37, k_40, k_41, k_42, k_43, k_44, k_45, k_48, k_52, k_56,
+        k_60, k_61, k_62, k_69, k_76, k_84, k_92, k_94, k_95, k_96, k_97, k_98, k_100, k_101, k_107,
+        k_113, k_119, k_125, k_131, k_138, k_145, k_152, k_154, k_155, k_156, k_157, k_159, k_160,
+        k_165, k_170, k_175, k_180, k_186, k_192, k_194, k_195, k_196, k_198, k_199, k_203, k_207,
+        k_211, k_216, k_218, k_219, k_221, k_222, k_225, k_228, k_230, k_231, k_232, k_235, k_236,
     ) = F
     (
         hinge_1_x, hinge_1_y, hinge_1_z, hinge_1_f, hinge_1_g, hinge_2_x, hinge_2_y, hinge_2_z,
@@ -1657,110 +1640,101 @@ def _solve(f, F, b):
         hinge_4_y, hinge_4_z, hinge_4_f, hinge_4_g, motor, second, norm_link_1, norm_link_2,
         norm_link_3,
     ) = b
-    x_link_3, b_2 = -hinge_4_x, hinge_3_x + hinge_4_x
-    y_link_3, b_4 = -hinge_4_y, hinge_3_y + hinge_4_y
-    b_5, b_6 = norm_link_1 * k_1, norm_link_2 * k_18
-    b_7, b_8 = norm_link_3 * k_43, hinge_1_f - k_10 * b_5
-    b_9 = hinge_1_g - k_13 * b_5
-    b_10, b_11 = (k_15 * b_8 - k_12 * b_9) * k_63, (k_11 * b_9 - k_14 * b_8) * k_63
-    b_12 = (motor - k_16 * b_11) * k_64
-    e0_link_1 = norm_link_1_e0_link_1 * b_5 - norm_link_1_e1_link_1 * b_10 + k_2 * b_11 - k_6 * b_12
-    e1_link_1 = norm_link_1_e1_link_1 * b_5 + norm_link_1_e0_link_1 * b_10 - k_3 * b_11 - k_7 * b_12
-    e2_link_1 = norm_link_1_e2_link_1 * b_5 + norm_link_1_e3_link_1 * b_10 + k_4 * b_11 - k_8 * b_12
-    e3_link_1 = norm_link_1_e3_link_1 * b_5 - norm_link_1_e2_link_1 * b_10 + k_5 * b_11 + k_9 * b_12
-    b_17, b_18 = hinge_1_x_e0_link_1 * e0_link_1, hinge_1_x_e1_link_1 * e1_link_1
-    b_19, b_20 = hinge_1_x_e2_link_1 * e2_link_1, hinge_1_x_e3_link_1 * e3_link_1
-    b_21 = hinge_2_x + hinge_1_x + b_2 - b_17 - b_18 - b_19 - b_20 - k_23 * b_6 - k_48 * b_7
-    b_22, b_23 = hinge_1_y_e0_link_1 * e0_link_1, hinge_1_y_e1_link_1 * e1_link_1
-    b_24, b_25 = hinge_1_y_e2_link_1 * e2_link_1, hinge_1_y_e3_link_1 * e3_link_1
-    b_26 = hinge_2_y + hinge_1_y + b_4 - b_22 - b_23 - b_24 - b_25 - k_26 * b_6 - k_51 * b_7
-    b_27 = (
+    y_link_3, b_2 = -hinge_4_y, hinge_3_y + hinge_4_y
+    b_3, b_4 = norm_link_1 * k_1, norm_link_2 * k_18
+    b_5, b_6 = norm_link_3 * k_40, hinge_1_f - k_10 * b_3
+    b_7 = hinge_1_g - k_13 * b_3
+    b_8, b_9 = (k_15 * b_6 - k_12 * b_7) * k_60, (k_11 * b_7 - k_14 * b_6) * k_60
+    b_10 = (motor - k_16 * b_9) * k_61
+    e0_link_1 = norm_link_1_e0_link_1 * b_3 - norm_link_1_e1_link_1 * b_8 + k_2 * b_9 - k_6 * b_10
+    e1_link_1 = norm_link_1_e1_link_1 * b_3 + norm_link_1_e0_link_1 * b_8 - k_3 * b_9 - k_7 * b_10
+    e2_link_1 = norm_link_1_e2_link_1 * b_3 + norm_link_1_e3_link_1 * b_8 + k_4 * b_9 - k_8 * b_10
+    e3_link_1 = norm_link_1_e3_link_1 * b_3 - norm_link_1_e2_link_1 * b_8 + k_5 * b_9 + k_9 * b_10
+    b_15, b_16 = hinge_1_y_e0_link_1 * e0_link_1, hinge_1_y_e1_link_1 * e1_link_1
+    b_17, b_18 = hinge_1_y_e2_link_1 * e2_link_1, hinge_1_y_e3_link_1 * e3_link_1
+    b_19 = hinge_2_y + hinge_1_y + b_2 - b_15 - b_16 - b_17 - b_18 - k_23 * b_4 - k_45 * b_5
+    b_20 = (
         hinge_2_f - hinge_2_f_e0_link_1 * e0_link_1 - hinge_2_f_e1_link_1 * e1_link_1
-        - hinge_2_f_e2_link_1 * e2_link_1 - hinge_2_f_e3_link_1 * e3_link_1 - k_29 * b_6
+        - hinge_2_f_e2_link_1 * e2_link_1 - hinge_2_f_e3_link_1 * e3_link_1 - k_26 * b_4
     )
-    b_28 = (
+    b_21 = (
         hinge_2_g - hinge_2_g_e0_link_1 * e0_link_1 - hinge_2_g_e1_link_1 * e1_link_1
-        - hinge_2_g_e2_link_1 * e2_link_1 - hinge_2_g_e3_link_1 * e3_link_1 - k_33 * b_6
+        - hinge_2_g_e2_link_1 * e2_link_1 - hinge_2_g_e3_link_1 * e3_link_1 - k_30 * b_4
     )
-    b_29, b_30 = hinge_3_f - k_37 * b_6 - k_54 * b_7, hinge_3_g - k_40 * b_6 - k_58 * b_7
-    b_31 = where(k_65, b_26, b_21)
-    b_32 = where(k_71, b_27, b_31)
-    b_33 = where(k_78, b_28, b_32)
-    b_34 = where(k_85, b_29, b_33)
-    b_35 = where(k_93, b_30, b_34)
-    b_36, b_37 = where(k_65, b_21, b_26) - k_102 * b_35, where(k_71, b_31, b_27) - k_108 * b_35
-    b_38, b_39 = where(k_78, b_32, b_28) - k_114 * b_35, where(k_85, b_33, b_29) - k_120 * b_35
-    b_40, b_41 = where(k_93, b_34, b_30) - k_126 * b_35, where(k_132, b_37, b_36)
-    b_42 = where(k_139, b_38, b_41)
-    b_43 = where(k_146, b_39, b_42)
-    b_44 = where(k_153, b_40, b_43)
-    b_45 = where(k_132, b_36, b_37) - k_161 * b_44
-    b_46 = where(k_139, b_41, b_38) - k_166 * b_44
-    b_47 = where(k_146, b_42, b_39) - k_171 * b_44
-    b_48, b_49 = where(k_153, b_43, b_40) - k_176 * b_44, where(k_181, b_46, b_45)
-    b_50 = where(k_187, b_47, b_49)
-    b_51 = where(k_193, b_48, b_50)
-    b_52 = where(k_181, b_45, b_46) - k_200 * b_51
-    b_53 = where(k_187, b_49, b_47) - k_204 * b_51
-    b_54, b_55 = where(k_193, b_50, b_48) - k_208 * b_51, where(k_212, b_53, b_52)
-    b_56 = where(k_217, b_54, b_55)
-    b_57 = where(k_212, b_52, b_53) - k_223 * b_56
-    b_58 = where(k_217, b_55, b_54) - k_226 * b_56
-    b_59 = where(k_229, b_58, b_57)
-    b_60 = (where(k_229, b_57, b_58) - k_233 * b_59) * k_236
-    b_61 = (b_59 - k_231 * b_60) * k_232
-    b_62 = (b_56 - k_219 * b_61 - k_220 * b_60) * k_222
-    b_63 = (b_51 - k_195 * b_62 - k_196 * b_61 - k_197 * b_60) * k_199
-    b_64 = (b_44 - k_155 * b_63 - k_156 * b_62 - k_157 * b_61 - k_158 * b_60) * k_160
-    b_65 = (b_35 - k_95 * b_64 - k_96 * b_63 - k_97 * b_62 - k_98 * b_61 - k_99 * b_60) * k_101
+    b_22, b_23 = hinge_3_f - k_34 * b_4 - k_48 * b_5, hinge_3_g - k_37 * b_4 - k_52 * b_5
+    b_24, b_25 = hinge_4_f - k_56 * b_5, where(k_62, b_20, b_19)
+    b_26 = where(k_69, b_21, b_25)
+    b_27 = where(k_76, b_22, b_26)
+    b_28 = where(k_84, b_23, b_27)
+    b_29 = where(k_92, b_24, b_28)
+    b_30, b_31 = where(k_62, b_19, b_20) - k_101 * b_29, where(k_69, b_25, b_21) - k_107 * b_29
+    b_32, b_33 = where(k_76, b_26, b_22) - k_113 * b_29, where(k_84, b_27, b_23) - k_119 * b_29
+    b_34, b_35 = where(k_92, b_28, b_24) - k_125 * b_29, where(k_131, b_31, b_30)
+    b_36 = where(k_138, b_32, b_35)
+    b_37 = where(k_145, b_33, b_36)
+    b_38 = where(k_152, b_34, b_37)
+    b_39 = where(k_131, b_30, b_31) - k_160 * b_38
+    b_40 = where(k_138, b_35, b_32) - k_165 * b_38
+    b_41 = where(k_145, b_36, b_33) - k_170 * b_38
+    b_42, b_43 = where(k_152, b_37, b_34) - k_175 * b_38, where(k_180, b_40, b_39)
+    b_44 = where(k_186, b_41, b_43)
+    b_45 = where(k_192, b_42, b_44)
+    b_46 = where(k_180, b_39, b_40) - k_199 * b_45
+    b_47 = where(k_186, b_43, b_41) - k_203 * b_45
+    b_48, b_49 = where(k_192, b_44, b_42) - k_207 * b_45, where(k_211, b_47, b_46)
+    b_50 = where(k_216, b_48, b_49)
+    b_51 = where(k_211, b_46, b_47) - k_222 * b_50
+    b_52 = where(k_216, b_49, b_48) - k_225 * b_50
+    b_53 = where(k_228, b_52, b_51)
+    b_54 = (where(k_228, b_51, b_52) - k_232 * b_53) * k_235
+    b_55 = (b_53 - k_230 * b_54) * k_231
+    b_56 = (b_50 - k_218 * b_55 - k_219 * b_54) * k_221
+    b_57 = (b_45 - k_194 * b_56 - k_195 * b_55 - k_196 * b_54) * k_198
+    b_58 = (b_38 - k_154 * b_57 - k_155 * b_56 - k_156 * b_55 - k_157 * b_54) * k_159
+    b_59 = (b_29 - k_94 * b_58 - k_95 * b_57 - k_96 * b_56 - k_97 * b_55 - k_98 * b_54) * k_100
     e0_link_2 = (
-        norm_link_2_e0_link_2 * b_6 - norm_link_2_e2_link_2 * b_65
-        - norm_link_2_e3_link_2 * b_64 - k_19 * b_63
+        norm_link_2_e0_link_2 * b_4 - norm_link_2_e2_link_2 * b_59
+        - norm_link_2_e3_link_2 * b_58 - k_19 * b_57
     )
     e1_link_2 = (
-        norm_link_2_e1_link_2 * b_6 - norm_link_2_e3_link_2 * b_65
-        + norm_link_2_e2_link_2 * b_64 + k_20 * b_63
+        norm_link_2_e1_link_2 * b_4 - norm_link_2_e3_link_2 * b_59
+        + norm_link_2_e2_link_2 * b_58 + k_20 * b_57
     )
     e2_link_2 = (
-        norm_link_2_e2_link_2 * b_6 + norm_link_2_e0_link_2 * b_65
-        - norm_link_2_e1_link_2 * b_64 + k_21 * b_63
+        norm_link_2_e2_link_2 * b_4 + norm_link_2_e0_link_2 * b_59
+        - norm_link_2_e1_link_2 * b_58 + k_21 * b_57
     )
     e3_link_2 = (
-        norm_link_2_e3_link_2 * b_6 + norm_link_2_e1_link_2 * b_65
-        + norm_link_2_e0_link_2 * b_64 - k_22 * b_63
+        norm_link_2_e3_link_2 * b_4 + norm_link_2_e1_link_2 * b_59
+        + norm_link_2_e0_link_2 * b_58 - k_22 * b_57
     )
     e0_link_3 = (
-        norm_link_3_e0_link_3 * b_7 - norm_link_3_e2_link_3 * b_62
-        - norm_link_3_e3_link_3 * b_61 - k_44 * b_60
+        norm_link_3_e0_link_3 * b_5 - norm_link_3_e2_link_3 * b_56
+        - norm_link_3_e3_link_3 * b_55 - k_41 * b_54
     )
     e1_link_3 = (
-        norm_link_3_e1_link_3 * b_7 - norm_link_3_e3_link_3 * b_62
-        + norm_link_3_e2_link_3 * b_61 + k_45 * b_60
+        norm_link_3_e1_link_3 * b_5 - norm_link_3_e3_link_3 * b_56
+        + norm_link_3_e2_link_3 * b_55 + k_42 * b_54
     )
     e2_link_3 = (
-        norm_link_3_e2_link_3 * b_7 + norm_link_3_e0_link_3 * b_62
-        - norm_link_3_e1_link_3 * b_61 + k_46 * b_60
+        norm_link_3_e2_link_3 * b_5 + norm_link_3_e0_link_3 * b_56
+        - norm_link_3_e1_link_3 * b_55 + k_43 * b_54
     )
     e3_link_3 = (
-        norm_link_3_e3_link_3 * b_7 + norm_link_3_e1_link_3 * b_62
-        + norm_link_3_e0_link_3 * b_61 - k_47 * b_60
+        norm_link_3_e3_link_3 * b_5 + norm_link_3_e1_link_3 * b_56
+        + norm_link_3_e0_link_3 * b_55 - k_44 * b_54
     )
     theta_second = (
         (second - second_e0_link_1 * e0_link_1 - second_e1_link_1 * e1_link_1
             - second_e2_link_1 * e2_link_1 - second_e3_link_1 * e3_link_1
             - second_e0_link_2 * e0_link_2 - second_e1_link_2 * e1_link_2
-            - second_e2_link_2 * e2_link_2 - second_e3_link_2 * e3_link_2) * k_237
+            - second_e2_link_2 * e2_link_2 - second_e3_link_2 * e3_link_2) * k_236
     )
     y_link_2 = (
-        -(b_4 - hinge_3_y_e0_link_3 * e0_link_3 - hinge_3_y_e1_link_3 * e1_link_3
+        -(b_2 - hinge_3_y_e0_link_3 * e0_link_3 - hinge_3_y_e1_link_3 * e1_link_3
             - hinge_3_y_e2_link_3 * e2_link_3 - hinge_3_y_e3_link_3 * e3_link_3)
     )
-    x_link_2 = (
-        -(b_2 - hinge_3_x_e0_link_3 * e0_link_3 - hinge_3_x_e1_link_3 * e1_link_3
-            - hinge_3_x_e2_link_3 * e2_link_3 - hinge_3_x_e3_link_3 * e3_link_3)
-    )
-    y_link_1 = hinge_1_y - b_22 - b_23 - b_24 - b_25
-    x_link_1 = hinge_1_x - b_17 - b_18 - b_19 - b_20
+    y_link_1 = hinge_1_y - b_15 - b_16 - b_17 - b_18
     z_link_1 = (
         hinge_1_z - hinge_1_z_e0_link_1 * e0_link_1 - hinge_1_z_e1_link_1 * e1_link_1
         - hinge_1_z_e2_link_1 * e2_link_1 - hinge_1_z_e3_link_1 * e3_link_1
@@ -1774,6 +1748,20 @@ def _solve(f, F, b):
         hinge_3_z + z_link_2 - hinge_3_z_e0_link_3 * e0_link_3
         - hinge_3_z_e1_link_3 * e1_link_3 - hinge_3_z_e2_link_3 * e2_link_3
         - hinge_3_z_e3_link_3 * e3_link_3
+    )
+    x_link_1 = (
+        hinge_1_x - hinge_1_x_e0_link_1 * e0_link_1 - hinge_1_x_e1_link_1 * e1_link_1
+        - hinge_1_x_e2_link_1 * e2_link_1 - hinge_1_x_e3_link_1 * e3_link_1
+    )
+    x_link_2 = (
+        hinge_2_x + x_link_1 - hinge_2_x_e0_link_2 * e0_link_2
+        - hinge_2_x_e1_link_2 * e1_link_2 - hinge_2_x_e2_link_2 * e2_link_2
+        - hinge_2_x_e3_link_2 * e3_link_2
+    )
+    x_link_3 = (
+        hinge_3_x + x_link_2 - hinge_3_x_e0_link_3 * e0_link_3
+        - hinge_3_x_e1_link_3 * e1_link_3 - hinge_3_x_e2_link_3 * e2_link_3
+        - hinge_3_x_e3_link_3 * e3_link_3
     )
     return (
         x_link_1, y_link_1, z_link_1, e0_link_1, e1_link_1, e2_link_1, e3_link_1, x_link_2,

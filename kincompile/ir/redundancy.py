@@ -11,6 +11,7 @@ from kincompile.errors import StructuralError
 from kincompile.ir.interpret import interpret
 from kincompile.model.resolve import Joint
 from kincompile.names import listed
+from kincompile.structure.choice import rows_left_out
 from kincompile.structure.counting import counting_problem
 from kincompile.structure.rank import RankReport, generic_rank
 from kincompile.structure.remedies import least_squares_will_do, surpluses
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from kincompile.model.resolve import FreeEquation
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.counting import Pattern
+    from kincompile.structure.rank import Evaluate
     from kincompile.structure.remedies import Surplus
 
 
@@ -34,15 +36,8 @@ def rank_report(
 
     The guess, shape (n,), is where it is meant to be assembled; without it, the system's own.
     """
-
-    def evaluate(
-        q: NDArray[np.float64], t: NDArray[np.float64]
-    ) -> tuple[NDArray[Any], NDArray[Any]]:
-        Phi, Phi_q, *_ = interpret(program, q, np.zeros_like(q), t)
-        return Phi, Phi_q
-
     return generic_rank(
-        evaluate,
+        _evaluation(program),
         np.array([item.guess for item in system.coordinates]) if guess is None else guess,
         np.array(turning((item.unit for item in system.coordinates), system.body_columns)),
         driver_rows(system),
@@ -50,6 +45,18 @@ def rank_report(
         float(system.end),
         system.equations,
     )
+
+
+def _evaluation(program: Program) -> Evaluate:
+    """Return what gives Phi and Phi_q at states, with default parameters."""
+
+    def evaluate(
+        q: NDArray[np.float64], t: NDArray[np.float64]
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        Phi, Phi_q, *_ = interpret(program, q, np.zeros_like(q), t)
+        return Phi, Phi_q
+
+    return evaluate
 
 
 def driver_rows(system: ConstraintSystem) -> list[int]:
@@ -69,22 +76,30 @@ def _rows(system: ConstraintSystem, wanted: Callable[[Joint | FreeEquation], boo
 
 def redundant_equations(
     system: ConstraintSystem, program: Program, pattern: Pattern
-) -> tuple[tuple[Surplus, ...], str]:
-    """Return the redundant ones of more equations than coordinates, and what is wrong with them.
+) -> tuple[tuple[str, ...], str, str]:
+    """Return which of more equations than coordinates the solve leaves out.
 
-    They depend on others at every assembled position; nothing is wrong where they agree with those.
+    They depend on others at every assembled position. With them come a warning about them, and
+    what is wrong: nothing where they agree with the others.
     """
     report = rank_report(system, program)
     found = surpluses(system, report)
     if least_squares_will_do(system, report):
-        return found, ""
+        joints = [
+            range(first, first + len(item.equation_names))
+            for item, first in zip(system.constraints, system.row_offsets, strict=True)
+            if isinstance(item, Joint) and not item.is_driver
+        ]
+        rows = rows_left_out(_evaluation(program), report, float(system.end), joints)
+        left_out = tuple(system.equations[row] for row in rows)
+        return left_out, _warning(system, found, left_out), ""
     names = [name for item in found for name in item.equations]
     sentences = [counting_problem(system, pattern, names)]
     sentences += [f"{item.text}; {item.remedy}" for item in found]
     if report.free:
         free = [system.coordinates[column].name for column in report.free]
         sentences.append(f"at assembled positions {listed(free)} may still move")
-    return found, ". ".join(sentences)
+    return (), "", ". ".join(sentences)
 
 
 def independence(
@@ -100,10 +115,12 @@ def independence(
     return equations, tuple(system.coordinates[column].name for column in report.drive)
 
 
-def redundancy_warning(system: ConstraintSystem, found: Sequence[Surplus]) -> str:
+def _warning(system: ConstraintSystem, found: Sequence[Surplus], left_out: Sequence[str]) -> str:
     """Return the warning about consistent redundant equations."""
     sentences = ". ".join(f"{item.text}; to remove it, {item.remedy}" for item in found)
+    said = {name for item in found for name in item.equations}
+    others = "" if said == set(left_out) else f". Left out of the solve are {listed(left_out)}"
     return (
         f"{system.name!r} has redundant equations: the others are solved, and whether these "
-        f"agree is checked at every point. {sentences}"
+        f"agree is checked at every point. {sentences}{others}"
     )

@@ -86,6 +86,7 @@ class RankReport:
     rank_at_start: int
     nearest: Array  # (n,): the position at the start, or the nearest to one
     residuals: Array  # (m,): Phi there
+    scale: Array  # (n,): the size of the mechanism, 1 for angles
 
 
 def generic_rank(
@@ -192,6 +193,7 @@ class _Analysis:
             rank_at_start=_rank(self._scaled(nearest, self._t[:1])[0]),
             nearest=nearest[0],
             residuals=self._evaluate(nearest, self._t[:1])[0][0],
+            scale=self._scale,
         )
 
     def _nearly_assembled(self, q: Array) -> tuple[Array, Array, float] | None:

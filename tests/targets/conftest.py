@@ -33,11 +33,7 @@ from kincompile.model.spline import PeriodicSpline
 from tests.targets import golden_rows
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.py"))
-SPACE = [
-    path
-    for path in sorted(EXAMPLES[0].with_name("space").glob("*.py"))
-    if path.stem != "bennett"  # the rows that are solved are nearly dependent on the way
-]
+SPACE = sorted(EXAMPLES[0].with_name("space").glob("*.py"))
 STATES = 4
 STEP = 30
 """Digits of a step of differences: of 120, 60 are lost in a second one, and its error is 1e-60."""

@@ -83,6 +83,21 @@ def test_bennett(target: str) -> None:
     np.testing.assert_allclose(place, list(BENNETT.values()), rtol=0, atol=1e-12)
 
 
+@quiet
+def test_that_the_rows_that_are_solved_are_independent_along_the_motion() -> None:
+    """Without z, f and g of the last hinge they are, but for a position on the way."""
+    m = bennett()
+    m.end = 4.0
+    module = kc.compile(m)
+    rows = [k for k, name in enumerate(module.EQUATIONS) if name not in module.REDUNDANT]
+    solution = kc.solve(module, np.linspace(0, 4, 401))
+    Phi_q = module.Phi_q(solution.q, solution.t)
+    ours, whole = (
+        np.linalg.svd(some, compute_uv=False)[:, -1] for some in (Phi_q[:, rows], Phi_q)
+    )
+    assert (ours > 0.03 * whole).all()
+
+
 def test_that_a_bennett_of_wrong_dimensions_is_a_structure() -> None:
     """With a hinge moved along its axis the loop still closes, in single positions."""
     m = bennett()
