@@ -19,15 +19,17 @@ import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import sympy
 
 import kincompile as kc
 from benchmarks import machine
 from benchmarks.linkages import FOUR_BAR
 from benchmarks.tables import Target, print_table, print_targets
+from kincompile.runtime.results.measures import measures_together, output_measures
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 VARIANTS, TIMES = 1_000_000, 100
 SPREAD = 0.02
 ROUNDS = 3
+MEASURED = 500
 CHUNKS = 50, 250
 """Numbers of chunks of one variant, whose times give the overhead of one."""
 
@@ -54,6 +57,7 @@ def main(variants: int) -> None:
             if number == 0:
                 found_again = killed_and_resumed(variants, Path(folder) / "killed.zarr")
         print_chunks(Path(folder))
+    print_measures()
     report(variants, found, found_again == wanted)
     print(f"{machine.description()}. Load before {before}, after {machine.load()}.")
 
@@ -170,6 +174,30 @@ def per_chunk(options: Callable[[int], dict[str, Any]]) -> float:
                 remove(own["store"])
         seconds.append(statistics.median(samples))
     return (seconds[1] - seconds[0]) / (CHUNKS[1] - CHUNKS[0]) * 1e3
+
+
+def print_measures() -> None:
+    """Print what a measure of a motion costs, all motions together and each alone."""
+    mechanism = FOUR_BAR.mechanism()
+    mechanism.output("swing", sympy.Symbol("phi_rocker"), "rad")
+    module, rng = kc.compile(mechanism), np.random.default_rng(4)
+    *lengths, _ = FOUR_BAR.parameters.items()
+    p = {name: x * (1 + SPREAD * rng.uniform(-1, 1, MEASURED)) for name, x in lengths}
+    several = kc.solve(module, FOUR_BAR.times(TIMES), p)
+    sets = np.array(list(several.parameters.values())).T
+    seconds: dict[str, list[float]] = {"together": [], "each alone": []}
+    for _ in range(ROUNDS):
+        start = process_time()
+        measures_together([several.variant(k) for k in range(MEASURED)], module, sets, ("swing",))
+        seconds["together"].append(process_time() - start)
+        start = process_time()
+        for number in range(MEASURED):
+            output_measures(several.variant(number), module, sets[number], ("swing",))
+        seconds["each alone"].append(process_time() - start)
+    least = {name: min(runs) for name, runs in seconds.items()}
+    rows = [[name, f"{x / MEASURED * 1e3:.3g}"] for name, x in least.items()]
+    rows.append(["ratio", f"{least['each alone'] / least['together']:.3g}"])
+    print_table("Measures of an output", ("motions", "ms a motion"), rows)
 
 
 def report(variants: int, found: dict[int, list[dict[str, float]]], is_same: bool) -> None:

@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from kincompile.structure.report import Inspection
     from kincompile.targets.target import Emitted
 
+    LoadableSource = tuple[str, str, Mapping[str, NDArray[Any]], Mapping[str, str]]
+
 LOG = logging.getLogger(__name__)
 
 LARGEST_INLINE = 300
@@ -250,12 +252,8 @@ def compile(  # noqa: A001 - the public name kc.compile
             cache(partial(_sensitive_module, code.program)),
         )
         if system.loads:
-            joints = {
-                item.name: tuple(body.name for body in item.bodies) for item in system.constraints
-            }
-            vars(module)[FORCES] = ForceModules(
-                cache(partial(_forces_module, code, target)), joints
-            )
+            compiled = cache(partial(_forces_module, code, target))
+            vars(module)[FORCES] = ForceModules(compiled, _joints(system))
             vars(module)[DYNAMICS] = cache(partial(_dynamic_modules, code, system, target))
     return remember_model(module, system)
 
@@ -275,9 +273,7 @@ def _loadable(target: str, system: ConstraintSystem, form: str | None) -> str:
     return target
 
 
-def emit_loadable(
-    model: Mechanism | ConstraintSystem, target: str
-) -> tuple[str, str, Mapping[str, NDArray[Any]], Mapping[str, str]]:
+def emit_loadable(model: Mechanism | ConstraintSystem, target: str) -> LoadableSource:
     """Return what another process makes the module from that `compile` gives.
 
     Returns
@@ -291,9 +287,40 @@ def emit_loadable(
         system = system_of(model)
         target = _loadable(target, system, None)
         code = _lowered(system, None)
-        native = emit_program(target, code).files if target == "c" else {}
-        emitted = emit_program("numpy", code)
-        return system.name, emitted.source, emitted.arrays, native
+        return _sources(code, target)
+
+
+def emit_forces(
+    model: Mechanism | ConstraintSystem, target: str
+) -> tuple[LoadableSource | None, LoadableSource, dict[str, tuple[str, ...]]]:
+    """Return what another process makes the forces of a mechanism from, as `emit_loadable`.
+
+    That is with the planned elimination, None where there is none; then with multipliers given; and
+    the bodies of each joint.
+    """
+    from kincompile.ir.forces import observing_forces
+
+    with _without_collector():
+        system = system_of(model)
+        target = _loadable(target, system, None)
+        code = _lowered(system, None)
+        assert isinstance(code, InlineProgram)
+        planned, given = (observing_forces(code, is_planned=x) for x in (True, False))
+        assert given is not None
+        first = None if planned is None else _sources(inline(planned), target)
+        return first, _sources(inline(given), target), _joints(system)
+
+
+def _sources(code: InlineProgram | GroupedProgram, target: str) -> LoadableSource:
+    """Return name, text and arrays of a NumPy module, and the files of C that it is to have."""
+    native = emit_program(target, code).files if target == "c" else {}
+    emitted = emit_program("numpy", code)
+    return code.program.name, emitted.source, emitted.arrays, native
+
+
+def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:
+    """Return the bodies of each constraint, by its name."""
+    return {item.name: tuple(body.name for body in item.bodies) for item in system.constraints}
 
 
 def _joint_points(system: ConstraintSystem) -> ModuleType:

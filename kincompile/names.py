@@ -16,6 +16,9 @@ RESERVED = frozenset({"t", "pi", "alpha", "deg"})
 SYMBOLS = frozenset({"a parameter", "a coordinate"})
 """What has a name that occurs in expressions."""
 
+COLUMNS = frozenset({"t", "status", "residual"})
+"""Columns that every motion has besides its own, in tables and files."""
+
 LONGEST = 60
 """Characters of a value that a message shows."""
 
@@ -47,6 +50,8 @@ def name_problem(name: object, what: str) -> str | None:
             f"{what} is named {name!r}, which is reserved (t is time, pi the number, deg a "
             "degree, alpha a cam's angle); rename it"
         )
+    if name in COLUMNS and what in SYMBOLS | {"an output"}:
+        return f"{what} is named {name!r}, which is a column of every motion; rename it"
     return None
 
 
@@ -102,6 +107,12 @@ def _given(value: object) -> str:
 def rate(name: str, order: int = 1) -> str:
     """Return the name of a coordinate's first or second time derivative; of order 0, its own."""
     return f"{name}_{'d' * order}ot" if order else name
+
+
+def rate_of(wanted: str, known: Iterable[str]) -> tuple[str, int] | None:
+    """Return the known name of which another is the rate, and its order; None where none is."""
+    names = ((name, order) for name in known for order in range(3))
+    return next((item for item in names if rate(*item) == wanted), None)
 
 
 def column_name(name: str) -> str:

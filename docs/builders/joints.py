@@ -11,6 +11,7 @@ import sympy
 
 import kincompile as kc
 from docs.builders.places import DOCS
+from docs.builders.space import alone
 from kincompile.derivation.document import Figure
 from kincompile.derivation.slides import ATTRIBUTES
 from kincompile.derivation.svg import standalone_svg
@@ -20,12 +21,16 @@ from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from kincompile import spatial
     from kincompile.derivation.derivation import Derivation
     from kincompile.model.constraint import Constraint
 
 BEGIN, END = "<!-- catalogue -->\n", "<!-- end of catalogue -->\n"
 SPACE, END_OF_SPACE = "<!-- catalogue of space -->\n", "<!-- end of catalogue of space -->\n"
 """What stands between these lines of the page is written here."""
+
+PICTURED = {name: kind for name, kind in IN_SPACE.items() if not kind.is_own}
+"""The types in space but the norm of a body, which has no vectors."""
 
 
 def catalogue_text() -> str:
@@ -44,7 +49,9 @@ def catalogue_text() -> str:
 
 def pictures() -> dict[str, str]:
     """Return the picture of each type by the name of its file."""
-    return {f"joint_{name}.svg": _picture(_derivation(kind)) for name, kind in CONSTRAINTS.items()}
+    plane = {f"joint_{name}.svg": mechanism_of(kind) for name, kind in CONSTRAINTS.items()}
+    space = {f"space_{name}.svg": alone(kind) for name, kind in PICTURED.items()}
+    return {name: _picture(_derivation(m)) for name, m in (plane | space).items()}
 
 
 def _section(kind: type[Constraint]) -> Iterator[str]:
@@ -54,7 +61,7 @@ def _section(kind: type[Constraint]) -> Iterator[str]:
     yield from (f"## {name}", "", first, *rest, "")
     yield from (f"Known as: {kind.known_as}. In the textbook: {kind.source}.", "")
     yield from (f"![{name} with the vectors of its equation](images/joint_{name}.svg)", "")
-    yield from (_equation(_derivation(kind)), "")
+    yield from (_equation(_derivation(mechanism_of(kind))), "")
     yield from (kind.positive, "")
     yield from ("```python", *kind.use, "```", "")
 
@@ -66,7 +73,7 @@ def mechanism_of(kind: type[Constraint]) -> kc.Mechanism:
     return m
 
 
-def assembled(m: kc.Mechanism) -> dict[str, float]:
+def assembled(m: kc.Mechanism | spatial.Mechanism) -> dict[str, float]:
     """Return the position nearest to the guess at which the constraint holds."""
     module = kc.compile(m)
     q = module.GUESS.copy()
@@ -78,8 +85,7 @@ def assembled(m: kc.Mechanism) -> dict[str, float]:
     return dict(zip(module.COORDINATES, q.tolist(), strict=True))
 
 
-def _derivation(kind: type[Constraint]) -> Derivation:
-    m = mechanism_of(kind)
+def _derivation(m: kc.Mechanism | spatial.Mechanism) -> Derivation:
     (constraint,) = m.constraints
     found = kc.derivation(m, assembled(m), constraint=constraint.name, levels=("vector",))
     return cast("Derivation", found)
@@ -106,7 +112,7 @@ def page() -> str:
     text = (DOCS / "joints.md").read_text(encoding="utf-8")
     for begin, written, end in (
         (BEGIN, catalogue_text(), END),
-        (SPACE, space_table(), END_OF_SPACE),
+        (SPACE, f"{space_table()}\n{space_gallery()}", END_OF_SPACE),
     ):
         before, rest = text.split(begin)
         text = before + begin + written + end + rest.split(end)[1]
@@ -124,3 +130,13 @@ def space_table() -> str:
         arguments = ", ".join(kind.arguments())
         rows.append(f"| `{name}` | {what} | {arguments} | {max(len(kind.row_names), 1)} |")
     return "\n".join(rows) + "\n"
+
+
+def space_gallery() -> str:
+    """Return the types in space, each with its equations and the vectors in them."""
+    lines = []
+    for name, kind in PICTURED.items():
+        rows = inspect.cleandoc(str(kind.Phi.__doc__)).partition("\n")[0].removeprefix("Return ")
+        shown = f"![spatial.{name} with the vectors of its equations](images/space_{name}.svg)"
+        lines += [f"### spatial.{name}", "", f"Phi: {rows}", "", shown, ""]
+    return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""The picture of what joints in space look like."""
+"""The pictures of joints in space: what they look like, and a mechanism of each for its vectors."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kincompile import spatial
+from kincompile.model.arguments import Kind
 from kincompile.view.drawing import drawing
 from kincompile.view.svg import as_svg
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+    from kincompile.model.constraint import Constraint
 
 X, Y, Z = np.eye(3)
 ORIGIN = np.zeros(3)
@@ -55,3 +59,45 @@ def joints_in_space() -> str:
     q = np.array([float(item.guess) for item in m.system().coordinates])
     drawn = replace(drawing(m), size=SIZE)
     return as_svg(drawn, q[None], "Joints in space: the ground is grey, the body coloured.")
+
+
+VECTORS = {
+    "s_i": (0.11, 0.04, 0.17),
+    "s_j": (-0.13, 0.02, 0.11),
+    "h_i": (0.3, 0.2, 1),
+    "f_i": (1, 0, 0),
+    "h_j": (0.2, 0, 1),
+    "f_j": (0.9, 0.5, 0),
+    "a_i": (0, 0.5, 0.8),
+    "a_j": (0.8, 0.2, 0.4),
+    "c": (0.1, -0.12, 0.05),
+    "u": (0.1, -0.2, 0.3),
+}
+"""Points and directions of a constraint in the frames of its bodies, by symbol."""
+
+CROSSED = {"h_j": (0.3, 1, 0), "f_j": (-0.4, 1, 0)}
+"""Those where a right angle is kept."""
+
+STANDS = {"i": ((0.02, 0.16, -0.06), (0.2, -0.1, 0.4)), "j": ((0.28, 0.36, 0.0), (-0.1, 0.3, -0.3))}
+"""Place and rotation vector [rad] of each body."""
+
+LENGTH, ANGLE = 0.12, 0.7
+"""Lengths and angles that a constraint is given."""
+
+
+def alone(kind: type[Constraint]) -> spatial.Mechanism:
+    """Return a mechanism of two bodies with one constraint of a type."""
+    m = spatial.Mechanism(kind.__name__)
+    given: dict[str, Any] = {}
+    crossed = [symbol for symbol in getattr(kind, "right_angle", ()) if symbol in CROSSED]
+    vectors = {**VECTORS, **{symbol: CROSSED[symbol] for symbol in crossed}}
+    for name, item in kind.arguments().items():
+        if item.kind is Kind.BODY:
+            place, turn = STANDS[item.symbol]
+            given[name] = m.body(item.symbol, place, Rotation.from_rotvec(turn))
+        elif item.symbol in vectors:
+            given[name] = vectors[item.symbol]
+        else:
+            given[name] = ANGLE if item.unit == "rad" else LENGTH
+    m.add(kind("joint", **given))
+    return m

@@ -35,7 +35,7 @@ import numpy as np
 
 NAME = "double_universal_joint"
 FORMAT = 3
-FINGERPRINT = "7801119a79b22577b9f30ae363bbd76c"
+FINGERPRINT = "8bef08d62a789fb6dab021d9e595aea6"
 N_COORDINATES, N_EQUATIONS = 23, 23
 COORDINATES = (
     "x_first", "y_first", "z_first", "e0_first", "e1_first", "e2_first", "e3_first", "x_middle",
@@ -63,21 +63,23 @@ GUESS = np.array((
 ), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
 PATTERN = np.array((
-    (0, 0), (1, 1), (2, 2), (3, 3), (3, 4), (3, 5), (3, 6), (4, 3), (4, 4), (4, 5), (4, 6),
-    (5, 0), (5, 7), (6, 1), (6, 8), (7, 2), (7, 9), (8, 3), (8, 4), (8, 5), (8, 6), (8, 10),
-    (8, 11), (8, 12), (8, 13), (9, 7), (9, 10), (9, 11), (9, 12), (9, 13), (9, 14), (10, 8),
-    (10, 10), (10, 11), (10, 12), (10, 13), (10, 15), (11, 9), (11, 10), (11, 11), (11, 12),
-    (11, 13), (11, 16), (12, 10), (12, 11), (12, 12), (12, 13), (12, 17), (12, 18), (12, 19),
-    (12, 20), (13, 17), (13, 18), (13, 19), (13, 20), (14, 17), (14, 18), (14, 19), (14, 20),
-    (15, 15), (16, 16), (17, 3), (17, 4), (17, 5), (17, 6), (18, 10), (18, 11), (18, 12),
+    (0, 0), (0, 3), (0, 4), (0, 5), (0, 6), (1, 1), (1, 3), (1, 4), (1, 5), (1, 6), (2, 2),
+    (2, 3), (2, 4), (2, 5), (2, 6), (3, 3), (3, 4), (3, 5), (3, 6), (4, 3), (4, 4), (4, 5),
+    (4, 6), (5, 0), (5, 7), (6, 1), (6, 8), (7, 2), (7, 9), (8, 3), (8, 4), (8, 5), (8, 6),
+    (8, 10), (8, 11), (8, 12), (8, 13), (9, 7), (9, 10), (9, 11), (9, 12), (9, 13), (9, 14),
+    (10, 8), (10, 10), (10, 11), (10, 12), (10, 13), (10, 15), (11, 9), (11, 10), (11, 11),
+    (11, 12), (11, 13), (11, 16), (12, 10), (12, 11), (12, 12), (12, 13), (12, 17), (12, 18),
+    (12, 19), (12, 20), (13, 17), (13, 18), (13, 19), (13, 20), (14, 17), (14, 18), (14, 19),
+    (14, 20), (15, 15), (15, 17), (15, 18), (15, 19), (15, 20), (16, 16), (16, 17), (16, 18),
+    (16, 19), (16, 20), (17, 3), (17, 4), (17, 5), (17, 6), (18, 10), (18, 11), (18, 12),
     (18, 13), (18, 21), (19, 17), (19, 18), (19, 19), (19, 20), (19, 22), (20, 3), (20, 4),
     (20, 5), (20, 6), (21, 10), (21, 11), (21, 12), (21, 13), (22, 17), (22, 18), (22, 19),
     (22, 20),
 ), dtype=int).reshape(-1, 2)
 # number in the pattern and value of the entries that never change
 _CONSTANTS = {
-    0: 1.0, 1: 1.0, 2: 1.0, 11: -1.0, 12: 1.0, 13: -1.0, 14: 1.0, 15: -1.0, 16: 1.0, 25: -1.0,
-    30: 1.0, 31: -1.0, 36: 1.0, 37: -1.0, 42: 1.0, 59: 1.0, 60: 1.0,
+    0: 1.0, 5: 1.0, 10: 1.0, 23: -1.0, 24: 1.0, 25: -1.0, 26: 1.0, 27: -1.0, 28: 1.0, 37: -1.0,
+    42: 1.0, 43: -1.0, 48: 1.0, 49: -1.0, 54: 1.0, 71: 1.0, 76: 1.0,
 }
 
 
@@ -90,67 +92,74 @@ def _position(f, q, t, p):
     beta, phase, length, speed = p
     atan2, cos, sin, sqrt = f.atan2, f.cos, f.sin, f.sqrt
     # body frames: A = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~
-    frame_1 = e2_first + e2_first
-    frame_2 = e1_first * frame_1
-    frame_3 = e3_first + e3_first
-    frame_4 = e0_first * frame_3
     e0_first_sq = e0_first**2
     e3_first_sq = e3_first**2
+    frame_3 = e0_first_sq - e3_first_sq
     e1_first_sq = e1_first**2
     e2_first_sq = e2_first**2
-    A12_first = frame_2 - frame_4
-    A21_first = frame_2 + frame_4
-    A22_first = e0_first_sq - e3_first_sq - (e1_first_sq - e2_first_sq)
-    A31_first = e1_first * frame_3 - e0_first * frame_1
-    A32_first = e2_first * frame_3 + e0_first * (e1_first + e1_first)
+    frame_6 = e1_first_sq - e2_first_sq
+    frame_7 = e2_first + e2_first
+    frame_8 = e1_first * frame_7
+    frame_9 = e3_first + e3_first
+    frame_10 = e0_first * frame_9
+    A11_first = frame_3 + frame_6
+    A12_first = frame_8 - frame_10
+    A21_first = frame_8 + frame_10
+    A22_first = frame_3 - frame_6
+    A31_first = e1_first * frame_9 - e0_first * frame_7
+    A32_first = e2_first * frame_9 + e0_first * (e1_first + e1_first)
     e0_middle_sq = e0_middle**2
     e3_middle_sq = e3_middle**2
     frame_3_ = e0_middle_sq - e3_middle_sq
     e1_middle_sq = e1_middle**2
     e2_middle_sq = e2_middle**2
-    frame_6 = e1_middle_sq - e2_middle_sq
-    frame_7 = e2_middle + e2_middle
-    frame_8 = e1_middle * frame_7
-    frame_9 = e3_middle + e3_middle
-    frame_10 = e0_middle * frame_9
-    frame_11 = e1_middle * frame_9
-    frame_12 = e0_middle * frame_7
-    frame_13 = e2_middle * frame_9
+    frame_6_ = e1_middle_sq - e2_middle_sq
+    frame_7_ = e2_middle + e2_middle
+    e1_middle_frame_7_ = e1_middle * frame_7_
+    frame_9_ = e3_middle + e3_middle
+    e0_middle_frame_9_ = e0_middle * frame_9_
+    e1_middle_frame_9_ = e1_middle * frame_9_
+    e0_middle_frame_7_ = e0_middle * frame_7_
+    e2_middle_frame_9_ = e2_middle * frame_9_
     frame_14 = e0_middle * (e1_middle + e1_middle)
-    A11_middle = frame_3_ + frame_6
-    A12_middle = frame_8 - frame_10
-    A13_middle = frame_11 + frame_12
-    A21_middle = frame_8 + frame_10
-    A22_middle = frame_3_ - frame_6
-    A23_middle = frame_13 - frame_14
-    A31_middle = frame_11 - frame_12
-    A32_middle = frame_13 + frame_14
+    A11_middle = frame_3_ + frame_6_
+    A12_middle = e1_middle_frame_7_ - e0_middle_frame_9_
+    A13_middle = e1_middle_frame_9_ + e0_middle_frame_7_
+    A21_middle = e1_middle_frame_7_ + e0_middle_frame_9_
+    A22_middle = frame_3_ - frame_6_
+    A23_middle = e2_middle_frame_9_ - frame_14
+    A31_middle = e1_middle_frame_9_ - e0_middle_frame_7_
+    A32_middle = e2_middle_frame_9_ + frame_14
     A33_middle = e0_middle_sq + e3_middle_sq - (e1_middle_sq + e2_middle_sq)
-    frame_1_ = e2_last + e2_last
-    e1_last_frame_1_ = e1_last * frame_1_
+    frame_1 = e2_last + e2_last
+    frame_2 = e1_last * frame_1
     frame_3_2 = e3_last + e3_last
-    frame_4_ = e0_last * frame_3_2
+    frame_4 = e0_last * frame_3_2
     frame_5 = e1_last * frame_3_2
-    e0_last_frame_1_ = e0_last * frame_1_
+    frame_6_2 = e0_last * frame_1
     e0_last_sq = e0_last**2
     e3_last_sq = e3_last**2
     e1_last_sq = e1_last**2
     e2_last_sq = e2_last**2
-    frame_11_ = e2_last * frame_3_2
-    frame_12_ = e0_last * (e1_last + e1_last)
-    A12_last = e1_last_frame_1_ - frame_4_
-    A13_last = frame_5 + e0_last_frame_1_
-    A21_last = e1_last_frame_1_ + frame_4_
+    frame_11 = e2_last * frame_3_2
+    frame_12 = e0_last * (e1_last + e1_last)
+    A12_last = frame_2 - frame_4
+    A13_last = frame_5 + frame_6_2
+    A21_last = frame_2 + frame_4
     A22_last = e0_last_sq - e3_last_sq - (e1_last_sq - e2_last_sq)
-    A23_last = frame_11_ - frame_12_
-    A31_last = frame_5 - e0_last_frame_1_
-    A32_last = frame_11_ + frame_12_
+    A23_last = frame_11 - frame_12
+    A31_last = frame_5 - frame_6_2
+    A32_last = frame_11 + frame_12
     A33_last = e0_last_sq + e3_last_sq - (e1_last_sq + e2_last_sq)
     # 0-4  Revolute "bearing"
-    bearing_1 = 2 * e3_first
-    bearing_2 = 2 * e2_first
-    bearing_3 = 2 * e1_first
-    bearing_4 = 2 * e0_first
+    bearing_1 = 0.2 * e0_first
+    bearing_2 = 0.2 * e1_first
+    bearing_3 = 0.2 * e2_first
+    bearing_4 = 0.2 * e3_first
+    bearing_5 = 2 * e3_first
+    bearing_6 = 2 * e2_first
+    bearing_7 = 2 * e1_first
+    bearing_8 = 2 * e0_first
     # 5-8  Universal "U"
     U_1 = 2 * e2_middle
     U_2 = 2 * e1_middle
@@ -193,17 +202,21 @@ def _position(f, q, t, p):
     V_34 = V_27 * V_12 + V_28 * V_13
     # 13-16  Cylindrical "end"
     sin_beta = sin(beta)
+    end_2 = 0.2 * e3_last
+    end_3 = 0.2 * e2_last
+    end_4 = 0.2 * e1_last
+    end_5 = 0.2 * e0_last
     # 17  RelativeRotation "motor"
     motor_C = speed * t
     cos_motor_C = cos(motor_C)
     sin_motor_C = sin(motor_C)
     motor_4 = A32_first * cos_motor_C - A22_first * sin_motor_C
     motor_5 = A22_first * cos_motor_C + A32_first * sin_motor_C
-    motor_6 = bearing_3 * cos_motor_C - bearing_4 * sin_motor_C
-    motor_7 = bearing_4 * cos_motor_C + bearing_3 * sin_motor_C
+    motor_6 = bearing_7 * cos_motor_C - bearing_8 * sin_motor_C
+    motor_7 = bearing_8 * cos_motor_C + bearing_7 * sin_motor_C
     motor_8 = 1 / (motor_4**2 + motor_5**2)
-    motor_9 = bearing_1 * cos_motor_C - bearing_2 * sin_motor_C
-    motor_10 = bearing_2 * cos_motor_C + bearing_1 * sin_motor_C
+    motor_9 = bearing_5 * cos_motor_C - bearing_6 * sin_motor_C
+    motor_10 = bearing_6 * cos_motor_C + bearing_5 * sin_motor_C
     # 18  JointAngle "middle"
     middle_1 = sqrt(sin_beta**2 + cos_beta_sq)
     middle_g_i_x = sin_beta / middle_1
@@ -232,11 +245,11 @@ def _position(f, q, t, p):
     last_10 = V_27 * cos_theta_last + V_28 * sin_theta_last
     return (
         # Phi
-        # 0-4  Revolute "bearing": ground (0, 0, 0) axis (1, 0, 0) - first (0, 0, 0) axis (1, 0,
-        #      0)
-        x_first,
-        y_first,
-        z_first,
+        # 0-4  Revolute "bearing": ground (-0.1, 0, 0) axis (1, 0, 0) - first (-0.1, 0, 0) axis
+        #      (1, 0, 0)
+        x_first - 0.1 * A11_first + 0.1,
+        y_first - 0.1 * A21_first,
+        z_first - 0.1 * A31_first,
         A21_first,
         A31_first,
         # 5-8  Universal "U": first (0, 0, 0) axis (0, 1, 0) - middle (0, 0, 0) axis (0, 0, 1)
@@ -250,12 +263,12 @@ def _position(f, q, t, p):
         y_last - y_middle - A21_middle * length,
         z_last - z_middle - A31_middle * length,
         V_h_i_x * V_h_j_x + V_h_i_y * V_h_j_y + V_h_i_z * V_h_j_z,
-        # 13-16  Cylindrical "end": ground (length*cos(beta), length*sin(beta), 0) axis (1, 0, 0)
-        #      - last (0, 0, 0) axis (1, 0, 0)
+        # 13-16  Cylindrical "end": ground (length*cos(beta) + 0.1, length*sin(beta), 0) axis (1,
+        #      0, 0) - last (0.1, 0, 0) axis (1, 0, 0)
         A21_last,
         A31_last,
-        y_last - length * sin_beta,
-        z_last,
+        y_last + 0.1 * A21_last - length * sin_beta,
+        z_last + 0.1 * A31_last,
         # 17  RelativeRotation "motor": ground axis (1, 0, 0) axis (0, 1, 0) - first axis (1, 0,
         #      0) axis (0, 1, 0) angle speed*t
         atan2(motor_4, motor_5),
@@ -272,18 +285,30 @@ def _position(f, q, t, p):
         # 22  Normalization "norm_last": last
         e0_last_sq + e1_last_sq + e2_last_sq + e3_last_sq - 1,
         # Phi_q
-        bearing_1,  # bearing.f by e0_first
-        bearing_2,  # bearing.f by e1_first
-        bearing_3,  # bearing.f by e2_first
-        bearing_4,  # bearing.f by e3_first
-        -bearing_2,  # bearing.g by e0_first
-        bearing_1,  # bearing.g by e1_first
-        -bearing_4,  # bearing.g by e2_first
-        bearing_3,  # bearing.g by e3_first
-        bearing_4 * A23_middle - bearing_1 * A13_middle + bearing_3 * A33_middle,  # U.cross by e0_first
-        bearing_2 * A13_middle - bearing_3 * A23_middle + bearing_4 * A33_middle,  # U.cross by e1_first
-        bearing_3 * A13_middle + bearing_2 * A23_middle + bearing_1 * A33_middle,  # U.cross by e2_first
-        bearing_2 * A33_middle - (bearing_1 * A23_middle + bearing_4 * A13_middle),  # U.cross by e3_first
+        -bearing_1,  # bearing.x by e0_first
+        -bearing_2,  # bearing.x by e1_first
+        bearing_3,  # bearing.x by e2_first
+        bearing_4,  # bearing.x by e3_first
+        -bearing_4,  # bearing.y by e0_first
+        -bearing_3,  # bearing.y by e1_first
+        -bearing_2,  # bearing.y by e2_first
+        -bearing_1,  # bearing.y by e3_first
+        bearing_3,  # bearing.z by e0_first
+        -bearing_4,  # bearing.z by e1_first
+        bearing_1,  # bearing.z by e2_first
+        -bearing_2,  # bearing.z by e3_first
+        bearing_5,  # bearing.f by e0_first
+        bearing_6,  # bearing.f by e1_first
+        bearing_7,  # bearing.f by e2_first
+        bearing_8,  # bearing.f by e3_first
+        -bearing_6,  # bearing.g by e0_first
+        bearing_5,  # bearing.g by e1_first
+        -bearing_8,  # bearing.g by e2_first
+        bearing_7,  # bearing.g by e3_first
+        bearing_8 * A23_middle - bearing_5 * A13_middle + bearing_7 * A33_middle,  # U.cross by e0_first
+        bearing_6 * A13_middle - bearing_7 * A23_middle + bearing_8 * A33_middle,  # U.cross by e1_first
+        bearing_7 * A13_middle + bearing_6 * A23_middle + bearing_5 * A33_middle,  # U.cross by e2_first
+        bearing_6 * A33_middle - (bearing_5 * A23_middle + bearing_8 * A13_middle),  # U.cross by e3_first
         A12_first * U_1 - A22_first * U_2 + A32_first * U_3,  # U.cross by e0_middle
         A12_first * U_4 - A22_first * U_3 - A32_first * U_2,  # U.cross by e1_middle
         A12_first * U_3 + A22_first * U_4 - A32_first * U_1,  # U.cross by e2_middle
@@ -316,6 +341,14 @@ def _position(f, q, t, p):
         V_28,  # end.parallel_g by e1_last
         -V_30,  # end.parallel_g by e2_last
         V_31,  # end.parallel_g by e3_last
+        end_2,  # end.line_f by e0_last
+        end_3,  # end.line_f by e1_last
+        end_4,  # end.line_f by e2_last
+        end_5,  # end.line_f by e3_last
+        -end_3,  # end.line_g by e0_last
+        end_2,  # end.line_g by e1_last
+        -end_5,  # end.line_g by e2_last
+        end_4,  # end.line_g by e3_last
         (motor_5 * motor_6 - motor_4 * motor_7) * motor_8,  # motor by e0_first
         (motor_5 * motor_7 + motor_4 * motor_6) * motor_8,  # motor by e1_first
         (motor_5 * motor_9 - motor_4 * motor_10) * motor_8,  # motor by e2_first
@@ -334,10 +367,10 @@ def _position(f, q, t, p):
         (last_4 * last_9 - last_3 * last_10) * last_8,  # last by e2_last
         -(last_4 * last_10 + last_3 * last_9) * last_8,  # last by e3_last
         -last_7 * last_8,  # last by theta_last
-        bearing_4,  # norm_first by e0_first
-        bearing_3,  # norm_first by e1_first
-        bearing_2,  # norm_first by e2_first
-        bearing_1,  # norm_first by e3_first
+        bearing_8,  # norm_first by e0_first
+        bearing_7,  # norm_first by e1_first
+        bearing_6,  # norm_first by e2_first
+        bearing_5,  # norm_first by e3_first
         U_3,  # norm_middle by e0_middle
         U_2,  # norm_middle by e1_middle
         U_1,  # norm_middle by e2_middle
@@ -428,51 +461,58 @@ def _gamma(f, q, q_dot, t, p):
     A23_last = e2_last_frame_2_ - frame_8_
     A32_last = e2_last_frame_2_ + frame_8_
     A33_last = e0_last_sq + e3_last_sq - (e1_last_sq + e2_last_sq)
-    bearing_1 = e2_first_dot + e2_first_dot
-    bearing_2 = bearing_1 + bearing_1
-    bearing_3 = e1_first_dot * bearing_2
-    bearing_4 = e3_first_dot + e3_first_dot
-    bearing_5 = bearing_4 + bearing_4
-    bearing_6 = e0_first_dot * bearing_5
-    U_1 = e0_first_dot + e0_first_dot
-    U_2 = e1_first_dot + e1_first_dot
-    U_3 = (
-        e0_first_dot * U_1 - e3_first_dot * bearing_4
-        - (e1_first_dot * U_2 - e2_first_dot * bearing_1)
+    bearing_1 = e0_first_dot + e0_first_dot
+    bearing_2 = e3_first_dot + e3_first_dot
+    bearing_3 = e0_first_dot * bearing_1 - e3_first_dot * bearing_2
+    bearing_4 = e1_first_dot + e1_first_dot
+    bearing_5 = e2_first_dot + e2_first_dot
+    bearing_6 = e1_first_dot * bearing_4 - e2_first_dot * bearing_5
+    bearing_7 = bearing_5 + bearing_5
+    bearing_8 = e1_first_dot * bearing_7
+    bearing_9 = bearing_2 + bearing_2
+    bearing_10 = e0_first_dot * bearing_9
+    bearing_11 = bearing_8 + bearing_10
+    bearing_12 = e1_first_dot * bearing_9 - e0_first_dot * bearing_7
+    U_1 = bearing_3 - bearing_6
+    U_2 = e2_first_dot * bearing_9 + e0_first_dot * (bearing_4 + bearing_4)
+    U_3 = e3_middle_dot + e3_middle_dot
+    U_4 = e1_middle_dot + e1_middle_dot
+    U_5 = e2_middle_dot + e2_middle_dot
+    U_6 = e0_middle_dot + e0_middle_dot
+    U_7 = e1_middle * U_3 + U_4 * e3_middle + (e0_middle * U_5 + U_6 * e2_middle)
+    U_8 = (
+        e0_first * bearing_1 - e3_first * bearing_2
+        - (e1_first * bearing_4 - e2_first * bearing_5)
     )
-    U_4 = e2_first_dot * bearing_5 + e0_first_dot * (U_2 + U_2)
-    U_5 = e3_middle_dot + e3_middle_dot
-    U_6 = e1_middle_dot + e1_middle_dot
-    U_7 = e2_middle_dot + e2_middle_dot
-    U_8 = e0_middle_dot + e0_middle_dot
-    U_9 = e1_middle * U_5 + U_6 * e3_middle + (e0_middle * U_7 + U_8 * e2_middle)
-    U_10 = e0_first * U_1 - e3_first * bearing_4 - (e1_first * U_2 - e2_first * bearing_1)
-    U_11 = e2_middle * U_5 + U_7 * e3_middle
-    U_12 = e0_middle * U_6 + U_8 * e1_middle
-    U_13 = U_11 - U_12
-    U_14 = e2_first * bearing_4 + bearing_1 * e3_first + (e0_first * U_2 + U_1 * e1_first)
-    U_15 = e0_middle * U_8
-    U_16 = e3_middle * U_5
-    U_17 = e1_middle * U_6
-    U_18 = e2_middle * U_7
-    U_19 = U_15 + U_16 - (U_17 + U_18)
+    U_9 = e2_middle * U_3 + U_5 * e3_middle
+    U_10 = e0_middle * U_4 + U_6 * e1_middle
+    U_11 = U_9 - U_10
+    U_12 = (
+        e2_first * bearing_2 + bearing_5 * e3_first
+        + (e0_first * bearing_4 + bearing_1 * e1_first)
+    )
+    U_13 = e0_middle * U_6
+    U_14 = e3_middle * U_3
+    U_15 = e1_middle * U_4
+    U_16 = e2_middle * U_5
+    U_17 = U_13 + U_14 - (U_15 + U_16)
+    U_18 = U_3 + U_3
+    U_19 = e1_middle_dot * U_18
     U_20 = U_5 + U_5
-    U_21 = e1_middle_dot * U_20
-    U_22 = U_7 + U_7
-    U_23 = e0_middle_dot * U_22
-    U_24 = U_21 + U_23
-    U_25 = e2_middle_dot * U_20
-    U_26 = e0_middle_dot * (U_6 + U_6)
-    U_27 = U_25 - U_26
-    U_28 = e0_middle_dot * U_8
-    U_29 = e3_middle_dot * U_5
-    U_30 = e1_middle_dot * U_6
-    U_31 = e2_middle_dot * U_7
-    U_32 = U_28 + U_29 - (U_30 + U_31)
-    V_1 = U_28 - U_29
-    V_2 = U_30 - U_31
-    V_3 = e1_middle_dot * U_22
-    V_4 = e0_middle_dot * U_20
+    U_21 = e0_middle_dot * U_20
+    U_22 = U_19 + U_21
+    U_23 = e2_middle_dot * U_18
+    U_24 = e0_middle_dot * (U_4 + U_4)
+    U_25 = U_23 - U_24
+    U_26 = e0_middle_dot * U_6
+    U_27 = e3_middle_dot * U_3
+    U_28 = e1_middle_dot * U_4
+    U_29 = e2_middle_dot * U_5
+    U_30 = U_26 + U_27 - (U_28 + U_29)
+    V_1 = U_26 - U_27
+    V_2 = U_28 - U_29
+    V_3 = e1_middle_dot * U_20
+    V_4 = e0_middle_dot * U_18
     cos_phase = cos(phase)
     sin_phase = sin(phase)
     sin_phase_sq = sin_phase**2
@@ -511,20 +551,22 @@ def _gamma(f, q, q_dot, t, p):
     V_40 = e0_last_dot * (V_18 + V_18)
     V_41 = V_39 - V_40
     V_42 = V_35 + V_36 - (V_37 + V_38)
+    end_1 = V_30 + V_32
+    end_2 = V_33 - V_34
     motor_C = speed * t
     cos_motor_C = cos(motor_C)
     A22_first_cos_motor_C = A22_first * cos_motor_C
     sin_motor_C = sin(motor_C)
     A32_first_sin_motor_C = A32_first * sin_motor_C
     motor_6 = A22_first_cos_motor_C + A32_first_sin_motor_C
-    motor_7 = U_14 * cos_motor_C
-    motor_8 = U_10 * sin_motor_C
+    motor_7 = U_12 * cos_motor_C
+    motor_8 = U_8 * sin_motor_C
     motor_9 = motor_7 - motor_8
     A32_first_cos_motor_C = A32_first * cos_motor_C
     A22_first_sin_motor_C = A22_first * sin_motor_C
     motor_12 = A32_first_cos_motor_C - A22_first_sin_motor_C
-    motor_13 = U_10 * cos_motor_C
-    motor_14 = U_14 * sin_motor_C
+    motor_13 = U_8 * cos_motor_C
+    motor_14 = U_12 * sin_motor_C
     motor_15 = motor_13 + motor_14
     motor_16 = motor_6 * motor_9 - motor_12 * motor_15
     motor_17 = motor_12**2 + motor_6**2
@@ -548,25 +590,25 @@ def _gamma(f, q, q_dot, t, p):
     sin_theta_middle = sin(theta_middle)
     middle_9 = middle_7 * sin_theta_middle
     middle_10 = middle_2 + middle_9
-    middle_11 = middle_g_i_x * U_9 - middle_6 * U_13
+    middle_11 = middle_g_i_x * U_7 - middle_6 * U_11
     middle_12 = (
-        middle_11 * cos_theta_middle - middle_9 * theta_middle_dot - U_19 * sin_theta_middle
+        middle_11 * cos_theta_middle - middle_9 * theta_middle_dot - U_17 * sin_theta_middle
         - middle_2 * theta_middle_dot
     )
     middle_13 = middle_7 * cos_theta_middle
     middle_14 = A33_middle * sin_theta_middle
     middle_15 = middle_13 - middle_14
     middle_16 = (
-        U_19 * cos_theta_middle - middle_14 * theta_middle_dot + middle_11 * sin_theta_middle
+        U_17 * cos_theta_middle - middle_14 * theta_middle_dot + middle_11 * sin_theta_middle
         + middle_13 * theta_middle_dot
     )
     middle_17 = middle_15**2 + middle_10**2
     middle_18 = 2 * middle_7
     middle_19 = 2 * A33_middle
-    middle_20 = middle_g_i_x * U_24 - middle_6 * U_27
+    middle_20 = middle_g_i_x * U_22 - middle_6 * U_25
     middle_21 = 2 * middle_11
     theta_middle_dot_sq = theta_middle_dot**2
-    middle_23 = 2 * U_19
+    middle_23 = 2 * U_17
     cos_theta_last = cos(theta_last)
     A33_last_cos_theta_last = A33_last * cos_theta_last
     sin_theta_last = sin(theta_last)
@@ -590,50 +632,50 @@ def _gamma(f, q, q_dot, t, p):
     theta_last_dot_sq = theta_last_dot**2
     last_16 = 2 * V_28
     return (
-        # 0-4  Revolute "bearing": ground (0, 0, 0) axis (1, 0, 0) - first (0, 0, 0) axis (1, 0,
-        #      0)
-        0,
-        0,
-        0,
-        -(bearing_3 + bearing_6),
-        -(e1_first_dot * bearing_5 - e0_first_dot * bearing_2),
+        # 0-4  Revolute "bearing": ground (-0.1, 0, 0) axis (1, 0, 0) - first (-0.1, 0, 0) axis
+        #      (1, 0, 0)
+        0.1 * (bearing_3 + bearing_6),
+        0.1 * bearing_11,
+        0.1 * bearing_12,
+        -bearing_11,
+        -bearing_12,
         # 5-8  Universal "U": first (0, 0, 0) axis (0, 1, 0) - middle (0, 0, 0) axis (0, 0, 1)
         0,
         0,
         0,
-        -((bearing_3 - bearing_6) * A13_middle + U_3 * A23_middle + U_4 * A33_middle
-                + 2 * ((e1_first * bearing_1 + U_2 * e2_first
-                        - (e0_first * bearing_4 + U_1 * e3_first)) * U_9
-                    + U_10 * U_13 + U_14 * U_19)
-                + (A12_first * U_24 + A22_first * U_27 + A32_first * U_32)),
+        -((bearing_8 - bearing_10) * A13_middle + U_1 * A23_middle + U_2 * A33_middle
+                + 2 * ((e1_first * bearing_5 + bearing_4 * e2_first
+                        - (e0_first * bearing_2 + bearing_1 * e3_first)) * U_7
+                    + U_8 * U_11 + U_12 * U_17)
+                + (A12_first * U_22 + A22_first * U_25 + A32_first * U_30)),
         # 9-12  Universal "V": middle (length, 0, 0) axis (0, -sin(phase), cos(phase)) - last (0,
         #      0, 0) axis (0, cos(phase), sin(phase)*cos(beta))
         (V_1 + V_2) * length,
         (V_3 + V_4) * length,
-        (U_21 - U_23) * length,
-        -((U_24 * V_10 - (V_3 - V_4) * V_11) * (A12_last * V_15 + A13_last * V_16)
-                + (U_27 * V_10 - (V_1 - V_2) * V_11) * (A22_last * V_15 + A23_last * V_16)
-                + (U_32 * V_10 - (U_25 + U_26) * V_11) * (A32_last * V_15 + A33_last * V_16)
-                + 2 * ((U_9 * V_10
-                        - (e1_middle * U_7 + U_6 * e2_middle
-                            - (e0_middle * U_5 + U_8 * e3_middle)) * V_11) * ((e1_last * V_17 + V_18 * e2_last
+        (U_19 - U_21) * length,
+        -((U_22 * V_10 - (V_3 - V_4) * V_11) * (A12_last * V_15 + A13_last * V_16)
+                + (U_25 * V_10 - (V_1 - V_2) * V_11) * (A22_last * V_15 + A23_last * V_16)
+                + (U_30 * V_10 - (U_23 + U_24) * V_11) * (A32_last * V_15 + A33_last * V_16)
+                + 2 * ((U_7 * V_10
+                        - (e1_middle * U_5 + U_4 * e2_middle
+                            - (e0_middle * U_3 + U_6 * e3_middle)) * V_11) * ((e1_last * V_17 + V_18 * e2_last
                             - (e0_last * V_19 + V_20 * e3_last)) * V_15
                         + (e1_last * V_19 + V_18 * e3_last + (e0_last * V_17 + V_20 * e2_last)) * V_16)
-                    + (U_13 * V_10
-                        - (U_15 - U_16 - (U_17 - U_18)) * V_11) * ((V_21 - V_22 - (V_23 - V_24)) * V_15
+                    + (U_11 * V_10
+                        - (U_13 - U_14 - (U_15 - U_16)) * V_11) * ((V_21 - V_22 - (V_23 - V_24)) * V_15
                         + V_27 * V_16)
-                    + (U_19 * V_10 - (U_11 + U_12) * V_11) * ((V_25 + V_26) * V_15 + V_28 * V_16))
+                    + (U_17 * V_10 - (U_9 + U_10) * V_11) * ((V_25 + V_26) * V_15 + V_28 * V_16))
                 + ((A13_middle * V_10 - A12_middle * V_11) * ((V_30 - V_32) * V_15
                         + (V_33 + V_34) * V_16)
                     + (A23_middle * V_10 - A22_middle * V_11) * ((V_35 - V_36 - (V_37 - V_38)) * V_15
                         + V_41 * V_16)
                     + (A33_middle * V_10 - A32_middle * V_11) * ((V_39 + V_40) * V_15 + V_42 * V_16))),
-        -(V_30 + V_32), -(V_33 - V_34), 0, 0,  # 13-16  Cylindrical "end"
+        -end_1, -end_2, -0.1 * end_1, -0.1 * end_2,  # 13-16  Cylindrical "end"
         # 17  RelativeRotation "motor": ground axis (1, 0, 0) axis (0, 1, 0) - first axis (1, 0,
         #      0) axis (0, 1, 0) angle speed*t
         motor_16 * motor_18 * (motor_21 * motor_9 + motor_22 * motor_15)
-            - (motor_6 * (U_4 * cos_motor_C - U_3 * sin_motor_C)
-                - motor_12 * (U_3 * cos_motor_C + U_4 * sin_motor_C)) * motor_23
+            - (motor_6 * (U_2 * cos_motor_C - U_1 * sin_motor_C)
+                - motor_12 * (U_1 * cos_motor_C + U_2 * sin_motor_C)) * motor_23
             - 2 * (motor_24 * motor_9 - motor_6 * (motor_14 * speed + motor_13 * speed)
                 + motor_25 * motor_15 - motor_12 * (motor_7 * speed - motor_8 * speed)) * motor_23
             + 2 * motor_16 * motor_18 * motor_26
@@ -649,9 +691,9 @@ def _gamma(f, q, q_dot, t, p):
                 + (middle_19 * cos_theta_middle + middle_18 * sin_theta_middle) * middle_16)
             - (middle_10 * (middle_20 * cos_theta_middle
                     - middle_21 * sin_theta_middle * theta_middle_dot - middle_13 * theta_middle_dot_sq
-                    - U_32 * sin_theta_middle - middle_23 * cos_theta_middle * theta_middle_dot
+                    - U_30 * sin_theta_middle - middle_23 * cos_theta_middle * theta_middle_dot
                     + middle_14 * theta_middle_dot_sq)
-                - middle_15 * (U_32 * cos_theta_middle
+                - middle_15 * (U_30 * cos_theta_middle
                     - middle_23 * sin_theta_middle * theta_middle_dot - middle_2 * theta_middle_dot_sq
                     + middle_20 * sin_theta_middle + middle_21 * cos_theta_middle * theta_middle_dot
                     - middle_9 * theta_middle_dot_sq)) * (1 / middle_17),
@@ -692,95 +734,106 @@ def _kinematics(f, q, q_dot, t, p):
     ) = q_dot
     beta, phase, length, speed = p
     atan2, cos, sin, sqrt = f.atan2, f.cos, f.sin, f.sqrt
-    frame_1 = e2_first + e2_first
-    frame_2 = e1_first * frame_1
-    frame_3 = e3_first + e3_first
-    frame_4 = e0_first * frame_3
     e0_first_sq = e0_first**2
     e3_first_sq = e3_first**2
+    frame_3 = e0_first_sq - e3_first_sq
     e1_first_sq = e1_first**2
     e2_first_sq = e2_first**2
-    A12_first = frame_2 - frame_4
-    A21_first = frame_2 + frame_4
-    A22_first = e0_first_sq - e3_first_sq - (e1_first_sq - e2_first_sq)
-    A31_first = e1_first * frame_3 - e0_first * frame_1
-    A32_first = e2_first * frame_3 + e0_first * (e1_first + e1_first)
+    frame_6 = e1_first_sq - e2_first_sq
+    frame_7 = e2_first + e2_first
+    frame_8 = e1_first * frame_7
+    frame_9 = e3_first + e3_first
+    frame_10 = e0_first * frame_9
+    A11_first = frame_3 + frame_6
+    A12_first = frame_8 - frame_10
+    A21_first = frame_8 + frame_10
+    A22_first = frame_3 - frame_6
+    A31_first = e1_first * frame_9 - e0_first * frame_7
+    A32_first = e2_first * frame_9 + e0_first * (e1_first + e1_first)
     e0_middle_sq = e0_middle**2
     e3_middle_sq = e3_middle**2
     frame_3_ = e0_middle_sq - e3_middle_sq
     e1_middle_sq = e1_middle**2
     e2_middle_sq = e2_middle**2
-    frame_6 = e1_middle_sq - e2_middle_sq
-    frame_7 = e2_middle + e2_middle
-    frame_8 = e1_middle * frame_7
-    frame_9 = e3_middle + e3_middle
-    frame_10 = e0_middle * frame_9
-    frame_11 = e1_middle * frame_9
-    frame_12 = e0_middle * frame_7
-    frame_13 = e2_middle * frame_9
+    frame_6_ = e1_middle_sq - e2_middle_sq
+    frame_7_ = e2_middle + e2_middle
+    e1_middle_frame_7_ = e1_middle * frame_7_
+    frame_9_ = e3_middle + e3_middle
+    e0_middle_frame_9_ = e0_middle * frame_9_
+    e1_middle_frame_9_ = e1_middle * frame_9_
+    e0_middle_frame_7_ = e0_middle * frame_7_
+    e2_middle_frame_9_ = e2_middle * frame_9_
     frame_14 = e0_middle * (e1_middle + e1_middle)
-    A11_middle = frame_3_ + frame_6
-    A12_middle = frame_8 - frame_10
-    A13_middle = frame_11 + frame_12
-    A21_middle = frame_8 + frame_10
-    A22_middle = frame_3_ - frame_6
-    A23_middle = frame_13 - frame_14
-    A31_middle = frame_11 - frame_12
-    A32_middle = frame_13 + frame_14
+    A11_middle = frame_3_ + frame_6_
+    A12_middle = e1_middle_frame_7_ - e0_middle_frame_9_
+    A13_middle = e1_middle_frame_9_ + e0_middle_frame_7_
+    A21_middle = e1_middle_frame_7_ + e0_middle_frame_9_
+    A22_middle = frame_3_ - frame_6_
+    A23_middle = e2_middle_frame_9_ - frame_14
+    A31_middle = e1_middle_frame_9_ - e0_middle_frame_7_
+    A32_middle = e2_middle_frame_9_ + frame_14
     A33_middle = e0_middle_sq + e3_middle_sq - (e1_middle_sq + e2_middle_sq)
-    frame_1_ = e2_last + e2_last
-    e1_last_frame_1_ = e1_last * frame_1_
+    frame_1 = e2_last + e2_last
+    frame_2 = e1_last * frame_1
     frame_3_2 = e3_last + e3_last
-    frame_4_ = e0_last * frame_3_2
+    frame_4 = e0_last * frame_3_2
     frame_5 = e1_last * frame_3_2
-    e0_last_frame_1_ = e0_last * frame_1_
+    frame_6_2 = e0_last * frame_1
     e0_last_sq = e0_last**2
     e3_last_sq = e3_last**2
     e1_last_sq = e1_last**2
     e2_last_sq = e2_last**2
-    frame_11_ = e2_last * frame_3_2
-    frame_12_ = e0_last * (e1_last + e1_last)
-    A12_last = e1_last_frame_1_ - frame_4_
-    A13_last = frame_5 + e0_last_frame_1_
-    A21_last = e1_last_frame_1_ + frame_4_
+    frame_11 = e2_last * frame_3_2
+    frame_12 = e0_last * (e1_last + e1_last)
+    A12_last = frame_2 - frame_4
+    A13_last = frame_5 + frame_6_2
+    A21_last = frame_2 + frame_4
     A22_last = e0_last_sq - e3_last_sq - (e1_last_sq - e2_last_sq)
-    A23_last = frame_11_ - frame_12_
-    A31_last = frame_5 - e0_last_frame_1_
-    A32_last = frame_11_ + frame_12_
+    A23_last = frame_11 - frame_12
+    A31_last = frame_5 - frame_6_2
+    A32_last = frame_11 + frame_12
     A33_last = e0_last_sq + e3_last_sq - (e1_last_sq + e2_last_sq)
-    bearing_1, bearing_2 = 2 * e3_first, 2 * e2_first
-    bearing_3, bearing_4 = 2 * e1_first, 2 * e0_first
-    bearing_5 = e2_first_dot + e2_first_dot
-    bearing_6 = bearing_5 + bearing_5
-    bearing_7, bearing_8 = e1_first_dot * bearing_6, e3_first_dot + e3_first_dot
-    bearing_9 = bearing_8 + bearing_8
-    bearing_10 = e0_first_dot * bearing_9
+    bearing_1, bearing_2 = 0.2 * e0_first, 0.2 * e1_first
+    bearing_3, bearing_4 = 0.2 * e2_first, 0.2 * e3_first
+    bearing_5, bearing_6 = 2 * e3_first, 2 * e2_first
+    bearing_7, bearing_8 = 2 * e1_first, 2 * e0_first
+    bearing_9, bearing_10 = e0_first_dot + e0_first_dot, e3_first_dot + e3_first_dot
+    bearing_11 = e0_first_dot * bearing_9 - e3_first_dot * bearing_10
+    bearing_12, bearing_13 = e1_first_dot + e1_first_dot, e2_first_dot + e2_first_dot
+    bearing_14 = e1_first_dot * bearing_12 - e2_first_dot * bearing_13
+    bearing_15 = bearing_13 + bearing_13
+    bearing_16, bearing_17 = e1_first_dot * bearing_15, bearing_10 + bearing_10
+    bearing_18 = e0_first_dot * bearing_17
+    bearing_19 = bearing_16 + bearing_18
+    bearing_20 = e1_first_dot * bearing_17 - e0_first_dot * bearing_15
     U_1, U_2 = 2 * e2_middle, 2 * e1_middle
     U_3, U_4 = 2 * e0_middle, 2 * e3_middle
-    U_5, U_6 = e0_first_dot + e0_first_dot, e1_first_dot + e1_first_dot
-    U_7 = (
-        e0_first_dot * U_5 - e3_first_dot * bearing_8
-        - (e1_first_dot * U_6 - e2_first_dot * bearing_5)
+    U_5 = bearing_11 - bearing_14
+    U_6 = e2_first_dot * bearing_17 + e0_first_dot * (bearing_12 + bearing_12)
+    U_7, U_8 = e3_middle_dot + e3_middle_dot, e1_middle_dot + e1_middle_dot
+    U_9, U_10 = e2_middle_dot + e2_middle_dot, e0_middle_dot + e0_middle_dot
+    U_11 = e1_middle * U_7 + U_8 * e3_middle + (e0_middle * U_9 + U_10 * e2_middle)
+    U_12 = (
+        e0_first * bearing_9 - e3_first * bearing_10
+        - (e1_first * bearing_12 - e2_first * bearing_13)
     )
-    U_8 = e2_first_dot * bearing_9 + e0_first_dot * (U_6 + U_6)
-    U_9, U_10 = e3_middle_dot + e3_middle_dot, e1_middle_dot + e1_middle_dot
-    U_11, U_12 = e2_middle_dot + e2_middle_dot, e0_middle_dot + e0_middle_dot
-    U_13 = e1_middle * U_9 + U_10 * e3_middle + (e0_middle * U_11 + U_12 * e2_middle)
-    U_14 = e0_first * U_5 - e3_first * bearing_8 - (e1_first * U_6 - e2_first * bearing_5)
-    U_15, U_16 = e2_middle * U_9 + U_11 * e3_middle, e0_middle * U_10 + U_12 * e1_middle
-    U_17 = U_15 - U_16
-    U_18 = e2_first * bearing_8 + bearing_5 * e3_first + (e0_first * U_6 + U_5 * e1_first)
-    U_19, U_20 = e0_middle * U_12, e3_middle * U_9
-    U_21, U_22 = e1_middle * U_10, e2_middle * U_11
-    U_23, U_24 = U_19 + U_20 - (U_21 + U_22), U_9 + U_9
-    U_25, U_26 = e1_middle_dot * U_24, U_11 + U_11
-    U_27 = e0_middle_dot * U_26
-    U_28, U_29 = U_25 + U_27, e2_middle_dot * U_24
-    U_30 = e0_middle_dot * (U_10 + U_10)
-    U_31, U_32 = U_29 - U_30, e0_middle_dot * U_12
-    U_33, U_34 = e3_middle_dot * U_9, e1_middle_dot * U_10
-    U_35 = e2_middle_dot * U_11
-    U_36 = U_32 + U_33 - (U_34 + U_35)
+    U_13, U_14 = e2_middle * U_7 + U_9 * e3_middle, e0_middle * U_8 + U_10 * e1_middle
+    U_15 = U_13 - U_14
+    U_16 = (
+        e2_first * bearing_10 + bearing_13 * e3_first
+        + (e0_first * bearing_12 + bearing_9 * e1_first)
+    )
+    U_17, U_18 = e0_middle * U_10, e3_middle * U_7
+    U_19, U_20 = e1_middle * U_8, e2_middle * U_9
+    U_21, U_22 = U_17 + U_18 - (U_19 + U_20), U_7 + U_7
+    U_23, U_24 = e1_middle_dot * U_22, U_9 + U_9
+    U_25 = e0_middle_dot * U_24
+    U_26, U_27 = U_23 + U_25, e2_middle_dot * U_22
+    U_28 = e0_middle_dot * (U_8 + U_8)
+    U_29, U_30 = U_27 - U_28, e0_middle_dot * U_10
+    U_31, U_32 = e3_middle_dot * U_7, e1_middle_dot * U_8
+    U_33 = e2_middle_dot * U_9
+    U_34 = U_30 + U_31 - (U_32 + U_33)
     cos_phase, sin_phase = cos(phase), sin(phase)
     sin_phase_sq, cos_phase_sq = sin_phase**2, cos_phase**2
     V_5 = sqrt(sin_phase_sq + cos_phase_sq)
@@ -800,9 +853,9 @@ def _kinematics(f, q, q_dot, t, p):
     V_29, V_30 = V_27 * V_13 - V_28 * V_12, 2 * e0_last
     V_31 = 2 * e1_last
     V_32, V_33 = V_30 * V_12 - V_31 * V_13, V_31 * V_12 + V_30 * V_13
-    V_34, V_35 = V_27 * V_12 + V_28 * V_13, U_32 - U_33
-    V_36, V_37 = U_34 - U_35, e1_middle_dot * U_26
-    V_38, V_39 = e0_middle_dot * U_24, e2_last_dot + e2_last_dot
+    V_34, V_35 = V_27 * V_12 + V_28 * V_13, U_30 - U_31
+    V_36, V_37 = U_32 - U_33, e1_middle_dot * U_24
+    V_38, V_39 = e0_middle_dot * U_22, e2_last_dot + e2_last_dot
     V_40, V_41 = e1_last_dot + e1_last_dot, e3_last_dot + e3_last_dot
     V_42 = e0_last_dot + e0_last_dot
     V_43, V_44 = e0_last * V_42, e3_last * V_41
@@ -817,7 +870,10 @@ def _kinematics(f, q, q_dot, t, p):
     V_60, V_61 = e2_last_dot * V_39, e2_last_dot * V_53
     V_62 = e0_last_dot * (V_40 + V_40)
     V_63, V_64 = V_61 - V_62, V_57 + V_58 - (V_59 + V_60)
-    sin_beta = sin(beta)
+    sin_beta, end_2 = sin(beta), 0.2 * e3_last
+    end_3, end_4 = 0.2 * e2_last, 0.2 * e1_last
+    end_5, end_6 = 0.2 * e0_last, V_52 + V_54
+    end_7 = V_55 - V_56
     motor_C = speed * t
     cos_motor_C = cos(motor_C)
     A32_first_cos_motor_C, sin_motor_C = A32_first * cos_motor_C, sin(motor_C)
@@ -826,17 +882,17 @@ def _kinematics(f, q, q_dot, t, p):
     A22_first_cos_motor_C = A22_first * cos_motor_C
     A32_first_sin_motor_C = A32_first * sin_motor_C
     motor_9 = A22_first_cos_motor_C + A32_first_sin_motor_C
-    motor_10 = bearing_3 * cos_motor_C - bearing_4 * sin_motor_C
-    motor_11 = bearing_4 * cos_motor_C + bearing_3 * sin_motor_C
+    motor_10 = bearing_7 * cos_motor_C - bearing_8 * sin_motor_C
+    motor_11 = bearing_8 * cos_motor_C + bearing_7 * sin_motor_C
     motor_12 = motor_6**2 + motor_9**2
-    motor_13, motor_14 = 1 / motor_12, bearing_1 * cos_motor_C - bearing_2 * sin_motor_C
-    motor_15 = bearing_2 * cos_motor_C + bearing_1 * sin_motor_C
+    motor_13, motor_14 = 1 / motor_12, bearing_5 * cos_motor_C - bearing_6 * sin_motor_C
+    motor_15 = bearing_6 * cos_motor_C + bearing_5 * sin_motor_C
     motor_16 = A32_first_sin_motor_C * speed + A22_first_cos_motor_C * speed
     motor_17 = A32_first_cos_motor_C * speed - A22_first_sin_motor_C * speed
-    motor_18, motor_19 = motor_9 * motor_16 + motor_6 * motor_17, U_18 * cos_motor_C
-    motor_20 = U_14 * sin_motor_C
-    motor_21, motor_22 = motor_19 - motor_20, U_14 * cos_motor_C
-    motor_23 = U_18 * sin_motor_C
+    motor_18, motor_19 = motor_9 * motor_16 + motor_6 * motor_17, U_16 * cos_motor_C
+    motor_20 = U_12 * sin_motor_C
+    motor_21, motor_22 = motor_19 - motor_20, U_12 * cos_motor_C
+    motor_23 = U_16 * sin_motor_C
     motor_24 = motor_22 + motor_23
     motor_25, motor_26 = motor_9 * motor_21 - motor_6 * motor_24, 1 / motor_12**2
     motor_27, motor_28 = 2 * A32_first, 2 * A22_first
@@ -856,18 +912,18 @@ def _kinematics(f, q, q_dot, t, p):
     middle_15, middle_16 = 1 / middle_14, middle_g_i_x * U_4 + middle_3 * U_3
     middle_17 = middle_g_i_x * U_3 - middle_3 * U_4
     middle_18 = middle_g_i_x * U_2 - middle_3 * U_1
-    middle_19 = middle_g_i_x * U_13 - middle_3 * U_17
+    middle_19 = middle_g_i_x * U_11 - middle_3 * U_15
     middle_20 = (
-        middle_19 * cos_theta_middle - middle_11 * theta_middle_dot - U_23 * sin_theta_middle
+        middle_19 * cos_theta_middle - middle_11 * theta_middle_dot - U_21 * sin_theta_middle
         - middle_10 * theta_middle_dot
     )
     middle_21 = (
-        U_23 * cos_theta_middle - middle_8 * theta_middle_dot + middle_19 * sin_theta_middle
+        U_21 * cos_theta_middle - middle_8 * theta_middle_dot + middle_19 * sin_theta_middle
         + middle_6 * theta_middle_dot
     )
     middle_22, middle_23 = 2 * middle_4, 2 * A33_middle
-    middle_24, middle_25 = middle_g_i_x * U_28 - middle_3 * U_31, 2 * middle_19
-    theta_middle_dot_sq, middle_27 = theta_middle_dot**2, 2 * U_23
+    middle_24, middle_25 = middle_g_i_x * U_26 - middle_3 * U_29, 2 * middle_19
+    theta_middle_dot_sq, middle_27 = theta_middle_dot**2, 2 * U_21
     cos_theta_last = cos(theta_last)
     A23_last_cos_theta_last, sin_theta_last = A23_last * cos_theta_last, sin(theta_last)
     A33_last_sin_theta_last = A33_last * sin_theta_last
@@ -892,22 +948,25 @@ def _kinematics(f, q, q_dot, t, p):
     last_21 = 2 * V_50
     return (
         # Phi
-        x_first, y_first, z_first, A21_first, A31_first, x_middle - x_first, y_middle - y_first,
-        z_middle - z_first,
+        x_first - 0.1 * A11_first + 0.1, y_first - 0.1 * A21_first, z_first - 0.1 * A31_first,
+        A21_first, A31_first, x_middle - x_first, y_middle - y_first, z_middle - z_first,
         A12_first * A13_middle + A22_first * A23_middle + A32_first * A33_middle,
         x_last - x_middle - A11_middle * length, y_last - y_middle - A21_middle * length,
         z_last - z_middle - A31_middle * length,
         V_h_i_x * V_h_j_x + V_h_i_y * V_h_j_y + V_h_i_z * V_h_j_z, A21_last, A31_last,
-        y_last - length * sin_beta, z_last, atan2(motor_6, motor_9), atan2(middle_9, middle_12),
-        atan2(-last_5, last_8), e0_first_sq + e1_first_sq + e2_first_sq + e3_first_sq - 1,
+        y_last + 0.1 * A21_last - length * sin_beta, z_last + 0.1 * A31_last,
+        atan2(motor_6, motor_9), atan2(middle_9, middle_12), atan2(-last_5, last_8),
+        e0_first_sq + e1_first_sq + e2_first_sq + e3_first_sq - 1,
         e0_middle_sq + e1_middle_sq + e2_middle_sq + e3_middle_sq - 1,
         e0_last_sq + e1_last_sq + e2_last_sq + e3_last_sq - 1,
         # Phi_q
-        bearing_1, bearing_2, bearing_3, bearing_4, -bearing_2, bearing_1, -bearing_4, bearing_3,
-        bearing_4 * A23_middle - bearing_1 * A13_middle + bearing_3 * A33_middle,
-        bearing_2 * A13_middle - bearing_3 * A23_middle + bearing_4 * A33_middle,
-        bearing_3 * A13_middle + bearing_2 * A23_middle + bearing_1 * A33_middle,
-        bearing_2 * A33_middle - (bearing_1 * A23_middle + bearing_4 * A13_middle),
+        -bearing_1, -bearing_2, bearing_3, bearing_4, -bearing_4, -bearing_3, -bearing_2,
+        -bearing_1, bearing_3, -bearing_4, bearing_1, -bearing_2, bearing_5, bearing_6, bearing_7,
+        bearing_8, -bearing_6, bearing_5, -bearing_8, bearing_7,
+        bearing_8 * A23_middle - bearing_5 * A13_middle + bearing_7 * A33_middle,
+        bearing_6 * A13_middle - bearing_7 * A23_middle + bearing_8 * A33_middle,
+        bearing_7 * A13_middle + bearing_6 * A23_middle + bearing_5 * A33_middle,
+        bearing_6 * A33_middle - (bearing_5 * A23_middle + bearing_8 * A13_middle),
         A12_first * U_1 - A22_first * U_2 + A32_first * U_3,
         A12_first * U_4 - A22_first * U_3 - A32_first * U_2,
         A12_first * U_3 + A22_first * U_4 - A32_first * U_1,
@@ -920,7 +979,8 @@ def _kinematics(f, q, q_dot, t, p):
         V_h_i_x * V_34 - V_h_i_y * V_33 + V_h_i_z * V_32,
         V_h_i_x * V_33 + V_h_i_y * V_34 - V_h_i_z * V_29,
         V_h_i_y * V_29 - V_h_i_x * V_32 + V_h_i_z * V_34, V_28, V_27, V_31, V_30, -V_27, V_28,
-        -V_30, V_31, (motor_9 * motor_10 - motor_6 * motor_11) * motor_13,
+        -V_30, V_31, end_2, end_3, end_4, end_5, -end_3, end_2, -end_5, end_4,
+        (motor_9 * motor_10 - motor_6 * motor_11) * motor_13,
         (motor_9 * motor_11 + motor_6 * motor_10) * motor_13,
         (motor_9 * motor_14 - motor_6 * motor_15) * motor_13,
         (motor_9 * motor_15 + motor_6 * motor_14) * motor_13,
@@ -935,38 +995,38 @@ def _kinematics(f, q, q_dot, t, p):
         -middle_14 * middle_15, (last_8 * last_9 + last_5 * last_10) * last_12,
         (last_8 * last_10 - last_5 * last_9) * last_12,
         (last_8 * last_13 - last_5 * last_14) * last_12,
-        -(last_8 * last_14 + last_5 * last_13) * last_12, -last_11 * last_12, bearing_4, bearing_3,
-        bearing_2, bearing_1, U_3, U_2, U_1, U_4, V_30, V_31, V_27, V_28,
+        -(last_8 * last_14 + last_5 * last_13) * last_12, -last_11 * last_12, bearing_8, bearing_7,
+        bearing_6, bearing_5, U_3, U_2, U_1, U_4, V_30, V_31, V_27, V_28,
         # nu
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, motor_18 * motor_13, 0, 0, 0, 0, 0,
         # gamma
-        0, 0, 0, -(bearing_7 + bearing_10), -(e1_first_dot * bearing_9 - e0_first_dot * bearing_6),
-        0, 0, 0,
-        -((bearing_7 - bearing_10) * A13_middle + U_7 * A23_middle + U_8 * A33_middle
-                + 2 * ((e1_first * bearing_5 + U_6 * e2_first
-                        - (e0_first * bearing_8 + U_5 * e3_first)) * U_13
-                    + U_14 * U_17 + U_18 * U_23)
-                + (A12_first * U_28 + A22_first * U_31 + A32_first * U_36)),
-        (V_35 + V_36) * length, (V_37 + V_38) * length, (U_25 - U_27) * length,
-        -((U_28 * V_6 - (V_37 - V_38) * V_7) * V_h_j_x
-                + (U_31 * V_6 - (V_35 - V_36) * V_7) * V_h_j_y
-                + (U_36 * V_6 - (U_29 + U_30) * V_7) * V_h_j_z
-                + 2 * ((U_13 * V_6
-                        - (e1_middle * U_11 + U_10 * e2_middle
-                            - (e0_middle * U_9 + U_12 * e3_middle)) * V_7) * ((e1_last * V_39 + V_40 * e2_last
+        0.1 * (bearing_11 + bearing_14), 0.1 * bearing_19, 0.1 * bearing_20, -bearing_19,
+        -bearing_20, 0, 0, 0,
+        -((bearing_16 - bearing_18) * A13_middle + U_5 * A23_middle + U_6 * A33_middle
+                + 2 * ((e1_first * bearing_13 + bearing_12 * e2_first
+                        - (e0_first * bearing_10 + bearing_9 * e3_first)) * U_11
+                    + U_12 * U_15 + U_16 * U_21)
+                + (A12_first * U_26 + A22_first * U_29 + A32_first * U_34)),
+        (V_35 + V_36) * length, (V_37 + V_38) * length, (U_23 - U_25) * length,
+        -((U_26 * V_6 - (V_37 - V_38) * V_7) * V_h_j_x
+                + (U_29 * V_6 - (V_35 - V_36) * V_7) * V_h_j_y
+                + (U_34 * V_6 - (U_27 + U_28) * V_7) * V_h_j_z
+                + 2 * ((U_11 * V_6
+                        - (e1_middle * U_9 + U_8 * e2_middle
+                            - (e0_middle * U_7 + U_10 * e3_middle)) * V_7) * ((e1_last * V_39 + V_40 * e2_last
                             - (e0_last * V_41 + V_42 * e3_last)) * V_12
                         + (e1_last * V_41 + V_40 * e3_last + (e0_last * V_39 + V_42 * e2_last)) * V_13)
-                    + (U_17 * V_6
-                        - (U_19 - U_20 - (U_21 - U_22)) * V_7) * ((V_43 - V_44 - (V_45 - V_46)) * V_12
+                    + (U_15 * V_6
+                        - (U_17 - U_18 - (U_19 - U_20)) * V_7) * ((V_43 - V_44 - (V_45 - V_46)) * V_12
                         + V_49 * V_13)
-                    + (U_23 * V_6 - (U_15 + U_16) * V_7) * ((V_47 + V_48) * V_12 + V_50 * V_13))
+                    + (U_21 * V_6 - (U_13 + U_14) * V_7) * ((V_47 + V_48) * V_12 + V_50 * V_13))
                 + (V_h_i_x * ((V_52 - V_54) * V_12 + (V_55 + V_56) * V_13)
                     + V_h_i_y * ((V_57 - V_58 - (V_59 - V_60)) * V_12 + V_63 * V_13)
                     + V_h_i_z * ((V_61 + V_62) * V_12 + V_64 * V_13))),
-        -(V_52 + V_54), -(V_55 - V_56), 0, 0,
+        -end_6, -end_7, -0.1 * end_6, -0.1 * end_7,
         motor_25 * motor_26 * (motor_29 * motor_21 + motor_30 * motor_24)
-            - (motor_9 * (U_8 * cos_motor_C - U_7 * sin_motor_C)
-                - motor_6 * (U_7 * cos_motor_C + U_8 * sin_motor_C)) * motor_13
+            - (motor_9 * (U_6 * cos_motor_C - U_5 * sin_motor_C)
+                - motor_6 * (U_5 * cos_motor_C + U_6 * sin_motor_C)) * motor_13
             - 2 * (motor_17 * motor_21 - motor_9 * (motor_23 * speed + motor_22 * speed)
                 + motor_16 * motor_24 - motor_6 * (motor_19 * speed - motor_20 * speed)) * motor_13
             + 2 * motor_25 * motor_26 * motor_31
@@ -980,9 +1040,9 @@ def _kinematics(f, q, q_dot, t, p):
                 + (middle_23 * cos_theta_middle + middle_22 * sin_theta_middle) * middle_21)
             - (middle_12 * (middle_24 * cos_theta_middle
                     - middle_25 * sin_theta_middle * theta_middle_dot - middle_6 * theta_middle_dot_sq
-                    - U_36 * sin_theta_middle - middle_27 * cos_theta_middle * theta_middle_dot
+                    - U_34 * sin_theta_middle - middle_27 * cos_theta_middle * theta_middle_dot
                     + middle_8 * theta_middle_dot_sq)
-                - middle_9 * (U_36 * cos_theta_middle - middle_27 * sin_theta_middle * theta_middle_dot
+                - middle_9 * (U_34 * cos_theta_middle - middle_27 * sin_theta_middle * theta_middle_dot
                     - middle_10 * theta_middle_dot_sq + middle_24 * sin_theta_middle
                     + middle_25 * cos_theta_middle * theta_middle_dot
                     - middle_11 * theta_middle_dot_sq)) * middle_15,
@@ -1006,18 +1066,21 @@ def _kinematics(f, q, q_dot, t, p):
 
 def _factor(f, J):
     """Return what a solve needs of Phi_q, and the determinants of its blocks."""
-    # eliminated: x_first by bearing.x, y_first by bearing.y, z_first by bearing.z
-    # x_middle by U.x, y_middle by U.y, z_middle by U.z, x_last by V.x, y_last by end.line_f
+    # eliminated: x_last by V.x, x_middle by U.x, x_first by bearing.x, y_first by U.y
+    # z_first by U.z, y_middle by bearing.y, z_middle by bearing.z, y_last by end.line_f
     # z_last by end.line_g
     # block: pi_f_first, pi_g_first by bearing.f, bearing.g
-    # block: pi_f_middle, pi_g_middle by V.y, V.z
     # block: pi_f_last, pi_g_last by end.parallel_f, end.parallel_g
     # block: pi_h_first by motor
-    # block: pi_h_middle by U.cross
+    # block: pi_g_middle, pi_h_middle by V.y, V.z
+    # block: pi_f_middle by U.cross
     # block: pi_h_last by V.cross
     # block: theta_middle by middle
     # block: theta_last by last
     (
+        bearing_x_e0_first, bearing_x_e1_first, bearing_x_e2_first, bearing_x_e3_first,
+        bearing_y_e0_first, bearing_y_e1_first, bearing_y_e2_first, bearing_y_e3_first,
+        bearing_z_e0_first, bearing_z_e1_first, bearing_z_e2_first, bearing_z_e3_first,
         bearing_f_e0_first, bearing_f_e1_first, bearing_f_e2_first, bearing_f_e3_first,
         bearing_g_e0_first, bearing_g_e1_first, bearing_g_e2_first, bearing_g_e3_first,
         U_cross_e0_first, U_cross_e1_first, U_cross_e2_first, U_cross_e3_first, U_cross_e0_middle,
@@ -1027,10 +1090,12 @@ def _factor(f, J):
         V_cross_e1_middle, V_cross_e2_middle, V_cross_e3_middle, V_cross_e0_last, V_cross_e1_last,
         V_cross_e2_last, V_cross_e3_last, end_parallel_f_e0_last, end_parallel_f_e1_last,
         end_parallel_f_e2_last, end_parallel_f_e3_last, end_parallel_g_e0_last,
-        end_parallel_g_e1_last, end_parallel_g_e2_last, end_parallel_g_e3_last, motor_e0_first,
-        motor_e1_first, motor_e2_first, motor_e3_first, middle_e0_middle, middle_e1_middle,
-        middle_e2_middle, middle_e3_middle, middle_theta_middle, last_e0_last, last_e1_last,
-        last_e2_last, last_e3_last, last_theta_last, norm_first_e0_first, norm_first_e1_first,
+        end_parallel_g_e1_last, end_parallel_g_e2_last, end_parallel_g_e3_last, end_line_f_e0_last,
+        end_line_f_e1_last, end_line_f_e2_last, end_line_f_e3_last, end_line_g_e0_last,
+        end_line_g_e1_last, end_line_g_e2_last, end_line_g_e3_last, motor_e0_first, motor_e1_first,
+        motor_e2_first, motor_e3_first, middle_e0_middle, middle_e1_middle, middle_e2_middle,
+        middle_e3_middle, middle_theta_middle, last_e0_last, last_e1_last, last_e2_last,
+        last_e3_last, last_theta_last, norm_first_e0_first, norm_first_e1_first,
         norm_first_e2_first, norm_first_e3_first, norm_middle_e0_middle, norm_middle_e1_middle,
         norm_middle_e2_middle, norm_middle_e3_middle, norm_last_e0_last, norm_last_e1_last,
         norm_last_e2_last, norm_last_e3_last,
@@ -1079,21 +1144,21 @@ def _factor(f, J):
         1 / (norm_middle_e0_middle**2 + norm_middle_e1_middle**2 + norm_middle_e2_middle**2
             + norm_middle_e3_middle**2)
     )
-    k_15, k_16 = k_14 * norm_middle_e1_middle, k_14 * norm_middle_e0_middle
-    k_17, k_18 = k_14 * norm_middle_e3_middle, k_14 * norm_middle_e2_middle
+    k_15, k_16 = k_14 * norm_middle_e3_middle, k_14 * norm_middle_e2_middle
+    k_17, k_18 = k_14 * norm_middle_e1_middle, k_14 * norm_middle_e0_middle
     k_19 = (
         U_cross_e0_middle * norm_middle_e0_middle + U_cross_e1_middle * norm_middle_e1_middle
         + U_cross_e2_middle * norm_middle_e2_middle + U_cross_e3_middle * norm_middle_e3_middle
     )
-    k_20 = (
+    determinant_ = (
+        U_cross_e1_middle * norm_middle_e0_middle - U_cross_e0_middle * norm_middle_e1_middle
+        + U_cross_e2_middle * norm_middle_e3_middle - U_cross_e3_middle * norm_middle_e2_middle
+    )
+    k_21 = (
         U_cross_e2_middle * norm_middle_e0_middle
         - (U_cross_e0_middle * norm_middle_e2_middle
             + U_cross_e1_middle * norm_middle_e3_middle)
         + U_cross_e3_middle * norm_middle_e1_middle
-    )
-    determinant_ = (
-        U_cross_e1_middle * k_16 - U_cross_e0_middle * k_15 + U_cross_e2_middle * k_17
-        - U_cross_e3_middle * k_18
     )
     k_22 = (
         V_y_e0_middle * norm_middle_e0_middle + V_y_e1_middle * norm_middle_e1_middle
@@ -1105,8 +1170,8 @@ def _factor(f, J):
         + V_y_e3_middle * norm_middle_e1_middle
     )
     k_24 = (
-        V_y_e1_middle * norm_middle_e2_middle - V_y_e0_middle * norm_middle_e3_middle
-        - V_y_e2_middle * norm_middle_e1_middle + V_y_e3_middle * norm_middle_e0_middle
+        V_y_e1_middle * k_16 - V_y_e0_middle * k_15 - V_y_e2_middle * k_17
+        + V_y_e3_middle * k_18
     )
     k_25 = (
         V_z_e0_middle * norm_middle_e0_middle + V_z_e1_middle * norm_middle_e1_middle
@@ -1118,8 +1183,8 @@ def _factor(f, J):
         + V_z_e3_middle * norm_middle_e1_middle
     )
     k_27 = (
-        V_z_e1_middle * norm_middle_e2_middle - V_z_e0_middle * norm_middle_e3_middle
-        - V_z_e2_middle * norm_middle_e1_middle + V_z_e3_middle * norm_middle_e0_middle
+        V_z_e1_middle * k_16 - V_z_e0_middle * k_15 - V_z_e2_middle * k_17
+        + V_z_e3_middle * k_18
     )
     k_28 = (
         1 / (norm_last_e0_last**2 + norm_last_e1_last**2 + norm_last_e2_last**2
@@ -1128,15 +1193,39 @@ def _factor(f, J):
     k_29, k_30 = k_28 * norm_last_e1_last, k_28 * norm_last_e0_last
     k_31, k_32 = k_28 * norm_last_e3_last, k_28 * norm_last_e2_last
     k_33 = (
+        end_line_f_e0_last * norm_last_e0_last + end_line_f_e1_last * norm_last_e1_last
+        + end_line_f_e2_last * norm_last_e2_last + end_line_f_e3_last * norm_last_e3_last
+    )
+    k_34 = (
+        end_line_f_e0_last * norm_last_e2_last + end_line_f_e1_last * norm_last_e3_last
+        - end_line_f_e2_last * norm_last_e0_last - end_line_f_e3_last * norm_last_e1_last
+    )
+    k_35 = (
+        end_line_f_e0_last * norm_last_e3_last - end_line_f_e1_last * norm_last_e2_last
+        + end_line_f_e2_last * norm_last_e1_last - end_line_f_e3_last * norm_last_e0_last
+    )
+    k_36 = (
+        end_line_g_e0_last * norm_last_e0_last + end_line_g_e1_last * norm_last_e1_last
+        + end_line_g_e2_last * norm_last_e2_last + end_line_g_e3_last * norm_last_e3_last
+    )
+    k_37 = (
+        end_line_g_e0_last * norm_last_e2_last + end_line_g_e1_last * norm_last_e3_last
+        - end_line_g_e2_last * norm_last_e0_last - end_line_g_e3_last * norm_last_e1_last
+    )
+    k_38 = (
+        end_line_g_e0_last * norm_last_e3_last - end_line_g_e1_last * norm_last_e2_last
+        + end_line_g_e2_last * norm_last_e1_last - end_line_g_e3_last * norm_last_e0_last
+    )
+    k_39 = (
         V_cross_e0_last * norm_last_e0_last + V_cross_e1_last * norm_last_e1_last
         + V_cross_e2_last * norm_last_e2_last + V_cross_e3_last * norm_last_e3_last
     )
-    k_34 = (
+    k_40 = (
         V_cross_e2_last * norm_last_e0_last
         - (V_cross_e0_last * norm_last_e2_last + V_cross_e1_last * norm_last_e3_last)
         + V_cross_e3_last * norm_last_e1_last
     )
-    k_35 = (
+    k_41 = (
         V_cross_e1_last * norm_last_e2_last - V_cross_e0_last * norm_last_e3_last
         - V_cross_e2_last * norm_last_e1_last + V_cross_e3_last * norm_last_e0_last
     )
@@ -1144,57 +1233,64 @@ def _factor(f, J):
         V_cross_e1_last * k_30 - V_cross_e0_last * k_29 + V_cross_e2_last * k_31
         - V_cross_e3_last * k_32
     )
-    k_37 = (
+    k_43 = (
         end_parallel_f_e0_last * norm_last_e0_last + end_parallel_f_e1_last * norm_last_e1_last
         + end_parallel_f_e2_last * norm_last_e2_last
         + end_parallel_f_e3_last * norm_last_e3_last
     )
-    k_38 = (
+    k_44 = (
         end_parallel_f_e2_last * norm_last_e0_last
         - (end_parallel_f_e0_last * norm_last_e2_last
             + end_parallel_f_e1_last * norm_last_e3_last)
         + end_parallel_f_e3_last * norm_last_e1_last
     )
-    k_39 = (
+    k_45 = (
         end_parallel_f_e1_last * norm_last_e2_last - end_parallel_f_e0_last * norm_last_e3_last
         - end_parallel_f_e2_last * norm_last_e1_last
         + end_parallel_f_e3_last * norm_last_e0_last
     )
-    k_40 = (
+    k_46 = (
         end_parallel_g_e0_last * norm_last_e0_last + end_parallel_g_e1_last * norm_last_e1_last
         + end_parallel_g_e2_last * norm_last_e2_last
         + end_parallel_g_e3_last * norm_last_e3_last
     )
-    k_41 = (
+    k_47 = (
         end_parallel_g_e2_last * norm_last_e0_last
         - (end_parallel_g_e0_last * norm_last_e2_last
             + end_parallel_g_e1_last * norm_last_e3_last)
         + end_parallel_g_e3_last * norm_last_e1_last
     )
-    k_42 = (
+    k_48 = (
         end_parallel_g_e1_last * norm_last_e2_last - end_parallel_g_e0_last * norm_last_e3_last
         - end_parallel_g_e2_last * norm_last_e1_last
         + end_parallel_g_e3_last * norm_last_e0_last
     )
     determinant_3 = k_7 * k_11 - k_8 * k_10
-    k_44, determinant_4 = 1 / determinant_3, k_23 * k_27 - k_24 * k_26
-    k_46, determinant_5 = 1 / determinant_4, k_38 * k_42 - k_39 * k_41
-    k_48, k_49 = 1 / determinant_5, 1 / determinant
-    k_50, k_51 = 1 / determinant_, 1 / determinant_2
-    k_52, k_53 = 1 / middle_theta_middle, 1 / last_theta_last
+    k_50, determinant_4 = 1 / determinant_3, k_44 * k_48 - k_45 * k_47
+    k_52, k_53 = 1 / determinant_4, 1 / determinant
+    determinant_5 = k_23 * k_27 - k_24 * k_26
+    k_55, k_56 = 1 / determinant_5, 1 / determinant_
+    k_57, k_58 = 1 / determinant_2, 1 / middle_theta_middle
+    k_59 = 1 / last_theta_last
     return (
+        bearing_x_e0_first, bearing_x_e1_first, bearing_x_e2_first, bearing_x_e3_first,
+        bearing_y_e0_first, bearing_y_e1_first, bearing_y_e2_first, bearing_y_e3_first,
+        bearing_z_e0_first, bearing_z_e1_first, bearing_z_e2_first, bearing_z_e3_first,
         U_cross_e0_first, U_cross_e1_first, U_cross_e2_first, U_cross_e3_first, V_x_e0_middle,
         V_x_e1_middle, V_x_e2_middle, V_x_e3_middle, V_cross_e0_middle, V_cross_e1_middle,
-        V_cross_e2_middle, V_cross_e3_middle, middle_e0_middle, middle_e1_middle, middle_e2_middle,
-        middle_e3_middle, last_e0_last, last_e1_last, last_e2_last, last_e3_last,
+        V_cross_e2_middle, V_cross_e3_middle, end_line_f_e0_last, end_line_f_e1_last,
+        end_line_f_e2_last, end_line_f_e3_last, end_line_g_e0_last, end_line_g_e1_last,
+        end_line_g_e2_last, end_line_g_e3_last, middle_e0_middle, middle_e1_middle,
+        middle_e2_middle, middle_e3_middle, last_e0_last, last_e1_last, last_e2_last, last_e3_last,
         norm_first_e0_first, norm_first_e1_first, norm_first_e2_first, norm_first_e3_first,
         norm_middle_e0_middle, norm_middle_e1_middle, norm_middle_e2_middle, norm_middle_e3_middle,
         norm_last_e0_last, norm_last_e1_last, norm_last_e2_last, norm_last_e3_last, k_1, k_2, k_3,
-        k_4, k_5, k_6, k_7, k_8, k_9, k_10, k_11, k_12, k_14, k_15, k_16, k_17, k_18, k_19, k_20,
-        k_22, k_23, k_24, k_25, k_26, k_27, k_28, k_29, k_30, k_31, k_32, k_33, k_34, k_35, k_37,
-        k_38, k_39, k_40, k_41, k_42, k_44, k_46, k_48, k_49, k_50, k_51, k_52, k_53,
+        k_4, k_5, k_6, k_7, k_8, k_9, k_10, k_11, k_12, k_14, k_15, k_16, k_17, k_18, k_19, k_21,
+        k_22, k_23, k_24, k_25, k_26, k_27, k_28, k_29, k_30, k_31, k_32, k_33, k_34, k_35, k_36,
+        k_37, k_38, k_39, k_40, k_41, k_43, k_44, k_45, k_46, k_47, k_48, k_50, k_52, k_53, k_55,
+        k_56, k_57, k_58, k_59,
     ), (
-        determinant_3, determinant_4, determinant_5, determinant, determinant_, determinant_2,
+        determinant_3, determinant_4, determinant, determinant_5, determinant_, determinant_2,
         middle_theta_middle, last_theta_last,
     )
 
@@ -1202,107 +1298,138 @@ def _factor(f, J):
 def _solve(f, F, b):
     """Return x of Phi_q x = b."""
     (
+        bearing_x_e0_first, bearing_x_e1_first, bearing_x_e2_first, bearing_x_e3_first,
+        bearing_y_e0_first, bearing_y_e1_first, bearing_y_e2_first, bearing_y_e3_first,
+        bearing_z_e0_first, bearing_z_e1_first, bearing_z_e2_first, bearing_z_e3_first,
         U_cross_e0_first, U_cross_e1_first, U_cross_e2_first, U_cross_e3_first, V_x_e0_middle,
         V_x_e1_middle, V_x_e2_middle, V_x_e3_middle, V_cross_e0_middle, V_cross_e1_middle,
-        V_cross_e2_middle, V_cross_e3_middle, middle_e0_middle, middle_e1_middle, middle_e2_middle,
-        middle_e3_middle, last_e0_last, last_e1_last, last_e2_last, last_e3_last,
+        V_cross_e2_middle, V_cross_e3_middle, end_line_f_e0_last, end_line_f_e1_last,
+        end_line_f_e2_last, end_line_f_e3_last, end_line_g_e0_last, end_line_g_e1_last,
+        end_line_g_e2_last, end_line_g_e3_last, middle_e0_middle, middle_e1_middle,
+        middle_e2_middle, middle_e3_middle, last_e0_last, last_e1_last, last_e2_last, last_e3_last,
         norm_first_e0_first, norm_first_e1_first, norm_first_e2_first, norm_first_e3_first,
         norm_middle_e0_middle, norm_middle_e1_middle, norm_middle_e2_middle, norm_middle_e3_middle,
         norm_last_e0_last, norm_last_e1_last, norm_last_e2_last, norm_last_e3_last, k_1, k_2, k_3,
-        k_4, k_5, k_6, k_7, k_8, k_9, k_10, k_11, k_12, k_14, k_15, k_16, k_17, k_18, k_19, k_20,
-        k_22, k_23, k_24, k_25, k_26, k_27, k_28, k_29, k_30, k_31, k_32, k_33, k_34, k_35, k_37,
-        k_38, k_39, k_40, k_41, k_42, k_44, k_46, k_48, k_49, k_50, k_51, k_52, k_53,
+        k_4, k_5, k_6, k_7, k_8, k_9, k_10, k_11, k_12, k_14, k_15, k_16, k_17, k_18, k_19, k_21,
+        k_22, k_23, k_24, k_25, k_26, k_27, k_28, k_29, k_30, k_31, k_32, k_33, k_34, k_35, k_36,
+        k_37, k_38, k_39, k_40, k_41, k_43, k_44, k_45, k_46, k_47, k_48, k_50, k_52, k_53, k_55,
+        k_56, k_57, k_58, k_59,
     ) = F
     (
         bearing_x, bearing_y, bearing_z, bearing_f, bearing_g, U_x, U_y, U_z, U_cross, V_x, V_y,
         V_z, V_cross, end_parallel_f, end_parallel_g, end_line_f, end_line_g, motor, middle, last,
         norm_first, norm_middle, norm_last,
     ) = b
-    x_middle, y_middle = U_x + bearing_x, U_y + bearing_y
-    z_middle, b_4 = U_z + bearing_z, norm_first * k_1
-    b_5, b_6 = norm_middle * k_14, norm_last * k_28
-    b_7, b_8 = bearing_f - k_6 * b_4, bearing_g - k_9 * b_4
-    b_9, b_10 = (k_11 * b_7 - k_8 * b_8) * k_44, (k_7 * b_8 - k_10 * b_7) * k_44
-    b_11 = V_y + y_middle - end_line_f - k_22 * b_5
-    b_12 = V_z + z_middle - end_line_g - k_25 * b_5
-    b_13, b_14 = (k_27 * b_11 - k_24 * b_12) * k_46, (k_23 * b_12 - k_26 * b_11) * k_46
-    b_15, b_16 = end_parallel_f - k_37 * b_6, end_parallel_g - k_40 * b_6
-    b_17, b_18 = (k_42 * b_15 - k_39 * b_16) * k_48, (k_38 * b_16 - k_41 * b_15) * k_48
-    b_19 = (motor - k_12 * b_10) * k_49
+    b_1, b_2 = bearing_y + U_y, bearing_z + U_z
+    b_3, b_4 = norm_first * k_1, norm_middle * k_14
+    b_5, b_6 = norm_last * k_28, bearing_f - k_6 * b_3
+    b_7 = bearing_g - k_9 * b_3
+    b_8, b_9 = (k_11 * b_6 - k_8 * b_7) * k_50, (k_7 * b_7 - k_10 * b_6) * k_50
+    b_10, b_11 = end_parallel_f - k_43 * b_5, end_parallel_g - k_46 * b_5
+    b_12, b_13 = (k_48 * b_10 - k_45 * b_11) * k_52, (k_44 * b_11 - k_47 * b_10) * k_52
+    b_14 = (motor - k_12 * b_9) * k_53
     e0_first = (
-        norm_first_e0_first * b_4 - norm_first_e2_first * b_9 - norm_first_e3_first * b_10
-        - k_2 * b_19
+        norm_first_e0_first * b_3 - norm_first_e2_first * b_8 - norm_first_e3_first * b_9
+        - k_2 * b_14
     )
     e1_first = (
-        norm_first_e1_first * b_4 - norm_first_e3_first * b_9 + norm_first_e2_first * b_10
-        + k_3 * b_19
+        norm_first_e1_first * b_3 - norm_first_e3_first * b_8 + norm_first_e2_first * b_9
+        + k_3 * b_14
     )
     e2_first = (
-        norm_first_e2_first * b_4 + norm_first_e0_first * b_9 - norm_first_e1_first * b_10
-        + k_4 * b_19
+        norm_first_e2_first * b_3 + norm_first_e0_first * b_8 - norm_first_e1_first * b_9
+        + k_4 * b_14
     )
     e3_first = (
-        norm_first_e3_first * b_4 + norm_first_e1_first * b_9 + norm_first_e0_first * b_10
-        - k_5 * b_19
+        norm_first_e3_first * b_3 + norm_first_e1_first * b_8 + norm_first_e0_first * b_9
+        - k_5 * b_14
     )
-    b_24 = (
+    b_19, b_20 = bearing_y_e0_first * e0_first, bearing_y_e1_first * e1_first
+    b_21, b_22 = bearing_y_e2_first * e2_first, bearing_y_e3_first * e3_first
+    b_23 = (
+        V_y + b_1 - end_line_f - b_19 - b_20 - b_21 - b_22 - k_22 * b_4 + k_33 * b_5
+        - k_34 * b_12 - k_35 * b_13
+    )
+    b_24, b_25 = bearing_z_e0_first * e0_first, bearing_z_e1_first * e1_first
+    b_26, b_27 = bearing_z_e2_first * e2_first, bearing_z_e3_first * e3_first
+    b_28 = (
+        V_z + b_2 - end_line_g - b_24 - b_25 - b_26 - b_27 - k_25 * b_4 + k_36 * b_5
+        - k_37 * b_12 - k_38 * b_13
+    )
+    b_29, b_30 = (k_27 * b_23 - k_24 * b_28) * k_55, (k_23 * b_28 - k_26 * b_23) * k_55
+    b_31 = (
         (U_cross - U_cross_e0_first * e0_first - U_cross_e1_first * e1_first
-            - U_cross_e2_first * e2_first - U_cross_e3_first * e3_first - k_19 * b_5
-            - k_20 * b_13) * k_50
+            - U_cross_e2_first * e2_first - U_cross_e3_first * e3_first - k_19 * b_4
+            - k_21 * b_29) * k_56
     )
     e0_middle = (
-        norm_middle_e0_middle * b_5 - norm_middle_e2_middle * b_13
-        - norm_middle_e3_middle * b_14 - k_15 * b_24
+        norm_middle_e0_middle * b_4 - norm_middle_e1_middle * b_31
+        - norm_middle_e2_middle * b_29 - k_15 * b_30
     )
     e1_middle = (
-        norm_middle_e1_middle * b_5 - norm_middle_e3_middle * b_13
-        + norm_middle_e2_middle * b_14 + k_16 * b_24
+        norm_middle_e1_middle * b_4 + norm_middle_e0_middle * b_31
+        - norm_middle_e3_middle * b_29 + k_16 * b_30
     )
     e2_middle = (
-        norm_middle_e2_middle * b_5 + norm_middle_e0_middle * b_13
-        - norm_middle_e1_middle * b_14 + k_17 * b_24
+        norm_middle_e2_middle * b_4 + norm_middle_e3_middle * b_31
+        + norm_middle_e0_middle * b_29 - k_17 * b_30
     )
     e3_middle = (
-        norm_middle_e3_middle * b_5 + norm_middle_e1_middle * b_13
-        + norm_middle_e0_middle * b_14 - k_18 * b_24
+        norm_middle_e3_middle * b_4 - norm_middle_e2_middle * b_31
+        + norm_middle_e1_middle * b_29 + k_18 * b_30
     )
-    b_29 = (
+    b_36 = (
         (V_cross - V_cross_e0_middle * e0_middle - V_cross_e1_middle * e1_middle
-            - V_cross_e2_middle * e2_middle - V_cross_e3_middle * e3_middle - k_33 * b_6
-            - k_34 * b_17 - k_35 * b_18) * k_51
+            - V_cross_e2_middle * e2_middle - V_cross_e3_middle * e3_middle - k_39 * b_5
+            - k_40 * b_12 - k_41 * b_13) * k_57
     )
     e0_last = (
-        norm_last_e0_last * b_6 - norm_last_e2_last * b_17 - norm_last_e3_last * b_18
-        - k_29 * b_29
+        norm_last_e0_last * b_5 - norm_last_e2_last * b_12 - norm_last_e3_last * b_13
+        - k_29 * b_36
     )
     e1_last = (
-        norm_last_e1_last * b_6 - norm_last_e3_last * b_17 + norm_last_e2_last * b_18
-        + k_30 * b_29
+        norm_last_e1_last * b_5 - norm_last_e3_last * b_12 + norm_last_e2_last * b_13
+        + k_30 * b_36
     )
     e2_last = (
-        norm_last_e2_last * b_6 + norm_last_e0_last * b_17 - norm_last_e1_last * b_18
-        + k_31 * b_29
+        norm_last_e2_last * b_5 + norm_last_e0_last * b_12 - norm_last_e1_last * b_13
+        + k_31 * b_36
     )
     e3_last = (
-        norm_last_e3_last * b_6 + norm_last_e1_last * b_17 + norm_last_e0_last * b_18
-        - k_32 * b_29
+        norm_last_e3_last * b_5 + norm_last_e1_last * b_12 + norm_last_e0_last * b_13
+        - k_32 * b_36
     )
     theta_middle = (
         (middle - middle_e0_middle * e0_middle - middle_e1_middle * e1_middle
-            - middle_e2_middle * e2_middle - middle_e3_middle * e3_middle) * k_52
+            - middle_e2_middle * e2_middle - middle_e3_middle * e3_middle) * k_58
     )
     theta_last = (
         (last - last_e0_last * e0_last - last_e1_last * e1_last - last_e2_last * e2_last
-            - last_e3_last * e3_last) * k_53
+            - last_e3_last * e3_last) * k_59
     )
+    z_last = (
+        end_line_g - end_line_g_e0_last * e0_last - end_line_g_e1_last * e1_last
+        - end_line_g_e2_last * e2_last - end_line_g_e3_last * e3_last
+    )
+    y_last = (
+        end_line_f - end_line_f_e0_last * e0_last - end_line_f_e1_last * e1_last
+        - end_line_f_e2_last * e2_last - end_line_f_e3_last * e3_last
+    )
+    z_middle, y_middle = b_2 - b_24 - b_25 - b_26 - b_27, b_1 - b_19 - b_20 - b_21 - b_22
+    z_first, y_first = -(U_z - z_middle), -(U_y - y_middle)
+    x_first = (
+        bearing_x - bearing_x_e0_first * e0_first - bearing_x_e1_first * e1_first
+        - bearing_x_e2_first * e2_first - bearing_x_e3_first * e3_first
+    )
+    x_middle = U_x + x_first
     x_last = (
         V_x + x_middle - V_x_e0_middle * e0_middle - V_x_e1_middle * e1_middle
         - V_x_e2_middle * e2_middle - V_x_e3_middle * e3_middle
     )
     return (
-        bearing_x, bearing_y, bearing_z, e0_first, e1_first, e2_first, e3_first, x_middle, y_middle,
-        z_middle, e0_middle, e1_middle, e2_middle, e3_middle, x_last, end_line_f, end_line_g,
-        e0_last, e1_last, e2_last, e3_last, theta_middle, theta_last,
+        x_first, y_first, z_first, e0_first, e1_first, e2_first, e3_first, x_middle, y_middle,
+        z_middle, e0_middle, e1_middle, e2_middle, e3_middle, x_last, y_last, z_last, e0_last,
+        e1_last, e2_last, e3_last, theta_middle, theta_last,
     )
 
 
@@ -1317,7 +1444,7 @@ def Phi_q(q, t, p=DEFAULTS):
 
 
 def Phi_q_nonzeros(q, t, p=DEFAULTS):
-    """Entries of Phi_q in the order of PATTERN, shape (..., 87)."""
+    """Entries of Phi_q in the order of PATTERN, shape (..., 107)."""
     return _evaluate(_position, 23, _PHI_Q_NONZEROS, t, p, q)
 
 
@@ -1363,7 +1490,7 @@ def kinematics_batch_last(q, q_dot, t, p=DEFAULTS):
 def solve(nonzeros, b):
     """Return x of Phi_q x = b by the planned elimination, shape (..., 23).
 
-    nonzeros (..., 87) are the entries of Phi_q in the order of PATTERN, b is (..., 23).
+    nonzeros (..., 107) are the entries of Phi_q in the order of PATTERN, b is (..., 23).
     Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that may happen.
     """
     nonzeros, b = np.asarray(nonzeros, dtype=float), np.asarray(b, dtype=float)

@@ -247,16 +247,11 @@ class Rotation(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Rotated(Vector):
-    """A vector turned by a rotation matrix A, or by a directional derivative of A.
-
-    Attributes
-    ----------
-    along
-        The directions in which A is differentiated: none for ``A v``.
-    """
+    """A vector turned by a rotation matrix A, or by a directional derivative of A."""
 
     rotation: Rotation
     vector: Vector
+    # The directions in which A is differentiated: none for ``A v``.
     along: tuple[Expression, ...] = ()
 
     @property

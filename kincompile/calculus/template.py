@@ -14,19 +14,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """Phi of a constraint type in vectors, with its generalised coordinates.
+    """Phi of a constraint type in vectors, with its generalised coordinates."""
 
-    Attributes
-    ----------
-    type_name
-        Name of the constraint type, for instance ``Revolute``.
-    Phi
-        One expression per row block: a vector is two equations, a scalar one.
-    """
-
-    type_name: str
+    type_name: str  # name of the constraint type, for instance ``Revolute``
     frames: tuple[Frame, ...]
     contacts: tuple[Contact, ...]
+    # One expression per row block: a vector is two equations, a scalar one.
     Phi: tuple[Expression, ...]
 
     def __hash__(self) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -11,17 +10,16 @@ import numpy as np
 import kincompile as kc
 from kincompile.cli.motion import set_values
 from kincompile.cli.shared import (
-    NOT_CONVERGED,
     deg_option,
+    end_unsolved,
     output_option,
     print_data,
     read_model,
+    require_page,
     set_option,
 )
-from kincompile.errors import InputError
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.tables import table
-from kincompile.writing import require_writable
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -56,9 +54,7 @@ def command(
     there is none.
     """
     if output is not None:
-        if Path(output).suffix not in (".html", ".htm"):
-            raise InputError(f"cannot write {output}: end its name in .html")
-        require_writable(output)
+        require_page(output)
     read = read_model(model)
     numbers = set_values(read, values)
     if output is None:
@@ -68,8 +64,7 @@ def command(
         drawn = kc.assembly_gallery(read, at, numbers)
         module, found = drawn.module, drawn.positions
     if not len(found):
-        click.echo(f"Error: {module.NAME} cannot be assembled at t = {at:g}", err=True)
-        context.exit(NOT_CONVERGED)
+        end_unsolved(context, f"{module.NAME} cannot be assembled at t = {at:g}")
     print_data("\n".join(_listed(module, found, at, angle_unit)) + "\n")
     if output is not None:
         click.echo(f"Wrote {drawn.write(output)}", err=True)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, motion_times, set_values
-from kincompile.cli.shared import NOT_CONVERGED, output_option, read_model, require_output
+from kincompile.cli.motion import Motion, motion_options
+from kincompile.cli.shared import end_unsolved, output_option, read_model, require_output
 from kincompile.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,13 +46,7 @@ def command(
     trace: tuple[str, ...],
     true_size: bool,
     view: str | None,
-    start: str,
-    end: str | None,
-    points: int | None,
-    grid: str | None,
-    values: tuple[str, ...],
-    through: str | None,
-    assembly: int | None,
+    motion: Motion,
 ) -> None:
     """Draw MODEL in motion, or at one time, for slides and for CAD.
 
@@ -66,12 +60,13 @@ def command(
         raise InputError("--view is for an .svg of one time: give --time T, too")
     require_output(output, model, "the model itself")
     mechanism = read_model(model)
-    numbers = set_values(mechanism, values)
-    times = motion_times(mechanism, start, end, points, grid, numbers)
+    numbers = motion.numbers(mechanism)
+    times = motion.times(mechanism, numbers)
     if at is not None:
         times = _with_time(times, at)
     module = kc.compile(mechanism)
-    solution = kc.solve(module, times, numbers, through=through, assembly=assembly)
+    options: Any = {"through": motion.through, "assembly": motion.assembly}
+    solution = kc.solve(module, times, numbers, **options)
     shown = solution.good if at is None else solution.good[times == at]
     if shown.any():
         named = trace or None
@@ -81,8 +76,7 @@ def command(
             kc.animate(solution, output, trace=named)
         click.echo(f"Wrote {output}", err=True)
     if not solution.success:
-        click.echo(f"Error: {solution.message}", err=True)
-        context.exit(NOT_CONVERGED)
+        end_unsolved(context, solution.message)
 
 
 def _is_still(output: str, at: float | None, true_size: bool) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 import kincompile as kc
 from kincompile.cli.motion import set_values
 from kincompile.cli.shared import (
-    NOT_CONVERGED,
+    end_unsolved,
     output_option,
     print_data,
     read_model,
@@ -59,8 +59,7 @@ def command(
         one = kc.equilibrium(module, at, numbers)
         found, message = [one] if one.success else [], one.message
     if not found:
-        click.echo(f"Error: {message}", err=True)
-        context.exit(NOT_CONVERGED)
+        end_unsolved(context, message)
     print_data("\n".join(_listed(module, found, at)) + "\n")
     if output is not None:
         click.echo(f"Wrote {kc.write(found[0].forces.motion, output)}", err=True)

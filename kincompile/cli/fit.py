@@ -9,7 +9,7 @@ import click
 import kincompile as kc
 from kincompile.cli.motion import set_values
 from kincompile.cli.shared import (
-    NOT_CONVERGED,
+    end_unsolved,
     output_option,
     page_option,
     print_data,
@@ -68,5 +68,4 @@ def command(
     if page is not None:
         write_page(page, fit_page(found))
     if not found.success:
-        click.echo(f"Error: {found.message}", err=True)
-        context.exit(NOT_CONVERGED)
+        end_unsolved(context, found.message)

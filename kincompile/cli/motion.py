@@ -7,7 +7,9 @@ for ``--help``.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields
+from functools import wraps
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -25,10 +27,49 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
 
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What the options of a motion say; those that a command has not are left out."""
+
+    start: str
+    end: str | float | None
+    points: int | None
+    values: tuple[str, ...]
+    grid: str | None = None
+    through: str | None = None
+    assembly: int | None = None
+
+    def numbers(self, model: Mechanism | ConstraintSystem) -> dict[str, float]:
+        """Return the values of parameters that are set."""
+        return set_values(model, self.values)
+
+    def times(
+        self, model: Mechanism | ConstraintSystem, numbers: dict[str, float]
+    ) -> NDArray[np.float64]:
+        """Return the times, shape (N,): equally spaced, or where a coordinate is."""
+        from kincompile.cli import values
+
+        times = values.time_grid(model, self.start, self.end, self.points, numbers)
+        return (
+            times if self.grid is None else values.times_on_grid(model, self.grid, times, numbers)
+        )
+
+
+def _together(command: Command) -> Command:
+    """Hand the options of a motion to a command as one, `motion`."""
+
+    @wraps(command)
+    def called(*args: Any, **given: Any) -> None:
+        own = {item.name: given.pop(item.name) for item in fields(Motion) if item.name in given}
+        command(*args, motion=Motion(**own), **given)
+
+    return called
+
+
 def time_options(command: Command) -> Command:
     """Add the options of times, and of values of parameters."""
     return _with(
-        command,
+        _together(command),
         click.option("--start", default="0", metavar="T", help="First time."),
         click.option(
             "--end",
@@ -116,18 +157,3 @@ def set_values(
     from kincompile.cli import values
 
     return values.set_values(model, given, option)
-
-
-def motion_times(
-    model: Mechanism | ConstraintSystem,
-    start: str,
-    end: str | float | None,
-    points: int | None,
-    grid: str | None,
-    numbers: dict[str, float],
-) -> NDArray[np.float64]:
-    """Return the times of a motion, shape (N,): equally spaced, or where a coordinate is."""
-    from kincompile.cli import values
-
-    times = values.time_grid(model, start, end, points, numbers)
-    return times if grid is None else values.times_on_grid(model, grid, times, numbers)

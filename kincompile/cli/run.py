@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, motion_times, set_values, sweep_options
+from kincompile.cli.motion import Motion, motion_options, sweep_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     deg_option,
@@ -38,13 +39,7 @@ if TYPE_CHECKING:
 def command(
     context: click.Context,
     model: str,
-    start: str,
-    end: str | float | None,
-    points: int | None,
-    grid: str | None,
-    values: tuple[str, ...],
-    through: str | None,
-    assembly: int | None,
+    motion: Motion,
     sweeps: dict[str, NDArray[np.float64]],
     product: bool,
     analysis: str | None,
@@ -65,14 +60,19 @@ def command(
     mechanism = read_model(model)
     if analysis is not None:
         settings = kc.read_analysis(analysis)
-        end = settings.end if end is None else end
-        points = settings.points if points is None else points
-    numbers = set_values(mechanism, values)
+        motion = replace(
+            motion,
+            end=settings.end if motion.end is None else motion.end,
+            points=settings.points if motion.points is None else motion.points,
+        )
+    numbers = motion.numbers(mechanism)
     if twice := numbers.keys() & sweeps.keys():
         raise InputError(f"--set and --sweep both name {listed(sorted(twice))}: give one of them")
-    times = motion_times(mechanism, start, end, points, grid, numbers)
+    times = motion.times(mechanism, numbers)
     module = kc.compile(mechanism)
     with progress_bar() as progress:
-        options: dict[str, Any] = {"through": through, "assembly": assembly, "product": product}
-        solution = kc.solve(module, times, numbers | sweeps, progress=progress, **options)
+        options: dict[str, Any] = {"through": motion.through, "assembly": motion.assembly}
+        solution = kc.solve(
+            module, times, numbers | sweeps, product=product, progress=progress, **options
+        )
     give_motion(context, solution, summary(solution, angle_unit), output, angle_unit, has_forces)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -68,10 +68,15 @@ def _page(context: click.Context, option: click.Parameter, given: str | None) ->
     """Return the name of a page, which can be written."""
     del context, option
     if given is not None:
-        if Path(given).suffix not in (".html", ".htm"):
-            raise InputError(f"cannot write {given}: end its name in .html")
-        require_writable(given)
+        require_page(given)
     return given
+
+
+def require_page(path: str) -> None:
+    """Refuse a page that has another ending, or cannot be written."""
+    if Path(path).suffix not in (".html", ".htm"):
+        raise InputError(f"cannot write {path}: end its name in .html")
+    require_writable(path)
 
 
 def write_page(path: str, html: str) -> None:
@@ -85,6 +90,12 @@ def print_data(text: str) -> None:
         click.echo(text, nl=False)
     except OSError as error:
         raise InputError(f"cannot write to stdout: {error.strerror}") from error
+
+
+def end_unsolved(context: click.Context, message: str) -> NoReturn:
+    """Say what was not solved, and end the command with the exit code of that."""
+    click.echo(f"Error: {message}", err=True)
+    context.exit(NOT_CONVERGED)
 
 
 def give_motion(
@@ -109,5 +120,4 @@ def give_motion(
         kc.write(written, output, angle_unit=angle_unit)
         click.echo(f"{text}\nWrote {output}", err=True)
     if not solution.success:
-        click.echo(f"Error: {solution.message}", err=True)
-        context.exit(NOT_CONVERGED)
+        end_unsolved(context, solution.message)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_times, set_values, time_options
+from kincompile.cli.motion import Motion, set_values, time_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
     deg_option,
@@ -42,7 +42,7 @@ from kincompile.runtime.results.write import require_known_suffix
     "stops",
     multiple=True,
     metavar="NAME=VALUE",
-    help="End where a coordinate or output has this value.",
+    help="End where a coordinate or output has this value; a name may have several.",
 )
 @click.option("--method", type=click.Choice(METHODS), default="DOP853", help="The integrator.")
 @click.option("--rtol", type=float, default=1e-9, help="Relative tolerance of a step.")
@@ -54,16 +54,12 @@ from kincompile.runtime.results.write import require_known_suffix
 def command(
     context: click.Context,
     model: str,
-    start: str,
-    end: str | None,
-    points: int | None,
-    values: tuple[str, ...],
+    motion: Motion,
     positions: tuple[str, ...],
     velocities: tuple[str, ...],
     stops: tuple[str, ...],
     method: str,
     rtol: float,
-    through: str | None,
     angle_unit: str,
     has_forces: bool,
     output: str | None,
@@ -78,10 +74,14 @@ def command(
         require_known_suffix(output)
         require_output(output, model, "the model itself")
     mechanism = read_model(model)
-    numbers = set_values(mechanism, values)
-    times = motion_times(mechanism, start, end, points, None, numbers)
+    numbers = motion.numbers(mechanism)
+    times = motion.times(mechanism, numbers)
     if times.size < 2:
         raise InputError("a simulation takes time: give --end and --points of at least 2.")
+    limits: dict[str, list[float]] = {}
+    for text in stops:
+        for name, value in set_values(mechanism, [text], "--stop").items():
+            limits.setdefault(name, []).append(value)
     module = kc.compile(mechanism)
     with progress_bar() as progress:
         solution = kc.simulate(
@@ -90,10 +90,10 @@ def command(
             numbers,
             position=set_values(mechanism, positions, "--position"),
             velocity=set_values(mechanism, velocities, "--velocity"),
-            stops=set_values(mechanism, stops, "--stop"),
+            stops=limits,
             method=method,
             rtol=rtol,
-            through=through,
+            through=motion.through,
             progress=progress,
         )
     text = f"{summary(solution, angle_unit)}\n{solution.message}"

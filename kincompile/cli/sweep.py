@@ -12,11 +12,11 @@ from typing import Any
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, motion_times, set_values, sweep_options
+from kincompile.cli.motion import Motion, motion_options, sweep_options
 from kincompile.cli.progress import progress_bar
 from kincompile.cli.shared import (
-    NOT_CONVERGED,
     deg_option,
+    end_unsolved,
     output_option,
     page_option,
     print_data,
@@ -59,12 +59,7 @@ def command(
     model: str,
     output: str | None,
     page: str | None,
-    start: str,
-    end: str | None,
-    points: int | None,
-    grid: str | None,
-    values: tuple[str, ...],
-    assembly: int | None,
+    motion: Motion,
     sweeps: dict[str, Any],
     product: bool,
     columns: tuple[str, ...],
@@ -89,14 +84,14 @@ def command(
     mechanism = read_model(model)
     table = read_sweep_table(model) or SweepTable({})
     swept: dict[str, Any] = sweeps or values_of(table)
-    numbers = set_values(mechanism, values)
+    numbers = motion.numbers(mechanism)
     if twice := numbers.keys() & swept.keys():
         raise InputError(f"--set names {listed(sorted(twice))}, which is swept: give one of them")
-    times = motion_times(mechanism, start, end, points, grid, numbers)
+    times = motion.times(mechanism, numbers)
     kept = {"columns": columns or None, "measures": measures}
     if not columns and not measures:
         kept = {"columns": table.columns, "measures": table.measures}
-    options = {"product": product or (table.product and not sweeps), "assembly": assembly}
+    options = {"product": product or (table.product and not sweeps), "assembly": motion.assembly}
     # Fresh processes: a copy of this one would have its memory, and its threads as they stand.
     pool = (
         ProcessPoolExecutor(processes, get_context("spawn"), end_with_parent)
@@ -114,5 +109,4 @@ def command(
     if page is not None:
         write_page(page, sweep_page(found, angle_unit))
     if not {"CONVERGED", "CORNER"} & found.statuses().keys():
-        click.echo("Error: no set of parameters was solved", err=True)
-        ctx.exit(NOT_CONVERGED)
+        end_unsolved(ctx, "no set of parameters was solved")

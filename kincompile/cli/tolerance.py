@@ -7,7 +7,7 @@ from functools import partial
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, motion_times, set_values
+from kincompile.cli.motion import Motion, motion_options
 from kincompile.cli.shared import page_option, print_data, read_model, write_page
 
 
@@ -19,12 +19,7 @@ from kincompile.cli.shared import page_option, print_data, read_model, write_pag
 def command(
     model: str,
     page: str | None,
-    start: str,
-    end: str | None,
-    points: int | None,
-    grid: str | None,
-    values: tuple[str, ...],
-    assembly: int | None,
+    motion: Motion,
     samples: int | None,
 ) -> None:
     """Say how far the motion of MODEL deviates, as its table [tolerance] says.
@@ -40,9 +35,9 @@ def command(
     given = read_tolerance(model)
     if samples is not None:
         given["samples"] = samples
-    numbers = set_values(mechanism, values)
-    times = motion_times(mechanism, start, end, points, grid, numbers)
-    found = kc.tolerance(mechanism, t=times, p=numbers, assembly=assembly, **given)
+    numbers = motion.numbers(mechanism)
+    times = motion.times(mechanism, numbers)
+    found = kc.tolerance(mechanism, t=times, p=numbers, assembly=motion.assembly, **given)
     print_data(f"{found}\n")
     if page is not None:
         write_page(page, tolerance_page(found))

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import kincompile as kc
-from kincompile.cli.motion import motion_options, motion_times, set_values
+from kincompile.cli.motion import Motion, motion_options
 from kincompile.cli.shared import NOT_CONVERGED, deg_option, output_option, read_model
 from kincompile.cli.watch import follow
 from kincompile.errors import InputError
@@ -29,13 +29,7 @@ def command(
     models: tuple[str, ...],
     output: str | None,
     watch: bool,
-    start: str,
-    end: str | None,
-    points: int | None,
-    grid: str | None,
-    values: tuple[str, ...],
-    through: str | None,
-    assembly: int | None,
+    motion: Motion,
     angle_unit: str,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
@@ -60,13 +54,12 @@ def command(
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
     read = [read_model(model) for model in models]
     options: dict[str, Any] = {
-        "through": through, "assembly": assembly, "angle_unit": angle_unit,
+        "through": motion.through, "assembly": motion.assembly, "angle_unit": angle_unit,
     }  # fmt: skip
     pages = []
     for model in read:
-        numbers = set_values(model, values)
-        times = motion_times(model, start, end, points, grid, numbers)
-        pages.append(kc.page(model, t=times, p=numbers, **options))
+        numbers = motion.numbers(model)
+        pages.append(kc.page(model, t=motion.times(model, numbers), p=numbers, **options))
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:
         click.echo(f"Wrote {path}", err=True)

@@ -45,18 +45,10 @@ def agrees(written: Array, sizes: Array, generated: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Multiple:
-    """How one row is a multiple of another.
+    """How one row is a multiple of another."""
 
-    Attributes
-    ----------
-    factor
-        By state, shape (N,): written = factor * generated.
-    share
-        Share of the entries that are, 1 where the whole row is.
-    """
-
-    factor: Array
-    share: float
+    factor: Array  # by state, shape (N,): written = factor * generated
+    share: float  # share of the entries that are, 1 where the whole row is
 
 
 def multiple(

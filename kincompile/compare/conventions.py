@@ -35,18 +35,10 @@ _CHOICES: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What an author says of a hand-in.
+    """What an author says of a hand-in."""
 
-    Attributes
-    ----------
-    signs
-        -1 for nu or gamma with the opposite sign.
-    form
-        The form of a mechanism in space, "" where it has to be found.
-    """
-
-    signs: Mapping[str, float]
-    form: str = ""
+    signs: Mapping[str, float]  # -1 for nu or gamma with the opposite sign
+    form: str = ""  # the form of a mechanism in space, "" where it has to be found
 
 
 def stated_conventions(stated: Mapping[str, str]) -> Stated:

@@ -102,11 +102,6 @@ class Diagnostician:
             for fault in self._catalogue(block, "Phi_q", form)
         )
 
-    @property
-    def _is_by_q(self) -> bool:
-        """Whether rows are by the coordinates, as a free equation's three parts of gamma are."""
-        return self._reference.base is self._reference
-
     def _catalogue(
         self, block: ConstraintBlock, quantity: str, form: Form | None
     ) -> list[NumericFault]:
@@ -117,8 +112,10 @@ class Diagnostician:
             faults: Iterable[NumericFault] = ()
             if isinstance(joint, Joint):
                 faults = self._faults_of(joint, block, quantity)
-            elif isinstance(joint, FreeEquation) and quantity == "gamma" and self._is_by_q:
-                faults = self._missing_in_equations(joint, block)
+            elif isinstance(joint, FreeEquation) and quantity == "gamma":
+                # Its three parts are by the coordinates.
+                is_by_q = self._reference.base is self._reference
+                faults = self._missing_in_equations(joint, block) if is_by_q else ()
             self._catalogues[key] = [*faults, *self._other_forms(block, quantity, form)]
         return self._catalogues[key]
 

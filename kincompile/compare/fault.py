@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Generic, TypeVar
 
@@ -11,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 
-class Kind(StrEnum):
+class Kind:
     """The kinds of faults, in a few words."""
 
     SIGN = "sign"
@@ -68,20 +67,12 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class Fault(Generic[Result]):
-    """A fault and its result.
-
-    Attributes
-    ----------
-    result
-        The faulty formula, formulas by part, or numbers by entry.
-    detail
-        The right formula of the faulty term or entry, for those who may see it.
-    """
+    """A fault and its result."""
 
     kind: str
     text: str
-    result: Result
-    detail: str = ""
+    result: Result  # the faulty formula, formulas by part, or numbers by entry
+    detail: str = ""  # the right formula of the faulty term or entry, for those who may see it
 
 
 def whole_faults(

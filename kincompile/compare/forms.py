@@ -57,29 +57,17 @@ Function = Callable[[States], Array]
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """Formulas that stand in the place of some generated rows.
+    """Formulas that stand in the place of some generated rows."""
 
-    Attributes
-    ----------
-    kind, text
-        The convention that it is; `text` says what is written.
-    rows
-        The rows of the system, in the order of the form's own.
-    evaluate
-        Gives its quantities at states.
-    accuracy
-        Relative accuracy of its values; 0 where they are exact.
-    defines
-        Whether it is the author's own, from which the author's other formulas have to follow.
-    """
-
+    # kind, text: the convention that it is; `text` says what is written.
     kind: str
     text: str
-    rows: tuple[int, ...]
-    evaluate: Evaluate
+    rows: tuple[int, ...]  # the rows of the system, in the order of the form's own
+    evaluate: Evaluate  # gives its quantities at states
     joint: Joint | None = None
     formulas: Reference | None = None
-    accuracy: float = 0.0
+    accuracy: float = 0.0  # relative accuracy of its values; 0 where they are exact
+    # Whether it is the author's own, from which the author's other formulas have to follow.
     defines: bool = False
 
 

@@ -31,19 +31,11 @@ _MINUS_ONE = ex.Number(Fraction(-1))
 
 @dataclass(frozen=True, slots=True)
 class Symbols:
-    """The names of a joint's angles and of its body-fixed vectors.
-
-    Attributes
-    ----------
-    angles, vectors
-        The names.
-    partners
-        The vector that each vector is easily mistaken for, by name.
-    """
+    """The names of a joint's angles and of its body-fixed vectors."""
 
     angles: frozenset[str]
     vectors: frozenset[str]
-    partners: Mapping[str, str]
+    partners: Mapping[str, str]  # the vector that each vector is easily mistaken for, by name
 
     def other_angle(self, name: str) -> str | None:
         """Return the angle of the other body."""

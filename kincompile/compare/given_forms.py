@@ -54,17 +54,11 @@ class GivenForm:
 
 @dataclass(frozen=True)
 class Forms:
-    """The forms that a hand-in may have, the system's own first.
-
-    Attributes
-    ----------
-    constraint
-        Name of the one constraint that is checked; all where None.
-    """
+    """The forms that a hand-in may have, the system's own first."""
 
     reference: Reference
     stated: Stated
-    constraint: str | None
+    constraint: str | None  # name of the one constraint that is checked; all where None
 
     @cached_property
     def all(self) -> list[GivenForm]:

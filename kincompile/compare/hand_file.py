@@ -41,23 +41,13 @@ _QUOTES = ('"""', "'''", '"', "'")
 
 @dataclass(frozen=True, slots=True)
 class HandFile:
-    """The content of a hand file, still as text.
-
-    Attributes
-    ----------
-    quantities
-        Rows of elements by quantity: Phi, Phi_q, nu, gamma, M, Q.
-    aliases
-        The author's own names, each with its expression.
-    conventions
-        What its author says that nu and gamma are.
-    """
+    """The content of a hand file, still as text."""
 
     name: str
-    quantities: Mapping[str, Rows]
-    aliases: Mapping[str, Cell]
+    quantities: Mapping[str, Rows]  # rows of elements by quantity: Phi, Phi_q, nu, gamma, M, Q
+    aliases: Mapping[str, Cell]  # the author's own names, each with its expression
     constraint: str | None
-    conventions: Mapping[str, str]
+    conventions: Mapping[str, str]  # what its author says that nu and gamma are
 
 
 class _Draft:

@@ -84,13 +84,7 @@ _ORDERS = {
 
 
 class JointFaults:
-    """The faults of one quantity of a joint, on the level of vectors.
-
-    Parameters
-    ----------
-    joint
-        The joint, as its author sees the roles of its bodies.
-    """
+    """The faults of one quantity of a joint, on the level of vectors."""
 
     def __init__(self, joint: Joint, quantity: str, reference: Reference, states: States) -> None:
         self._joint = joint

@@ -33,18 +33,12 @@ UNEXPLAINED = "no slip with one of the loads gives these numbers."
 
 @dataclass(frozen=True)
 class LoadComparer:
-    """One comparison of M and Q.
-
-    Attributes
-    ----------
-    strict
-        Whether what is right by a convention alone is not accepted.
-    """
+    """One comparison of M and Q."""
 
     reference: Reference
     written: Mapping[str, Written]
     states: States
-    strict: bool
+    strict: bool  # whether what is right by a convention alone is not accepted
 
     @property
     def wrong_count(self) -> int:

@@ -44,27 +44,16 @@ class Units:
 
 @dataclass(frozen=True)
 class Matching:
-    """How the written formulas are laid out against the generated ones.
+    """How the written formulas are laid out against the generated ones."""
 
-    Attributes
-    ----------
-    layout, units
-        Columns of Phi_q, and the unit of angles.
-    rows
-        The row of the system that each written row is.
-    factors
-        written = factor * generated, by row and state, shape (rows, N).
-    forms
-        The forms of constraints that are not written as they are generated.
-    signs
-        -1 for nu or gamma where its author states that the whole vector has the opposite sign.
-    """
-
+    # layout, units: columns of Phi_q, and the unit of angles.
     layout: Layout
     units: Units
-    rows: tuple[int, ...]
-    factors: Array
+    rows: tuple[int, ...]  # the row of the system that each written row is
+    factors: Array  # written = factor * generated, by row and state, shape (rows, N)
+    # The forms of constraints that are not written as they are generated.
     forms: tuple[Form, ...] = ()
+    # -1 for nu or gamma where its author states that the whole vector has the opposite sign.
     signs: Mapping[str, float] = field(default_factory=dict)
 
     @property

@@ -49,32 +49,20 @@ _NO_ACCELERATIONS = "accelerations are the unknowns of Phi_q q_ddot = gamma; no 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """One quantity as its author has it.
+    """One quantity as its author has it."""
 
-    Attributes
-    ----------
-    texts
-        The text of each entry; empty for functions and for arrays of values at states.
-    evaluate
-        Gives the values and the sizes of their terms at states, both (N, rows, columns).
-    expressions
-        The formulas, row by row; None for functions and arrays.
-    lost
-        Gives what rounding may have taken from values at states, of the same shape.
-    rounding
-        What rounding that is, in words.
-    takes_parameters
-        Whether it may be evaluated at other parameters than the default ones.
-    takes_states
-        Whether it may be evaluated at any states, not only those its author gave.
-    """
-
-    texts: Texts
+    texts: Texts  # the text of each entry; empty for functions and for arrays of values at states
+    # Gives the values and the sizes of their terms at states, both (N, rows, columns).
     evaluate: Callable[[States], tuple[Array, Array]]
+    # The formulas, row by row; None for functions and arrays.
     expressions: tuple[sympy.Expr, ...] | None = None
+    # Gives what rounding may have taken from values at states, of the same shape.
     lost: Callable[[States, Array], Array] | None = None
+    # What rounding that is, in words.
     rounding: str = "numbers are rounded; they count to half of their last digit"
+    # Whether it may be evaluated at other parameters than the default ones.
     takes_parameters: bool = True
+    # Whether it may be evaluated at any states, not only those its author gave.
     takes_states: bool = True
 
     @property
@@ -278,8 +266,6 @@ def read_written(
         Text, rows of `Cell`, nested lists of numbers, texts and SymPy expressions, a SymPy matrix,
         a NumPy array, or a function ``f(q, t)`` (of gamma and Q: ``f(q, q_dot, t)``), which
         may also take the parameters as a last argument.
-    at_states
-        Whether an array holds values at given states.
     shape_problems
         Says what is wrong with a number of rows and columns. It is asked before any formula is
         read: a file can hold more of them than anyone could wait for.

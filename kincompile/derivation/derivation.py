@@ -21,7 +21,8 @@ from kincompile.derivation.figures import Figures
 from kincompile.derivation.joint_section import joint_section
 from kincompile.derivation.joint_terms import abbreviations
 from kincompile.derivation.load_section import load_abbreviations, loads_section
-from kincompile.derivation.to_html import as_html, as_slides
+from kincompile.derivation.slides import slides_of
+from kincompile.derivation.to_html import as_html
 from kincompile.derivation.to_latex import as_tex
 from kincompile.derivation.to_markdown import as_markdown
 from kincompile.derivation.to_notebook import as_notebook
@@ -39,9 +40,6 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
-
-    import numpy as np
-    from numpy.typing import NDArray
 
     from kincompile.calculus.expressions import Expression
     from kincompile.derivation.formulas import Glyph
@@ -62,7 +60,7 @@ class Derivation(Manuscript):
 
     def to_slides(self) -> str:
         """Return a page of slides, one for each constraint, for a screen or to be printed."""
-        return as_slides(self)
+        return as_html(slides_of(self), kind="slides")
 
     def to_latex(self) -> str:
         """Return a LaTeX document, for pdflatex."""
@@ -256,9 +254,5 @@ def _state_code(chosen: Evaluation) -> str:
     """Return the state as Python code, exact to the last digit."""
     lines = [f"t = {chosen.t!r}"]
     for name, values in (("q", chosen.q), ("q_dot", chosen.q_dot), ("p", chosen.p)):
-        lines.append(f"{name} = np.array({_listed(values)})")
+        lines.append(f"{name} = np.array({(values + 0.0).tolist()})")
     return "\n".join(lines)
-
-
-def _listed(values: NDArray[np.float64]) -> str:
-    return repr([value + 0.0 for value in values.tolist()])

@@ -62,52 +62,31 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Display:
-    """A formula on a line of its own.
-
-    Attributes
-    ----------
-    anchor
-        Where links to it lead; "" for none.
-    source
-        The emitted code of it.
-    """
+    """A formula on a line of its own."""
 
     formula: Formula
-    anchor: str = ""
-    source: SourceLine | None = None
+    anchor: str = ""  # where links to it lead; "" for none
+    source: SourceLine | None = None  # the emitted code of it
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table.
-
-    Attributes
-    ----------
-    folded
-        Title under which it is folded away where the medium can fold, "" for an open table.
-    """
+    """A table."""
 
     header: tuple[Runs, ...]
     rows: tuple[tuple[Runs, ...], ...]
+    # Title under which it is folded away where the medium can fold, "" for an open table.
     folded: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """The picture of a sparse matrix.
-
-    Attributes
-    ----------
-    entries
-        Anchor of the derivation of each entry, by row and column.
-    bands
-        First row and number of rows of each constraint.
-    """
+    """The picture of a sparse matrix."""
 
     rows: tuple[str, ...]
     columns: tuple[str, ...]
-    entries: dict[tuple[int, int], str]
-    bands: tuple[tuple[int, int], ...]
+    entries: dict[tuple[int, int], str]  # anchor of the derivation of each entry, by row and column
+    bands: tuple[tuple[int, int], ...]  # first row and number of rows of each constraint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,24 +108,14 @@ Block: TypeAlias = Text | Display | Table | Pattern | Figure | NotebookCode
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
-    """A titled part of the page.
+    """A titled part of the page."""
 
-    Attributes
-    ----------
-    anchor
-        Where links to it lead.
-    level
-        "vector", "expanded" or "numeric"; "" where that says nothing.
-    is_folded
-        Whether it is folded away where the medium can fold.
-    """
-
-    anchor: str
+    anchor: str  # where links to it lead
     title: Runs
     blocks: tuple[Block, ...] = ()
     sections: tuple[Chapter, ...] = ()
-    level: str = ""
-    is_folded: bool = False
+    level: str = ""  # "vector", "expanded" or "numeric"; "" where that says nothing
+    is_folded: bool = False  # whether it is folded away where the medium can fold
 
 
 @dataclass(frozen=True, slots=True, eq=False)

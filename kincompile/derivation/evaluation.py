@@ -48,44 +48,30 @@ ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """A system, its emitted module and the numbers at one state.
-
-    Attributes
-    ----------
-    origin
-        The source of the state, in words.
-    q, q_dot, q_ddot
-        Coordinates and rates, shape (n,); the rates are zero where they are not determined.
-    Phi, Phi_q, nu, gamma
-        The values of the emitted module there.
-    assembly
-        The iterates of Newton's method; None where the system is not square.
-    start
-        In words, from where they come.
-    is_assembled
-        Whether the state lies on the constraints.
-    problem
-        The reason why the system cannot be solved, "" where it can.
-    """
+    """A system, its emitted module and the numbers at one state."""
 
     system: ConstraintSystem
     code: InlineProgram
     source: str
     module: ModuleType
-    origin: str
+    origin: str  # the source of the state, in words
     t: float
+    # q, q_dot, q_ddot: coordinates and rates, shape (n,); the rates are zero where they are not
+    # determined.
     q: Array
     q_dot: Array
     q_ddot: Array
     p: Array
+    # Phi, Phi_q, nu, gamma: the values of the emitted module there.
     Phi: Array
     Phi_q: Array
     nu: Array
     gamma: Array
+    # The iterates of Newton's method; None where the system is not square.
     assembly: NewtonResult | None
-    start: str
-    is_assembled: bool
-    problem: str
+    start: str  # in words, from where they come
+    is_assembled: bool  # whether the state lies on the constraints
+    problem: str  # the reason why the system cannot be solved, "" where it can
 
     @property
     def values(self) -> dict[str, float]:

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 SHORTEST = 0.4
 """Length of the shortest vector that is drawn, in sizes of marks."""
 
-AXIS, DIRECTION = 5.0, 7.0
-"""Lengths of the axes of a frame and of directions, in sizes of marks."""
+AXIS, DIRECTION, OF_TRIAD = 5.0, 7.0, 10.0
+"""Lengths of the axes of a frame, of directions, and of those in space, in sizes of marks."""
 
 SHORTER = 0.75
 """Part of its length that a direction has where it would lie on another one."""
@@ -136,7 +136,7 @@ class Figures:
                 continue
             direction = np.array(self._geometry.numbers(joint.points[symbol]), dtype=np.float64)
             start = last.get(frame, self._place(frame))
-            length = DIRECTION * self._drawn.size
+            length = self._drawn.size * (OF_TRIAD if self._drawn.is_spatial else DIRECTION)
             way = self._place(frame, *(length / norm(direction) * direction)) - self._place(frame)
             ray = np.concatenate((start, way)) / length
             if any(norm(ray - other) < ALIKE for other in taken):

@@ -16,23 +16,13 @@ from kincompile.calculus.expressions import Expression, Scalar, Vector
 
 @dataclass(frozen=True, slots=True)
 class Glyph:
-    """A symbol of the page itself: Phi_q, nu, A_i.
+    """A symbol of the page itself: Phi_q, nu, A_i."""
 
-    Attributes
-    ----------
-    letter
-        The letter, or the name of a Greek one.
-    index
-        Subscript; several indices are separated by commas.
-    exponent
-        Superscript, "" for none.
-    """
-
-    letter: str
-    index: str = ""
+    letter: str  # the letter, or the name of a Greek one
+    index: str = ""  # subscript; several indices are separated by commas
     dots: int = 0
     bold: bool = True
-    exponent: str = ""
+    exponent: str = ""  # superscript, "" for none
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,16 +93,12 @@ def abbreviations(template: Template) -> dict[ex.Expression, Glyph]:
     return names
 
 
-def _separations(expression: ex.Expression) -> Iterator[ex.VectorSum]:
+def _separations(expression: ex.Expression) -> Iterator[ex.Vector]:
     """Yield the sums with a position in them that a scalar product has as a factor."""
-    if isinstance(expression, ex.Dot):
-        for side in (expression.left, expression.right):
-            if isinstance(side, ex.VectorSum) and _has_position(side):
-                yield side
-
-
-def _has_position(vector: ex.VectorSum) -> bool:
-    return any(isinstance(term, ex.VectorSymbol) for term in vector.terms)
+    for side in (expression.left, expression.right) if isinstance(expression, ex.Dot) else ():
+        terms = side.terms if isinstance(side, ex.VectorSum) else ()
+        if any(isinstance(term, ex.VectorSymbol) for term in terms):
+            yield side
 
 
 def is_zero(entry: ex.Expression) -> bool:

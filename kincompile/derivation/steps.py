@@ -52,24 +52,15 @@ Derived = TypeVar("Derived", bound="RowBlock | EquationDerivatives")
 
 @dataclass(frozen=True, slots=True)
 class Steps(ABC, Generic[Derived]):
-    """The steps of a constraint.
-
-    Attributes
-    ----------
-    rows
-        The rows of the constraint in the emitted program.
-    derivatives
-        What follows from Phi, for each row block of a joint or each expression of an equation.
-    level
-        Level of the steps that are derived: "vector" or "expanded".
-    """
+    """The steps of a constraint."""
 
     evaluation: Evaluation
-    rows: Rows
+    rows: Rows  # the rows of the constraint in the emitted program
     name: str
     columns: Sequence[str]
+    # What follows from Phi, for each row block of a joint or each expression of an equation.
     derivatives: Sequence[Derived]
-    level: str
+    level: str  # level of the steps that are derived: "vector" or "expanded"
 
     @abstractmethod
     def symbol(self, letter: str, k: int) -> Glyph:
@@ -113,13 +104,15 @@ class Steps(ABC, Generic[Derived]):
         return self.step(6, title, *blocks)
 
     def expansion(self) -> Chapter:
-        """Return the step in which everything becomes sines and cosines: the emitted code."""
+        """Return the step in which everything is written out: the emitted code."""
         note = text(
             "This is what the emitted module computes, with its intermediate values written out. "
             "Entries of the Jacobian that are not listed are zero."
         )
         lines = self.evaluation.expansion(self.rows, QUANTITIES)
-        return self.step(7, "Expanded to sines and cosines", note, *lines, level="expanded")
+        is_spatial = len(self.evaluation.system.ground.kind.axes) > 2
+        title = "Written out in components" if is_spatial else "Expanded to sines and cosines"
+        return self.step(7, title, note, *lines, level="expanded")
 
     def placement(self) -> Chapter:
         """Return the step that gives the rows and columns of the constraint."""

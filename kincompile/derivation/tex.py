@@ -35,13 +35,7 @@ def escape(text: str) -> str:
 
 
 class TexPrinter(Notation, LatexPrinter):
-    """Prints formulas as LaTeX in mathematical mode; amsmath is all that it needs.
-
-    Parameters
-    ----------
-    is_breakable
-        Whether a line may be broken between factors.
-    """
+    """Prints formulas as LaTeX in mathematical mode; amsmath is all that it needs."""
 
     def __init__(
         self, abbreviations: Mapping[Any, Glyph] | None = None, *, is_breakable: bool = False

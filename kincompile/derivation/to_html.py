@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from kincompile.derivation.mathml import MathMLPrinter
 from kincompile.derivation.renderer import Renderer
-from kincompile.derivation.slides import slides_of
 from kincompile.derivation.svg import as_svg
 from kincompile.targets.templates import fill, read
 
@@ -34,11 +33,6 @@ CELL = 18
 
 CHARACTER = 6.8
 """Width of a character of a pattern's labels, in a monospaced font of 11 pixels."""
-
-
-def as_slides(document: Manuscript) -> str:
-    """Return a derivation as an HTML page of slides."""
-    return as_html(slides_of(document), kind="slides")
 
 
 def as_html(

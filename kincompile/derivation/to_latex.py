@@ -62,7 +62,8 @@ class _LatexRenderer(Renderer):
         pieces = self._printer.pieces(block.formula)
         target = _target(block.anchor) if block.anchor else ""
         yield rf"\formula{{{target}%"
-        yield from (rf"{_command(piece)}{{{piece}}}%" for piece in pieces)
+        for piece in pieces:  # no line is broken within a matrix
+            yield rf"\{'block' if 'bmatrix' in piece else 'piece'}{{{piece}}}%"
         yield "}"
         if block.source is not None:
             lines = r" \\ ".join(escape(line) for line in block.source.text.split("\n"))
@@ -139,11 +140,6 @@ def _plain(run: Run) -> str:
         case str():
             return run
     return ""
-
-
-def _command(piece: str) -> str:
-    """Return the command of a piece of a formula; no line is broken within a matrix."""
-    return r"\block" if "bmatrix" in piece else r"\piece"
 
 
 def _target(anchor: str) -> str:

@@ -16,31 +16,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RowBlock:
-    r"""One row block of a constraint: a vector equation (two rows) or a scalar one.
-
-    Attributes
-    ----------
-    Phi_q
-        Its columns: Phi_q q_dot with each rate one in turn, by component of the coordinates of the
-        template, and each a vector or a scalar, as Phi is.
-    velocity
-        :math:`\Phi_q \dot q`.
-    nu
-        :math:`-\Phi_t`.
-    gamma_terms
-        :math:`-(\Phi_q \dot q)_q \dot q`, :math:`-2 \Phi_{qt} \dot q` and :math:`-\Phi_{tt}`.
-    gamma
-        Their sum.
-    Phi_t_steps, gamma_steps
-        The rules that fired for Phi_t and for each of the three terms, innermost first.
-    """
+    """One row block of a constraint: a vector equation (two rows) or a scalar one."""
 
     Phi: ex.Expression
+    # Its columns: Phi_q q_dot with each rate one in turn, by component of the coordinates of the
+    # template, and each a vector or a scalar, as Phi is.
     Phi_q: tuple[ex.Expression, ...]
-    velocity: ex.Expression
-    nu: ex.Expression
+    velocity: ex.Expression  # Phi_q q_dot
+    nu: ex.Expression  # -Phi_t
+    # -(Phi_q q_dot)_q q_dot, -2 Phi_qt q_dot and -Phi_tt.
     gamma_terms: tuple[ex.Expression, ex.Expression, ex.Expression]
-    gamma: ex.Expression
+    gamma: ex.Expression  # their sum
+    # Phi_t_steps, gamma_steps: the rules that fired for Phi_t and for each of the three terms,
+    # innermost first.
     Phi_t_steps: tuple[Step, ...]
     gamma_steps: tuple[tuple[Step, ...], ...]
 

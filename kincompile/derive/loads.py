@@ -29,20 +29,11 @@ Leaf = ex.Symbol | ex.VectorSymbol
 
 @dataclass(frozen=True, slots=True)
 class LoadTemplate(Template):
-    """A load in vectors, with every attribute symbolic.
+    """A load in vectors, with every attribute symbolic."""
 
-    Attributes
-    ----------
-    energy
-        Kinetic energy; zero of a force.
-    work
-        Forces and displacements, whose products are the virtual work.
-    values
-        Forces that may depend on any coordinates and rates, leaves of `work`.
-    """
-
-    energy: ex.Scalar
-    work: tuple[Work, ...]
+    energy: ex.Scalar  # kinetic energy; zero of a force
+    work: tuple[Work, ...]  # forces and displacements, whose products are the virtual work
+    # Forces that may depend on any coordinates and rates, leaves of `work`.
     values: tuple[Leaf, ...]
 
     def __hash__(self) -> int:
@@ -52,21 +43,12 @@ class LoadTemplate(Template):
 
 @dataclass(frozen=True, slots=True)
 class LoadDerivatives:
-    """What a load adds to the equations of motion, by its own coordinates.
+    """What a load adds to the equations of motion, by its own coordinates."""
 
-    Attributes
-    ----------
-    M
-        Mass matrix, row by row.
-    Q
-        Generalised forces.
-    Q_q, Q_q_dot
-        Their derivatives: a row for each of Q, a column for each of the load's own coordinates and
-        then of the others on which its values depend.
-    """
-
-    M: tuple[tuple[ex.Scalar, ...], ...]
-    Q: tuple[ex.Scalar, ...]
+    M: tuple[tuple[ex.Scalar, ...], ...]  # mass matrix, row by row
+    Q: tuple[ex.Scalar, ...]  # generalised forces
+    # Q_q, Q_q_dot: their derivatives: a row for each of Q, a column for each of the load's own
+    # coordinates and then of the others on which its values depend.
     Q_q: tuple[tuple[ex.Scalar, ...], ...]
     Q_q_dot: tuple[tuple[ex.Scalar, ...], ...]
 
@@ -79,15 +61,7 @@ def slope_of(leaf: Leaf, column: int, *, by_rate: bool) -> Leaf:
 
 @cache
 def derive_load(template: LoadTemplate, others: int, *, varies: bool) -> LoadDerivatives:
-    """Derive M, Q and its Jacobians of a type of load.
-
-    Parameters
-    ----------
-    others
-        How many coordinates of others its values depend on.
-    varies
-        Whether its values depend on coordinates or rates at all.
-    """
+    """Derive M, Q and its Jacobians of a type of load."""
     motion: Direction = dict(zip(template.coordinates, template.rates, strict=True))
     by_q, by_rate = _columns(template.coordinates), _columns(template.rates)
     momenta = [along(template.energy, direction) for direction in by_rate]

@@ -24,22 +24,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PartialDerivative:
-    """The derivative of a row block by a coordinate.
+    """The derivative of a row block by a coordinate."""
 
-    Attributes
-    ----------
-    coordinate
-        A coordinate of the template.
-    entry
-        By a vector r: k of the block k I where Phi is a vector, u of the row u^T where Phi is a
-        scalar. By Euler parameters, and by a small rotation: the matrix, or the row, of slopes. By
-        a scalar: a vector or a scalar, as Phi is.
-    steps
-        The rules that fired, innermost first, with what they give in the same form.
-    """
-
-    coordinate: CoordinateSymbol
+    coordinate: CoordinateSymbol  # a coordinate of the template
+    # By a vector r: k of the block k I where Phi is a vector, u of the row u^T where Phi is a
+    # scalar. By Euler parameters, and by a small rotation: the matrix, or the row, of slopes. By a
+    # scalar: a vector or a scalar, as Phi is.
     entry: ex.Expression
+    # The rules that fired, innermost first, with what they give in the same form.
     steps: tuple[Step, ...]
 
     def columns(self, entry: ex.Expression) -> tuple[ex.Expression, ...]:

@@ -31,38 +31,23 @@ SPACE = 3
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """What a constraint does to one of its bodies.
+    """What a constraint does to one of its bodies."""
 
-    Attributes
-    ----------
-    force
-        Components along the fixed axes.
-    moment
-        About the joint's point of this body, or its origin where it has none; in space components
-        along the fixed axes.
-    """
-
-    force: tuple[ex.Scalar, ...]
+    force: tuple[ex.Scalar, ...]  # components along the fixed axes
+    # About the joint's point of this body, or its origin where it has none; in space components
+    # along the fixed axes.
     moment: tuple[ex.Scalar, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Reactions:
-    """Reactions of a constraint type, in its multipliers and its own symbols.
+    """Reactions of a constraint type, in its multipliers and its own symbols."""
 
-    Attributes
-    ----------
-    bodies
-        Of each of its bodies.
-    drive
-        What the driver does, along its value C: a force or a torque; zero where there is no C.
-    along_axis
-        The force on the last body along the joint's axis and, in the plane, across it; in space
-        along the axis h and along f and g, then the moment so; none without an axis.
-    """
-
-    bodies: tuple[Reaction, ...]
+    bodies: tuple[Reaction, ...]  # of each of its bodies
+    # What the driver does, along its value C: a force or a torque; zero where there is no C.
     drive: ex.Scalar
+    # The force on the last body along the joint's axis and, in the plane, across it; in space along
+    # the axis h and along f and g, then the moment so; none without an axis.
     along_axis: tuple[ex.Scalar, ...]
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy
+from scipy.optimize import brentq
 
 from kincompile.design.columns import Column, column_of
 from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
@@ -202,17 +203,11 @@ def turning(t: Array, rate: Array, second: Array, sign: float) -> list[Turning]:
     for cell in np.flatnonzero((signed[:-1] > 0) & (signed[1:] <= 0)).tolist():
         h = t[cell + 1] - t[cell]
         data = np.array([rate[cell], rate[cell + 1], h * second[cell], h * second[cell + 1]])
-        low, high = 0.0, 1.0
-        for _ in range(60):
-            middle = (low + high) / 2
-            if sign * (_basis(middle) @ data) > 0:
-                low = middle
-            else:
-                high = middle
-        slope = float(_basis_slopes(low) @ data) / h
-        weights = -_basis(low) / slope
+        s = brentq(lambda s, data: float(_basis(s) @ data), 0.0, 1.0, (data,), xtol=1e-16)
+        slope = float(_basis_slopes(s) @ data) / h
+        weights = -_basis(s) / slope
         weights[2:] *= h
-        found.append(Turning(float(t[cell] + low * h), weights, cell))
+        found.append(Turning(float(t[cell] + s * h), weights, cell))
     return found
 
 

@@ -46,15 +46,13 @@ MOST_SEED = 2**32 - 1
 def read_tolerance(path: str | os.PathLike[str]) -> Arguments:
     """Return the arguments of `kc.tolerance` that the table `tolerance` of a model file says."""
     reader = _reader(path, "tolerance")
-    found = reader.tolerance()
-    return reader.checked(found)
+    return reader.checked(reader.tolerance())
 
 
 def read_fit(path: str | os.PathLike[str], model: Mechanism) -> Arguments:
     """Return the arguments of `kc.fit` that the table `fit` of a model file says."""
     reader = _reader(path, "fit")
-    found = reader.fit(model)
-    return reader.checked(found)
+    return reader.checked(reader.fit(model))
 
 
 def _reader(path: str | os.PathLike[str], section: str) -> _TaskReader:

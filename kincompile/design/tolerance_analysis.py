@@ -210,9 +210,7 @@ class ToleranceAnalysis(Shown):
             If matplotlib is not installed.
         """
         self._place(column)
-        with package_of_extra("matplotlib", "plot"):
-            from matplotlib import pyplot as plt
-        ax = plt.figure(layout="constrained").subplots() if ax is None else ax
+        ax = ax or _new_axes()
         self._draw_bands(ax, column)
         return ax
 
@@ -254,9 +252,7 @@ class ToleranceAnalysis(Shown):
             If matplotlib is not installed.
         """
         self._place(column)
-        with package_of_extra("matplotlib", "plot"):
-            from matplotlib import pyplot as plt
-        ax = plt.figure(layout="constrained").subplots() if ax is None else ax
+        ax = ax or _new_axes()
         at = self.widest(column) if t is None else int(np.argmin(np.abs(self.t - t)))
         self._draw_tornado(ax, column, at)
         return ax
@@ -302,6 +298,12 @@ class ToleranceAnalysis(Shown):
 
     def _repr_html_(self) -> str:
         return self.to_html()
+
+
+def _new_axes() -> Axes:
+    with package_of_extra("matplotlib", "plot"):
+        from matplotlib import pyplot as plt
+    return plt.figure(layout="constrained").subplots()
 
 
 def _parts(values: Array) -> Array:

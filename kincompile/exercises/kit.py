@@ -7,7 +7,7 @@ import shutil
 import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.derivation.to_html import as_html
 from kincompile.errors import InputError
@@ -170,8 +170,9 @@ def exercise(
             f"{getattr(model, 'name', model)} is no mechanism of bodies and joints, which an "
             "exercise needs: it is a system of free equations"
         )
-    if not 1 <= students <= MOST_STUDENTS:
-        raise InputError(f"{students} students: give a number from 1 to {MOST_STUDENTS}")
+    wanted: Any = students  # whatever its type says
+    if not isinstance(wanted, int) or not 1 <= wanted <= MOST_STUDENTS:
+        raise InputError(f"{students!r} students: give a number from 1 to {MOST_STUDENTS}")
     made = variants(model, students, seed, Choices(signs, lengths))
     blanks = choose_blanks(made[0].system(), seed)
     return ExerciseKit(model.name, blanks, tuple(made))

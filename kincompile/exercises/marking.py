@@ -132,7 +132,7 @@ def _key(folder: Path) -> tuple[list[Blank], list[str]]:
             f"{folder} is no exercise: {path} cannot be read; give the folder that "
             "`kincompile exercise` wrote"
         ) from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(
             f"{path} is not the key of an exercise; write the exercise again with the same seed"
         ) from error

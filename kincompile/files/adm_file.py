@@ -91,11 +91,6 @@ def read_adm(path: Path, content: bytes) -> Mechanism:
 def read_acf(path: Path, content: bytes) -> AnalysisSettings:
     """Read the settings of an analysis of simEngine2D.
 
-    Parameters
-    ----------
-    content
-        What the file holds: simulation, tend, stepSize, outputSteps.
-
     Returns
     -------
     AnalysisSettings

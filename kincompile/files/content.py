@@ -30,8 +30,6 @@ def file_content(
     ----------
     endings
         Endings that a reader may have forgotten, for a hint where there is no such file.
-    follows_links
-        Whether the last part of the path may be a symbolic link.
 
     Raises
     ------

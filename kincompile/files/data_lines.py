@@ -67,7 +67,7 @@ class _Outline:
             return None
         if inside is not None and inside[0] == "{" and inside[1] is None:
             return self._take_key(token, separator, inside)
-        address = self._address()
+        address = (*self._base, *(key for _, key in self._stack if key is not None))
         if token in ("{", "["):
             self._stack.append([token, None if token == "{" else 0])
         return address
@@ -81,9 +81,6 @@ class _Outline:
         elif token != ".":
             self._key.append(_unquoted(token))
         return None
-
-    def _address(self) -> Address:
-        return (*self._base, *(key for _, key in self._stack if key is not None))
 
 
 def toml_lines(text: str) -> dict[Address, int]:

@@ -53,20 +53,12 @@ _DIGITS = re.compile(r"(?<![\d_])[\d_]{1000}")
 
 @dataclass(frozen=True)
 class Document:
-    """A data file.
-
-    Attributes
-    ----------
-    data
-        Its values: dicts, lists, texts, numbers, truth values.
-    is_toml
-        Whether it is TOML; JSON otherwise.
-    """
+    """A data file."""
 
     file: str
     text: str
-    data: Any
-    is_toml: bool
+    data: Any  # its values: dicts, lists, texts, numbers, truth values
+    is_toml: bool  # whether it is TOML; JSON otherwise
 
     @cached_property
     def lines(self) -> Mapping[Address, int]:

@@ -23,17 +23,10 @@ PLANE, SPACE = 2, 3
 
 @dataclass(frozen=True, slots=True)
 class Dimensions:
-    """The words of a file in the plane, or in space.
+    """The words of a file in the plane, or in space."""
 
-    Attributes
-    ----------
-    mechanism
-        The builder, which has the kind of bodies and of points.
-    constraints
-        The constraint types by name, but for the equations that bodies bring themselves.
-    """
-
-    mechanism: type[Mechanism]
+    mechanism: type[Mechanism]  # the builder, which has the kind of bodies and of points
+    # The constraint types by name, but for the equations that bodies bring themselves.
     constraints: Mapping[str, type[Constraint]]
 
     @property

@@ -36,12 +36,32 @@ class Field:
     is_required: bool = True
 
 
+def _optional(schema: Mapping[str, Any]) -> Field:
+    return Field(schema, is_required=False)
+
+
+def _ref(name: str) -> dict[str, Any]:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _any_of(*schemas: Mapping[str, Any]) -> dict[str, Any]:
+    return {"anyOf": list(schemas)}
+
+
+def _map(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "object", "additionalProperties": values}
+
+
+def _array(items: Mapping[str, Any], least: int = 0) -> dict[str, Any]:
+    return {"type": "array", "items": items} | ({"minItems": least} if least else {})
+
+
 _TEXT: dict[str, Any] = {"type": "string"}
 _NAME: dict[str, Any] = {
     "type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": MOST_CHARACTERS,
 }  # fmt: skip
 _NUMBER: dict[str, Any] = {"type": "number"}
-_EXPRESSION: dict[str, Any] = {"$ref": "#/$defs/expression"}
+_EXPRESSION: dict[str, Any] = _ref("expression")
 
 
 def _components(count: int) -> dict[str, Any]:
@@ -51,9 +71,9 @@ def _components(count: int) -> dict[str, Any]:
 
 _POINT = _components(2)
 _TRIPLE = _components(3)
-_NUMBERS: dict[str, Any] = {"type": "array", "items": _NUMBER, "minItems": 6}
-_VALUES: dict[str, Any] = {"type": "array", "items": _EXPRESSION, "minItems": 3}
-_NAMES: dict[str, Any] = {"type": "array", "items": _TEXT}
+_NUMBERS: dict[str, Any] = _array(_NUMBER, 6)
+_VALUES: dict[str, Any] = _array(_EXPRESSION, 3)
+_NAMES: dict[str, Any] = _array(_TEXT)
 _VARIANTS: dict[str, Any] = {"type": "integer", "minimum": 1, "maximum": MOST_VARIANTS}
 _LAW: dict[str, Any] = {"enum": list(RISES)}
 _CORNERS: dict[str, Any] = {"type": "boolean"}
@@ -71,140 +91,118 @@ TASKS = ("tolerance", "fit", "sweep")
 
 
 def _list(name: str) -> dict[str, Any]:
-    return {"type": "array", "items": {"$ref": f"#/$defs/{name}"}}
+    return _array(_ref(name))
 
 
 FIELDS: Mapping[str, Mapping[str, Field]] = {
     "model": {
-        "$schema": Field(_TEXT, is_required=False),
+        "$schema": _optional(_TEXT),
         "kincompile": Field({"const": VERSION}),
-        "space": Field({"enum": [PLANE, SPACE]}, is_required=False),
+        "space": _optional({"enum": [PLANE, SPACE]}),
         "name": Field(_NAME),
-        "length_unit": Field(_TEXT, is_required=False),
-        "analysis": Field({"$ref": "#/$defs/analysis"}, is_required=False),
-        "parameters": Field(_list("parameter"), is_required=False),
-        "bodies": Field(_list("body"), is_required=False),
-        "coordinates": Field(_list("coordinate"), is_required=False),
-        "sketch": Field({"$ref": "#/$defs/sketch"}, is_required=False),
-        "constraints": Field(_list("constraint"), is_required=False),
-        "gravity": Field(_POINT, is_required=False),
-        "loads": Field(_list("load"), is_required=False),
-        "points": Field(_list("point"), is_required=False),
-        "outputs": Field(_list("output"), is_required=False),
-        "sweep": Field({"$ref": "#/$defs/sweep"}, is_required=False),
-        "tolerance": Field({"$ref": "#/$defs/tolerance"}, is_required=False),
-        "fit": Field({"$ref": "#/$defs/fit"}, is_required=False),
+        "length_unit": _optional(_TEXT),
+        "analysis": _optional(_ref("analysis")),
+        "parameters": _optional(_list("parameter")),
+        "bodies": _optional(_list("body")),
+        "coordinates": _optional(_list("coordinate")),
+        "sketch": _optional(_ref("sketch")),
+        "constraints": _optional(_list("constraint")),
+        "gravity": _optional(_POINT),
+        "loads": _optional(_list("load")),
+        "points": _optional(_list("point")),
+        "outputs": _optional(_list("output")),
+        "sweep": _optional(_ref("sweep")),
+        "tolerance": _optional(_ref("tolerance")),
+        "fit": _optional(_ref("fit")),
     },
     "tolerance": {
-        "of": Field(_NAMES, is_required=False),
-        "parameters": Field(
-            {
-                "type": "object",
-                "additionalProperties": {
-                    "anyOf": [_EXPRESSION, _POINT, {"$ref": "#/$defs/deviation"}]
-                },
-            },
-            is_required=False,
-        ),
-        "clearances": Field(
-            {"type": "object", "additionalProperties": _EXPRESSION}, is_required=False
-        ),
-        "samples": Field(_VARIANTS, is_required=False),
-        "seed": Field(_SEED, is_required=False),
+        "of": _optional(_NAMES),
+        "parameters": _optional(_map(_any_of(_EXPRESSION, _POINT, _ref("deviation")))),
+        "clearances": _optional(_map(_EXPRESSION)),
+        "samples": _optional(_VARIANTS),
+        "seed": _optional(_SEED),
     },
     "deviation": {
         "low": Field(_EXPRESSION),
         "high": Field(_EXPRESSION),
-        "distribution": Field({"enum": list(DISTRIBUTIONS)}, is_required=False),
-        "sigmas": Field(_EXPRESSION, is_required=False),
+        "distribution": _optional({"enum": list(DISTRIBUTIONS)}),
+        "sigmas": _optional(_EXPRESSION),
     },
     "fit": {
-        "parameters": Field({"type": "object", "additionalProperties": _POINT}),
+        "parameters": Field(_map(_POINT)),
         "targets": Field(_list("target")),
-        "samples": Field(_VARIANTS, is_required=False),
-        "starts": Field(_VARIANTS, is_required=False),
-        "search": Field({"enum": list(SEARCHES)}, is_required=False),
-        "minimizer": Field({"enum": list(MINIMIZERS)}, is_required=False),
-        "seed": Field(_SEED, is_required=False),
+        "samples": _optional(_VARIANTS),
+        "starts": _optional(_VARIANTS),
+        "search": _optional({"enum": list(SEARCHES)}),
+        "minimizer": _optional({"enum": list(MINIMIZERS)}),
+        "seed": _optional(_SEED),
     },
     "sweep": {
-        "parameters": Field(
-            {
-                "type": "object",
-                "additionalProperties": {
-                    "anyOf": [
-                        {"type": "array", "items": _EXPRESSION, "minItems": 1},
-                        {"$ref": "#/$defs/span"},
-                    ]
-                },
-            }
-        ),
-        "samples": Field(_VARIANTS, is_required=False),
-        "product": Field({"type": "boolean"}, is_required=False),
-        "columns": Field(_NAMES, is_required=False),
-        "measures": Field(_NAMES, is_required=False),
+        "parameters": Field(_map(_any_of(_array(_EXPRESSION, 1), _ref("span")))),
+        "samples": _optional(_VARIANTS),
+        "product": _optional({"type": "boolean"}),
+        "columns": _optional(_NAMES),
+        "measures": _optional(_NAMES),
     },
     "span": {
         "from": Field(_EXPRESSION),
         "to": Field(_EXPRESSION),
-        "count": Field(_VARIANTS, is_required=False),
+        "count": _optional(_VARIANTS),
     },
     "sketch": {
-        "lengths": Field({"type": "object", "additionalProperties": _NUMBER}, is_required=False),
-        "ground": Field({"type": "object", "additionalProperties": _POINT}, is_required=False),
-        "joints": Field({"type": "object", "additionalProperties": _POINT}, is_required=False),
+        "lengths": _optional(_map(_NUMBER)),
+        "ground": _optional(_map(_POINT)),
+        "joints": _optional(_map(_POINT)),
         "parts": Field(_list("part")),
     },
     "analysis": {
-        "end": Field(_EXPRESSION, is_required=False),
-        "points": Field(
-            {"type": "integer", "minimum": 1, "maximum": MOST_POINTS}, is_required=False
-        ),
+        "end": _optional(_EXPRESSION),
+        "points": _optional({"type": "integer", "minimum": 1, "maximum": MOST_POINTS}),
     },
     "parameter": {
         "name": Field(_NAME),
         "default": Field(_EXPRESSION),
-        "unit": Field(_TEXT, is_required=False),
-        "range": Field(_POINT, is_required=False),
+        "unit": _optional(_TEXT),
+        "range": _optional(_POINT),
     },
     "body": {
         "name": Field(_NAME),
-        "guess": Field(_TRIPLE, is_required=False),
-        "outline": Field({"type": "array", "items": _POINT, "minItems": 3}, is_required=False),
-        "mass": Field(_EXPRESSION, is_required=False),
-        "inertia": Field(_EXPRESSION, is_required=False),
-        "centre": Field(_POINT, is_required=False),
-        "density": Field(_EXPRESSION, is_required=False),
-        "thickness": Field(_EXPRESSION, is_required=False),
+        "guess": _optional(_TRIPLE),
+        "outline": _optional(_array(_POINT, 3)),
+        "mass": _optional(_EXPRESSION),
+        "inertia": _optional(_EXPRESSION),
+        "centre": _optional(_POINT),
+        "density": _optional(_EXPRESSION),
+        "thickness": _optional(_EXPRESSION),
     },
     "point": {"name": Field(_NAME), "body": Field(_NAME), "local": Field(_POINT)},
     "output": {
         "name": Field(_NAME),
         "expression": Field(_EXPRESSION),
-        "unit": Field(_TEXT, is_required=False),
+        "unit": _optional(_TEXT),
     },
-    "coordinate": {"name": Field(_NAME), "guess": Field(_EXPRESSION, is_required=False)},
+    "coordinate": {"name": Field(_NAME), "guess": _optional(_EXPRESSION)},
     "profile": {
         "angles": Field(_NUMBERS),
         "radii": Field(_NUMBERS),
         "smoothness": Field({"const": SMOOTHNESS}),
     },
     "sequence": {
-        "points": Field({"type": "array", "items": _POINT, "minItems": 2}),
-        "law": Field({"anyOf": [_LAW, {"type": "array", "items": _LAW}]}, is_required=False),
-        "ramp": Field(_EXPRESSION, is_required=False),
+        "points": Field(_array(_POINT, 2)),
+        "law": _optional(_any_of(_LAW, _array(_LAW))),
+        "ramp": _optional(_EXPRESSION),
     },
     "table": {
         "times": Field(_VALUES),
         "values": Field(_VALUES),
-        "velocities": Field({**_POINT}, is_required=False),
-        "over": Field(_EXPRESSION, is_required=False),
+        "velocities": _optional({**_POINT}),
+        "over": _optional(_EXPRESSION),
     },
     "Equation": {
         "type": Field({"const": "Equation"}),
         "name": Field(_NAME),
-        "expressions": Field({"type": "array", "items": _EXPRESSION, "minItems": 1}),
-        "corners": Field(_CORNERS, is_required=False),
+        "expressions": Field(_array(_EXPRESSION, 1)),
+        "corners": _optional(_CORNERS),
     },
 }
 """Fields of the file itself, of its tables, and of a free equation."""
@@ -213,32 +211,27 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
     "model": {
         **FIELDS["model"],
         "space": Field({"const": SPACE}),
-        "sketch": Field({"$ref": "#/$defs/spatial_sketch"}, is_required=False),
-        "bodies": Field(_list("spatial_body"), is_required=False),
-        "constraints": Field(_list("spatial_constraint"), is_required=False),
-        "points": Field(_list("spatial_point"), is_required=False),
-        "gravity": Field(_TRIPLE, is_required=False),
-        "loads": Field(_list("spatial_load"), is_required=False),
+        "sketch": _optional(_ref("spatial_sketch")),
+        "bodies": _optional(_list("spatial_body")),
+        "constraints": _optional(_list("spatial_constraint")),
+        "points": _optional(_list("spatial_point")),
+        "gravity": _optional(_TRIPLE),
+        "loads": _optional(_list("spatial_load")),
     },
     "body": {
         "name": Field(_NAME),
-        "position": Field(_TRIPLE, is_required=False),
-        "orientation": Field(
-            {"anyOf": [_components(4), {**_TRIPLE, "items": _TRIPLE}]}, is_required=False
-        ),
-        **{key: Field(_TRIPLE, is_required=False) for key in ("axis", "x", "y", "z")},
-        "angle": Field(_EXPRESSION, is_required=False),
-        "mass": Field(_EXPRESSION, is_required=False),
-        "inertia": Field({"anyOf": [_TRIPLE, {**_TRIPLE, "items": _TRIPLE}]}, is_required=False),
-        "centre": Field(_TRIPLE, is_required=False),
+        "position": _optional(_TRIPLE),
+        "orientation": _optional(_any_of(_components(4), {**_TRIPLE, "items": _TRIPLE})),
+        **{key: _optional(_TRIPLE) for key in ("axis", "x", "y", "z")},
+        "angle": _optional(_EXPRESSION),
+        "mass": _optional(_EXPRESSION),
+        "inertia": _optional(_any_of(_TRIPLE, {**_TRIPLE, "items": _TRIPLE})),
+        "centre": _optional(_TRIPLE),
     },
     "point": {**FIELDS["point"], "local": Field(_TRIPLE)},
     "sketch": {
         **FIELDS["sketch"],
-        **{
-            name: Field({"type": "object", "additionalProperties": _TRIPLE}, is_required=False)
-            for name in ("ground", "joints", "hinges")
-        },
+        **{name: _optional(_map(_TRIPLE)) for name in ("ground", "joints", "hinges")},
         "parts": Field(_list("spatial_part")),
     },
 }
@@ -250,43 +243,43 @@ def fields_of(table: str, count: int = PLANE) -> Mapping[str, Field]:
     return IN_SPACE.get(table, FIELDS[table]) if count == SPACE else FIELDS[table]
 
 
-_MOTIONS = [{"$ref": "#/$defs/sequence"}, {"$ref": "#/$defs/table"}]
-VALUE: dict[str, Any] = {"anyOf": [_EXPRESSION, *_MOTIONS]}
+_MOTIONS = [_ref("sequence"), _ref("table")]
+VALUE: dict[str, Any] = _any_of(_EXPRESSION, *_MOTIONS)
 
 
 def _line(place: Mapping[str, Any]) -> dict[str, Field]:
     """Return the fields of a guide, through two joints or along a direction, and of its link."""
-    along = Field({"anyOf": [_TEXT, place]})
-    return {"along": along, "on": Field(_NAME, is_required=False)}
+    along = Field(_any_of(_TEXT, place))
+    return {"along": along, "on": _optional(_NAME)}
 
 
-_WEIGHT: Mapping[str, Field] = {"weight": Field(_EXPRESSION, is_required=False)}
+_WEIGHT: Mapping[str, Field] = {"weight": _optional(_EXPRESSION)}
 _PASSING: Mapping[str, Field] = {
-    "times": Field({"type": "array", "items": _EXPRESSION}, is_required=False),
+    "times": _optional(_array(_EXPRESSION)),
     **_WEIGHT,
-    "within": Field(_EXPRESSION, is_required=False),
-    "between": Field(_POINT, is_required=False),
+    "within": _optional(_EXPRESSION),
+    "between": _optional(_POINT),
 }
-_ROWS: dict[str, Any] = {"type": "array", "items": {"type": "array", "items": _EXPRESSION}}
+_ROWS: dict[str, Any] = _array(_array(_EXPRESSION))
 
 TARGETS: Mapping[str, Mapping[str, Field]] = {
     "path": {"path": Field(_TEXT), "points": Field(_ROWS), **_PASSING},
     "value": {
-        "value": Field(_TEXT), "values": Field({"type": "array", "items": _EXPRESSION}), **_PASSING,
+        "value": Field(_TEXT), "values": Field(_array(_EXPRESSION)), **_PASSING,
     },
     "pose": {
         "pose": Field(_TEXT), "poses": Field(_ROWS),
-        "angle_weight": Field(_EXPRESSION, is_required=False), **_PASSING,
+        "angle_weight": _optional(_EXPRESSION), **_PASSING,
     },
     "time_ratio": {
         "time_ratio": Field(_TEXT), "ratio": Field(_EXPRESSION), **_WEIGHT,
-        "within": Field(_EXPRESSION, is_required=False),
+        "within": _optional(_EXPRESSION),
     },
     "limit": {
         "limit": Field(_TEXT),
-        "least": Field(_EXPRESSION, is_required=False),
-        "most": Field(_EXPRESSION, is_required=False),
-        "title": Field(_TEXT, is_required=False),
+        "least": _optional(_EXPRESSION),
+        "most": _optional(_EXPRESSION),
+        "title": _optional(_TEXT),
     },
     "moves": {"moves": Field({"const": True})},
 }  # fmt: skip
@@ -296,7 +289,7 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
     "link": {
         "link": Field(_NAME),
         "joints": Field(_TEXT),
-        "length": Field(_EXPRESSION, is_required=False),
+        "length": _optional(_EXPRESSION),
     },
     "wheel": {"wheel": Field(_NAME), "joint": Field(_NAME)},
     "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_line(_POINT)},
@@ -309,7 +302,7 @@ PARTS: Mapping[str, Mapping[str, Field]] = {
     "drive": {
         "drive": Field(_TEXT),
         "value": Field(VALUE),
-        "against": Field(_NAME, is_required=False),
+        "against": _optional(_NAME),
     },
 }  # fmt: skip
 """Parts of a drawing: the methods of `Sketch`, and their arguments in order."""
@@ -318,7 +311,7 @@ SPATIAL_PARTS: Mapping[str, Mapping[str, Field]] = {
     "link": {"link": Field(_NAME), "joints": Field(_TEXT)},
     "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_line(_TRIPLE)},
     "rod": {
-        "rod": Field(_NAME), "joints": Field(_TEXT), "length": Field(VALUE, is_required=False),
+        "rod": Field(_NAME), "joints": Field(_TEXT), "length": _optional(VALUE),
     },
     "drive": {"drive": Field(_TEXT), "value": Field(VALUE)},
 }  # fmt: skip
@@ -335,7 +328,7 @@ _KINDS: Mapping[Kind, Mapping[str, Any]] = {
     Kind.LOAD: VALUE,
     Kind.DISTANCE: VALUE,
     Kind.BODY: _NAME,
-    Kind.PROFILE: {"anyOf": [_EXPRESSION, {"$ref": "#/$defs/profile"}]},
+    Kind.PROFILE: _any_of(_EXPRESSION, _ref("profile")),
 }
 
 
@@ -354,10 +347,10 @@ def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
     for name, item in constraint.arguments().items():
         found[name] = Field(_kind(item.kind, len(constraint.bodies.axes)))
     if any(item.symbol == "C" for item in constraint.arguments().values()):
-        found["corners"] = Field(_CORNERS, is_required=False)
+        found["corners"] = _optional(_CORNERS)
     if constraint.contacts:
-        guesses = {"type": "array", "items": _EXPRESSION, "minItems": len(constraint.contacts)}
-        found["guess"] = Field({"anyOf": [_EXPRESSION, guesses]}, is_required=False)
+        guesses = _array(_EXPRESSION, len(constraint.contacts))
+        found["guess"] = _optional(_any_of(_EXPRESSION, guesses))
     return found
 
 
@@ -380,14 +373,14 @@ def model_schema() -> dict[str, Any]:
     in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in IN_SPACE if name != "model"}
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
-    parts[0]["additionalProperties"] = {"anyOf": [_EXPRESSION, _POINT]}
+    parts[0]["additionalProperties"] = _any_of(_EXPRESSION, _POINT)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Mechanism for kincompile, format {VERSION}",
         "type": "object",
         "if": {"properties": {"space": {"const": SPACE}}, "required": ["space"]},
-        "then": {"$ref": "#/$defs/in_space"},
-        "else": {"$ref": "#/$defs/in_the_plane"},
+        "then": _ref("in_space"),
+        "else": _ref("in_the_plane"),
         "$defs": {
             "in_the_plane": _object(FIELDS["model"]),
             "in_space": _object(IN_SPACE["model"]),

@@ -35,23 +35,14 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class SweepTable:
-    """What a file says of a sweep.
+    """What a file says of a sweep."""
 
-    Attributes
-    ----------
-    parameters
-        Lists of values, or spans, by the names of parameters.
-    samples
-        How many points fill the spans that have no count; None where there are none.
-    product
-        Whether every value goes with every other one.
-    columns, measures
-        What is kept; None where the file does not say.
-    """
-
+    # Lists of values, or spans, by the names of parameters.
     parameters: Mapping[str, tuple[float, ...] | Span]
+    # How many points fill the spans that have no count; None where there are none.
     samples: int | None = None
-    product: bool = False
+    product: bool = False  # whether every value goes with every other one
+    # columns, measures: what is kept; None where the file does not say.
     columns: tuple[str, ...] | None = None
     measures: tuple[str, ...] = ()
 

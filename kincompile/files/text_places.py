@@ -16,13 +16,7 @@ class TextPlace:
 
 
 class TextPlaces:
-    """The places of the characters of a text; each is found by bisection.
-
-    Parameters
-    ----------
-    first
-        Where it begins in its file.
-    """
+    """The places of the characters of a text; each is found by bisection."""
 
     def __init__(self, text: str, first: TextPlace | None = None) -> None:
         self._first = first or TextPlace()

@@ -22,7 +22,7 @@ from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from kincompile.model.bodies import Body, Coordinate, Parameter
     from kincompile.model.expressions import Scalar
@@ -280,7 +280,7 @@ def _toml(item: Any) -> str:
     if isinstance(item, dict):
         return "{ " + ", ".join(f"{_key(key)} = {_toml(part)}" for key, part in item.items()) + " }"
     if isinstance(item, list):
-        return _listed(item)
+        return "[" + ", ".join(map(_toml, item)) + "]"
     return json.dumps(item, ensure_ascii=False) if isinstance(item, str | bool) else repr(item)
 
 
@@ -288,7 +288,3 @@ def _key(name: str) -> str:
     """Return a key, in quotes where it has to be."""
     is_bare = name.isascii() and name.replace("-", "_").isidentifier()
     return name if is_bare else json.dumps(name, ensure_ascii=False)
-
-
-def _listed(items: Sequence[Any]) -> str:
-    return "[" + ", ".join(_toml(item) for item in items) + "]"

@@ -140,15 +140,7 @@ def _program(
 
 
 class _Motion:
-    """The equations of motion of a mechanism, with their planned solve.
-
-    Attributes
-    ----------
-    graph
-        The mechanism's code, to which that of the solve is added.
-    names, n
-        The coordinates, and how many they are.
-    """
+    """The equations of motion of a mechanism, with their planned solve."""
 
     def __init__(self, code: InlineProgram, left_out: Collection[int]) -> None:
         program = code.program

@@ -78,20 +78,12 @@ class EquationShapes:
 
 
 class _Shape(Converter):
-    """Writes an expression in names of its own, in an order that no name or number decides.
-
-    Attributes
-    ----------
-    graph
-        The code.
-    symbols
-        Name in the code of each name that occurs, in order of occurrence.
-    """
+    """Writes an expression in names of its own, in an order that no name or number decides."""
 
     def __init__(self, coordinates: Collection[str]) -> None:
         self.graph = Graph()
         super().__init__(self.graph, self._symbol)
-        self.symbols: dict[str, str] = {}
+        self.symbols: dict[str, str] = {}  # names in the code, in order of occurrence
         self._coordinates = coordinates
         self._numbers: list[sympy.Number] = []
 

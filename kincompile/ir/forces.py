@@ -67,19 +67,10 @@ class _Row:
 def observing_forces(code: InlineProgram, *, is_planned: bool = True) -> Program | None:
     """Return a program without equations whose outputs are forces along a motion.
 
-    Parameters
-    ----------
-    code
-        A mechanism with loads.
-    is_planned
-        Whether the multipliers are solved for; else they are further parameters.
-
-    Returns
-    -------
-    Program or None
-        Its outputs are, where multipliers are solved for, determinants of the blocks of Phi_q and
-        the multipliers; then forces in the order of constraints, the force on the ground and what
-        springs pull with. There are no rates. None where there is no planned elimination.
+    Where the multipliers are solved for, `is_planned`, these are determinants of the blocks of
+    Phi_q and the multipliers first; else the multipliers are further parameters. Then come forces
+    in the order of constraints, the force on the ground and what springs pull with. There are no
+    rates. None where there is no planned elimination.
     """
     program, graph = code.program, Graph(code.nodes)
     is_square = not program.redundant and not program.unsolvable

@@ -117,15 +117,7 @@ class _Slopes:
 
 
 class _Linearized:
-    """The equations of a mechanism and their rates, linearized along a motion.
-
-    Attributes
-    ----------
-    graph
-        The mechanism's code, to which derivatives are added.
-    determinants
-        Nodes of the determinants of the blocks.
-    """
+    """The equations of a mechanism and their rates, linearized along a motion."""
 
     def __init__(self, code: InlineProgram, plan: SolvePlan, names: Sequence[str]) -> None:
         self._code, self.graph = code, Graph(code.nodes)

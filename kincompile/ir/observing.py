@@ -58,10 +58,7 @@ def bound(
 ) -> tuple[Instance, tuple[Node, ...]]:
     """Return an instance that gives vectors of a mechanism, and the values that feed it.
 
-    Parameters
-    ----------
-    outputs
-        Nodes of the graph by quantity, of all rows.
+    The outputs are nodes of the graph by quantity, of all rows.
     """
     entries = {
         quantity: [(row, 0, node) for row, node in enumerate(nodes)]

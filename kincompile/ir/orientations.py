@@ -120,28 +120,9 @@ class Samples:
 class SmallRotation:
     """A body's small rotation in place of its Euler parameters.
 
-    Parameters
-    ----------
-    graph, samples
-        The code, and its values at the random states.
-    own
-        The body's own row, and the columns of its Euler parameters.
-    first
-        The first of the four columns of s and pi', which follow those of Phi_q.
-    matrix, right
-        Rows of Phi_q as nodes by column, and their right sides. The body's own row is taken out,
-        the others get the columns of s and pi' instead of those of p.
-
-    Attributes
-    ----------
-    columns
-        Those of p.
-    is_finished
-        Whether dp is known.
-    solution
-        The stretch s by its column: known from the start.
-    turns
-        The columns of pi'.
+    `own` are the body's own row and the columns of its Euler parameters p, `first` is the first of
+    the four columns of s and pi', which follow those of Phi_q. Rows are nodes by column: the body's
+    own is taken out of the matrix, the others get the columns of s and pi' instead of those of p.
     """
 
     def __init__(
@@ -154,12 +135,13 @@ class SmallRotation:
         right: Mapping[int, int],
     ) -> None:
         self._graph, (row_of_norm, self.columns) = graph, own
-        self.is_finished = False
+        self.is_finished = False  # whether dp is known
         norm = matrix.pop(row_of_norm)
         p = [norm[column] for column in self.columns]
         inverse = graph.div(graph.const(1), self._dot(p, p))
+        # The stretch s by its column is known from the start.
         self.solution = {first: graph.mul(right[row_of_norm], inverse)}
-        self.turns = range(first + 1, first + 4)
+        self.turns = range(first + 1, first + 4)  # the columns of pi'
         self._rows = {
             row: {column: entries[column] for column in self.columns if column in entries}
             for row, entries in matrix.items()

@@ -78,25 +78,17 @@ class _OutputConverter(Converter):
 
     Coordinates, parameters and the places of points are numbered in the order in which they occur,
     so that outputs of equal structure are the same code.
-
-    Attributes
-    ----------
-    given
-        What each input stands for: a name, or the value of an attribute.
-    motion
-        The rate of each node that moves, as far as it is known without the rules.
-    by_column
-        The derivatives of such nodes by each coordinate.
-    turns
-        The angles between vectors.
     """
 
     def __init__(self, graph: Graph, columns: Sequence[str]) -> None:
         super().__init__(graph, self._named)
+        # What each input stands for: a name, or the value of an attribute.
         self.given: dict[Input | str, Scalar | str] = {"t": "t"}
+        # The rate of each node that moves, as far as it is known without the rules.
         self.motion = {graph.input("t"): graph.const(1)}
+        # The derivatives of such nodes by each coordinate.
         self.by_column: dict[str, dict[int, int]] = {}
-        self.turns: list[Turn] = []
+        self.turns: list[Turn] = []  # the angles between vectors
         self._frames: dict[tuple[Any, ...], list[int]] = {}
         for k, name in enumerate(columns):
             entries = [StateEntry(0, k, order, rate(f"q_{k}", order)) for order in range(3)]

@@ -54,29 +54,17 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """One argument of a constraint type.
+    """One argument of a constraint type."""
 
-    Attributes
-    ----------
-    kind
-        What may be given.
-    symbol
-        Its symbol in the textbook's formula.
-    text
-        What it means, for the docstring; ``{on}`` stands for the argument that names its body,
-        ``{place}`` for its coordinates, ``{ground}`` for a remark on the ground.
-    on
-        The symbol of the body whose frame a point or a direction is given in, ``"ground"`` for the
-        fixed frame; "" for what belongs to no frame.
-    unit
-        ``"rad"`` of an angle, ``"length"`` of a length, "" of what is neither.
-    """
-
-    kind: Kind
-    symbol: str
+    kind: Kind  # what may be given
+    symbol: str  # its symbol in the textbook's formula
+    # What it means, for the docstring; ``{on}`` stands for the argument that names its body,
+    # ``{place}`` for its coordinates, ``{ground}`` for a remark on the ground.
     text: str
+    # The symbol of the body whose frame a point or a direction is given in, ``"ground"`` for the
+    # fixed frame; "" for what belongs to no frame.
     on: str = ""
-    unit: str = ""
+    unit: str = ""  # ``"rad"`` of an angle, ``"length"`` of a length, "" of what is neither
 
 
 _DRIVEN = "a number or an expression of parameters; with `t` in it, a driver."

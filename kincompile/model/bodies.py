@@ -22,26 +22,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyKind:
-    """A kind of body: what its coordinates are.
+    """A kind of body: what its coordinates are."""
 
-    Attributes
-    ----------
-    frame
-        The frame of a body i or j in the calculus, by its index.
-    units
-        Unit of each coordinate, None for that of lengths.
-    drivers
-        Name of the constraint type that drives each.
-    elsewhere
-        What to take in place of constraint types of the other kinds of bodies, by their names.
-    masses
-        The module that makes a load of a body's mass; loaded where a body has one.
-    """
-
-    frame: type[Frame]
-    units: tuple[str | None, ...]
-    drivers: tuple[str, ...]
+    frame: type[Frame]  # the frame of a body i or j in the calculus, by its index
+    units: tuple[str | None, ...]  # unit of each coordinate, None for that of lengths
+    drivers: tuple[str, ...]  # name of the constraint type that drives each
+    # What to take in place of constraint types of the other kinds of bodies, by their names.
     elsewhere: Mapping[str, str]
+    # The module that makes a load of a body's mass; loaded where a body has one.
     masses: str = "kincompile.model.masses"
 
     @property

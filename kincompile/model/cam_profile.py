@@ -45,6 +45,9 @@ POINTS = 720
 FEWEST = 12
 """Of these at least."""
 
+MOST = 100_000
+"""And at most."""
+
 CLOSED = 1e-9
 """How far a law may be from closing after one revolution, relative to its largest value."""
 
@@ -254,8 +257,8 @@ def _law(
         for name, number in (lengths | others).items()
         if not _is_number(number) or (name in lengths and number <= 0)
     ]
-    if type(points) is not int or points < FEWEST:
-        problems.append(f"points is {points!r}: give a whole number, {FEWEST} or more")
+    if type(points) is not int or not FEWEST <= points <= MOST:
+        problems.append(f"points is {points!r}: give a whole number from {FEWEST} to {MOST:,}")
     try:
         value = in_radians(as_sympy(as_expression(law)))
     except NotAnExpressionError as error:

@@ -27,21 +27,11 @@ _pi = sympy.pi
 
 
 class MotionLaw(sympy.Function):
-    """A function of one argument in pieces, with its derivatives; every law is a subclass.
+    """A function of one argument in pieces, with its derivatives; every law is a subclass."""
 
-    Attributes
-    ----------
-    title
-        What people call the law; "" for the derivative of one.
-    order
-        Of a derivative its order.
-    continuity
-        How many derivatives of the law itself are continuous.
-    """
-
-    title: ClassVar[str] = ""
-    order: ClassVar[int] = 0
-    continuity: ClassVar[int] = 2
+    title: ClassVar[str] = ""  # what people call the law; "" for the derivative of one
+    order: ClassVar[int] = 0  # of a derivative its order
+    continuity: ClassVar[int] = 2  # how many derivatives of the law itself are continuous
 
     @classmethod
     def pieces(cls) -> Sequence[Piece]:
@@ -236,22 +226,12 @@ RISES: dict[str, type[Rise]] = {
 
 
 class TableLaw(MotionLaw):
-    """A spline through values over time, which goes on at constant velocity on both sides.
-
-    Attributes
-    ----------
-    given
-        Times, values, and the velocities at both ends.
-    table
-        The pieces of the spline.
-    table_name
-        What the table is called in emitted code.
-    """
+    """A spline through values over time, which goes on at constant velocity on both sides."""
 
     nargs = 1
-    given: ClassVar[tuple[tuple[float, ...], ...]]
-    table: ClassVar[SplineTable]
-    table_name: ClassVar[str]
+    given: ClassVar[tuple[tuple[float, ...], ...]]  # times, values, velocities at both ends
+    table: ClassVar[SplineTable]  # the pieces of the spline
+    table_name: ClassVar[str]  # what the table is called in emitted code
 
     @classmethod
     @lru_cache

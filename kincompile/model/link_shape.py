@@ -30,24 +30,12 @@ FLAT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """What is known of a link.
+    """What is known of a link."""
 
-    Attributes
-    ----------
-    joints
-        Its joints; the first two carry the frame.
-    drawn
-        Where the drawing has them.
-    lengths
-        Distances of pairs of joints, as far as they are given.
-    places
-        Joints whose place in the frame is given.
-    """
-
-    joints: Sequence[str]
-    drawn: Mapping[str, Point]
-    lengths: Mapping[Pair, Scalar]
-    places: Mapping[str, Point]
+    joints: Sequence[str]  # its joints; the first two carry the frame
+    drawn: Mapping[str, Point]  # where the drawing has them
+    lengths: Mapping[Pair, Scalar]  # distances of pairs of joints, as far as they are given
+    places: Mapping[str, Point]  # joints whose place in the frame is given
     values: dict[str, float]
     unit: str
 

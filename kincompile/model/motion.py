@@ -32,6 +32,12 @@ if TYPE_CHECKING:
 
 __all__ = ["flat_cam", "law", "oscillating_cam", "roller_cam", "sequence", "table"]
 
+MOST_STEPS = 500
+"""Points of a sequence, each a part of the formula that is differentiated."""
+
+SHORTEST = 1e-12
+"""Part of all times up to which one is as good as that before it."""
+
 RAMP = sympy.Rational(1, 4)
 """The share of a rise that each ramp of the law "constant velocity" takes, unless told."""
 
@@ -93,16 +99,18 @@ def sequence(
     if share.is_number and not 0 < share <= sympy.S.Half:
         problems.append(f"ramp is {share}: each of the two ramps takes more than 0, up to 1/2")
     _check_times([time for time, _ in rows], problems)
+    if len(rows) > MOST_STEPS:
+        problems.append(f"{len(rows)} points are more than {MOST_STEPS}: a table goes through them")
     if len(rows) < 2 and not problems:
         problems.append(f"a sequence needs two points (time, value) or more, not {len(rows)}")
     if problems:
         raise ModelError([f"motion sequence: {problem}" for problem in problems])
-    motion = rows[0][1]
+    moves = []
     for (begin, start), (end, stop), rise in zip(rows, rows[1:], laws, strict=False):
         shape = (share,) if rise is constant_velocity else ()
         if in_radians(stop - start) != 0:
-            motion += (stop - start) * rise((t - begin) / (end - begin), *shape)
-    return motion
+            moves.append((stop - start) * rise((t - begin) / (end - begin), *shape))
+    return sympy.Add(rows[0][1], *moves)
 
 
 def table(
@@ -187,8 +195,9 @@ def _laws(given: Any, steps: int, problems: list[str]) -> list[type[Rise]]:
     if isinstance(given, str):
         titles = [given] * max(steps, 1)
     else:
+        before = len(problems)
         titles = _items(given, "law", problems)
-        if titles and len(titles) != steps:
+        if len(titles) != steps and len(problems) == before:
             problems.append(f"there are {len(titles)} laws for {steps} steps from point to point")
     wrong = list(dict.fromkeys(filter(None, map(_law_problem, titles))))
     problems += wrong
@@ -204,8 +213,10 @@ def _law_problem(title: Any) -> str | None:
 
 
 def _check_times(times: Sequence[sympy.Expr], problems: list[str]) -> None:
+    span = times[-1] - times[0] if times else sympy.S.Zero
+    least = SHORTEST * span if span.is_number and span > 0 else 0
     for before, after in pairwise(times):
         step = after - before
-        if step.is_number and not step > 0:
+        if step.is_number and not step > least:
             late, early = number_text(after), number_text(before)
             problems.append(f"times must rise, but {late} follows {early}")

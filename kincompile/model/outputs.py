@@ -55,20 +55,13 @@ class Output:
 
 @dataclass(frozen=True, slots=True)
 class ResolvedOutput(Observed):
-    """An output that is known to be good.
-
-    Attributes
-    ----------
-    value
-        In plain symbols of coordinates, rates, parameters and t, with `rate` and points in it.
-    columns
-        The coordinates on which it depends, or on whose rates.
-    """
+    """An output that is known to be good."""
 
     name: str
+    # In plain symbols of coordinates, rates, parameters and t, with `rate` and points in it.
     value: sympy.Expr
     unit: str
-    columns: tuple[str, ...]
+    columns: tuple[str, ...]  # the coordinates on which it depends, or on whose rates
     written: Output
 
     @property

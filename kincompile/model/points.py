@@ -161,23 +161,13 @@ class Observed:
 
 @dataclass(frozen=True, slots=True)
 class PlacedPoint(Observed):
-    """A point that is known to be good: r + A s with the names of its body.
-
-    Attributes
-    ----------
-    columns
-        Names of the body's coordinates, None for those of the ground.
-    local
-        xi and eta.
-    rows
-        The outputs that its coordinates are.
-    """
+    """A point that is known to be good: r + A s with the names of its body."""
 
     name: str
-    columns: tuple[str | None, ...]
-    local: tuple[Scalar, ...]
+    columns: tuple[str | None, ...]  # names of the body's coordinates, None for those of the ground
+    local: tuple[Scalar, ...]  # xi and eta
     bodies: tuple[Body, ...] = ()
-    rows: tuple[OutputColumn, ...] = ()
+    rows: tuple[OutputColumn, ...] = ()  # the outputs that its coordinates are
     frame: Frame = i
 
     scalars: ClassVar[Mapping[str, Scalar]] = {}

@@ -44,23 +44,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A constraint of a known type with its attributes resolved.
-
-    Attributes
-    ----------
-    scalars, points, profiles
-        Attributes by their symbol in the template. The value C(t) is among the scalars; a profile
-        is an expression of `alpha`.
-    columns
-        Names of the coordinates in the order of the template, None for those of the ground.
-    """
+    """A constraint of a known type with its attributes resolved."""
 
     written: Constraint
     template: Template
     bodies: tuple[Body, ...]
+    # scalars, points, profiles: attributes by their symbol in the template. The value C(t) is among
+    # the scalars; a profile is an expression of `alpha`.
     scalars: Mapping[str, Scalar]
     points: Mapping[str, Point]
     profiles: Mapping[str, sympy.Expr]
+    # Names of the coordinates in the order of the template, None for those of the ground.
     columns: tuple[str | None, ...]
 
     @property

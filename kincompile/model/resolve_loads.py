@@ -46,26 +46,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AppliedLoad:
-    """A load with its attributes resolved.
-
-    Attributes
-    ----------
-    scalars, points
-        Attributes and values by their symbol in the template, in plain symbols.
-    columns
-        Names of the coordinates of the bodies, None for those of the ground, then of the others on
-        which its values depend.
-    varies
-        Whether its values depend on coordinates or rates.
-    """
+    """A load with its attributes resolved."""
 
     written: Load
     template: LoadTemplate
     bodies: tuple[Body, ...]
+    # scalars, points: attributes and values by their symbol in the template, in plain symbols.
     scalars: Mapping[str, Scalar]
     points: Mapping[str, Point]
+    # Names of the coordinates of the bodies, None for those of the ground, then of the others on
+    # which its values depend.
     columns: tuple[str | None, ...]
-    varies: bool
+    varies: bool  # whether its values depend on coordinates or rates
 
     profiles: ClassVar[Mapping[str, sympy.Expr]] = {}
     is_driver: ClassVar[bool] = False

@@ -21,24 +21,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link as it was made.
-
-    Attributes
-    ----------
-    places
-        Its joints in the frame of the body.
-    angle
-        Angle of the body in the drawing [rad].
-    guide
-        Of a slider, the line along which it slides.
-    hinge
-        In space the axis of the first hinge in which it hangs, on the other link.
-    """
+    """A link as it was made."""
 
     body: Body
-    places: Mapping[str, Point]
-    angle: float = 0.0
-    guide: Line | None = None
+    places: Mapping[str, Point]  # its joints in the frame of the body
+    angle: float = 0.0  # angle of the body in the drawing [rad]
+    guide: Line | None = None  # of a slider, the line along which it slides
+    # In space the axis of the first hinge in which it hangs, on the other link.
     hinge: Line | None = None
 
     def turned(self, vector: Point) -> Point:

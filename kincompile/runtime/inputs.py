@@ -25,13 +25,7 @@ if TYPE_CHECKING:
 
 
 def names_of(given: Any, what: str) -> tuple[Any, ...]:
-    """Return names that are given as one text, or as a list of them.
-
-    Raises
-    ------
-    InputError
-        If it is neither; `what` begins the message.
-    """
+    """Return names that are given as one text, or as a list; `what` begins a message of neither."""
     if isinstance(given, str):
         return (given,)
     if not isinstance(given, Iterable):
@@ -40,26 +34,14 @@ def names_of(given: Any, what: str) -> tuple[Any, ...]:
 
 
 def mapping_of(given: Any, what: str) -> Mapping[str, Any]:
-    """Return values by name; without any none.
-
-    Raises
-    ------
-    InputError
-        If it is no mapping; `what` begins the message.
-    """
+    """Return values by name, without any none; `what` begins the message where it is no mapping."""
     if given is not None and not isinstance(given, Mapping):
         raise InputError(f"{what} is {given!r}: give values by name, such as {{'a': 0.1}}.")
     return given or {}
 
 
 def require_seed(seed: Any) -> None:
-    """Check that a seed is a whole number that is not negative.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """Check that a seed is a whole number that is not negative."""
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise InputError(f"seed is {seed!r}: give a whole number of at least 0.")
 
@@ -185,14 +167,7 @@ def read_inputs(
     """Check all inputs of the solver and bring them into the form in which it uses them.
 
     There may be several parameter sets unless `product` is None, and degrees of freedom that no
-    equation determines with `may_move`.
-
-    Raises
-    ------
-    InputError
-        With everything that is wrong with the values, by name.
-    StructuralError
-        When the equations cannot determine the coordinates: what is wrong, and what to do.
+    equation determines with `may_move`. All that is wrong with the values is told at once, by name.
     """
     _require_module(module)
     given = Variants(p) if product is None else _read_variants(module, p, product)
@@ -240,7 +215,7 @@ def _require_module(module: object) -> None:
 
 def _times(t: ArrayLike, problems: list[str]) -> NDArray[np.float64]:
     """Read a time or a grid of times."""
-    times = _numbers("t", t, problems)
+    times = real_numbers("t", t, problems)
     if times is None:
         return np.empty(0)
     if times.ndim > 1 or times.size == 0:
@@ -269,7 +244,7 @@ def _values(
         return defaults
     if isinstance(given, Mapping):
         return _overridden(what, names, defaults, given, problems)
-    values = _numbers(f"the {what} vector", given, problems)
+    values = real_numbers(f"the {what} vector", given, problems)
     if values is None:
         return defaults
     if values.shape != defaults.shape:
@@ -298,7 +273,7 @@ def _overridden(
             near = suggestion(str(name), names) or "."
             problems.append(f"there is no {what} {name!r}{near} The {what}s are {listed(names)}.")
             continue
-        number = _numbers(f"{what} {name!r}", value, problems)
+        number = real_numbers(f"{what} {name!r}", value, problems)
         if number is None:
             continue
         if number.ndim:
@@ -309,7 +284,7 @@ def _overridden(
     return values
 
 
-def _numbers(what: str, given: object, problems: list[str]) -> NDArray[np.float64] | None:
+def real_numbers(what: str, given: object, problems: list[str]) -> NDArray[np.float64] | None:
     """Turn anything into a new array of real numbers, or note why that is impossible."""
     try:
         array = np.asarray(given)

@@ -67,26 +67,9 @@ def from_source(
 ) -> ModuleType:
     """Make a module from emitted text, in memory, and check that it keeps the contract.
 
-    Tracebacks and `inspect.getsource` show the text as they would for a file.
-
-    Parameters
-    ----------
-    source : str
-        Text of an emitted module.
-    name : str
-        Name of the module, for messages and tracebacks.
-    arrays : mapping, optional
-        What the module would read from the companion file beside it.
-
-    Returns
-    -------
-    module
-        With the names of the contract in docs/contract.md.
-
-    Raises
-    ------
-    ContractError
-        When the text is not an emitted module, or one that this version cannot use.
+    The name is for messages and tracebacks, which show the text as they would for a file, and so
+    does `inspect.getsource`. The arrays are what the module would read from the companion file
+    beside it.
     """
     # The checksum keeps the lines of two mechanisms of one name apart; the same text takes the
     # same place, so that compiling again and again does not fill the cache.

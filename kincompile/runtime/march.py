@@ -246,7 +246,7 @@ class March:
                 return Outcome(status, iterations, None)
         return Outcome(Status.CONVERGED, iterations, following, point)
 
-    def step_together(self, state: State, t: float, most: int) -> tuple[State, Any, Any]:
+    def step_together(self, state: State, t: Any, most: int) -> tuple[State, Any, Any]:
         """Take a step with a batch; return the states, where they are good, and the iterations."""
         predicted = self.predict(state, t)
         found = self.correct_together(predicted.copy(), t, most)

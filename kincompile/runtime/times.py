@@ -9,6 +9,7 @@ import numpy as np
 from kincompile.criteria import TOLERANCE
 from kincompile.errors import InputError
 from kincompile.names import rate
+from kincompile.runtime.inputs import real_numbers
 from kincompile.runtime.solve import solve
 
 if TYPE_CHECKING:
@@ -61,7 +62,12 @@ def times_at(
     InputError
         When there is no such column, it turns round or stands still, or does not reach a value.
     """
-    wanted = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    problems: list[str] = []
+    given = real_numbers("the list of values", values, problems)
+    if given is None or given.ndim > 1 or not given.size:
+        shape = f"the values are {values!r}: give one, or a list of them."
+        raise InputError(problems or shape)
+    wanted = np.atleast_1d(given)
     known = solve(module, t, p, guess)
     times, column = _one_way(known, name, wanted)
     forward = np.sign(column[-1] - column[0])

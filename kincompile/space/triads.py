@@ -46,7 +46,10 @@ def _plain(vector: Sequence[Scalar]) -> list[Any]:
 
 def _unit(vector: Sequence[Any]) -> list[Any]:
     square = sum(item * item for item in vector)
-    size = math.sqrt(square) if isinstance(square, float) else sympy.sqrt(square)
+    if not isinstance(square, float):
+        size = sympy.sqrt(square)
+    else:  # squares may be beyond the range of numbers where lengths are not
+        size = math.sqrt(square) if 0 < square < math.inf else math.hypot(*vector)
     return [item / size for item in vector]
 
 

@@ -66,44 +66,26 @@ ANGLES_FIRST = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankReport:
-    """The generic rank of a system, and the rows and columns that make it smaller than it might be.
+    """The generic rank of a system, and the rows and columns that make it smaller."""
 
-    Attributes
-    ----------
-    rank
-        Rank of Phi_q at generic states at which the joints are assembled; where all that were found
-        are singular, at states beside them that the independent joints allow.
-    redundant
-        Rows that depend on rows before them and hold whenever those do.
-    conflicting
-        Rows that depend on rows before them and cannot hold together with them.
-    partners
-        For each redundant and conflicting row, the rows that it depends on.
-    free
-        Columns that no equation determines.
-    drive
-        As many of them as there are degrees of freedom: with these driven, nothing is free.
-    assembled
-        Whether joints and drivers, as far as they are independent, could be assembled at the start.
-    rank_at_start
-        Rank at the start; where it is less than `rank` and the system is assembled, that position
-        is singular.
-    nearest : ndarray, shape (n,)
-        The position at the start, or the nearest to one.
-    residuals : ndarray, shape (m,)
-        Phi there.
-    """
-
+    # Rank of Phi_q at generic states at which the joints are assembled; where all that were found
+    # are singular, at states beside them that the independent joints allow.
     rank: int
-    redundant: tuple[int, ...]
+    redundant: tuple[int, ...]  # rows that depend on rows before them and hold whenever those do
+    # Rows that depend on rows before them and cannot hold together with them.
     conflicting: tuple[int, ...]
+    # For each redundant and conflicting row, the rows that it depends on.
     partners: dict[int, tuple[int, ...]]
-    free: tuple[int, ...]
+    free: tuple[int, ...]  # columns that no equation determines
+    # As many of them as there are degrees of freedom: with these driven, nothing is free.
     drive: tuple[int, ...]
+    # Whether joints and drivers, as far as they are independent, could be assembled at the start.
     assembled: bool
+    # Rank at the start; where it is less than `rank` and the system is assembled, that position is
+    # singular.
     rank_at_start: int
-    nearest: Array
-    residuals: Array
+    nearest: Array  # (n,): the position at the start, or the nearest to one
+    residuals: Array  # (m,): Phi there
 
 
 def generic_rank(

@@ -12,7 +12,7 @@ import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
 from kincompile.names import escaped, listed
-from kincompile.runtime.results.columns import TIME_UNIT
+from kincompile.runtime.results.columns import TIME_UNIT, unit_attributes
 from kincompile.sweep.layout import PENDING, STATUS, TIME, Layout
 
 if TYPE_CHECKING:
@@ -162,19 +162,14 @@ class Contents:
         with package_of_extra("xarray", "tables"):
             import xarray
         variables = {
-            name: (item.dimensions, arrays[name], units(item.unit))
+            name: (item.dimensions, arrays[name], unit_attributes(item.unit))
             for name, item in self.form.variables.items()
         }
         coordinates = {
-            name: (dimension, values, units(unit))
+            name: (dimension, values, unit_attributes(unit))
             for name, (dimension, values, unit) in self.coordinates.items()
         }
         return xarray.Dataset(variables, coords=coordinates, attrs=self.about)
-
-
-def units(unit: str) -> dict[str, str]:
-    """Return the attributes of an array with a unit."""
-    return {"units": unit} if unit else {}
 
 
 def marks_of(job: Job, plan: Plan, given: Array, assembly: int | None) -> dict[str, str]:

@@ -11,13 +11,16 @@ from kincompile.errors import InputError
 from kincompile.names import listed, suggestion
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import TIME_UNIT
-from kincompile.runtime.results.measures import output_measures
+from kincompile.runtime.results.force_measures import force_measure
+from kincompile.runtime.results.forces import forces
+from kincompile.runtime.results.measures import measures_together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from kincompile.runtime.results.columns import Column
     from kincompile.runtime.results.solution import Solution
 
 TIME, STATUS = "t", "status"
@@ -30,27 +33,22 @@ MEASURES = (
 )  # fmt: skip
 """What can be kept of an output, as `sol.measures()` calls it."""
 
+OF_FORCES = ("peak", "least", "t_least", "greatest", "t_greatest", "mean", "rms")
+"""What can be kept of a force, at the times alone, as `kc.forces(sol).measures()` calls it."""
+
 OF_TIME = ("t_least", "t_greatest", "period")
 
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A number that is kept: a column, or a measure of an output.
+    """A number that is kept: a column, or a measure of an output."""
 
-    Attributes
-    ----------
-    name, unit
-        What it is called in the results, for instance ``x_foot_stroke``, and its unit.
-    column
-        The column, or the output that is measured.
-    measure
-        One of `MEASURES`; "" of a column over time.
-    """
-
+    # name, unit: what it is called in the results, for instance ``x_foot_stroke``, and its unit
     name: str
     unit: str
-    column: str
-    measure: str = ""
+    column: str  # the column, or the output that is measured
+    measure: str = ""  # one of `MEASURES` or `OF_FORCES`; "" of a column over time
+    is_force: bool = False  # whether it is one of those that `kc.forces` gives
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,17 +64,26 @@ class Layout:
 
     def values(self, solution: Solution) -> dict[str, NDArray[np.generic]]:
         """Return what is kept of the variants of a solution: (B, N) over time, else (B,)."""
+        bearing = bearing_of(solution) if any(item.is_force for item in self.kept) else solution
         found: dict[str, NDArray[np.generic]] = {
-            item.name: solution[item.column] for item in self.kept if not item.measure
+            item.name: (bearing if item.is_force else solution)[item.column]
+            for item in self.kept
+            if not item.measure
         }
-        measured = [item for item in self.kept if item.measure]
+        for item in self.kept:
+            if item.measure and item.is_force:
+                found[item.name] = _measured_forces(bearing, item)
+        measured = [item for item in self.kept if item.measure and not item.is_force]
         for item in measured:
             found[item.name] = np.full(len(solution.q), np.nan)
         names = {item.column for item in measured}
-        for number in np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else ():
-            one = solution.variant(number)
-            p = np.array(list(one.parameters.values()))
-            for own in output_measures(one, one.require_module("its measures"), p, names):
+        whole = np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else []
+        motions = [solution.variant(number) for number in whole]
+        sets = np.array(list(solution.parameters.values())).T[whole]
+        module = solution.require_module("its measures")
+        measures = measures_together(motions, module, sets, names)
+        for number, several in zip(whole, measures, strict=True):
+            for own in several:
                 for item in measured:
                     value = getattr(own, item.measure) if item.column == own.name else None
                     if value is not None:
@@ -89,13 +96,36 @@ class Layout:
         return found
 
 
+def bearing_of(solution: Solution) -> Solution:
+    """Return a motion whose outputs are also its forces, and the sizes of reactions."""
+    found = forces(solution)
+    sizes = {name: x for name, x in found.columns().items() if name not in found.names}
+    values = np.stack([values for values, _ in sizes.values()], axis=-1)
+    units = {name: unit for name, (_, unit) in sizes.items()}
+    return found.motion.observing(found.motion.observed.joined(tuple(sizes), units, values))
+
+
+def _measured_forces(bearing: Solution, item: Kept) -> NDArray[np.generic]:
+    """Return a measure of a force in each variant, (B,), NaN where it was not found throughout."""
+    values = bearing[item.column]
+    found = np.full(len(values), np.nan)
+    for number in np.flatnonzero(np.isfinite(values).all(axis=1)).tolist():
+        own = force_measure(item.column, item.unit, bearing.t, values[number])
+        found[number] = getattr(own, item.measure)
+    return found
+
+
 def read_layout(
-    solution: Solution, columns: Sequence[str] | None, measures: Sequence[str]
+    solution: Solution,
+    columns: Sequence[str] | None,
+    measures: Sequence[str],
+    bearing: Solution | None = None,
 ) -> Layout:
     """Read what is to be kept of a solution, which has one position and knows its columns.
 
     Without names of columns they are all outputs, of a model without any all coordinates, unless
     there are measures of outputs, as ``"foot.x.stroke"``. Every name that means nothing is told.
+    Forces are known where the solution is given with them too.
     """
     problems: list[str] = []
     if columns is None:
@@ -103,22 +133,18 @@ def read_layout(
     kept: dict[str, Kept] = {}
     for name in names_of(columns, "columns"):
         try:
-            column = solution.column(name)
+            column, is_force = _column(solution, name, bearing)
         except InputError as error:
             problems += error.problems
         else:
-            kept[column.name] = Kept(column.name, column.unit, column.name)
+            kept[column.name] = Kept(column.name, column.unit, column.name, is_force=is_force)
     for name in names_of(measures, "measures"):
         try:
-            item = _measure(solution, name)
+            item = _measure(solution, name, bearing)
         except InputError as error:
             problems += error.problems
         else:
             kept[item.name] = item
-    if STATUS in kept:
-        problems.append(
-            f"{STATUS!r} is what the statuses are called in the results: rename the output."
-        )
     if not kept and not problems:
         problems.append("nothing is kept: name columns, or measures such as 'foot.x.stroke'.")
     if problems:
@@ -126,20 +152,35 @@ def read_layout(
     return Layout(tuple(kept.values()))
 
 
-def _measure(solution: Solution, given: str) -> Kept:
+def _column(solution: Solution, name: str, bearing: Solution | None) -> tuple[Column, bool]:
+    """Return a column of a motion, and whether it is a force."""
+    try:
+        return solution.column(name), False
+    except InputError:
+        if bearing is None:
+            raise
+        return bearing.column(name), True
+
+
+def _measure(solution: Solution, given: str, bearing: Solution | None) -> Kept:
     """Read a measure, such as ``foot.x.stroke``."""
     output, _, measure = str(given).rpartition(".")
-    if measure not in MEASURES or not output:
+    if measure not in (*MEASURES, *OF_FORCES) or not output:
         near = suggestion(measure, MEASURES) or "."
         raise InputError(
             f"there is no measure {given!r}{near} Write the output and what is measured of it, "
             f"such as 'foot.x.stroke'; there are {listed(MEASURES)}."
         )
-    column = solution.column(output)
-    if column.name not in solution.observed.names:
+    column, is_force = _column(solution, output, bearing)
+    if measure not in (OF_FORCES if is_force else MEASURES):
+        known = listed(OF_FORCES if is_force else MEASURES)
+        raise InputError(
+            f"{given!r}: there is no such measure of {column.name}; there are {known}."
+        )
+    if not is_force and column.name not in solution.observed.names:
         raise InputError(
             f"{given!r}: {column.name} is no output, and measures are those of outputs. There are "
             f"{listed(solution.observed.names)}: name a point or an output in the model."
         )
     unit = TIME_UNIT if measure in OF_TIME else "" if measure == "time_ratio" else column.unit
-    return Kept(f"{column.name}_{measure}", unit, column.name, measure)
+    return Kept(f"{column.name}_{measure}", unit, column.name, measure, is_force)

@@ -33,20 +33,11 @@ class End(NamedTuple):
 
 
 class Found:
-    """What is known of a column or a measure after some chunks.
-
-    Attributes
-    ----------
-    kept
-        Its name and unit.
-    low, high : ndarray, shape (N,)
-        The extremes at each time; of a measure there is one.
-    least, greatest
-        The extremes of all, the first of equal ones.
-    """
+    """What is known of a column or a measure after some chunks."""
 
     def __init__(self, kept: Kept, times: int) -> None:
         self.kept = kept
+        # The extremes at each time, and those of all; of a measure there is one time.
         self.low, self.high = np.full(times, np.inf), np.full(times, -np.inf)
         self.least, self.greatest = End(math.inf, ()), End(-math.inf, ())
         self._sum, self._count = np.zeros(times), np.zeros(times, dtype=np.int64)

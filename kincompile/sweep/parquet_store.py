@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import package_of_extra
-from kincompile.sweep.contents import require_same, units
+from kincompile.runtime.results.columns import unit_attributes
+from kincompile.sweep.contents import require_same
 from kincompile.sweep.folder import kept_in, made_whole, remove_unfinished
 from kincompile.sweep.layout import TIME
 
@@ -74,7 +75,11 @@ class ParquetWriter:
             given = values[name]
             columns[name] = given.ravel() if given.ndim > 1 else np.repeat(given, times)
         fields = [
-            pa.field(name, pa.from_numpy_dtype(column.dtype), metadata=units(self.unit_of[name]))
+            pa.field(
+                name,
+                pa.from_numpy_dtype(column.dtype),
+                metadata=unit_attributes(self.unit_of[name]),
+            )
             for name, column in columns.items()
         ]
         return pa.table([pa.array(column) for column in columns.values()], schema=pa.schema(fields))

@@ -10,20 +10,22 @@ chunks     -> executor    those that are missing, a few at a time             ch
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.compiler import emit_loadable
+from kincompile.compiler import emit_forces, emit_loadable
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import InputError, SweepError
 from kincompile.model.mechanism import system_of
 from kincompile.names import escaped
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import mapping_of, read_inputs, read_sweep
 from kincompile.runtime.solve import solve
 from kincompile.sweep.chunks import StoppedError, solved
 from kincompile.sweep.contents import Contents, marks_of
-from kincompile.sweep.layout import read_layout
+from kincompile.sweep.layout import bearing_of, read_layout
 from kincompile.sweep.plan import Plan, chunk_size
 from kincompile.sweep.result import Sweep
 from kincompile.sweep.store import open_store
@@ -41,7 +43,9 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.inputs import Inputs
+    from kincompile.runtime.results.solution import Solution
     from kincompile.sweep.contents import Store
+    from kincompile.sweep.layout import Layout
 
 
 def sweep(
@@ -77,7 +81,9 @@ def sweep(
         `columns` and `measures` it is the outputs, of a model without any the coordinates.
     measures : sequence of str
         What is kept of each motion, as ``"foot.x.stroke"``: of an output its least, t_least,
-        greatest, t_greatest, stroke, period, time_ratio, mean or rms.
+        greatest, t_greatest, stroke, period, time_ratio, mean or rms; of a force, as in
+        ``"motor.drive.peak"``, its peak, least, t_least, greatest, t_greatest, mean or rms at the
+        times. Forces may be columns too; what `kc.forces` names is known.
     product : bool
         Take every combination of the arrays: a grid.
     guess : mapping, optional
@@ -125,7 +131,8 @@ def sweep(
     begin = solve(module, inputs.t[:1], first, guess, assembly=assembly)
     # All chunks start from one position, so that one assembly is meant in all.
     position = begin.q[0] if begin.success else inputs.guess
-    job = Job(sources, inputs.t, position, read_layout(begin, columns, measures), None)
+    layout, sources = _layout(model, target, sources, begin, columns, measures)
+    job = Job(sources, inputs.t, position, layout, None)
     units = {name: module.UNITS[name] for name in module.PARAMETERS}
     marks = marks_of(job, plan, inputs.guess, assembly)
     contents = Contents(module.NAME, plan, job.layout, job.t, units, marks)
@@ -137,6 +144,28 @@ def sweep(
         raise SweepError(_stopped(error, result), result) from error
     _require_all(result)
     return result
+
+
+def _layout(
+    model: Mechanism | ConstraintSystem,
+    target: str,
+    sources: Sources,
+    begin: Solution,
+    columns: Sequence[str] | None,
+    measures: Sequence[str],
+) -> tuple[Layout, Sources]:
+    """Read what is kept; where forces are among it, workers get their source too."""
+    try:
+        return read_layout(begin, columns, measures), sources
+    except InputError:
+        code = code_of(sources.module())
+        if code.lanes is None or not hasattr(code.module, "LOADS"):
+            raise
+    planned, given, joints = emit_forces(model, target)
+    first = None if planned is None else Sources(*planned)
+    sources = replace(sources, forces=(first, Sources(*given), joints))
+    begin = replace(begin, module=sources.module())
+    return read_layout(begin, columns, measures, bearing_of(begin)), sources
 
 
 def _times(model: Mechanism | ConstraintSystem) -> Array:

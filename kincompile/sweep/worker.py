@@ -11,12 +11,13 @@ import os
 import threading
 import warnings
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from kincompile.errors import KincompileWarning
+from kincompile.runtime.engine.code import FORCES, ForceModules
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native.module import make_native
 from kincompile.runtime.solve import solve
@@ -46,6 +47,8 @@ class Sources:
     numpy: str  # text of the NumPy module
     arrays: Mapping[str, NDArray[Any]]  # what that would read from a companion file
     native: Mapping[str, str]  # text of the C files by name; none where C is not used
+    # those of its forces, planned and with multipliers given, and its joints; where they are wanted
+    forces: tuple[Sources | None, Sources, Mapping[str, tuple[str, ...]]] | None = None
     digest: str = field(init=False)  # of all of them: a worker compiles what has one digest once
 
     def __post_init__(self) -> None:
@@ -53,6 +56,9 @@ class Sources:
         found = hashlib.sha256()
         for part in (self.numpy, *self.native, *self.native.values(), *self.arrays):
             found.update(part.encode() + b"\0")
+        if self.forces is not None:
+            planned, given, _ = self.forces
+            found.update(((planned.digest if planned else "") + given.digest).encode())
         for array in self.arrays.values():
             found.update(np.ascontiguousarray(array).tobytes())
         object.__setattr__(self, "digest", found.hexdigest())
@@ -73,7 +79,19 @@ class Sources:
 @lru_cache(maxsize=8)
 def _module(sources: Sources) -> ModuleType:
     module = from_source(sources.numpy, sources.name, sources.arrays)
-    return make_native(module, sources.native) if sources.native else module
+    module = make_native(module, sources.native) if sources.native else module
+    if sources.forces is not None:
+        vars(module)[FORCES] = ForceModules(partial(_forces, sources), sources.forces[2])
+    return module
+
+
+def _forces(sources: Sources, is_planned: bool) -> ModuleType | None:
+    """Return the module of forces, as `ForceModules` describes."""
+    assert sources.forces is not None
+    planned, given, _ = sources.forces
+    if is_planned:
+        return None if planned is None else planned.module()
+    return given.module()
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import package_of_extra
-from kincompile.sweep.contents import require_same, units
+from kincompile.runtime.results.columns import unit_attributes
+from kincompile.sweep.contents import require_same
 from kincompile.sweep.folder import kept_in, made_whole, remove_unfinished
 from kincompile.sweep.layout import STATUS
 
@@ -117,7 +118,7 @@ def _make(group: zarr.Group, contents: Contents) -> None:
             dtype=item.dtype,
             fill_value=item.fill,
             dimension_names=item.dimensions,
-            attributes={**units(item.unit)},
+            attributes={**unit_attributes(item.unit)},
         )
     for name, (dimension, values, unit) in contents.coordinates.items():
         array = group.create_array(
@@ -126,6 +127,6 @@ def _make(group: zarr.Group, contents: Contents) -> None:
             dtype=values.dtype,
             fill_value=np.nan,
             dimension_names=(dimension,),
-            attributes={**units(unit)},
+            attributes={**unit_attributes(unit)},
         )
         array[:] = values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -79,15 +80,19 @@ def broken(text: str, width: int = WIDTH - 8) -> list[str]:
     return ["    " * depths[start] + text[start:stop].strip() for start, stop in spans]
 
 
+_BRACKET_OR_SIGN = re.compile(r"[()\[\]]|(?<= )[+-](?= )")
+
+
 def _breaks(text: str) -> dict[int, list[int]]:
     """Return where a plus or minus stands, by the number of parentheses around it."""
     breaks: dict[int, list[int]] = {}
     depth = 0
-    for k, character in enumerate(text):
-        depth += character in "(["
-        depth -= character in ")]"
-        if character in "+-" and text[k - 1 : k + 2 : 2] == "  ":
-            breaks.setdefault(depth, []).append(k)
+    for found in _BRACKET_OR_SIGN.finditer(text):
+        character = found[0]
+        if character in "+-":
+            breaks.setdefault(depth, []).append(found.start())
+        else:
+            depth += 1 if character in "([" else -1
     return breaks
 
 

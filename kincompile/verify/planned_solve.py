@@ -26,7 +26,8 @@ Array = NDArray[Any]
 
 LIMIT = 1e-8
 """Allowed error, in terms of an equation; of determinants, the part of them that they may change.
-A plan does not pivot, and Phi_q of a sensitivity of 1e7 costs half of the digits."""
+A plan does not pivot: Phi_q of a sensitivity of 1e7 may cost half of the digits of b. Those of x
+are lost to every method."""
 
 OF_LARGEST = 1e-4
 """Part of the largest equation's terms that counts for all: rounding errors go from large equations

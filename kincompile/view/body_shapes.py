@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from kincompile.view.marks import Hull, Polygon, moves_with
+from kincompile.view.marks import Hull, Polygon, Symbol, moves_with
 from kincompile.view.worlds import PLANE
 
 if TYPE_CHECKING:
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from kincompile.model.bodies import Body
     from kincompile.view.geometry import Geometry
     from kincompile.view.marks import BodyFrame, FramePoint, Mark, Point
+
+ALONG_SHAFTS = ("hinge", "knuckles", "shaft")
+"""Shapes in space about the axis of a shaft."""
 
 SAME_POINT = 1e-9
 """Distance, relative to the coordinates, up to which two points of a body are one."""
@@ -37,23 +41,19 @@ def links(
     attached: Iterable[FramePoint],
     marks: Sequence[Mark],
     dimension: int = PLANE,
-) -> list[Hull]:
+) -> list[Hull | Symbol]:
     """Return the hulls of bodies without an outline; of one point only where no mark shows it.
+
+    In space a body with one point, its origin, in a hinge is a stub of a shaft: the hinge hides it.
 
     Parameters
     ----------
-    frames
-        The frames of the bodies.
-    attached
-        Points that joints hold.
-    marks
-        All other marks, outlines included.
     dimension
         2, or 3 in space, where a hull keeps all its points: its faces are found where it is drawn.
     """
     outlined = {mark.frame for mark in marks if isinstance(mark, Polygon)}
     shown = {frame for mark in marks for frame in moves_with(mark)}
-    found = []
+    found: list[Hull | Symbol] = []
     for frame in sorted(set(frames) - outlined):
         own: list[Point] = [place.point for place in attached if place.frame == frame]
         own += [(0.0,) * dimension] if len(_distinct(own)) < 2 else []
@@ -61,6 +61,9 @@ def links(
         if len(points) > 1 or frame not in shown:
             corners = convex_chain(points) if dimension == PLANE else tuple(points)
             found.append(Hull(frame, corners, tuple(own)))
+        elif dimension > PLANE:
+            turning = (x for x in marks if isinstance(x, Symbol) and x.shape in ALONG_SHAFTS)
+            found += [replace(x, shape="stub") for x in turning if x.place.frame == frame][:1]
     return found
 
 

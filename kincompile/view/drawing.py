@@ -52,48 +52,29 @@ OVERHANG = 3
 
 @dataclass(frozen=True, slots=True)
 class JointLabel:
-    """The name and place of a constraint, for labels and for pointing at it.
-
-    Attributes
-    ----------
-    place
-        Where it is; on a moving body where it has one. None for a free equation.
-    is_driver
-        Whether its value is a function of time.
-    rows
-        First row of Phi and number of rows.
-    distances
-        Lengths that must be positive; none that is a function of time.
-    """
+    """The name and place of a constraint, for labels and for pointing at it."""
 
     name: str
     kind: str
+    # Where it is; on a moving body where it has one. None for a free equation.
     place: FramePoint | None
-    is_driver: bool
-    rows: tuple[int, int]
+    is_driver: bool  # whether its value is a function of time
+    rows: tuple[int, int]  # first row of Phi and number of rows
+    # Lengths that must be positive; none that is a function of time.
     distances: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A mechanism as shapes that move with q: what matplotlib and the page draw.
-
-    Attributes
-    ----------
-    bodies, frames
-        Name and frame of each body, in the order of the mechanism.
-    marks
-        All shapes, from back to front.
-    size
-        The length in which pins and blocks are measured.
-    """
+    """A mechanism as shapes that move with q: what matplotlib and the page draw."""
 
     name: str
+    # bodies, frames: name and frame of each body, in the order of the mechanism.
     bodies: tuple[str, ...]
     frames: tuple[BodyFrame, ...]
-    marks: tuple[Mark, ...]
+    marks: tuple[Mark, ...]  # all shapes, from back to front
     joints: tuple[JointLabel, ...]
-    size: float
+    size: float  # the length in which pins and blocks are measured
 
     @property
     def dots(self) -> tuple[Dot, ...]:

@@ -48,8 +48,6 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
 
     Parameters
     ----------
-    q : ndarray, shape (n,)
-        The position.
     length_unit
         The unit of length; one that DXF does not know is left open ($INSUNITS 0).
     paths

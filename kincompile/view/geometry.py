@@ -45,20 +45,12 @@ PITCH_LINE = ("s_P", "s_Q")
 
 @dataclass(frozen=True)
 class Geometry:
-    """The joints of a mechanism, with what turns their attributes into numbers.
-
-    Attributes
-    ----------
-    values
-        Parameters by name.
-    q : ndarray, shape (N, n)
-        Positions that rails must fit; all finite.
-    """
+    """The joints of a mechanism, with what turns their attributes into numbers."""
 
     joints: Sequence[Joint]
-    values: Mapping[str, float]
+    values: Mapping[str, float]  # parameters by name
     frames: Mapping[str, BodyFrame]
-    q: Array
+    q: Array  # shape (N, n): positions that rails must fit; all finite
 
     @cached_property
     def _code(self) -> tuple[Graph, Converter]:
@@ -237,10 +229,6 @@ class JointGeometry:
             What slides or rolls on it.
         style
             As for `Rail`; without, a guide on the ground, and a slot of a body.
-        offset
-            Distance of the rail from the line, to its left.
-        at_least
-            Distances along the axis that it covers in any case.
         """
         ways = along(self.mechanism.q, base, axis, follower)
         ends = [float(ways.min()), float(ways.max()), *at_least]

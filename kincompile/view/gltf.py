@@ -75,7 +75,7 @@ def as_glb(
     for name, frame in zip(drawn.bodies, drawn.frames, strict=True):
         node = file.node(name, file.mesh(name, groups.get(frame, [])))
         _add_points(file, node, drawn, frame)
-        file.animate(node, _moved(q, frame), _turned(q, frame))
+        file.animate(node, q[:, frame.columns[:3]], _turned(q, frame))
         nodes.append(node)
     for mark in drawn.marks:
         if isinstance(mark, Span) and mark.style not in LEFT_OUT:
@@ -141,10 +141,6 @@ def _rod(file: _File, drawn: Drawing, mark: Span, q: Array) -> list[int]:
 
 
 # ---- how nodes move ----
-
-
-def _moved(q: Array, frame: BodyFrame) -> Array:
-    return np.asarray(q[:, frame.columns[:3]], dtype=np.float64)
 
 
 def _turned(q: Array, frame: BodyFrame) -> Array:

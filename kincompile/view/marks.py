@@ -19,18 +19,11 @@ Point: TypeAlias = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True, order=True)
 class BodyFrame:
-    """The axes of a body, or of the ground.
+    """The axes of a body, or of the ground."""
 
-    Attributes
-    ----------
-    index
-        Index of the body in the mechanism; -1 for the ground.
-    columns
-        Columns of q with its x, y and phi, in space x, y, z and Euler parameters; none for the
-        ground.
-    """
-
-    index: int
+    index: int  # index of the body in the mechanism; -1 for the ground
+    # Columns of q with its x, y and phi, in space x, y, z and Euler parameters; none for the
+    # ground.
     columns: tuple[int, ...]
 
 
@@ -119,31 +112,19 @@ class Pin:
 
 @dataclass(frozen=True, slots=True)
 class Rail:
-    """A straight piece of a frame on which something slides or rolls.
-
-    Attributes
-    ----------
-    frame, base, axis
-        A point of its line and the direction, of length one, in a frame.
-    style
-        "guide" (a track of the ground, in which a block slides), "slot" (of a body), "rack" (the
-        pitch line of a rack) or "face" (of a follower).
-    follower
-        What slides or rolls on it.
-    at_least
-        Distances along the axis that it covers in any case.
-    reach
-        Distances along the axis between which it is drawn.
-    """
+    """A straight piece of a frame on which something slides or rolls."""
 
     joint: str
+    # frame, base, axis: a point of its line and the direction, of length one, in a frame.
     frame: BodyFrame
     base: Point
     axis: Point
+    # "guide" (a track of the ground, in which a block slides), "slot" (of a body), "rack" (the
+    # pitch line of a rack) or "face" (of a follower).
     style: str
-    follower: FramePoint
-    at_least: tuple[float, ...]
-    reach: tuple[float, float]
+    follower: FramePoint  # what slides or rolls on it
+    at_least: tuple[float, ...]  # distances along the axis that it covers in any case
+    reach: tuple[float, float]  # distances along the axis between which it is drawn
 
     @property
     def start(self) -> Point:
@@ -230,27 +211,18 @@ class Dot:
 
 @dataclass(frozen=True, slots=True)
 class Symbol:
-    """A solid that stands for a part of a joint in space, fixed in one frame.
-
-    Attributes
-    ----------
-    shape
-        A name in `SOLIDS`.
-    axis, cross
-        Unit vectors in the frame of `place`: what it is turned about, and one at a right angle.
-    follower
-        What slides along its axis, where it is as long as the motion.
-    reach
-        Distances along the axis between which it is drawn.
-    """
+    """A solid that stands for a part of a joint in space, fixed in one frame."""
 
     joint: str
-    shape: str
+    shape: str  # a name in `SOLIDS`
     place: FramePoint
+    # axis, cross: unit vectors in the frame of `place`: what it is turned about, and one at a right
+    # angle.
     axis: Point
     cross: Point
+    # What slides along its axis, where it is as long as the motion.
     follower: FramePoint | None = None
-    reach: tuple[float, float] = (0.0, 0.0)
+    reach: tuple[float, float] = (0.0, 0.0)  # distances along the axis between which it is drawn
 
 
 Mark: TypeAlias = (

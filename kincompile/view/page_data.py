@@ -48,8 +48,6 @@ def page_data(
 
     Parameters
     ----------
-    solution
-        Its motion; None where the equations determine none.
     starts_there
         Whether the page itself starts from the first position of the motion, not from the guess.
     """

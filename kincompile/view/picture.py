@@ -49,31 +49,16 @@ ALONG = (0.5, 0.65, 0.35, 0.8, 0.2)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PicturePath:
-    """A line or an area on the picture.
+    """A line or an area on the picture."""
 
-    Attributes
-    ----------
-    points
-        Corners [points], y upwards.
-    stroke, fill
-        Colours; "" for none.
-    width
-        Of the line.
-    opacity
-        Of the whole; the area of a body is paler by `FILL`.
-    is_pale
-        Whether the area has the pale colour of its line.
-    dash
-        "--", ":" or "" for an unbroken line.
-    """
-
-    points: Array
+    points: Array  # corners [points], y upwards
+    # stroke, fill: colours; "" for none.
     stroke: str
     fill: str
-    width: float
-    opacity: float = 1.0
-    is_pale: bool = False
-    dash: str = ""
+    width: float  # of the line
+    opacity: float = 1.0  # of the whole; the area of a body is paler by `FILL`
+    is_pale: bool = False  # whether the area has the pale colour of its line
+    dash: str = ""  # "--", ":" or "" for an unbroken line
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,26 +74,14 @@ class PictureLabel:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """A vector to be drawn, in the axes of the ground.
+    """A vector to be drawn, in the axes of the ground."""
 
-    Attributes
-    ----------
-    name
-        Name of its symbol, such as ``"s_i"``.
-    frame
-        The frame whose colour it has.
-    is_vector
-        Whether its symbol is bold; an axis of a frame is not.
-    is_direction
-        Whether it is drawn at a length of its own.
-    """
-
-    name: str
+    name: str  # name of its symbol, such as ``"s_i"``
     start: Array
     end: Array
-    frame: BodyFrame
-    is_vector: bool = True
-    is_direction: bool = False
+    frame: BodyFrame  # the frame whose colour it has
+    is_vector: bool = True  # whether its symbol is bold; an axis of a frame is not
+    is_direction: bool = False  # whether it is drawn at a length of its own
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,8 +108,6 @@ def picture(
     ----------
     q : ndarray, shape (n,)
         The position.
-    title
-        What is shown, for those who cannot see it.
     arrows
         Vectors over it.
     focus
@@ -178,15 +149,7 @@ def composed(
 
 
 class Scale:
-    """From the lengths of a model to points of a picture that shows some points.
-
-    Attributes
-    ----------
-    factor
-        Points for a unit of length.
-    width, height
-        Of the picture.
-    """
+    """From the lengths of a model to points of a picture that shows some points."""
 
     def __init__(
         self,
@@ -232,8 +195,7 @@ def _paths(polyline: Polyline, q: Array, scale: Scale, opacity: float) -> Iterab
 
 def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, PicturePath]:
     """Return line and head of a vector between two points of the picture."""
-    colour, length = colour_of(arrow.frame), float(np.hypot(*(end - start)))
-    along = (end - start) / length
+    colour, length, along = colour_of(arrow.frame), *_way(start, end)
     left = np.array((-along[1], along[0]))
     head = min(HEAD, 0.6 * length)
     neck = end - head * along
@@ -242,12 +204,18 @@ def _arrow(arrow: Arrow, start: Array, end: Array) -> tuple[PicturePath, Picture
     return line, PicturePath(corners, "", colour, 0.0)
 
 
+def _way(start: Array, end: Array) -> tuple[float, Array]:
+    """Return length and direction; to the right where the viewer looks along a vector."""
+    length = float(np.hypot(*(end - start)))
+    return length, (end - start) / length if length > 1e-6 * WIDTH else np.array((1.0, 0.0))
+
+
 def _places(arrow: Arrow, start: Array, end: Array) -> list[Array]:
     """Return where the label of a vector may stand; that of an axis is at its end.
 
     So is that of a direction in space, where six of them may begin at one point.
     """
-    along = (end - start) / float(np.hypot(*(end - start)))
+    _, along = _way(start, end)
     aside = ASIDE * np.array((-along[1], along[0]))
     if not arrow.is_vector or (arrow.is_direction and len(arrow.start) > PLANE):
         return [end + ASIDE * along, end + aside, end - aside]

@@ -52,23 +52,14 @@ def mixed(colour: str, part: float, paper: str = "#ffffff") -> str:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What a line or an area is drawn like.
+    """What a line or an area is drawn like."""
 
-    Attributes
-    ----------
-    width
-        Of the line [points].
-    line, face
-        Names in `INKS` of the line's and of the area's colour; without, that of the body, areas
-        pale.
-    dash
-        "--", ":" or "" for an unbroken line.
-    """
-
-    width: float
+    width: float  # of the line [points]
+    # line, face: names in `INKS` of the line's and of the area's colour; without, that of the body,
+    # areas pale.
     line: str = ""
     face: str = ""
-    dash: str = ""
+    dash: str = ""  # "--", ":" or "" for an unbroken line
 
     @property
     def colour(self) -> str:
@@ -101,33 +92,20 @@ LOOKS: Mapping[str, Look] = {
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """A line or an area of a mark, as a chain of corners in its axes.
+    """A line or an area of a mark, as a chain of corners in its axes."""
 
-    Attributes
-    ----------
-    look
-        A key of `LOOKS`.
-    on
-        What gives the axes: "place", "first" or "second", a point with the axes of the ground;
-        "axis", a point with an axis; "line", from start to end, or from first to second; "barrel",
-        the first part of it; "spoke", a radius of a wheel. Of "points" and "circle", a closed
-        curve, `grow` alone says what is drawn.
-    corners
-        Each as a part of the line's length, and sizes along and to its left. None interrupts.
-    is_area
-        Whether it is closed and filled.
-    every
-        Distance at which the corners are repeated along a line, or around a circle, in sizes.
-    grow
-        Sizes by which a closed curve is widened.
-    """
-
-    look: str
+    look: str  # a key of `LOOKS`
+    # What gives the axes: "place", "first" or "second", a point with the axes of the ground;
+    # "axis", a point with an axis; "line", from start to end, or from first to second; "barrel",
+    # the first part of it; "spoke", a radius of a wheel. Of "points" and "circle", a closed curve,
+    # `grow` alone says what is drawn.
     on: str
+    # Each as a part of the line's length, and sizes along and to its left. None interrupts.
     corners: tuple[Corner, ...] = ()
-    is_area: bool = False
+    is_area: bool = False  # whether it is closed and filled
+    # Distance at which the corners are repeated along a line, or around a circle, in sizes.
     every: float = 0.0
-    grow: float = 0.0
+    grow: float = 0.0  # sizes by which a closed curve is widened
 
 
 def _arc(radius: float, first: int, last: int, part: float = 0.0) -> tuple[Corner, ...]:

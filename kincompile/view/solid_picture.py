@@ -59,15 +59,9 @@ CIRCLE = np.stack([f(np.radians(np.arange(0, 360, 10))) for f in (np.cos, np.sin
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """A direction of view, without perspective.
+    """A direction of view, without perspective."""
 
-    Attributes
-    ----------
-    axes : ndarray, shape (3, 3)
-        Unit vectors to the right, up, and towards the viewer.
-    """
-
-    axes: Array
+    axes: Array  # shape (3, 3): unit vectors to the right, up, and towards the viewer
 
     @classmethod
     def named(cls, view: str) -> Camera:

@@ -32,14 +32,10 @@ class Piece(Stroke):
     Its axes are those that `on` names, as of a stroke, with "reach", along what slides; "stem",
     from the barrel on; "edges" of a body; "turn", across the axis. A corner is a part of the line's
     length, sizes along it, and sizes away from it.
-
-    Attributes
-    ----------
-    sides
-        Of the solid that the corners make when they are turned about the line; without, they are
-        the corners of a flat line or area. Of a ball without corners, `grow` is the radius.
     """
 
+    # Of the solid that the corners make when they are turned about the line; without, they are the
+    # corners of a flat line or area. Of a ball without corners, `grow` is the radius.
     sides: int = 0
 
     @property
@@ -106,6 +102,7 @@ SOLIDS: Mapping[str, tuple[Piece, ...]] = {
         _solid("body", "axis", _about(0.8, 1.4, 2.2), 8),
     ),
     "shaft": (_solid("body", "axis", _about(0.7, -2.2, 2.2)),),
+    "stub": (_solid("body", "axis", _about(0.5, -5.0, 5.0), 8),),
     "screw": (
         _solid("body", "reach", _tube(0.45), 8),
         Piece("body", "reach", _THREAD, is_area=True, every=0.6, sides=8),

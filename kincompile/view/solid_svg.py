@@ -5,7 +5,7 @@ Nothing of it moves rigidly on the picture, so that every frame has its own path
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from kincompile.view.drawing import Drawing
     from kincompile.view.marks import Array
-    from kincompile.view.picture import PicturePath
     from kincompile.view.svg import Timing
 
 NAME = 15
@@ -45,7 +44,10 @@ def svg_in_space(
     scale = Scale([*(path.points for frame in frames for path in frame), *traces], (WIDTH, HEIGHT))
     lines = [path for k, points in enumerate(traces) for path in trace(k, scale.at(points))]
     pictures = [
-        _elements([*(_scaled(path, scale) for path in frame), *lines], scale)
+        "\n".join(
+            svg_path(path, scale.height)
+            for path in (*(replace(item, points=scale.at(item.points)) for item in frame), *lines)
+        )
         + "".join(_name(dot.name, camera.seen(dot.place.at(row)), scale) for dot in drawn.dots)
         for frame, row in zip(frames, shown, strict=True)
     ]
@@ -65,14 +67,6 @@ def _frames(pictures: Sequence[str], timing: Timing) -> list[str]:
         f'repeatCount="indefinite"/>{picture}</g>\n'
         for picture, start, end in zip(pictures, timing.parts.tolist(), ends, strict=True)
     ]
-
-
-def _scaled(path: PicturePath, scale: Scale) -> PicturePath:
-    return dataclasses.replace(path, points=scale.at(path.points))
-
-
-def _elements(paths: Sequence[PicturePath], scale: Scale) -> str:
-    return "\n".join(svg_path(path, scale.height) for path in paths)
 
 
 def _name(name: str, seen: Array, scale: Scale) -> str:

@@ -80,27 +80,14 @@ class InFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A part of a mark in space.
+    """A part of a mark in space."""
 
-    Attributes
-    ----------
-    points : ndarray, shape (k, 3)
-        The corners of a flat facet, or of a line; of a ball its centre.
-    normal : ndarray, shape (3,), or None
-        Of a facet, to its outside; None of a line and of a ball.
-    is_flat
-        Whether a facet is seen from both sides.
-    is_rim
-        Whether the edges of a facet are edges of the solid.
-    radius
-        Of a ball, else zero.
-    """
-
-    points: Array
+    points: Array  # shape (k, 3): the corners of a flat facet, or of a line; of a ball its centre
+    # shape (3,): of a facet, to its outside; None of a line and of a ball.
     normal: Array | None = None
-    is_flat: bool = False
-    is_rim: bool = False
-    radius: float = 0.0
+    is_flat: bool = False  # whether a facet is seen from both sides
+    is_rim: bool = False  # whether the edges of a facet are edges of the solid
+    radius: float = 0.0  # of a ball, else zero
 
 
 @dataclass(frozen=True, slots=True)

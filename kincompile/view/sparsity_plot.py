@@ -86,19 +86,13 @@ def plot_sparsity(
 
 @dataclass(frozen=True, slots=True)
 class _Pattern:
-    """The pattern in the order in which it is drawn.
+    """The pattern in the order in which it is drawn."""
 
-    Attributes
-    ----------
-    rows, columns
-        Names, from top to bottom and from left to right.
-    is_unknown : ndarray of bool, shape (nnz,)
-        Whether the coordinate is solved for in the step of the equation.
-    """
-
+    # rows, columns: names, from top to bottom and from left to right.
     rows: Sequence[str]
     columns: Sequence[str]
     entries: NDArray[np.intp]
+    # shape (nnz,): whether the coordinate is solved for in the step of the equation.
     is_unknown: NDArray[np.bool_]
 
 

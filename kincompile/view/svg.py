@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import Array, BodyFrame
+    from kincompile.view.marks import Array
 
 WIDTH, HEIGHT = 960.0, 720.0
 """Largest sides of a picture [px]."""
@@ -49,18 +49,10 @@ STILL = "@media(prefers-reduced-motion:reduce){.moving{display:none}.still{displ
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """When the frames of a motion are shown.
+    """When the frames of a motion are shown."""
 
-    Attributes
-    ----------
-    seconds
-        Playing time.
-    parts : ndarray, shape (F,)
-        The part of it at which each frame is shown, from 0 to 1.
-    """
-
-    seconds: float
-    parts: Array
+    seconds: float  # playing time
+    parts: Array  # shape (F,): the part of it at which each frame is shown, from 0 to 1
 
     @property
     def attributes(self) -> str:
@@ -135,16 +127,12 @@ def as_svg(
     ----------
     q : ndarray, shape (F, n)
         Positions; of several the first is shown where nothing moves.
-    description
-        What is shown, for those who cannot see it.
     paths
         Lines over the mechanism, each of shape (k, 2), in space (k, 3).
     timing
         When the positions are shown; without, the first one is.
     millimetres
         Length of the model's unit where the picture has its true size, in space across the view.
-    view
-        From where a mechanism in space is seen.
     """
     if drawn.is_spatial:
         svg_in_space: Callable[..., str] = in_space("solid_svg").svg_in_space
@@ -274,7 +262,7 @@ def _rigid(
 def _path(shape: str, item: Polyline, line: float, inside: str = "") -> str:
     """Return the element of a stroke, in the colours of its look."""
     look = item.look
-    hue = "quiet" if item.frame == GROUND_FRAME else _hue(item.frame)
+    hue = "quiet" if item.frame == GROUND_FRAME else f"body{item.frame.index % len(HUES['light'])}"
     stroke = look.line or hue
     fill = (look.face or f"pale-{hue}") if item.is_area else ""
     width = f' stroke-width="{_number(line * look.width)}"' if look.width else ""
@@ -338,10 +326,6 @@ def _dash(dash: str, line: float) -> str:
 
 
 # ---- colours ----
-
-
-def _hue(frame: BodyFrame) -> str:
-    return f"body{frame.index % len(HUES['light'])}"
 
 
 def _paint(stroke: str, fill: str) -> str:

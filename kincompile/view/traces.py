@@ -25,11 +25,6 @@ def moving_system(
 ) -> ConstraintSystem:
     """Return the system that moves in a solution, after checking that it can be shown.
 
-    Parameters
-    ----------
-    what
-        What shows it, for messages, such as "an animation shows".
-
     Raises
     ------
     InputError

@@ -11,7 +11,8 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.errors import InputError
+from kincompile import spatial
+from kincompile.errors import InputError, ModelError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,6 +65,15 @@ WRONG: dict[str, Callable[[Any], object]] = {
     "a target that is none": lambda r: kc.fit(r.m, None, bounds={"a": (1, 2)}),
     "values that are a number": lambda r: kc.fit(r.m, _wanted(), bounds={"a": (1, 2)}, p=3),
     "bounds of all numbers": lambda r: kc.fit(r.m, _wanted(), bounds={"a": (1e-300, 1e300)}),
+    "a sequence with no laws": lambda r: kc.motion.sequence([(0, 0), (1, 1)], law=[]),
+    "a sequence without end": lambda r: kc.motion.sequence([(k, k % 2) for k in range(3000)]),
+    "times as good as equal": lambda r: kc.motion.table([0, 1e-300, 1], [0, 1, 2]),
+    "angles without end": lambda r: kc.motion.flat_cam(kc.t, 1.0, points=10**9),
+    "values as text": lambda r: kc.times_at(r.module, "arm.phi", ["x"], [0, 1]),
+    "no values": lambda r: kc.times_at(r.module, "arm.phi", [], [0, 1]),
+    "half a student": lambda r: kc.exercise(r.m, 1.5),
+    "an output called status": lambda r: kc.compile(_named("status")),
+    "an output called t": lambda r: kc.compile(_named("t")),
     "a seed of a fit": lambda r: kc.fit(r.m, _wanted(), bounds={"a": (1, 2)}, seed=1.5),
 }
 
@@ -72,9 +82,15 @@ def _wanted() -> Any:
     return kc.targets.value("tip.x", [1.5], [0.1])
 
 
+def _named(name: str) -> kc.Mechanism:
+    m = kc.Mechanism("named")
+    m.output(name, m.body("arm").phi)
+    return m
+
+
 @pytest.mark.parametrize("what", WRONG)
 def test_wrong_arguments_are_refused(room: SimpleNamespace, what: str) -> None:
-    with pytest.raises(InputError):
+    with pytest.raises((InputError, ModelError)):
         WRONG[what](room)
 
 
@@ -94,3 +110,11 @@ def test_a_measure_is_found_by_its_name(room: SimpleNamespace) -> None:
     assert found["tip.x.stroke"].equals(found["x_tip_stroke"])
     with pytest.raises(InputError, match="there is no"):
         found["tip.x.mean"]
+
+
+def test_axes_may_have_any_length() -> None:
+    axis, other, o = (1e-300, 0, 0), (1e300, 0, 0), (0, 0, 0)
+    m = spatial.Mechanism("axes")
+    arm = m.body("arm")
+    m.add(spatial.Revolute("O", m.ground, o, axis, arm, o, other))
+    assert np.isfinite(kc.compile(m).Phi_q(np.eye(7)[3], 0.0)).all()

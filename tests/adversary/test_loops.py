@@ -61,7 +61,8 @@ def check(seed: int) -> tuple[int, int]:
     module = kc.compile(mechanism(loop, scale, noise, random))
     checks = kc.verify(module).checks
     assert {item.quantity for item in checks} >= set(DERIVED)
-    # near a dead centre a plan that does not pivot loses half of the digits, which Newton mends
+    # At a dead centre, nearly, x is uncertain in half of its digits, by whatever method, and some
+    # equation shows it; Newton's method mends that of a position.
     wrong = [x for x in checks if not x.passed and (x.quantity != "solve" or x.error > 1e-6)]
     assert not wrong, f"seed {seed}"
     found = kc.solve(module, t)

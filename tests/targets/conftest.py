@@ -2,7 +2,8 @@
 
 The fixture `target` gives, for each target in turn, what its code says of the mechanisms, at the
 same states. `expected` is evaluated by mpmath with 40 digits: Phi as SymPy has it, the others as
-SymPy derives them from Phi, where there are no tables.
+SymPy derives them from Phi, where there are no tables; in space they are differences of Phi, with
+120 digits.
 """
 
 import json
@@ -98,7 +99,7 @@ class Case:
         return {name: self.evaluate(matrix) for name, matrix in self.derived.items()}
 
     def differences(self) -> dict[str, Any]:
-        """Return Phi and differences of it: SymPy's gamma of a body in space is a page a row."""
+        """Return Phi and differences of it: SymPy's gamma in space has 10^4 operations and more."""
         function, h = self.function(self.model.Phi), mpmath.mpf(10) ** -STEP
         found: dict[str, Any] = {name: [] for name in QUANTITIES}
         with mpmath.workdps(4 * STEP):

@@ -29,6 +29,12 @@ def test_that_a_type_says_what_it_is(kind):
     assert (DOCS / "images" / f"joint_{kind.__name__}.svg").exists()
 
 
+@pytest.mark.parametrize("name", joints.PICTURED)
+def test_that_a_type_in_space_has_its_picture(name):
+    text = (DOCS / "images" / f"space_{name}.svg").read_text(encoding="utf-8")
+    assert "<title>joint: the vectors of its equation" in text
+
+
 def moved(name, way):
     """Return how Phi of a type changes, to first order, when its bodies are moved."""
     m = joints.mechanism_of(CONSTRAINTS[name])

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import RESIDUAL_FACTOR, TOLERANCE
-from kincompile.errors import InputError, UnsupportedError
+from kincompile.errors import InputError
 from kincompile.names import without_loads
-from kincompile.runtime.engine.code import DYNAMICS, code_of
+from kincompile.runtime.engine.code import DYNAMICS, on_request
 from kincompile.runtime.problem import problem
 
 if TYPE_CHECKING:
@@ -31,20 +31,11 @@ CORRECTIONS = 8
 
 def dynamic_modules(module: ModuleType) -> DynamicModules:
     """Return the compiled equations of motion of a mechanism; say so where there can be none."""
-    found: Callable[[], DynamicModules] | None = vars(module).get(DYNAMICS)
-    if found is not None:
-        return found()
     if not hasattr(module, "LOADS"):
         raise InputError(without_loads(module.NAME))
-    if code_of(module).evaluate is not None:
-        raise UnsupportedError(
-            f"{module.NAME} is in grouped form, as large mechanisms are, whose equations of motion "
-            "are not compiled: use form='inline'."
-        )
-    raise InputError(
-        f"the module of {module.NAME} was loaded from a file, which knows no more than its own "
-        "functions: compile the model, and simulate that."
-    )
+    wanted = "whose equations of motion are not compiled:", "and simulate that"
+    found: Callable[[], DynamicModules] = on_request(module, DYNAMICS, *wanted)
+    return found()
 
 
 class Equations:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from kincompile.runtime.singular import events as singular
 from kincompile.runtime.singular.events import LOCK_UP, Event, involved
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from kincompile.runtime.dynamics.equations import Equations
     from kincompile.runtime.engine.code import Array
@@ -81,6 +81,15 @@ def signed(matrix: Array, rows: Array) -> float:
     return float(sign * math.exp(min(size, LARGEST_POWER)))
 
 
+def _asked(kind: str, values: Mapping[str, Any]) -> Iterator[tuple[str, str, float]]:
+    """Yield kind, name and value of what is to be located; of a name there may be several."""
+    for name, given in values.items():
+        for value in given if isinstance(given, list | tuple | np.ndarray) else [given]:
+            if not (isinstance(value, int | float | np.number) and np.isfinite(value)):
+                raise InputError(f"the event at {name!r} is {value!r}: give a finite number.")
+            yield kind, name, float(value)
+
+
 class Watch:
     """Looks for events in each step: values of coordinates or outputs, and singular configurations.
 
@@ -91,22 +100,19 @@ class Watch:
         self,
         equations: Equations,
         inputs: Inputs,
-        events: Mapping[str, float] | None,
-        stops: Mapping[str, float] | None,
+        events: Mapping[str, Any] | None,
+        stops: Mapping[str, Any] | None,
         *,
         smooth: bool,
     ) -> None:
         self._equations, self._inputs, self._smooth = equations, inputs, smooth
         module = inputs.code.module
         self._outputs: tuple[str, ...] = getattr(module, "OUTPUTS", ())
-        given = [*((PASSAGE, *item) for item in mapping_of(events, "events").items()),
-                 *((STOP, *item) for item in mapping_of(stops, "stops").items())]  # fmt: skip
-        for _, name, value in given:
-            if not (isinstance(value, int | float | np.number) and np.isfinite(value)):
-                raise InputError(f"the event at {name!r} is {value!r}: give a finite number.")
+        given = [*_asked(PASSAGE, mapping_of(events, "events")),
+                 *_asked(STOP, mapping_of(stops, "stops"))]  # fmt: skip
         self._kinds = [kind for kind, _, _ in given]
         self._names = self._checked([name for _, name, _ in given])
-        self._values = np.array([float(value) for _, _, value in given])
+        self._values = np.array([value for _, _, value in given])
         self._signs = np.zeros(len(given))
         self._rank: Rank | None = None
 

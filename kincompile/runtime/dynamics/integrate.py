@@ -46,24 +46,7 @@ COLUMNS = (
 
 
 class Integration:
-    """A simulation and what it found, N times and n coordinates.
-
-    Attributes
-    ----------
-    t : ndarray, shape (N,)
-        The times; where a stop ends the motion those up to it, and its own.
-    q, q_dot, q_ddot : ndarray, shape (N, n)
-        The motion; NaN where it was not reached.
-    kinetic, work, drift, residual, steps : ndarray, shape (N,)
-        Kinetic energy, work since the start, the largest correction since the point before, the
-        largest absolute value of Phi, and steps since the point before.
-    status : ndarray of int, shape (N,)
-        A `Status` for each.
-    events : list of Event
-        What was located.
-    message : str
-        How it went.
-    """
+    """A simulation and what it found, N times and n coordinates."""
 
     def __init__(
         self, equations: Equations, inputs: Inputs, watch: Watch, progress: Progress | None
@@ -72,7 +55,9 @@ class Integration:
         self._name = inputs.code.name
         self._progress = progress or (lambda done, total: None)
         size = inputs.t.size
+        # NaN where the motion was not reached.
         self.q, self.q_dot, self.q_ddot = np.full((3, size, equations.n), np.nan)
+        # Drift is the largest correction since the point before; so many are the steps.
         self.kinetic, self.work, self.drift, self.residual = np.full((4, size), np.nan)
         self.status = np.full(size, int(Status.NOT_REACHED))
         self.steps = np.zeros(size, dtype=np.int64)

@@ -53,8 +53,8 @@ def simulate(
     *,
     position: Mapping[str, float] | None = None,
     velocity: Values = None,
-    events: Mapping[str, float] | None = None,
-    stops: Mapping[str, float] | None = None,
+    events: Mapping[str, ArrayLike] | None = None,
+    stops: Mapping[str, ArrayLike] | None = None,
     method: str = "DOP853",
     rtol: float = 1e-9,
     atol: float | None = None,
@@ -87,8 +87,8 @@ def simulate(
         kinetic energy that the constraints allow. As an array, the velocities that are allowed and
         nearest to it. Without it all that no driver moves begins at rest.
     events, stops : mapping, optional
-        Values of coordinates or outputs, ``{"slider.x": 0.35}``, at which an event is located in
-        time; the motion goes on, or it ends there.
+        Values of coordinates or outputs, ``{"slider.x": 0.35}`` or ``{"slider.x": (0.1, 0.35)}``,
+        at which an event is located in time; the motion goes on, or it ends there.
     method : {"DOP853", "Radau", "BDF", "CVODE"}
         SciPy's explicit method of order 8, or for stiff systems its implicit one of order 5, its
         multistep method, or that of SUNDIALS (``pip install 'kincompile[stiff]'``). Implicit ones

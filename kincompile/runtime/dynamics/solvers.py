@@ -94,16 +94,13 @@ class _OneStep:
 
     @property
     def t(self) -> float:
-        """Time after the last step."""
         return float(self._solver.t)
 
     @property
     def y(self) -> Array:
-        """State after the last step."""
         return np.asarray(self._solver.y)
 
     def step(self) -> None:
-        """Take one step."""
         try:
             self._solver.step()
         except ValueError:  # numbers that are not finite, in the linear algebra of Radau
@@ -155,7 +152,6 @@ class _Multistep:
         self._solver.init_step(self.t, y)
 
     def step(self) -> None:
-        """Take one step."""
         found = self._solver.step(self._end, "onestep", tstop=self._end)
         if not found.success:
             self.problem = f"CVODE says: {found.message}"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kincompile.criteria import SPATIAL_COORDINATES, turning
-from kincompile.errors import StructuralError
+from kincompile.errors import InputError, StructuralError, UnsupportedError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
@@ -169,6 +169,22 @@ def code_of(module: ModuleType) -> Code:
     return found if isinstance(found, Code) else attach(module)
 
 
+def on_request(module: ModuleType, place: str, grouped: str, then: str) -> Any:
+    """Return what compiles more of a mechanism, from its place in the module; or say why not."""
+    found = vars(module).get(place)
+    if found is not None:
+        return found
+    if code_of(module).evaluate is not None:
+        raise UnsupportedError(
+            f"{module.NAME} is in grouped form, as large mechanisms are, {grouped} use "
+            "form='inline'."
+        )
+    raise InputError(
+        f"the module of {module.NAME} was loaded from a file, which knows no more than its own "
+        f"functions: compile the model, {then}."
+    )
+
+
 def attach(module: ModuleType) -> Code:
     """Read what a module has, and keep it there. To be called again when its functions change."""
     names = vars(module)
@@ -200,11 +216,7 @@ def attach(module: ModuleType) -> Code:
         unsolvable=names.get("UNSOLVABLE", ""),
         corners=names.get("CORNERS", False),
         lanes=LaneFunctions(
-            position=lanes["position"],
-            nu=lanes["nu"],
-            gamma=lanes["gamma"],
-            factor=lanes["factor"],
-            solve=lanes["solve"],
+            **{name: lanes[name] for name in ("position", "nu", "gamma", "factor", "solve")},
             floats=names["FLOATS"],
             arrays=names["ARRAYS"],
         )

@@ -39,7 +39,7 @@ from kincompile.runtime.native.structures import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -287,11 +287,7 @@ class _Functions:
             """
             t, p = inputs.t, inputs.p
             motion = Motion(t.size, t.ctypes.data, p.ctypes.data, guess.ctypes.data)
-            motion.size, motion.tolerance = size, tolerance
-            motion.max_iterations = inputs.max_iterations
-            motion.q, motion.q_dot, motion.q_ddot = (numbers_of_batch(state) for state in states)
-            motion.residual, motion.status = residual.ctypes.data, status.ctypes.data
-            motion.iterations = iterations.ctypes.data
+            _fill(motion, inputs, (size, tolerance), states, (residual, status, iterations))
             return int(run(byref(motion)))
 
         return march
@@ -319,18 +315,24 @@ class _Functions:
             """
             t, guess = inputs.t, inputs.guess
             motions = Variants(t.size, len(sets), t.ctypes.data, numbers_of_batch(sets.T))
-            motions.guess, motions.size = guess.ctypes.data, size
-            motions.tolerance = tolerance
-            motions.max_iterations = inputs.max_iterations
-            motions.q, motions.q_dot, motions.q_ddot = (
-                numbers_of_batch(state[0]) for state in states
-            )
-            motions.time = states.strides[1] // NUMBER
-            motions.residual, motions.status = residual.ctypes.data, status.ctypes.data
-            motions.iterations = iterations.ctypes.data
+            motions.guess, motions.time = guess.ctypes.data, states.strides[1] // NUMBER
+            _fill(motions, inputs, (size, tolerance), states[:, 0], (residual, status, iterations))
             return int(run(byref(motions)))
 
         return march_variants
+
+
+def _fill(
+    motion: Motion | Variants,
+    inputs: Inputs,
+    scales: tuple[float, float],
+    states: Iterable[Array],
+    said: Iterable[NDArray[Any]],
+) -> None:
+    """Say how a march is followed, and where it puts what it finds."""
+    (motion.size, motion.tolerance), motion.max_iterations = scales, inputs.max_iterations
+    motion.q, motion.q_dot, motion.q_ddot = map(numbers_of_batch, states)
+    motion.residual, motion.status, motion.iterations = (array.ctypes.data for array in said)
 
 
 def _shapes(module: ModuleType) -> dict[str, tuple[int, ...]]:

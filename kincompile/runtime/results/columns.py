@@ -76,7 +76,14 @@ def rate_unit(unit: str, order: int) -> str:
     return f"{unit}{('', '/s', '/s^2')[order]}" if unit else ""
 
 
-def _units(unit: str) -> dict[str, str]:
+def largest(values: NDArray[np.float64]) -> float:
+    """Return the largest size of finite values; NaN without any."""
+    found = np.abs(values[np.isfinite(values)])
+    return float(found.max()) if found.size else np.nan
+
+
+def unit_attributes(unit: str) -> dict[str, str]:
+    """Return the attributes of an array with a unit."""
     return {"units": unit} if unit else {}
 
 
@@ -265,16 +272,16 @@ class MotionTable:
         sizes = {dimension: values.size for dimension, values in axes.values()}
         shape = (*sizes.values(), self.t.size)
         variables: dict[str, Any] = {
-            item.name: (dimensions, item.values.reshape(shape), _units(item.unit))
+            item.name: (dimensions, item.values.reshape(shape), unit_attributes(item.unit))
             for item in (column.shown(angle_unit) for column in self.columns())
         }
         for name in ("status", "residual"):
             variables[name] = (dimensions, getattr(self, name).reshape(shape))
         coords: dict[str, Any] = {
-            name: (dimension, values, _units(self.units.get(name, "")))
+            name: (dimension, values, unit_attributes(self.units.get(name, "")))
             for name, (dimension, values) in axes.items()
         }
-        coords["t"] = ("t", self.t, _units(TIME_UNIT))
+        coords["t"] = ("t", self.t, unit_attributes(TIME_UNIT))
         about = {"name": self.name, "message": self.message}
         return xarray.Dataset(variables, coords=coords, attrs=about)
 

@@ -89,14 +89,15 @@ def force_measures(name: str, t: Array, columns: Mapping[str, tuple[Array, str]]
     return ForceMeasures(
         name,
         tuple(
-            _measured(key, unit, t, values)
+            force_measure(key, unit, t, values)
             for key, (values, unit) in columns.items()
             if np.isfinite(values).any()
         ),
     )
 
 
-def _measured(name: str, unit: str, t: Array, values: Array) -> ForceMeasure:
+def force_measure(name: str, unit: str, t: Array, values: Array) -> ForceMeasure:
+    """Measure one column of forces (N,), NaN where it has no value; somewhere it has one."""
     good = np.isfinite(values)
     times, own = t[good], values[good]
     order = np.argsort(times, kind="stable")

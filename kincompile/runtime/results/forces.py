@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import RANK, probe_of
-from kincompile.errors import InputError, SingularConfigurationWarning, UnsupportedError
+from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.html import Shown
 from kincompile.names import listed, multiplier
-from kincompile.runtime.engine.code import FORCES, code_of
+from kincompile.runtime.engine.code import FORCES, code_of, on_request
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.memory import empty
+from kincompile.runtime.results.columns import largest
 from kincompile.runtime.results.force_measures import ForceMeasures, force_measures
 from kincompile.runtime.results.orientation import orientation
 from kincompile.runtime.results.solution import Solution, require_solution
@@ -254,7 +255,7 @@ class Forces(Shown):
     def to_text(self) -> str:
         """Return a table: of each drive, load and reaction the largest magnitude."""
         rows = [
-            (name, f"{_largest(values):.6g}", unit)
+            (name, f"{largest(values):.6g}", unit)
             for name, (values, unit) in self.columns().items()
         ]
         lines = [
@@ -273,11 +274,6 @@ class Forces(Shown):
     def headline(self) -> str:
         """Return the name and the number of times."""
         return f"{self.name}: forces at {self.motion.t.size} times"
-
-
-def _largest(values: Array) -> float:
-    found = np.abs(values[np.isfinite(values)])
-    return float(found.max()) if found.size else np.nan
 
 
 def forces(solution: Solution) -> Forces:
@@ -332,23 +328,14 @@ def no_value(name: str, bodies: Sequence[str], t: float) -> str:
 
 def _modules(module: ModuleType) -> ForceModules:
     """Return what compiles the forces of a mechanism."""
-    found: ForceModules | None = vars(module).get(FORCES)
-    if found is not None:
-        return found
     if not hasattr(module, "LOADS"):
         raise InputError(
             f"{module.NAME} has no masses and no forces, so that nothing bears a load: give its "
             "bodies masses, m.body(..., mass=..., inertia=...), or add forces such as kc.Force."
         )
-    if code_of(module).evaluate is not None:
-        raise UnsupportedError(
-            f"{module.NAME} is in grouped form, as large mechanisms are, whose forces are not "
-            "compiled: use form='inline'."
-        )
-    raise InputError(
-        f"the module of {module.NAME} was loaded from a file, which knows no more than its own "
-        "functions: compile the model, solve with that, then ask for forces."
-    )
+    wanted = "whose forces are not compiled:", "solve with that, then ask for forces"
+    found: ForceModules = on_request(module, FORCES, *wanted)
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -125,6 +125,28 @@ class Balance:
         turning = self.turning(place.q, place.multipliers, place.point.t, place.free)
         return np.asarray(place.free.T @ turning)
 
+    def growth(self, place: Place, stiffness: Array) -> float | None:
+        r"""Return how fast a small movement grows, as a part of the fastest rate of any.
+
+        It is the largest real part of the s with
+        :math:`\det(s^2 Z^T M Z - s Z^T Q_{\dot q} Z + K) = 0`; None where masses do not determine
+        how the mechanism moves.
+        """
+        q, t, free = place.q, place.point.t, place.free
+        inertia = free.T @ self.module.M(q, t, self._p) @ free
+        values = np.linalg.eigvalsh(inertia)
+        if not values.min(initial=np.inf) > RANK * values.max(initial=0.0):
+            return None
+        slopes = free.T @ self.module.Q_q_dot(q, np.zeros_like(q), t, self._p) @ free
+        both = np.linalg.solve(inertia, np.hstack((-stiffness, slopes)))
+        size = len(both)
+        s = np.linalg.eigvals(np.vstack((np.eye(size, 2 * size, size), both)))
+        # What a stiffness that is nothing lets grow says nothing.
+        is_drift = np.abs(s) ** 2 * values.min(initial=np.inf) <= place.nothing
+        if np.abs(np.linalg.eigvals(stiffness)).min(initial=np.inf) > place.nothing:
+            is_drift[:] = False
+        return float(s.real[~is_drift].max(initial=0.0) / np.abs(s).max(initial=1e-300))
+
     def in_time(self, q: Array, factors: Array, t: float) -> tuple[Array, Array]:
         r"""Return how :math:`\Phi_q^T \lambda - Q` and Phi change in time where nothing moves."""
         later = t + 1j * STEP

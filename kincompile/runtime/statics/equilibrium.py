@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, SAME_POSITION, TOLERANCE
+from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import InputError, SolveError, StructuralError
 from kincompile.html import Shown
 from kincompile.names import listed
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.results.forces import forces, no_value
 from kincompile.runtime.results.solution import Solution
-from kincompile.runtime.singular.assemblies import distance_modulo_turns, spread_starts
+from kincompile.runtime.singular.assemblies import is_new, spread_starts
 from kincompile.runtime.singular.events import involved
 from kincompile.runtime.statics.balance import Balance
 from kincompile.runtime.statics.path import follow
@@ -38,8 +38,11 @@ STARTS = 60
 """Starts from which other equilibria are looked for."""
 
 STABLE, NEUTRAL, UNSTABLE = "stable", "neutral", "unstable"
+FLUTTER, UNDECIDED = "flutter", "undecided"
 """Kinds of equilibrium."""
 
+GROWTH = 1e-6
+"""Rate at which swings grow, as a part of the fastest rate, up to which they do not."""
 
 INDEPENDENT = 1e-9
 """Part of a movement up to which there is none."""
@@ -61,7 +64,9 @@ class Equilibrium(Shown):
         mechanism; NaN where there is no equilibrium. Of an unsymmetric one their real parts.
     stability : tuple of str
         ``"stable"`` where all are positive, ``"unstable"`` where one is negative, ``"neutral"``
-        where some vanish and none is negative; "" where there is no equilibrium.
+        where some vanish and none is negative; "" where there is no equilibrium. ``"flutter"``
+        where none is negative, and swings grow nevertheless, with the masses and dampers that there
+        are; ``"undecided"`` where an unsymmetric stiffness allows that, and a body has no mass.
     """
 
     motion: Solution
@@ -256,9 +261,10 @@ def equilibrium(
 
     Notes
     -----
-    Dampers and friction, which is smooth here, do nothing at rest. Stability is that of small slow
-    movements, the signs of the eigenvalues of the reduced stiffness: a load that follows its body
-    may make a mechanism flutter where all are positive.
+    Dampers and friction, which is smooth here, do nothing at rest. Stability is first that of small
+    slow movements, the signs of the eigenvalues of the reduced stiffness. A load that follows its
+    body, or pushes along with velocities, may make a mechanism flutter where none is negative: so
+    the eigenvalues of small swings are looked at too, with masses and dampers.
     """
     inputs = _inputs(module, t, p, guess, through)
     with np.errstate(all="ignore"):
@@ -308,20 +314,16 @@ def equilibria(module: ModuleType, t: float = 0.0, p: Values = None) -> list[Equ
         for start in spread_starts(balance.equations, inputs.guess)[:STARTS]:
             for downhill in (True, False):
                 rest = settle(balance, start, time, downhill=downhill)
-                if rest is not None and rest.is_balanced and _is_new(balance, rest, found):
+                known = (other.place.q for other in found)
+                if rest is None or not rest.is_balanced:
+                    continue
+                if is_new(balance.equations, rest.place.q, known):
                     _require_loads(balance, rest)
                     found.append(rest)
         results = [_equilibrium(inputs, balance, [rest], []) for rest in found]
     scale = balance.scale
     away = [float(np.linalg.norm((item.q[0] - inputs.guess) / scale)) for item in results]
     return [results[k] for k in np.argsort(np.round(away, 6), kind="stable")]
-
-
-def _is_new(balance: Balance, rest: Rest, found: list[Rest]) -> bool:
-    q, equations = rest.place.q, balance.equations
-    return all(
-        distance_modulo_turns(equations, q, other.place.q) > SAME_POSITION for other in found
-    )
 
 
 def _inputs(
@@ -383,14 +385,21 @@ def _equilibrium(
         message=_message(inputs, balance, found, events), statistics={}, events=events,
         **about(inputs),
     )  # fmt: skip
-    kinds = tuple(map(_kind, good)) + ("",) * (count - len(good))
+    kinds = tuple(_kind(balance, rest) for rest in good) + ("",) * (count - len(good))
     return Equilibrium(motion, eigenvalues, kinds, tuple(good), balance)
 
 
-def _kind(rest: Rest) -> str:
+def _kind(balance: Balance, rest: Rest) -> str:
     """Return the stability of an equilibrium."""
-    signs = rest.signs
-    return UNSTABLE if -1 in signs else NEUTRAL if 0 in signs else STABLE
+    signs, skew = rest.signs, rest.stiffness - rest.stiffness.T
+    if -1 in signs:
+        return UNSTABLE
+    growth = balance.growth(rest.place, rest.stiffness)
+    if growth is None and np.abs(skew).max(initial=0.0) > rest.place.nothing:
+        return UNDECIDED
+    if growth is not None and growth > GROWTH:
+        return FLUTTER
+    return NEUTRAL if 0 in signs else STABLE
 
 
 def _message(inputs: Inputs, balance: Balance, found: list[Rest], events: list[Event]) -> str:

@@ -82,7 +82,8 @@ def _move(place: Place, stiffness: Array) -> Array:
         return np.asarray(np.linalg.solve(stiffness, place.force))
     force = ways.T @ place.force
     force[np.abs(force) <= place.nothing] = 0.0
-    if not force.any() and values[0] < -place.nothing:
+    falls = np.linalg.eigvals(stiffness).real < -place.nothing
+    if not force.any() and falls.any():
         return np.asarray(REACH * ways[:, 0])
     sizes = np.maximum(np.abs(values), place.nothing or 1.0)
     # What nothing holds back goes on for ever, and keeps nothing else from coming to rest.

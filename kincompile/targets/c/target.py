@@ -54,9 +54,8 @@ RESERVED: tuple[str, ...] = (
 """Names that the functions of a mechanism use."""
 
 
-def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
-    """Return the kernels."""
-    return quantities.kernels(given)
+evaluators = quantities.kernels
+"""The kernels."""
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:

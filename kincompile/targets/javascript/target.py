@@ -25,11 +25,10 @@ from kincompile.targets.planned_solve import schedule_solve
 from kincompile.targets.templates import fill, read
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Mapping
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
-    from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.printer import Printer
 
@@ -90,9 +89,8 @@ TAKEN_BY_ENVIRONMENT = (
 """Names that a page or node does not let a script declare, or needs itself."""
 
 
-def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
-    """Return the functions of a point."""
-    return kernels(given)
+evaluators = kernels
+"""The functions of a point."""
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:

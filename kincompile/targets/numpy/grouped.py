@@ -84,25 +84,15 @@ def _constants(program: Program) -> dict[str, NDArray[Any]]:
 
 
 class _Module:
-    """The code and the arrays of a module, while they are written.
-
-    Attributes
-    ----------
-    code
-        Lines of the functions.
-    called
-        Elementary functions that they call.
-    arrays
-        What goes into the companion file, by name.
-    varies : ndarray of bool, shape (nnz,)
-        Which entries of Phi_q are not plain numbers.
-    """
+    """The code and the arrays of a module, while they are written."""
 
     def __init__(self, grouped: GroupedProgram) -> None:
         self.grouped, self.program = grouped, grouped.program
-        self.code: list[str] = []
-        self.called: set[str] = set()
+        self.code: list[str] = []  # lines of the functions
+        self.called: set[str] = set()  # elementary functions that they call
+        # What goes into the companion file.
         self.arrays: dict[str, NDArray[Any]] = {"numbers": grouped.numbers}
+        # Which entries of Phi_q, (nnz,), are not plain numbers.
         self.varies: NDArray[np.bool_] = np.empty(0, dtype=bool)
 
     def add_places(self, quantity: Quantity) -> None:

@@ -51,9 +51,8 @@ RESERVED: tuple[str, ...] = (
 RESERVED_IN_SOLVE = ("f", "J", "F", "b")
 
 
-def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
-    """Return the kernels."""
-    return kernels(given)
+evaluators = kernels
+"""The kernels."""
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import re
+from collections import deque
 from typing import TYPE_CHECKING
 
 from kincompile.targets.lines import WIDTH, broken, indented, pieces, wrapped
@@ -70,14 +71,14 @@ def assignments(texts: Sequence[tuple[str, str]], *, is_titled: bool = False) ->
     In titled code those are the two components of a vector.
     """
     lines: list[str] = []
-    rest = list(texts)
+    rest = deque(texts)
     while rest:
-        (name, text), *rest = rest
+        name, text = rest.popleft()
         if rest and (not is_titled or (name[-1], name[:-1]) == ("x", rest[0][0][:-1])):
             pair = f"{name}, {rest[0][0]} = {text}, {rest[0][1]}"
             if len(pair) <= WIDTH - 4 and name not in re.findall(r"\w+", rest[0][1]):
                 lines.append(pair)
-                del rest[0]
+                rest.popleft()
                 continue
         parts = broken(text)
         own = [f"{name} = (", *(f"    {part}" for part in parts), ")"]

@@ -20,12 +20,11 @@ from kincompile.targets.statements import Statements
 from kincompile.targets.templates import fill
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping
 
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
     from kincompile.model.spline import SplineTable
-    from kincompile.quantities import Quantity
     from kincompile.targets.evaluators import Listing
     from kincompile.targets.printer import Printer
 
@@ -68,9 +67,8 @@ RESERVED: tuple[str, ...] = (
 """Names that the functions use."""
 
 
-def evaluators(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
-    """Return the functions: one a quantity."""
-    return quantities.singles(given)
+evaluators = quantities.singles
+"""The functions: one a quantity."""
 
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:

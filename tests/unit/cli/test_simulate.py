@@ -47,6 +47,30 @@ def test_that_a_stop_and_the_forces_are_in_the_summary(kincompile, drop):
     assert "drop: forces" in done.stdout
 
 
+def test_that_of_two_stops_the_first_that_is_met_ends_the_motion(kincompile, drop):
+    options = ("--velocity", "stone.y_dot=5", "--stop", "stone.y=0.5", "--stop", "stone.y=-1")
+    done = kincompile("simulate", drop, *options)
+    assert "comes to its stop, 0.5" in done.stdout
+
+
+def test_that_a_motion_that_ends_early_is_written_and_what_cannot_be_is_said(
+    kincompile, drop, tmp_path
+):
+    tail = '\n[[loads]]\ntype = "Force"\nname = "F"\nbody = "stone"\npoint = [0, 0]\n'
+    (tmp_path / "early.toml").write_text(MODEL + tail + 'force = [0, "1/(t - 0.5)"]\n')
+    out = tmp_path / "early.csv"
+    done = kincompile("simulate", tmp_path / "early.toml", "-o", out)
+    assert done.exit_code == 3
+    assert "stopped at t = 0.5" in done.stderr
+    with out.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert math.isfinite(float(rows[1]["y_stone [m]"]))
+    assert rows[-1]["y_stone [m]"] == "nan"
+    for wrong in (("--rtol", "nan"), ("--method", "Euler"), ("--stop", "stone.z=1"),
+                  ("--velocity", "stone.y_dot"), ("--end", "nan"), ("--set", "L=2")):  # fmt: skip
+        assert kincompile("simulate", drop, *wrong).exit_code == 2
+
+
 def test_that_mistakes_are_messages(kincompile, drop):
     done = kincompile("simulate", drop, "--position", "ston.y=3")
     assert done.exit_code == 2

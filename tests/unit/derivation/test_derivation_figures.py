@@ -198,3 +198,18 @@ def test_that_a_direction_on_another_is_shorter_and_others_are_left_out() -> Non
     assert whole is not None
     assert len(picture.paths) < len(whole.paths)
     assert figures.joint(joint_of(figures, "norm_arm")) is None
+
+
+def test_that_an_axis_along_the_view_has_its_name_and_no_warning() -> None:
+    m = spatial.Mechanism("seen")
+    towards = ISOMETRIC.axes[2]
+    wheel = m.body("wheel", (0.2, 0, 0))
+    m.add(spatial.Revolute("hub", m.ground, (0, 0, 0), towards, wheel, (-0.2, 0, 0), towards))
+    m.add(spatial.JointAngle("turn", m.ground, towards, (1, 1, 0), wheel, towards, (1, 1, 0)))
+    figures = Figures(evaluation(m.system(), {x.name: x.guess for x in m.system().coordinates}))
+    picture = figures.joint(joint_of(figures, "hub"))
+    assert picture is not None
+    label = next(item for item in picture.labels if item.name == "h_i")
+    assert np.isfinite((label.x, label.y)).all()
+    for path in picture.paths:
+        assert np.isfinite(path.points).all()

@@ -296,3 +296,44 @@ def test_that_a_simulated_motion_swings_about_it_and_comes_to_rest_there():
     m.add(kc.TorsionSpring("damper", m.ground, m.bodies[0], damping=6))
     damped = kc.simulate(kc.compile(m), [0.0, 10.0])
     assert damped["rod.phi"][-1] == pytest.approx(rest, abs=1e-7)
+
+
+def ziegler(damper=0.0, masses=True):
+    """Return Ziegler's column: two rods with point masses 2 and 1, hinges of unit stiffness.
+
+    The load follows the upper rod. It grows in time.
+    """
+    m = kc.Mechanism("ziegler")
+    given = [{"mass": k, "inertia": 1e-9, "centre": (1, 0)} if masses else {} for k in (2, 1)]
+    lower, upper = (m.body(name, (k, 0, 0), **given[k]) for k, name in enumerate(("low", "up")))
+    m.add(kc.Revolute("O", m.ground, (0, 0), lower, (0, 0)))
+    m.add(kc.Revolute("A", lower, (1, 0), upper, (0, 0)))
+    m.add(kc.TorsionSpring("foot", m.ground, lower, 1, 0.0, damper))
+    m.add(kc.TorsionSpring("knee", lower, upper, 1, 0.0, damper))
+    m.add(kc.FollowerForce("push", upper, (1, 0), (-kc.t, 0)))
+    return m
+
+
+@pytest.mark.parametrize(
+    ("damper", "critical"),
+    [(0.0, 3.5 - np.sqrt(2)), (0.01, 41 / 28 + 0.01**2 / 2), (0.1, 41 / 28 + 0.1**2 / 2)],
+)
+def test_that_a_follower_load_makes_a_column_flutter(damper, critical):
+    """Ziegler (1952): no stiffness is negative; a little damping makes the critical load less."""
+    t = critical * np.array([0.5, 0.998, 1.002, 1.3])
+    found = kc.equilibrium(kc.compile(ziegler(damper)), t)
+    assert found.success
+    assert (found.eigenvalues > 0).all()
+    assert found.stability == ("stable", "stable", "flutter", "flutter")
+
+
+def test_that_without_masses_a_follower_load_leaves_stability_open():
+    found = kc.equilibrium(kc.compile(ziegler(masses=False)), [0.0, 1.0])
+    assert found.stability == ("stable", "undecided")
+
+
+def test_that_a_torque_along_with_the_rate_lets_swings_grow():
+    m = rod()
+    m.add(kc.Torque("wind", m.bodies[0], 0.1 * m.bodies[0].phi_dot))
+    assert kc.equilibrium(kc.compile(m)).stability == ("flutter",)
+    assert kc.equilibrium(kc.compile(rod())).stability == ("stable",)

@@ -278,6 +278,19 @@ class TestEvents:
         assert found["stone.y"][-1] == pytest.approx(0.5, abs=1e-11)
         assert "stop" in found.message
 
+    def test_that_the_first_of_two_ends_of_a_slot_stops_the_motion(self):
+        m = kc.Mechanism("slot")
+        slider = m.body("slider", (0.2, 0, 0), mass=1, inertia=1)
+        m.add(kc.AbsoluteY("rail", slider, (0, 0), 0))
+        m.add(kc.AbsoluteAngle("level", slider, 0))
+        module = kc.compile(m)
+        for speed, end in ((0.5, 0.35), (-0.5, 0.1)):
+            found = kc.simulate(
+                module, [0, 1], velocity={"slider.x_dot": speed}, stops={"slider.x": [0.1, 0.35]}
+            )
+            assert found["slider.x"][-1] == pytest.approx(end, abs=1e-12)
+            assert found.t[-1] == pytest.approx((end - 0.2) / speed, rel=1e-12)
+
     def test_that_a_singular_configuration_is_located_and_named(self):
         m = kc.Mechanism("flat")
         a, b, c = (
@@ -354,6 +367,7 @@ class TestBadInput:
             ({"velocity": {"first.phi_dott": 0}}, "velocity: there is no coordinate"),
             ({"velocity": [1, 2]}, r"velocity has shape \(2,\), expected \(6,\)"),
             ({"events": {"rod.x": 1}}, "an event is asked for at a value of 'x_rod'"),
+            ({"stops": {"first.x": [1, "a"]}}, "the event at 'first.x' is 'a': give a finite"),
         ],
     )
     def test_that_values_are_checked(self, options, text):

@@ -9,6 +9,8 @@ import sympy
 
 import kincompile as kc
 from kincompile import outputs
+from kincompile.runtime.results import between
+from kincompile.runtime.results.measures import measures_together
 
 A, L, START = 0.06, 0.26, 0.3
 
@@ -258,3 +260,29 @@ def test_what_cannot_be_measured():
     m.add(kc.AbsoluteX("far", bar, (0, 0), 3 + kc.t))
     with pytest.raises(kc.InputError, match="has no motion to measure"):
         kc.solve(kc.compile(m), [0, 1]).measures()
+
+
+def test_measures_of_variants_together_are_those_of_each_alone(monkeypatch):
+    starts = np.linspace(0, 3, 7)
+    several = slider_crank(1.3, 53, start=starts)  # pull has no rate, and speed turns in corners
+    looks = []
+    look = between.ObservedMotion.look
+
+    def counted(motion, t):
+        looks.append(t)
+        look(motion, t)
+
+    monkeypatch.setattr(between.ObservedMotion, "look", counted)
+    ones = [several.variant(number) for number in range(7)]
+    sets = starts[:, np.newaxis]
+    found = measures_together(ones, several.require_module(""), sets, ("travel", "speed", "pull"))
+    count = len(looks)
+    for number, start in enumerate(starts.tolist()):
+        alone = slider_crank(1.3, 53, start=start).measures().outputs
+        wanted = [item for item in alone if item.name in ("travel", "speed", "pull")]
+        for got, one in zip(found[number], wanted, strict=True):
+            assert (got.name, got.period is None) == (one.name, one.period is None)
+            for name in ("least", "greatest", "mean", "rms", "dead_points", "period"):
+                if (value := getattr(one, name)) is not None:
+                    assert getattr(got, name) == pytest.approx(value, rel=1e-7, abs=1e-8)
+    assert count < (len(looks) - count) / 5  # the last ones alone

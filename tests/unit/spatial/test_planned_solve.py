@@ -1,5 +1,6 @@
 """The planned solve with small rotations: the same x as LAPACK's, from blocks of three at most."""
 
+import mpmath
 import numpy as np
 import pytest
 import sympy
@@ -57,6 +58,45 @@ def test_that_x_is_that_of_lapack(make, target: str) -> None:
     wanted = np.linalg.solve(Phi_q, b[..., np.newaxis])[..., 0]
     size = np.linalg.cond(Phi_q)[:, np.newaxis] * np.abs(wanted).max(axis=1, keepdims=True)
     assert np.max(np.abs(found - wanted) / size) < 1e-13
+
+
+def before_dead_centre(module, seed: int, away: float) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return q before Phi_q becomes singular along a random line, if it does, and b."""
+    random = np.random.default_rng(seed)
+    n = len(module.COORDINATES)
+    start, line = module.GUESS + random.uniform(-0.3, 0.3, n), random.uniform(-1, 1, n)
+
+    def sign(s: float) -> float:
+        return float(np.linalg.slogdet(module.Phi_q(start + s * line, 0.3))[0])
+
+    grid = np.linspace(0, 2, 41).tolist()
+    before = sign(0.0)
+    after = next((k for k, s in enumerate(grid) if sign(s) != before), None)
+    if after is None:
+        return None
+    low, high = grid[after - 1], grid[after]
+    for _ in range(45):
+        middle = (low + high) / 2
+        low, high = (middle, high) if sign(middle) == before else (low, middle)
+    return start + (low - away) * line, random.uniform(-1, 1, n)
+
+
+@pytest.mark.parametrize("away", [1e-2, 1e-5, 1e-8])
+@pytest.mark.parametrize("make", MECHANISMS[:2], ids=["rssr", "wishbone"])
+def test_that_before_a_dead_centre_x_is_as_right_as_lapacks(make, away: float) -> None:
+    """A plan without pivots loses nothing there: what is lost any method loses."""
+    module, errors = kc.compile(make()), []
+    places = (before_dead_centre(module, seed, away) for seed in range(8))
+    for q, b in filter(None, places):
+        Phi_q = module.Phi_q(q, 0.3)
+        with mpmath.workdps(40):
+            exact = mpmath.lu_solve(mpmath.matrix(Phi_q.tolist()), mpmath.matrix(b.tolist()))
+        right = np.array([float(x) for x in exact])
+        found = module.solve(module.Phi_q_nonzeros(q, 0.3), b), np.linalg.solve(Phi_q, b)
+        errors.append([np.abs(x - right).max() / np.abs(right).max() for x in found])
+    assert len(errors) > 4
+    ours, lapacks = np.max(errors, axis=0)
+    assert ours < 10 * lapacks
 
 
 @pytest.mark.parametrize("linkage", LINKAGES, ids=lambda item: item.name)

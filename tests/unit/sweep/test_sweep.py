@@ -1,5 +1,6 @@
 """Sweeps give the numbers of the closed form, with dimensions, units and statuses."""
 
+import dataclasses
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 
@@ -52,6 +53,34 @@ def test_measures_are_those_of_a_solution():
     assert float(at["y_tip_t_greatest"]) == pytest.approx(np.pi / 5)
     assert float(at["x_tip_mean"]) == pytest.approx(0.9 * np.sin(5) / 5)
     assert found["y_tip_t_greatest"].attrs["units"] == "s"
+
+
+@pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
+def test_forces_are_kept_as_columns_and_measures(target):
+    m = crank()
+    m.bodies[0] = dataclasses.replace(m.bodies[0], mass=2.0, inertia=0.1)
+    m.gravity = (0, -9.81)
+    with processes(1) as executor:
+        found = sweep(
+            m, target=target, executor=executor, columns=["motor.drive", "tip.x"],
+            measures=["motor.drive.peak", "A.F.peak", "A.F_x.t_greatest", "tip.x.stroke"],
+        ).to_xarray()  # fmt: skip
+    a, omega, t = LENGTHS[:, None, None], SPEEDS[:, None], TIMES
+    drive = 2 * 9.81 * a * np.cos(omega * t)
+    np.testing.assert_allclose(found["drive_motor"], drive, atol=1e-12)
+    np.testing.assert_allclose(found["x_tip"], a * np.cos(omega * t), atol=1e-13)
+    np.testing.assert_allclose(found["drive_motor_peak"], np.abs(drive).max(axis=-1), rtol=1e-12)
+    pull = 2 * a * omega**2
+    size = np.hypot(pull * np.cos(omega * t), 2 * 9.81 - pull * np.sin(omega * t))
+    np.testing.assert_allclose(found["F_A_peak"], size.max(axis=-1), rtol=1e-12)
+    assert found["F_A_peak"].attrs["units"] == "N"
+    assert found["F_x_A_t_greatest"].attrs["units"] == "s"
+    with pytest.raises(kc.InputError, match="no such measure of drive_motor"):
+        sweep(m, measures=["motor.drive.stroke"])
+    with pytest.raises(kc.InputError, match=r"did you mean 'drive_motor'"):
+        sweep(m, columns=["motor.drve"])
+    with pytest.raises(kc.InputError, match="no such measure of x_tip"):
+        sweep(m, measures=["tip.x.peak"])
 
 
 def test_what_cannot_be_assembled_is_a_status_and_disturbs_nobody():

@@ -170,13 +170,6 @@ def test_what_is_wrong_is_said_in_names(options, message):
         sweep(**options)
 
 
-def test_an_output_called_as_the_statuses_is_refused():
-    m = crank()
-    m.output("status", kc.t)
-    with pytest.raises(kc.InputError, match="what the statuses are called in the results: rename"):
-        sweep(m, columns=["status"])
-
-
 def test_a_first_set_that_cannot_be_assembled_does_not_stop_the_others():
     found = kc.sweep(folding(), {"b": [0.1, 1.0, 1.1]}, columns=["angle"], target="numpy", chunk=1)
     assert found.statuses() == {"CONVERGED": 10, "NOT_CONVERGED": 1, "NOT_REACHED": 4}

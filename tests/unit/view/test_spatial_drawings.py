@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import kincompile as kc
+from kincompile import spatial
 from kincompile.space.catalogue import CONSTRAINTS
 from kincompile.targets.templates import read
 from kincompile.view.drawing import drawing
@@ -128,3 +129,13 @@ def test_that_no_name_is_declared_by_two_scripts():
             found += re.findall(r"^(?:const|let|function|class) (\w+)", read(f"view/{name}"), re.M)
         assert len(found) > 100
         assert sorted(found) == sorted(set(found))
+
+
+def test_that_a_body_whose_only_point_is_its_origin_is_a_stub_of_a_shaft():
+    m = spatial.Mechanism("fan")
+    fan, arm = m.body("fan"), m.body("arm", (1, 0, 0))
+    m.add(spatial.Revolute("hub", m.ground, (0, 0, 0), (0, 0, 2), fan, (0, 0, 0), (0, 0, 1)))
+    m.add(spatial.Revolute("hinge", m.ground, (1, 1, 0), (0, 0, 1), arm, (0, 1, 0), (0, 0, 1)))
+    symbols = [mark for mark in drawing(m).marks if isinstance(mark, Symbol)]
+    stubs = [mark for mark in symbols if mark.shape == "stub"]
+    assert [(mark.place.frame.index, mark.axis) for mark in stubs] == [(0, (0, 0, 1))]
