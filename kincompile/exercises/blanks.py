@@ -39,7 +39,7 @@ class Blank:
             return f"{self.quantity}[{row}]"
         return f"{self.quantity}[{row}, {system.coordinates[self.column].name}]"
 
-    def answer(self, Phi_q: sympy.Matrix, gamma: sympy.Matrix) -> sympy.Expr:
+    def answer(self, Phi_q: sympy.ImmutableMatrix, gamma: sympy.ImmutableMatrix) -> sympy.Expr:
         """Return the right formula."""
         column = self.column
         found: sympy.Expr = gamma[self.row, 0] if column is None else Phi_q[self.row, column]
