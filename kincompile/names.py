@@ -109,6 +109,12 @@ def rate(name: str, order: int = 1) -> str:
     return f"{name}_{'d' * order}ot" if order else name
 
 
+def rate_of(wanted: str, known: Iterable[str]) -> tuple[str, int] | None:
+    """Return the known name of which another is the rate, and its order; None where none is."""
+    names = ((name, order) for name in known for order in range(3))
+    return next((item for item in names if rate(*item) == wanted), None)
+
+
 def column_name(name: str) -> str:
     """Return the column that is meant by ``"rod.phi_dot"``, here ``"phi_rod_dot"``, or as given."""
     name = str(name)

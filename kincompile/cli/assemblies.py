@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -16,12 +15,11 @@ from kincompile.cli.shared import (
     output_option,
     print_data,
     read_model,
+    require_page,
     set_option,
 )
-from kincompile.errors import InputError
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.tables import table
-from kincompile.writing import require_writable
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -56,9 +54,7 @@ def command(
     there is none.
     """
     if output is not None:
-        if Path(output).suffix not in (".html", ".htm"):
-            raise InputError(f"cannot write {output}: end its name in .html")
-        require_writable(output)
+        require_page(output)
     read = read_model(model)
     numbers = set_values(read, values)
     if output is None:

@@ -68,10 +68,15 @@ def _page(context: click.Context, option: click.Parameter, given: str | None) ->
     """Return the name of a page, which can be written."""
     del context, option
     if given is not None:
-        if Path(given).suffix not in (".html", ".htm"):
-            raise InputError(f"cannot write {given}: end its name in .html")
-        require_writable(given)
+        require_page(given)
     return given
+
+
+def require_page(path: str) -> None:
+    """Refuse a page that has another ending, or cannot be written."""
+    if Path(path).suffix not in (".html", ".htm"):
+        raise InputError(f"cannot write {path}: end its name in .html")
+    require_writable(path)
 
 
 def write_page(path: str, html: str) -> None:

@@ -104,13 +104,15 @@ class Steps(ABC, Generic[Derived]):
         return self.step(6, title, *blocks)
 
     def expansion(self) -> Chapter:
-        """Return the step in which everything becomes sines and cosines: the emitted code."""
+        """Return the step in which everything is written out: the emitted code."""
         note = text(
             "This is what the emitted module computes, with its intermediate values written out. "
             "Entries of the Jacobian that are not listed are zero."
         )
         lines = self.evaluation.expansion(self.rows, QUANTITIES)
-        return self.step(7, "Expanded to sines and cosines", note, *lines, level="expanded")
+        is_spatial = len(self.evaluation.system.ground.kind.axes) > 2
+        title = "Written out in components" if is_spatial else "Expanded to sines and cosines"
+        return self.step(7, title, note, *lines, level="expanded")
 
     def placement(self) -> Chapter:
         """Return the step that gives the rows and columns of the constraint."""
@@ -155,7 +157,6 @@ class Steps(ABC, Generic[Derived]):
         return shown | {"Phi_q": shown["Phi_q"][:, columns]}
 
     def _results(self) -> Sequence[Block]:
-        """Return the numbers of Phi, of its columns of Phi_q, of nu and of gamma."""
         first, count = self.rows.instance.first_row, len(self.rows.entries["Phi"])
         columns = self.column_numbers()
         names: list[Run] = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from kincompile.criteria import probe_of
 from kincompile.errors import InputError
-from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.names import column_name, listed, rate_of, suggestion
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import rate_unit
 
@@ -35,11 +35,9 @@ def column_of(module: ModuleType, name: str) -> Column:
     """Return the column that a name means; refuse one that would need a third derivative of q."""
     known = (*module.COORDINATES, *getattr(module, "OUTPUTS", ()))
     wanted = column_name(str(name))
-    for of in known:
-        for order in range(3):
-            if rate(of, order) == wanted:
-                _require_rate(module, of, order)
-                return Column(wanted, rate_unit(module.UNITS.get(of, ""), order), of, order)
+    if found := rate_of(wanted, known):
+        _require_rate(module, *found)
+        return Column(wanted, rate_unit(module.UNITS.get(found[0], ""), found[1]), *found)
     near = suggestion(wanted, known) or "."
     raise InputError(
         f"{module.NAME} has no coordinate, point or output {name!r}{near} There are "

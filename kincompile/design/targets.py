@@ -162,12 +162,7 @@ def value(
     values : array_like, shape (K,)
         What is wanted, in the unit of the column.
     times, weight, within, between
-        As for `path`.
-
-    Raises
-    ------
-    InputError
-        As `path` does.
+        As for `path`, which also says what is refused.
     """
     wanted = _numbers(values, f"the values of {column!r}", 1)[:, np.newaxis]
     name = column_name(column)
@@ -195,12 +190,7 @@ def pose(
     angle_weight
         Factor of deviations of the angle beside those of lengths [length/rad].
     times, weight, within, between
-        As for `path`.
-
-    Raises
-    ------
-    InputError
-        As `path` does.
+        As for `path`, which also says what is refused.
     """
     wanted = _numbers(poses, f"the poses of {body!r}", 2)
     if wanted.shape[1] != 3:

@@ -76,6 +76,12 @@ def rate_unit(unit: str, order: int) -> str:
     return f"{unit}{('', '/s', '/s^2')[order]}" if unit else ""
 
 
+def largest(values: NDArray[np.float64]) -> float:
+    """Return the largest size of finite values; NaN without any."""
+    found = np.abs(values[np.isfinite(values)])
+    return float(found.max()) if found.size else np.nan
+
+
 def unit_attributes(unit: str) -> dict[str, str]:
     """Return the attributes of an array with a unit."""
     return {"units": unit} if unit else {}

@@ -20,6 +20,7 @@ from kincompile.names import listed, multiplier
 from kincompile.runtime.engine.code import FORCES, code_of, on_request
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.memory import empty
+from kincompile.runtime.results.columns import largest
 from kincompile.runtime.results.force_measures import ForceMeasures, force_measures
 from kincompile.runtime.results.orientation import orientation
 from kincompile.runtime.results.solution import Solution, require_solution
@@ -254,7 +255,7 @@ class Forces(Shown):
     def to_text(self) -> str:
         """Return a table: of each drive, load and reaction the largest magnitude."""
         rows = [
-            (name, f"{_largest(values):.6g}", unit)
+            (name, f"{largest(values):.6g}", unit)
             for name, (values, unit) in self.columns().items()
         ]
         lines = [
@@ -273,11 +274,6 @@ class Forces(Shown):
     def headline(self) -> str:
         """Return the name and the number of times."""
         return f"{self.name}: forces at {self.motion.t.size} times"
-
-
-def _largest(values: Array) -> float:
-    found = np.abs(values[np.isfinite(values)])
-    return float(found.max()) if found.size else np.nan
 
 
 def forces(solution: Solution) -> Forces:

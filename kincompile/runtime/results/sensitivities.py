@@ -24,7 +24,7 @@ from kincompile.names import (
     listed,
     parameters_problem,
     quotient_unit,
-    rate,
+    rate_of,
     suggestion,
 )
 from kincompile.runtime.engine.code import SENSITIVITIES, code_of, on_request
@@ -32,7 +32,7 @@ from kincompile.runtime.engine.engine import agree
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.memory import empty
-from kincompile.runtime.results.columns import rate_unit
+from kincompile.runtime.results.columns import largest, rate_unit
 from kincompile.runtime.results.observed import observed
 from kincompile.runtime.results.solution import require_solution
 from kincompile.tables import indented, table
@@ -150,10 +150,8 @@ class Sensitivities(Shown):
     def _found(self, column: str) -> tuple[str, int]:
         """Return the coordinate or output, and the order of the rate, that a name means."""
         wanted, known = column_name(column), (*self.coordinates, *self.outputs)
-        for name in known:
-            for order in range(3):
-                if rate(name, order) == wanted:
-                    return name, order
+        if found := rate_of(wanted, known):
+            return found
         near = suggestion(wanted, known) or "."
         raise InputError(
             f"{self.name} has no column {column!r}{near} There are {listed(known)}; add _dot or "
@@ -163,7 +161,7 @@ class Sensitivities(Shown):
     def to_text(self) -> str:
         """Return a table: by parameter, the largest absolute derivative of each column."""
         rows = [
-            (name, parameter, f"{_largest(self[name, parameter]):.6g}", self.unit(name, parameter))
+            (name, parameter, f"{largest(self[name, parameter]):.6g}", self.unit(name, parameter))
             for name in (*self.coordinates, *self.outputs)
             for parameter in self.parameters
         ]
@@ -173,11 +171,6 @@ class Sensitivities(Shown):
     def headline(self) -> str:
         """Return the name and the parameters."""
         return f"{self.name}: sensitivities to {listed(self.parameters)} at {self.t.size} times"
-
-
-def _largest(values: Array) -> float:
-    found = np.abs(values[np.isfinite(values)])
-    return float(found.max()) if found.size else np.nan
 
 
 def _names(names: object, mechanism: str) -> tuple[str, ...]:

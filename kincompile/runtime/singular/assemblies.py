@@ -16,7 +16,7 @@ from kincompile.runtime.problem import norm, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -102,15 +102,18 @@ def assembled_positions(inputs: Inputs) -> Vector:
             point = _assembled(equations, time, start)
             if point is not None:
                 q = unwound(equations, time, point, inputs.guess, TOLERANCE).q
-                if all(
-                    distance_modulo_turns(equations, q, other) > SAME_POSITION for other in found
-                ):
+                if is_new(equations, q, found):
                     found.append(q)
                     last = k
             if k >= max(FIRST_STARTS, PATIENCE * last):
                 break
         order = sorted(found, key=lambda q: _rank(equations, q, inputs.guess))
     return np.array(order).reshape(len(order), inputs.guess.size)
+
+
+def is_new(equations: Problem, q: Vector, others: Iterable[Vector]) -> bool:
+    """Say whether a position is none of others, whatever whole turns lie between."""
+    return all(distance_modulo_turns(equations, q, other) > SAME_POSITION for other in others)
 
 
 def assembly_guess(inputs: Inputs, number: object) -> Vector:

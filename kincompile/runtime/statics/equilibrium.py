@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, SAME_POSITION, TOLERANCE
+from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import InputError, SolveError, StructuralError
 from kincompile.html import Shown
 from kincompile.names import listed
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.results.forces import forces, no_value
 from kincompile.runtime.results.solution import Solution
-from kincompile.runtime.singular.assemblies import distance_modulo_turns, spread_starts
+from kincompile.runtime.singular.assemblies import is_new, spread_starts
 from kincompile.runtime.singular.events import involved
 from kincompile.runtime.statics.balance import Balance
 from kincompile.runtime.statics.path import follow
@@ -314,20 +314,16 @@ def equilibria(module: ModuleType, t: float = 0.0, p: Values = None) -> list[Equ
         for start in spread_starts(balance.equations, inputs.guess)[:STARTS]:
             for downhill in (True, False):
                 rest = settle(balance, start, time, downhill=downhill)
-                if rest is not None and rest.is_balanced and _is_new(balance, rest, found):
+                known = (other.place.q for other in found)
+                if rest is None or not rest.is_balanced:
+                    continue
+                if is_new(balance.equations, rest.place.q, known):
                     _require_loads(balance, rest)
                     found.append(rest)
         results = [_equilibrium(inputs, balance, [rest], []) for rest in found]
     scale = balance.scale
     away = [float(np.linalg.norm((item.q[0] - inputs.guess) / scale)) for item in results]
     return [results[k] for k in np.argsort(np.round(away, 6), kind="stable")]
-
-
-def _is_new(balance: Balance, rest: Rest, found: list[Rest]) -> bool:
-    q, equations = rest.place.q, balance.equations
-    return all(
-        distance_modulo_turns(equations, q, other.place.q) > SAME_POSITION for other in found
-    )
 
 
 def _inputs(
