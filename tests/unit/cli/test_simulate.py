@@ -5,6 +5,8 @@ import math
 
 import pytest
 
+import kincompile as kc
+
 MODEL = """
 kincompile = 1
 name = "drop"
@@ -45,6 +47,19 @@ def test_that_a_stop_and_the_forces_are_in_the_summary(kincompile, drop):
     time = (1 - math.sqrt(0.6)) / 2
     assert f"comes to its stop, 0.5, at t = {time:.10g}" in done.stdout
     assert "drop: forces" in done.stdout
+
+
+def test_that_the_right_side_is_compiled_for_other_integrators(kincompile, drop, tmp_path):
+    done = kincompile("compile", drop, "--dynamics", "-o", tmp_path / "own.py")
+    assert (done.exit_code, done.stderr) == (0, f"Wrote {tmp_path / 'own.py'}\n")
+    module = kc.load(tmp_path / "own.py")
+    assert module.accelerations([0, 1, 0], [0, 0, 0], 0.0).tolist() == [0, -10, 0]
+    (tmp_path / "light.toml").write_text(
+        MODEL.replace("mass = 2, inertia = 1", "guess = [0, 1, 0]")
+    )
+    light = kincompile("compile", tmp_path / "light.toml", "--dynamics", "-o", "-")
+    assert (light.exit_code, light.stdout) == (2, "")
+    assert "no masses" in light.stderr
 
 
 def test_that_of_two_stops_the_first_that_is_met_ends_the_motion(kincompile, drop):
