@@ -127,7 +127,6 @@ class Comparer:
                 )
 
     def _wrong(self, block: ConstraintBlock | None = None) -> list[Spot]:
-        """Return the entries that are not right, of all constraints or of one."""
         wrong = [spot for spot, verdict in self._verdicts.items() if not verdict.is_right]
         return [spot for spot in wrong if block is None or self._index(spot)[0] in block.rows]
 
@@ -163,7 +162,6 @@ class Comparer:
                 self._adopt(before)
 
     def _is_one_fault(self, block: ConstraintBlock) -> bool:
-        """Return whether one fault explains all that differs in the Jacobian of a constraint."""
         spots = [spot for spot in self._wrong(block) if spot[0] == "Phi_q"]
         return bool(spots) and self._diagnostician.is_one_fault(
             block, self._in_system_terms(spots), self._matching.form(block.rows[0])

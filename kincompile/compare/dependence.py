@@ -63,7 +63,6 @@ class Dependence:
 
 
 def _changes(reference: Reference, states: States) -> list[tuple[str, States]]:
-    """Return the states with one symbol changed, each with the symbol's name."""
     found = [("t", replace(states, t=CHANGE * states.t))]
     for k, name in enumerate(reference.base.coordinates):
         found.append((name, replace(states, q=_scaled(states.q, k))))

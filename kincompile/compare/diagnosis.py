@@ -135,7 +135,6 @@ class Diagnostician:
     def _missing_in_equations(
         self, equation: FreeEquation, block: ConstraintBlock
     ) -> Iterator[NumericFault]:
-        """Yield gamma of free equations without one of its three parts."""
         for row, Phi in zip(block.rows, equation.expressions, strict=True):
             terms = derive_equation(Phi, equation.columns).gamma_terms
             values, _ = self._reference.evaluate(terms, self._states)

@@ -91,7 +91,6 @@ def _faults_of_term(
 
 
 def _sine_cosine(expression: sympy.Expr) -> sympy.Expr:
-    """Return an expression with sines for cosines and cosines for sines."""
     other = {sympy.sin: sympy.cos, sympy.cos: sympy.sin}
     found = expression.atoms(sympy.sin, sympy.cos)
     swapped: sympy.Expr = expression.xreplace({f: other[f.func](*f.args) for f in found})
@@ -99,7 +98,6 @@ def _sine_cosine(expression: sympy.Expr) -> sympy.Expr:
 
 
 def _missing_factors(term: sympy.Expr, full: str) -> Iterator[Fault[sympy.Expr]]:
-    """Yield the term without a factor, or without a square."""
     number, _ = term.as_coeff_Mul()
     if abs(number) not in (0, 1, 2):
         text = "a constant factor of a term is missing"

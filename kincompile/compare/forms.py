@@ -169,7 +169,6 @@ def _differenced(reference: Reference, rows: Sequence[int], Phi: Function) -> Fo
 
 
 def _by_coordinates(function: Function, reference: Reference, states: States) -> Array:
-    """Return the partial derivatives by the coordinates, along a last axis."""
     columns, still = [], np.zeros_like(states.t)
     for k, size in enumerate(reference.base.sizes):
         direction = np.zeros_like(states.q)

@@ -193,7 +193,6 @@ class JointFaults:
             yield from _missing_parts_of_gamma(self._blocks[place[0]])
 
     def _exchanged_blocks(self) -> Iterator[Fault[Parts]]:
-        """Yield the Jacobians with the blocks of bodies i and j in each other's place."""
         other = {0: 2, 1: 3, 2: 0, 3: 1}
         swapped = {(b, k): self._parts[b, other[k]] for b, k in self._parts if k in other}
         text = "the blocks of bodies i and j are exchanged"
@@ -216,7 +215,6 @@ class JointFaults:
                 yield from self._if_different(Kind.SIGN, text, values)
 
     def _exchanged_rows(self) -> Iterator[NumericFault]:
-        """Yield a vector with two of its rows in each other's place."""
         rows = np.concatenate([*self._right.values()], axis=1)
         starts = np.cumsum([item.shape[1] for item in self._right.values()])[:-1]
         for a, b in combinations(range(rows.shape[1]), 2):
@@ -352,7 +350,6 @@ def _replaced(leaf: ex.Expression, new: ex.Expression, node: ex.Expression) -> e
 
 
 def _exchanged_names(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
-    """Yield the formulas with two names exchanged wherever they occur."""
 
     def angles(node: ex.Expression) -> ex.Expression | None:
         match node:
@@ -394,7 +391,6 @@ def _sum(terms: tuple[ex.Expression, ...]) -> ex.Expression:
 
 
 def _wrong_velocities(terms: tuple[CollectedTerm, ...]) -> Iterator[Fault[ex.Expression]]:
-    """Yield gamma with faults in its velocities, as it is printed."""
     names = ("r_i_dot", "r_j_dot")
     coupled = [term for term in terms if any(name in repr(term.product) for name in names)]
     rest = tuple(term.expression for term in terms if term not in coupled)

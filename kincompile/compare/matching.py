@@ -161,7 +161,6 @@ class Matcher:
         return found
 
     def _generated(self, matching: Matching, states: States) -> dict[str, Array]:
-        """Return the right quantities of the system, in the forms the author gave."""
         found = self._reference.values(states)
         values = {name: found.of(name) for name in QUANTITIES}
         for form in matching.forms:
@@ -219,7 +218,6 @@ class Matcher:
         return is_shown and plain.explained <= other.explained
 
     def _rows_matched(self, layout: Layout, units: Units) -> _Candidate:
-        """Find order and factors of the rows under a layout."""
         states, rows = self._subject.states, self._subject.rows
         plain = Matching(layout, units, rows, np.ones((len(rows), len(states))), signs=self._signs)
         written, expected = self.written(plain, states), self.expected(plain, states)

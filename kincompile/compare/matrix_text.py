@@ -86,7 +86,6 @@ class _Splitter:
         return start, max(start, span[0] + len(text.rstrip()))
 
     def _inner(self, span: Span) -> Span:
-        """Return a span without the brackets around it."""
         start, end = self._trimmed(span)
         if self._text.startswith("[", start) and self._after_bracket(start) == end:
             return self._trimmed((start + 1, end - 1))

@@ -240,7 +240,6 @@ def _jacobian(evaluation: Evaluation) -> Chapter:
 
 
 def _square_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> Block:
-    """Return the entries as a matrix with named rows and columns."""
     rows: Rows = []
     for row, name in enumerate(evaluation.system.equations):
         line: list[Run | Runs] = [Verbatim(name)]

@@ -107,7 +107,6 @@ class Figures:
         return FramePoint(frame, point or (0.0,) * len(self._letters)).at(self.evaluation.q)
 
     def _axes(self, frame: BodyFrame, index: str) -> Iterator[Arrow]:
-        """Yield the axes of a frame at its origin."""
         origin, length = self._place(frame), AXIS * self._drawn.size
         for letter, way in zip(self._letters, np.eye(len(self._letters)) * length, strict=True):
             name = f"{letter}_{index}" if index else letter

@@ -293,13 +293,11 @@ def _rule_lines(
 
 
 def _fired(lines: list[tuple[Run | Runs, ...]]) -> list[Block]:
-    """Return the rules used as a table that can be folded away."""
     header = ("for", "rule", "applied to", "gives")
     return [table(header, lines, "The rules used")] if lines else []
 
 
 def _column(values: Sequence[Scalar], known: Mapping[str, float]) -> Matrix:
-    """Return expressions in numbers, as a column."""
     return column(tuple(_decimal(value, known) for value in values))
 
 

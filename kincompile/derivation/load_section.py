@@ -152,7 +152,6 @@ def _components(frame: Frame) -> Iterator[Formula]:
 
 
 def _expanded(evaluation: Evaluation, load: AppliedLoad) -> Iterator[Block]:
-    """Yield what the load adds to Q and M, in sines and cosines and in numbers."""
     names = evaluation.coordinates
     for quantity, symbol in (("Q", FORCES), ("M", MASS)):
         rows: list[tuple[Run | Runs, ...]] = []
@@ -170,7 +169,6 @@ def _expanded(evaluation: Evaluation, load: AppliedLoad) -> Iterator[Block]:
 
 
 def _motion(evaluation: Evaluation) -> Chapter:
-    """Return the equations of motion, M, Q and the multipliers in numbers."""
     states = evaluation.q, evaluation.q_dot, evaluation.t, evaluation.p
     program = evaluation.code.program
     found = dict(

@@ -26,7 +26,6 @@ def slides_of(document: Manuscript) -> Manuscript:
 
 
 def _slide(chapter: Chapter) -> Chapter:
-    """Return what a lecturer shows of a constraint."""
     name = chapter.anchor.removeprefix("constraint-")
     steps = {item.anchor: item.blocks for item in chapter.sections}
 

@@ -157,7 +157,6 @@ class Steps(ABC, Generic[Derived]):
         return shown | {"Phi_q": shown["Phi_q"][:, columns]}
 
     def _results(self) -> Sequence[Block]:
-        """Return the numbers of Phi, of its columns of Phi_q, of nu and of gamma."""
         first, count = self.rows.instance.first_row, len(self.rows.entries["Phi"])
         columns = self.column_numbers()
         names: list[Run] = []

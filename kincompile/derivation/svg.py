@@ -36,7 +36,6 @@ def svg_address(picture: Picture) -> str:
 
 
 def _label(label: PictureLabel, height: float) -> str:
-    """Return a symbol with its index, and with the prime of what is given in a body's frame."""
     letter, index, _ = split_name(label.name)
     prime = "\N{PRIME}" if not label.is_vector or has_prime(letter, index) else ""
     below = f'<tspan dy="4" font-size="{0.7 * SIZE:g}">{index_text(index)}</tspan>' if index else ""

@@ -123,7 +123,6 @@ class _HtmlRenderer(Renderer):
 
 
 def _source(source: SourceLine) -> str:
-    """Return the emitted code of an entry: its line, and the lines it needs."""
     *before, last = source.text.split("\n")
     shown = f"line {source.number}: <code>{escape(last)}</code>"
     if not before:

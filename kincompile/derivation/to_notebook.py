@@ -49,7 +49,6 @@ def _preface(document: Manuscript) -> Iterator[Cell]:
 
 
 def _section_cells(renderer: MarkdownRenderer, section: Chapter, depth: int = 0) -> Iterator[Cell]:
-    """Yield the text of a section in cells, broken where code stands in it."""
     lines = list(renderer.heading(section, depth))
     for block in section.blocks:
         if isinstance(block, NotebookCode):

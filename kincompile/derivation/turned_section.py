@@ -70,8 +70,6 @@ def turned_section(figures: Figures, joint: Joint, rows: Rows) -> Chapter:
 
 @dataclass(frozen=True, slots=True)
 class _TurnedSteps(JointSteps):
-    """The steps of a joint by r and small rotations."""
-
     @property
     def names(self) -> Sequence[str]:
         """Names of the columns of Phi_q: six a body, then the other coordinates."""

@@ -82,7 +82,6 @@ def like_terms(
 
 
 def _over_divisors(parts: list[tuple[Monomial, Core, Polynomial]]) -> ex.Scalar:
-    """Return a sum of scalars; those with the same divisor are over it together."""
     found: dict[Monomial, list[ex.Scalar]] = {}
     for others, core, rates in parts:
         below = tuple(factor for factor in others if factor[1] < 0)
@@ -369,7 +368,6 @@ class _AtRandom:
 
 
 def _require_equal(first: ex.Expression, second: ex.Expression) -> None:
-    """Check that two forms of an expression have the same numbers."""
     values = [Expansion(_AtRandom()).components(item) for item in (first, second)]
     for a, b in zip(*values, strict=True):
         if not math.isclose(a, b, rel_tol=AGREEMENT, abs_tol=AGREEMENT):

@@ -86,7 +86,6 @@ def derive_load(template: LoadTemplate, others: int, *, varies: bool) -> LoadDer
 
 
 def _columns(symbols: tuple[Leaf, ...]) -> list[Direction]:
-    """Return the direction of each component of coordinates, or of rates."""
     return [{item: unit} for item in symbols for unit in units(item)]
 
 

@@ -114,7 +114,6 @@ def read_acf(path: Path, content: bytes) -> AnalysisSettings:
 
 
 def _check_kind(reader: FieldReader, given: Any) -> None:
-    """Check which analysis is asked for; of each the times can be used."""
     letters = "".join(filter(str.isalnum, given)).lower() if isinstance(given, str) else ""
     kind = next((word for word in _ANALYSES if word.lower() == letters), None)
     if kind is None:
@@ -284,7 +283,6 @@ class _AdmReader(FieldReader):
         return body
 
     def _normalised(self, direction: list[Any], place: Address) -> tuple[Scalar, Scalar]:
-        """Return a direction of length one, as simEngine2D uses it."""
         x, y = (sympy.sympify(item) for item in direction)
         length = sympy.sqrt(x**2 + y**2)
         size = evaluate(length, {})

@@ -62,7 +62,6 @@ class BodyReader(SketchReader):
         return body
 
     def _flat(self, name: str, address: Address, row: Row) -> tuple[Body, tuple[str, ...]]:
-        """Return a body in the plane, and the field that has the guess of each coordinate."""
         start = self.components(row.get("guess", [0] * 3), (*address, "guess"), "[x, y, phi]")
         outline = self._outline(row.get("outline", []), (*address, "outline"))
         heavy: dict[str, Any] = {
@@ -74,7 +73,6 @@ class BodyReader(SketchReader):
         return Body(name, start, outline, centre=centre, **heavy), ("guess",) * 3
 
     def _spatial(self, name: str, address: Address, row: Row) -> tuple[Body, tuple[str, ...]]:
-        """Return a body in space, and the field that has the guess of each coordinate."""
         before = len(self.problems)
         given: dict[str, Any] = {
             key: self.components(row[key], (*address, key), "[x, y, z]")

@@ -206,7 +206,6 @@ def _only_once(pairs: list[tuple[str, Any]], repeated: list[str]) -> dict[str, A
 
 
 def _repetitions(document: Document) -> list[str]:
-    """Return a message for each key that an object has twice."""
     first: dict[Address, int] = {}
     problems = []
     for address, line in json_lines(document.text):

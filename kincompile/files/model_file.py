@@ -144,7 +144,6 @@ class _ModelReader(BodyReader):
     def _checked(
         self, name: str, content: dict[str, Any], options: dict[str, Any]
     ) -> Mechanism | ConstraintSystem | None:
-        """Return the model; its checks see what has been good so far."""
         model = self.words.mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
         model.constraints, model.outputs = content["constraints"], content["outputs"]
@@ -218,7 +217,6 @@ class _ModelReader(BodyReader):
         return (name, guess) if self.is_free(name, address) else None
 
     def _output(self, address: Address, row: Row) -> Output | None:
-        """Return an output: a formula in coordinates and rates, parameters and t."""
         complete = self.has_fields(address, row, FIELDS["output"])
         name = self.name(row, address, "an output")
         self.remember(f"output {name!r}", address)
@@ -258,7 +256,6 @@ class _ModelReader(BodyReader):
         return None
 
     def _declare_contacts(self, row: Row) -> None:
-        """Declare the contact parameters of a cam, which any equation may name."""
         kind, name = row.get("type"), row.get("name")
         known = self.words.constraints
         if isinstance(kind, str) and kind in known and isinstance(name, str):
@@ -346,7 +343,6 @@ class _ModelReader(BodyReader):
         return self.expression(given, address, self.names)
 
     def _force(self, given: Any, address: Address) -> Any:
-        """Return a force: a formula in coordinates and rates too, or a table."""
         if isinstance(given, dict):
             return self.driven(given, address)
         return self.expression(given, address, self._moving_names())

@@ -58,7 +58,6 @@ def read_python(path: Path, content: bytes) -> Mechanism | ConstraintSystem:
 
 
 def _run(path: Path, content: bytes) -> dict[str, Any]:
-    """Run the text of a file and return its names."""
     try:
         code = compile(decode_source(content), str(path), "exec")
     except SyntaxError as error:

@@ -85,7 +85,6 @@ class SketchReader(FieldReader):
         return kind
 
     def _named(self, given: Row, section: str) -> list[tuple[str, Address, Any]]:
-        """Return the entries of a table of the drawing with their addresses."""
         entries = []
         for key, value in self._within(given, section, {}).items():
             address = (*PLACE, section, key)

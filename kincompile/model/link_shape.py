@@ -141,7 +141,6 @@ def _by_lengths(
 
 
 def _base(link: Outline, found: Mapping[str, Point], one: str, other: str) -> Scalar:
-    """Return the distance of two joints whose places are known."""
     (x, y), (to_x, to_y) = found[one], found[other]
     if (x, y) == (0, 0) and to_y == 0:
         return to_x
@@ -186,7 +185,6 @@ def _no_height(corners: tuple[str, str, str], square: sympy.Expr) -> Scalar:
 def _no_triangle(
     link: Outline, corners: tuple[str, str, str], sides: tuple[float, float, float]
 ) -> str:
-    """Say by how much three lengths miss a triangle."""
     joint, one, other = corners
     named = dict(zip((f"{one} {other}", f"{joint} {one}", f"{joint} {other}"), sides, strict=True))
     longest = max(named, key=named.__getitem__)

@@ -39,7 +39,6 @@ def mass_of(body: Body, gravity: Any, scope: Scope) -> Mass | None:
 
 
 def _of_plate(body: Body, where: str, gravity: Any, scope: Scope) -> Mass | None:
-    """Return the mass of a plate of even thickness, whose edge is the outline of the body."""
     given = (body.density, body.thickness)
     if None in given or not len(body.outline):
         scope.problems.append(

@@ -205,7 +205,6 @@ def _laws(given: Any, steps: int, problems: list[str]) -> list[type[Rise]]:
 
 
 def _law_problem(title: Any) -> str | None:
-    """Return a message about a law that does not exist, or None."""
     if isinstance(title, str) and title in RISES:
         return None
     near = suggestion(title, RISES) if isinstance(title, str) else ""

@@ -191,7 +191,6 @@ class Sketch(Drawing[Body]):
     def _turning_or_sliding(
         self, name: str, link: Link, value: ValueLike, against: BodyLike | None
     ) -> Constraint | None:
-        """Return the driver of a link's angle, or of a slider's way."""
         if link.guide is not None:
             guide = (link.guide.link.body, link.guide.point, link.guide.axis)
             return TranslationalDistance(name, *guide, link.body, (0, 0), value)

@@ -148,7 +148,6 @@ class Sketch(Drawing[SpatialBody]):
         return cast("Mechanism", super().mechanism())
 
     def _added(self, name: str, joints: Sequence[str], guide: Line | None = None) -> SpatialBody:
-        """Add a body with these joints, and what connects it to the links before it."""
         drawn = self._drawn
         if name in drawn.links:
             drawn.problems.append(f"there is a link {name!r} already; rename")
@@ -160,7 +159,6 @@ class Sketch(Drawing[SpatialBody]):
         return body
 
     def _connected(self, link: Link) -> list[Line]:
-        """Connect a link to those that have its joints; return the axes of hinges."""
         shared: dict[str, list[str]] = {}
         for joint in link.places:
             other = self._drawn.first(joint)
@@ -190,7 +188,6 @@ class Sketch(Drawing[SpatialBody]):
         return Line(other, other.places[first], axis)
 
     def _turning_or_sliding(self, name: str, link: Link, value: ValueLike) -> Constraint | None:
-        """Return the driver of a slider's way, or of a link's angle about its hinge."""
         if link.guide is not None:
             base = (link.guide.link.body, link.guide.point, link.guide.axis)
             return RelativeTranslation(name, *base, link.body, ORIGIN, value)

@@ -60,7 +60,6 @@ def _beside(vector: Sequence[Any], h: Sequence[Any]) -> list[Any]:
 
 
 def _farthest(h: Sequence[Any], defaults: Mapping[str, float]) -> list[Any]:
-    """Return the coordinate axis with the smallest component of h."""
     sizes = [abs(evaluate(item, dict(defaults)) or 0.0) for item in h]
     nearest = sizes.index(min(sizes))
     return [sympy.Integer(k == nearest) for k in range(3)]

@@ -74,7 +74,6 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
 def _add_strokes(
     space: Any, drawn: Drawing, q: Array, layers: Sequence[str], paths: Iterable[Array]
 ) -> None:
-    """Add the marks of the plane, and the paths, to the last layer."""
     for item in polylines(drawn):
         points = item.at(q)
         if item.stroke.look == "gap" and np.ptp(points, axis=0).max() <= 1e-3 * drawn.size:
@@ -92,7 +91,6 @@ def _add_strokes(
 def _add_solids(
     space: Any, drawn: Drawing, q: Array, layers: Sequence[str], paths: Iterable[Array]
 ) -> None:
-    """Add the marks of space as faces and lines, and the paths, to the last layer."""
     for item, part in in_space("solid_picture").all_parts(drawn, q):
         attributes = {"layer": _layer(item, layers)}
         if part.normal is None:

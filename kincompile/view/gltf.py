@@ -97,7 +97,6 @@ def _groups(drawn: Drawing) -> dict[BodyFrame, list[Solid]]:
 
 
 def _ground(file: _File, fixed: list[Solid], paths: Sequence[Array]) -> int:
-    """Add the node of the ground, with paths."""
     node = file.node("ground", file.mesh("ground", fixed))
     hues = HUES["light"]
     found = [file.lines("path", path, hues[(k + 4) % len(hues)]) for k, path in enumerate(paths)]
@@ -107,7 +106,6 @@ def _ground(file: _File, fixed: list[Solid], paths: Sequence[Array]) -> int:
 
 
 def _add_points(file: _File, node: int, drawn: Drawing, frame: BodyFrame) -> None:
-    """Add an empty node for each named point of a body."""
     children = []
     for dot in drawn.dots:
         if dot.place.frame == frame:

@@ -75,7 +75,6 @@ def _translational_distance(joint: JointGeometry) -> list[Mark]:
 
 
 def _distance(first: str, second: str) -> DrawJoint:
-    """Return the drawing of a length between two points."""
 
     def drawing(joint: JointGeometry) -> list[Mark]:
         length = joint.span(first, second, "cylinder" if joint.is_driver else "rod")
@@ -85,7 +84,6 @@ def _distance(first: str, second: str) -> DrawJoint:
 
 
 def _relative(axis: Point) -> DrawJoint:
-    """Return the drawing of a component from point to point."""
 
     def drawing(joint: JointGeometry) -> list[Mark]:
         drive = [Drive(joint.name, joint.point("s_j"), axis)] if joint.is_driver else []

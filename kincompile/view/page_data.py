@@ -97,7 +97,6 @@ def _still(name: str, shapes: Drawing, q: Array) -> str:
 
 
 def _parameter(item: Parameter, value: float) -> dict[str, Any]:
-    """Return a parameter, with the ends of its slider."""
     default = item.default or 0.0
     low, high = item.range or sorted((default / 2, 2 * default))
     if low == high:

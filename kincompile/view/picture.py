@@ -182,7 +182,6 @@ def colour_of(frame: BodyFrame) -> str:
 
 
 def _paths(polyline: Polyline, q: Array, scale: Scale, opacity: float) -> Iterable[PicturePath]:
-    """Yield a polyline in pieces, which NaN separates."""
     look, points = polyline.look, scale.at(polyline.at(q))
     colour = look.colour or colour_of(polyline.frame)
     if polyline.is_area:

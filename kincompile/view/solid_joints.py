@@ -144,7 +144,6 @@ def _hinge(joint: JointGeometry) -> FramePoint:
 
 
 def _relative(axis: Point) -> DrawJoint:
-    """Return the drawing of a component from point to point."""
 
     def drawing(joint: JointGeometry) -> list[Mark]:
         drive = [Drive(joint.name, joint.point("s_j"), axis)] if joint.is_driver else []

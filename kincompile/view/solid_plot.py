@@ -72,7 +72,6 @@ def _alike(chains: list[Array]) -> list[Array]:
 
 
 def _set_limits(ax: Any, unit: str, drawn: Drawing, q: Array) -> None:
-    """Show all positions, with equal scales, from the isometric view."""
     limits = np.reshape(drawn.extent(q), (3, 2))
     for letter, ends in zip(AXES, limits, strict=True):
         getattr(ax, f"set_{letter}lim")(*ends)

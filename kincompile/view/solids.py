@@ -312,7 +312,6 @@ def _faces(places: Array) -> list[tuple[tuple[int, ...], Array]]:
 
 
 def _ends(points: Sequence[Point], places: Array) -> tuple[Point, Point]:
-    """Return the ends of points on a line."""
 
     def farthest(start: int) -> int:
         return int(np.argmax(np.linalg.norm(places - places[start], axis=1)))

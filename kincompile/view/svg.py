@@ -222,7 +222,6 @@ def _shown(drawn: Drawing, q: Array) -> list[Polyline]:
 def _stroke(
     item: Polyline, q: Array, sheet: _Sheet, line: float, clock: str
 ) -> tuple[_Motion | None, str]:
-    """Return how a stroke moves, and its element in what moves it."""
     points = [item.at(row) for row in q]
     moved = _rigid(item, points, q, sheet)
     if moved is not None:
@@ -260,7 +259,6 @@ def _rigid(
 
 
 def _path(shape: str, item: Polyline, line: float, inside: str = "") -> str:
-    """Return the element of a stroke, in the colours of its look."""
     look = item.look
     hue = "quiet" if item.frame == GROUND_FRAME else f"body{item.frame.index % len(HUES['light'])}"
     stroke = look.line or hue
@@ -337,7 +335,6 @@ def _paint(stroke: str, fill: str) -> str:
 
 
 def _dark_rules() -> str:
-    """Return the style sheet that gives every colour on dark paper."""
     rules = "".join(
         f".s-{name}{{stroke:{colour}}}.f-{name}{{fill:{colour}}}"
         for name, colour in _palettes()["dark"].items()
