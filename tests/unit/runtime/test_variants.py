@@ -152,7 +152,7 @@ def test_that_compiled_code_solves_what_is_ordinary_alone(
     example_named, quick_compiler, monkeypatch
 ):
     module = example_named("four_bar").native
-    careful = []
+    careful: list[object] = []
     monkeypatch.setattr("kincompile.runtime.variants._Chunk.run", careful.append)
     found = kc.solve(module, np.linspace(0, 1, 9), {"a": module.DEFAULTS[0] * np.ones(5)})
     assert found.success
