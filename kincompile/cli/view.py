@@ -45,7 +45,7 @@ def command(
     if watch:
         _watch(context, models, output)
         return
-    if output is None:
+    if not output:
         raise click.MissingParameter(ctx=context, param=_parameter(context, "output"))
     is_page = Path(output).suffix in (".html", ".htm")
     if is_page:

@@ -39,35 +39,33 @@ class Blank:
             return f"{self.quantity}[{row}]"
         return f"{self.quantity}[{row}, {system.coordinates[self.column].name}]"
 
-    def answer(self, system: ConstraintSystem) -> sympy.Expr:
+    def answer(self, Phi_q: sympy.ImmutableMatrix, gamma: sympy.ImmutableMatrix) -> sympy.Expr:
         """Return the right formula."""
-        found: sympy.Expr = (
-            system.gamma[self.row, 0]
-            if self.column is None
-            else system.Phi_q[self.row, self.column]
-        )
+        column = self.column
+        found: sympy.Expr = gamma[self.row, 0] if column is None else Phi_q[self.row, column]
         return found
 
 
 def choose_blanks(system: ConstraintSystem, seed: int) -> tuple[Blank, ...]:
     """Choose entries that a student must derive: those that vary, of all joints in turn."""
     random = Random(f"blanks-{seed}")
+    Phi_q, gamma = system.Phi_q, system.gamma  # made anew each time they are asked for
     entries: list[list[tuple[str, str, int, int | None]]] = []
     rows: list[list[tuple[str, str, int, int | None]]] = []
     for item, first in zip(system.constraints, system.row_offsets, strict=True):
-        if not isinstance(item, Joint):
+        if not isinstance(item, Joint) or item.written.is_own:
             continue
         own = range(first, first + len(item.equation_names))
         found: list[tuple[str, str, int, int | None]] = [
             (item.name, "Phi_q", row, column)
             for row in own
             for column in range(len(system.coordinates))
-            if _is_fair(system.Phi_q[row, column])
+            if _is_fair(Phi_q[row, column])
         ]
         random.shuffle(found)
         entries.append(found)
         gammas: list[tuple[str, str, int, int | None]] = [
-            (item.name, "gamma", row, None) for row in own if _is_fair(system.gamma[row, 0])
+            (item.name, "gamma", row, None) for row in own if _is_fair(gamma[row, 0])
         ]
         random.shuffle(gammas)
         rows.append(gammas)

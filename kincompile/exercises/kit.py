@@ -103,10 +103,11 @@ class ExerciseKit:
         return target
 
     def _hand_in(self, student: str, system: ConstraintSystem) -> str:
-        angle = system.bodies[0].coordinates[-1]
+        last = system.bodies[0].coordinates[-1]
+        turned = f"sin({last})" if len(system.ground.kind.axes) == len("xy") else last
         lines = [
             f"# {self.name}, student {student}. Write a formula after each = sign, for instance",
-            f"#   B1 = -0.25*sin({angle})*{rate(angle)}**2",
+            f"#   B1 = -0.25*{turned}*{rate(last)}**2",
             "# Lines with # are comments. An empty blank has no points.",
             "",
         ]
@@ -168,11 +169,6 @@ def exercise(
         raise InputError(
             f"{getattr(model, 'name', model)} is no mechanism of bodies and joints, which an "
             "exercise needs: it is a system of free equations"
-        )
-    if len(model.ground.kind.axes) > 2:
-        raise InputError(
-            f"{model.name} is a mechanism in space, and exercises are of those in the plane; "
-            "compare checks what somebody derived for it"
         )
     wanted: Any = students  # whatever its type says
     if not isinstance(wanted, int) or not 1 <= wanted <= MOST_STUDENTS:

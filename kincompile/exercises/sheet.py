@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.calculus.expressions import Symbol
+from kincompile.calculus.expressions import Symbol, VectorSymbol
+from kincompile.calculus.space import EulerRotation
+from kincompile.derivation.assembled import EULER_PARAMETERS
 from kincompile.derivation.derivation import constraint_chapters
 from kincompile.derivation.document import (
     Chapter,
@@ -72,8 +74,9 @@ def solutions(
     """Return the page of the instructor: the right formula of every blank of every student."""
     chapters = []
     for system, student in zip(systems, students, strict=True):
+        derived = system.Phi_q, system.gamma
         rows: list[tuple[Run | Runs, ...]] = [
-            (item.name, Math(_symbol(item, system)), Math(item.answer(system))) for item in blanks
+            (item.name, Math(_symbol(item, system)), Math(item.answer(*derived))) for item in blanks
         ]
         shown = table(("blank", "entry", "formula"), rows)
         chapters.append(Chapter(f"student-{student}", (f"Student {student}",), (shown,)))
@@ -86,18 +89,26 @@ def _mechanism(figures: Figures) -> Chapter:
     blocks: list[Block] = []
     if (shown := figures.mechanism()) is not None:
         blocks.append(Figure(shown))
+    place = "x and y of its origin and the angle phi of its frame"
+    if _is_in_space(system):
+        place = "x, y and z of its origin and the Euler parameters of its frame"
+        blocks.append(text(*EULER_PARAMETERS))
     blocks.append(
         text(
-            "The coordinates of a body are x and y of its origin and the angle phi of its frame; "
-            "points and directions of bodies are given in their frames. The ground is fixed."
+            f"The coordinates of a body are {place}; points and directions of bodies are given in "
+            "their frames. The ground is fixed."
         )
     )
     rows: list[tuple[Run | Runs, ...]] = [
         (Verbatim(body.name), *(Verbatim(name) for name in body.coordinates))
         for body in system.bodies
     ]
-    blocks.append(table(("body", "x", "y", "phi"), rows))
+    blocks.append(table(("body", *system.ground.kind.letters), rows))
     return Chapter("mechanism", ("The mechanism",), tuple(blocks))
+
+
+def _is_in_space(system: ConstraintSystem) -> bool:
+    return len(system.ground.kind.axes) == len("xyz")
 
 
 def _symbol(blank: Blank, system: ConstraintSystem) -> Formula:
@@ -110,10 +121,11 @@ def _symbol(blank: Blank, system: ConstraintSystem) -> Formula:
 
 
 def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> Chapter:
-    angle = system.bodies[0].coordinates[-1]
+    last = system.bodies[0].coordinates[-1]
+    way = "Euler parameters" if _is_in_space(system) else "sines and cosines"
     note = text(
-        "Derive each entry in sines and cosines, with the numbers of this page and the names of "
-        "the coordinates; the rate of ", Verbatim(angle), " is ", Verbatim(rate(angle)),
+        f"Derive each entry in {way}, with the numbers of this page and the names of "
+        "the coordinates; the rate of ", Verbatim(last), " is ", Verbatim(rate(last)),
         ". With ", Math(Equated((Joined((Glyph("Phi", "q"), Glyph("q", dots=2))), Glyph("gamma")))),
         ", gamma is what stands on the right side of the acceleration equation.",
     )  # fmt: skip
@@ -171,10 +183,16 @@ def _is_gamma(formula: Formula) -> bool:
 
 
 def _matrices(joint: Joint) -> Iterator[Block]:
-    """Yield A and B of each body that moves, in sines and cosines."""
+    """Yield A and B of each body that moves, in sines and cosines; in space A by entries."""
     for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
         if body.is_ground:
             yield text(f"Body {frame.index} is the ground: A is the identity, and its rates are 0.")
+            continue
+        if len(body.kind.axes) == len("xyz"):
+            p = tuple(map(sympy.Symbol, body.coordinates[3:]))
+            entries = EulerRotation(VectorSymbol("p", 4)).entries((p,), lambda _, value: value)
+            turned = tuple(entries[k : k + 3] for k in (0, 3, 6))
+            yield Display(Equated((Glyph("A", frame.index), Matrix(turned))))
             continue
         angle = Symbol(str(sympy.sympify(body.phi)))
         cosine, sine = (Call(name, (angle,)) for name in ("cos", "sin"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass, fields, replace
 from random import Random
@@ -16,13 +17,13 @@ from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND
 from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
-from kincompile.model.mechanism import Mechanism
 from kincompile.runtime.solve import solve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from kincompile.model.bodies import Body
+    from kincompile.model.mechanism import Mechanism
 
     Values: TypeAlias = Mapping[str, float]
 
@@ -132,7 +133,7 @@ class _VariantBuilder:
         self._values: Any = {sympy.Symbol(name): _exact(value) for name, value in change.values}
         self._factors = dict(change.factors)
         self._turned = frozenset(change.turned)
-        self._made = Mechanism(
+        self._made = type(mechanism)(
             mechanism.name,
             length_unit=mechanism.length_unit,
             end=mechanism.end_given,
@@ -149,15 +150,31 @@ class _VariantBuilder:
         return self._made
 
     def _body(self, body: Body) -> Body:
-        sign, factor = self._sign(body.name), self._factors[body.name]
+        factor = self._factors[body.name]
+        if len(body.kind.axes) == len("xyz"):
+            return self._in_space(body, factor)
+        sign, _ = self._signs(body.name)
         x, y, phi = (self._number(value) for value in body.guess)
         turn = sympy.pi if sign < 0 else 0
         guess = (x * factor, y * factor, float(phi + turn))
         outline = [tuple(self._number(v, sign * factor) for v in corner) for corner in body.outline]
         return self._made.body(body.name, guess, outline)
 
-    def _sign(self, body: str) -> int:
-        return -1 if body in self._turned else 1
+    def _in_space(self, body: Body, factor: float) -> Body:
+        """Return a body in space; half a turn about its zeta axis makes p to p (0, 0, 0, 1)."""
+        place = tuple(self._number(value, factor) for value in body.guess[:3])
+        p = [float(sympy.sympify(value).subs(self._values)) for value in body.guess[3:]]
+        if body.name in self._turned:
+            p = [-p[3], p[2], -p[1], p[0]]
+        size = math.hypot(*p)
+        made: Any = self._made
+        turned: Body = made.body(body.name, place, tuple(item / size for item in p))
+        return turned
+
+    def _signs(self, body: str) -> tuple[int, ...]:
+        """Return what half a turn of a frame makes of the components of its vectors."""
+        sign = -1 if body in self._turned else 1
+        return (sign, sign, 1)[: len(self._mechanism.ground.kind.axes)]
 
     def _equation(self, equation: Equation) -> Equation:
         expressions: list[Any] = [
@@ -181,11 +198,12 @@ class _VariantBuilder:
                 continue
             owner = names.get(argument.on, GROUND.name)
             if argument.kind is Kind.BODY:
-                changed[item.name] = self._bodies.get(_name(given), GROUND)
+                changed[item.name] = self._bodies.get(_name(given), self._made.ground)
             elif argument.kind in (Kind.POINT, Kind.AXIS):
                 scale = self._factors[owner] if argument.kind is Kind.POINT else 1.0
                 changed[item.name] = tuple(
-                    self._number(value, self._sign(owner) * scale) for value in given
+                    self._number(value, sign * scale)
+                    for value, sign in zip(given, self._signs(owner), strict=True)
                 )
             elif argument.kind is Kind.PROFILE:
                 changed[item.name] = self._profile(given)

@@ -28,7 +28,6 @@ from kincompile.names import (
     correction,
     force_units,
     listed,
-    multiplier,
     rate,
     solved,
     without_loads,
@@ -243,7 +242,7 @@ class _Motion:
     def slopes(self) -> dict[tuple[int, int], int]:
         """Return the linear system of the derivatives by coordinates and rates, by place."""
         graph, n, last, one = self.graph, self.n, self.n + self._m, self.graph.const(1)
-        names = [*map(solved, self.names), *map(multiplier, self._code.program.equations)]
+        names = [("unknown", k) for k in range(last)]
         unknown = [graph.input(name) for name in names]
         # What is held in a derivative is an input, in whose place the solution is put afterwards.
         rest = self._unbalanced(unknown)
@@ -265,7 +264,9 @@ class _Motion:
     def _unbalanced(self, unknown: Sequence[int]) -> list[int]:
         """Return Q - M q_ddot - Phi_q^T lambda, gamma - Phi_q q_ddot, and the power."""
         graph, n = self.graph, self.n
-        rest = [*self._column("Q", n), *self._column("gamma", self._m)]
+        gamma = self._column("gamma", self._m)
+        kept = [node if row in self._rows else graph.const(0) for row, node in enumerate(gamma)]
+        rest = [*self._column("Q", n), *kept]
         entries = [(x.row, x.column, x.node) for x in self._code.entries("M")]
         for x in self._Phi_q:
             entries += (x.column, n + x.row, x.node), (n + x.row, x.column, x.node)

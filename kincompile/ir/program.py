@@ -253,17 +253,9 @@ class Program:
     def _owners(
         self, kind: Rows | Columns
     ) -> tuple[str | Coordinate | OutputColumn | Parameter, ...]:
-        """Return what the rows or columns of a quantity belong to."""
-        match kind:
-            case "equations":
-                return self.equations
-            case "coordinates":
-                return self.coordinates
-            case "outputs":
-                return self.outputs
-            case "parameters":
-                return self.parameters
-        return ()
+        """Return what the rows or columns of a quantity belong to; a kind is named as they are."""
+        found: tuple[str | Coordinate | OutputColumn | Parameter, ...] = getattr(self, kind, ())
+        return found
 
     def shape_of(self, quantity: Quantity) -> tuple[int, ...]:
         """Return the shape of a quantity: (rows,) or (rows, columns)."""

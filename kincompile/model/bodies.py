@@ -58,6 +58,7 @@ PLANAR = BodyKind(
         "RelativeRotation": "RelativeAngle",
         "RelativeTranslation": "TranslationalDistance",
         "PointOnLine": "RevoluteTranslational",
+        "FollowerTorque": "Torque",
     },
 )
 

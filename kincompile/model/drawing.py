@@ -186,6 +186,7 @@ class Drawing(Generic[Made]):
         self, what: str, value: ValueLike, of_link: Callable[[str, Link], Constraint | None]
     ) -> None:
         """Add a driver: that of a link, by its name, or that of joints."""
+        what = str(what)
         name = "drive_" + "_".join(what.replace(".", " ").split())
         link = self._drawn.links.get(what)
         made = self._moving_joints(name, what, value) if link is None else of_link(name, link)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from kincompile.model.link_shape import Outline, listed_pairs, number, pairs_by_
 from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from kincompile.model.arguments import BodyLike, PointLike
     from kincompile.model.mechanism import Mechanism
@@ -106,6 +107,9 @@ class Drawn:
         self, given: str | Iterable[str], what: str, least: int, most: int = 1000
     ) -> tuple[str, ...] | None:
         """Return names of joints; note what is wrong with them."""
+        if not isinstance(given, Iterable):
+            self.problems.append(f"{what}: {given!r} names no joints; give 'A B'")
+            return None
         names = tuple(given.replace(",", " ").split() if isinstance(given, str) else given)
         unknown = [name for name in names if name not in self.joints]
         before = len(self.problems)

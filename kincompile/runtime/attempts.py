@@ -45,6 +45,9 @@ def in_vain(
     return found
 
 
+WILD = 1e100
+"""Entry of Phi_q with whose square nothing can be solved."""
+
 MOST_NUMBERS = 1_000_000
 """Numbers of the matrices that are taken at a time."""
 
@@ -74,12 +77,15 @@ class _Attempts:
             terms = np.maximum(self._magnitude[moving], np.minimum(terms, self._limit[moving]))
             weights = weights_of(terms)
             before = _norms(weights * Phi)
-            known = (before > NEAR_MISS) & np.isfinite(Phi_q).all(axis=(1, 2))
+            known = (before > NEAR_MISS) & (np.abs(Phi_q) < WILD).all(axis=(1, 2))
             far[moving[~known]] = False
             moving, weights, before = moving[known], weights[known], before[known]
             matrix = weights[..., np.newaxis] * Phi_q[known] * reference[known][:, np.newaxis]
             correction = reference[known] * _directions(matrix, weights * Phi[known], before)
-            moved = self._shortened(q, moving, correction, weights, before)
+            sane = np.isfinite(correction).all(axis=1)
+            far[moving[~sane]] = False
+            moving, correction = moving[sane], correction[sane]
+            moved = self._shortened(q, moving, correction, weights[sane], before[sane])
             moving = moving[moved]
         return far
 

@@ -63,7 +63,7 @@ class State:
     # float or (N,): movement, in scales of the coordinates, for an error of one scale in the
     # equations
     sensitivity: Any = 0.0
-    # shape of determinants: sizes of the determinants where that was found
+    # Sizes of the determinants where that was found, in their shape.
     probed: Array | None = None
 
 

@@ -120,7 +120,7 @@ def _solve_chunk(inputs: Inputs, begin: Array, sets: Array, arrays: _Arrays, chu
     arrays.residual[:, chunk] = residual
     arrays.status[:, chunk], arrays.iterations[:, chunk] = status, iterations
     is_odd = status.any(axis=0) | together.strays(arrays.motion[0, 0, :, chunk])
-    failed = np.flatnonzero(is_odd | ~together.agree(motion))
+    failed = np.flatnonzero(is_odd | np.logical_not(together.agree(motion)))
     if failed.size:
         alone = _Arrays.over(inputs, failed.size)
         _Chunk(inputs, begin, sets[failed], alone, 0).run()

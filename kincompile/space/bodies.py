@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from kincompile.calculus.space import SpatialFrame
+from kincompile.errors import ModelError
 from kincompile.model.bodies import Body, BodyKind
+from kincompile.names import shown
 from kincompile.space.points import SpatialPoint
 
 if TYPE_CHECKING:
     import sympy
 
     from kincompile.model.expressions import Scalars
+
+
+def require_three(given: object, what: str) -> None:
+    """Refuse what has not three components."""
+    if not isinstance(given, Sized) or len(given) != SpatialFrame.size:
+        raise ModelError(f"{what} is {shown(given)}: give three components")
+
 
 ALIKE = (
     "AbsoluteX", "AbsoluteY", "AbsoluteDistance", "RelativeX", "RelativeY", "Distance", "Revolute",
@@ -71,6 +81,7 @@ class SpatialBody(Body):
 
     def direction(self, local: Scalars) -> tuple[sympy.Expr, ...]:
         """Return the global components A v of a vector v that is fixed in the body."""
+        require_three(local, f"a direction of {self.name!r}")
         origin = SpatialPoint(self.name, self, (0, 0, 0))
         ends = zip(
             SpatialPoint(self.name, self, local).coordinates, origin.coordinates, strict=True

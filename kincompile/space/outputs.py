@@ -24,6 +24,7 @@ from kincompile.model.outputs import speed as speed
 from kincompile.model.outputs import transmission_angle as transmission_angle
 from kincompile.model.outputs import velocity_ratio as velocity_ratio
 from kincompile.model.points import rate as rate
+from kincompile.space.bodies import require_three
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -64,6 +65,7 @@ def inclination(u: Direction, normal: Direction) -> sympy.Expr:
 
 
 def _components(given: Direction) -> tuple[sympy.Expr, ...]:
+    require_three(given, "a direction in space")
     return tuple(map(as_sympy, given))
 
 

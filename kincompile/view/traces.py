@@ -8,6 +8,7 @@ from kincompile.errors import InputError
 from kincompile.model.mechanism import system_of
 from kincompile.model.origins import model_of
 from kincompile.names import listed, suggestion
+from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.view.marks import FramePoint
 from kincompile.view.mechanism_plot import require_bodies
@@ -62,7 +63,7 @@ def traced_places(drawn: Drawing, names: Iterable[str] | None) -> list[FramePoin
     places |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
     dots = {dot.name: dot.place for dot in drawn.dots}
     places |= dots
-    for name in (chosen := list(dots if names is None else names)):
+    for name in (chosen := list(dots if names is None else names_of(names, "trace"))):
         if name not in places:
             raise InputError(
                 f"{drawn.name} has nothing called {name!r} to trace{suggestion(name, places)}; "

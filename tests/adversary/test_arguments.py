@@ -71,6 +71,10 @@ WRONG: dict[str, Callable[[Any], object]] = {
     "angles without end": lambda r: kc.motion.flat_cam(kc.t, 1.0, points=10**9),
     "values as text": lambda r: kc.times_at(r.module, "arm.phi", ["x"], [0, 1]),
     "no values": lambda r: kc.times_at(r.module, "arm.phi", [], [0, 1]),
+    "a direction of two components": lambda r: _spatial_body().direction((1, 0)),
+    "an angle of numbers": lambda r: spatial.outputs.inclination(cast("Any", 3), (0, 0, 1)),
+    "joints that are none": lambda r: _drawn(),
+    "a trace of a number": lambda r: kc.animate(r.motion, "x.svg", trace=3),
     "half a student": lambda r: kc.exercise(r.m, 1.5),
     "an output called status": lambda r: kc.compile(_named("status")),
     "an output called t": lambda r: kc.compile(_named("t")),
@@ -80,6 +84,16 @@ WRONG: dict[str, Callable[[Any], object]] = {
 
 def _wanted() -> Any:
     return kc.targets.value("tip.x", [1.5], [0.1])
+
+
+def _spatial_body() -> Any:
+    return spatial.Mechanism("s").body("b")
+
+
+def _drawn() -> kc.Mechanism:
+    s = kc.Sketch("s")
+    s.link("l", cast("Any", None))
+    return s.mechanism()
 
 
 def _named(name: str) -> kc.Mechanism:

@@ -46,10 +46,10 @@ class Point:
 class Rates:
     """Velocity and acceleration at a position."""
 
-    # q_dot, q_ddot shape of q: the rates; not finite where they cannot be had
+    # q_dot, q_ddot, in the shape of q: the rates; not finite where they cannot be had
     q_dot: Array
     q_ddot: Array
-    movement: Array  # shape of q: the solution for the right side that was asked for besides
+    movement: Array  # in the shape of q: the solution for the right side that was asked for besides
     agree: Any = True  # whether redundant equations are all met by the rates, shape (N,) or one
 
 

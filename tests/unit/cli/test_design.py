@@ -146,6 +146,11 @@ targets = [
         ("tolerance", "", "has no table [tolerance]"),
         ("fit", "", "has no table [fit]"),
         ("tolerance", "[tolerance]\nparameters = { q = 1 }", "no parameter 'q'"),
+        (
+            "tolerance",
+            "[tolerance]\nof = ['crank.phi']\nparameters = { r = 1e-4 }",
+            "the tolerance of 'r' moves none of phi_crank",
+        ),
         ("tolerance", "[tolerance]\nparameters = 3", "expected names and values, not 3"),
         ("tolerance", "[tolerance]\nparameters = { r = 'x' }", "there is no 'x'"),
         ("tolerance", "[tolerance]\nsample = 3", "there is no such field; did you mean 'samples'"),

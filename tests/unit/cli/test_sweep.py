@@ -175,6 +175,19 @@ def test_what_is_wrong_in_a_table_is_said_with_its_place(kincompile, model, tabl
     assert "Traceback" not in done.stderr
 
 
+def test_a_folder_of_another_model_is_refused_and_kept(kincompile, model, tmp_path):
+    folder = tmp_path / "a.zarr"
+    table = "[sweep]\nparameters = { a = [1, 2] }"
+    assert sweep(kincompile, model(table), "-o", folder).exit_code == 0
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    other = model(table)
+    other.write_text(other.read_text().replace('"omega*t"', '"omega*t + 0.1"'))
+    done = sweep(kincompile, other, "-o", folder)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "holds another sweep: model differs" in done.stderr
+    assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
 def test_what_cannot_be_written_is_said_before_the_work(kincompile, model, tmp_path):
     done = sweep(kincompile, model(), "--page", tmp_path / "missing" / "a.html")
     assert (done.exit_code, done.stdout) == (2, "")

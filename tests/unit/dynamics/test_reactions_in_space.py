@@ -16,7 +16,10 @@ from tests.unit.dynamics.test_space import g_of, inertia_of
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "space"
 G = 9.81
 ORIGIN, X, Y, Z = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)
-TURNS = [np.eye(3), Rotation.from_euler("xyz", (0.4, -1.1, 0.8)).as_matrix()]
+TURNS = [
+    pytest.param(np.eye(3), marks=pytest.mark.slow),
+    Rotation.from_euler("xyz", (0.4, -1.1, 0.8)).as_matrix(),
+]
 
 
 class Moving:
@@ -266,13 +269,13 @@ def heavy(model):
     return model
 
 
-SLOW = ("stewart_gough", "delta_robot", "double_wishbone_with_steering", "bennett")
+FAST = ("rssr", "spatial_slider_crank")
 
 
 @pytest.mark.parametrize(
     "path",
     [
-        pytest.param(path, marks=[pytest.mark.slow] if path.stem in SLOW else [])
+        pytest.param(path, marks=[] if path.stem in FAST else [pytest.mark.slow])
         for path in sorted(EXAMPLES.glob("*.toml"))
     ],
     ids=lambda path: path.stem,

@@ -203,6 +203,18 @@ def test_that_a_load_of_the_plane_names_its_twin():
         m.system()
 
 
+def test_that_a_load_of_space_names_its_twin_in_the_plane():
+    m = kc.Mechanism("mixed")
+    body = m.body("rock", mass=1, inertia=1)
+    hinge = (m.ground, (0, 0, 1), body, (0, 0, 1))
+    m.add(spatial.HingeFriction("dry", *hinge, 2))
+    m.add(spatial.FollowerTorque("turn", body, (0, 0, 1)))
+    with pytest.raises(kc.ModelError) as caught:
+        m.system()
+    assert "take kincompile.HingeFriction" in str(caught.value)
+    assert "take Torque" in str(caught.value)
+
+
 def test_that_torques_that_depend_on_the_motion_have_their_slopes():
     m = spatial.Mechanism("dragged")
     body = m.body("body", mass=1, inertia=(1, 1, 1))

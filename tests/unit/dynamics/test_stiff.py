@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sympy
 from scipy.integrate import solve_ivp  # type: ignore[attr-defined]  # a star there
 
 import kincompile as kc
@@ -24,7 +25,17 @@ def sprung():
     return m
 
 
-@pytest.mark.parametrize("model", [mixed(), repeated(), rolling(), sprung()], ids=lambda m: m.name)
+def driven_twice():
+    """Return a crank that is driven at its pin too: that equation is left out."""
+    m = mixed()
+    m.name = "driven_twice"
+    m.add(kc.AbsoluteX("again", m.bodies[0], (0.5, 0), sympy.cos(0.3 * kc.t + 2 * kc.t**2) / 2))
+    return m
+
+
+@pytest.mark.parametrize(
+    "model", [mixed(), repeated(), driven_twice(), rolling(), sprung()], ids=lambda m: m.name
+)
 def test_that_the_jacobian_is_that_of_complex_steps(model):
     equations, module = equations_of(model)
     n, rng = module.N_COORDINATES, np.random.default_rng(1)

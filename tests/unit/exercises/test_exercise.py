@@ -87,8 +87,9 @@ def test_that_variants_of_a_ready_exercise_assemble_and_differ(name: str) -> Non
     assert len(texts) == 2
     quantities = {item.quantity for item in made.blanks}
     assert quantities == {"Phi_q", "gamma"}
+    system = made.variants[0].system()
     for item in made.blanks:  # what is asked for varies, and is no riddle
-        answer = item.answer(made.variants[0].system())
+        answer = item.answer(system.Phi_q, system.gamma)
         assert answer.free_symbols
         assert sympy.count_ops(answer) <= 100
 
@@ -313,3 +314,21 @@ def test_that_a_folder_that_is_no_exercise_is_refused(tmp_path: Path, content: s
         (tmp_path / "instructor" / "blanks.json").write_text(content, encoding="utf-8")
     with pytest.raises(kc.InputError, match=r"no exercise|not the key|format 9"):
         kc.mark(tmp_path)
+
+
+@pytest.mark.slow
+def test_that_a_mechanism_in_space_makes_an_exercise(tmp_path: Path) -> None:
+    """Entries in Euler parameters; right answers have all points, a wrong sign costs its own."""
+    model, folder = read("space/rssr.toml"), tmp_path / "kit"
+    made = kc.exercise(model, 2, 1, signs=True, lengths=True)
+    made.write(folder)
+    assert len({item.to_toml() for item in made.variants}) == 2
+    page = (folder / "students/01/exercise.html").read_text(encoding="utf-8")
+    assert "Euler parameters" in page
+    assert "sines and cosines" not in page
+    fill(folder, "01", {})
+    fill(folder, "02", {"B2": lambda x: -x})
+    rows = rows_of(folder)
+    assert rows["01"]["points"] == rows["01"]["of"]
+    assert int(rows["02"]["points"]) == int(rows["02"]["of"]) - 1
+    assert rows["02"]["B2"] == "0"

@@ -146,3 +146,14 @@ def test_that_sets_that_cannot_be_assembled_are_found_out_together(four_bar, mon
     assert len(steps) < 20 * sum(failed)  # one by one they take a hundred each
     for k in np.flatnonzero(failed).tolist():
         assert together.status[k, 0] == alone[k].status
+
+
+def test_that_compiled_code_solves_what_is_ordinary_alone(
+    example_named, quick_compiler, monkeypatch
+):
+    module = example_named("four_bar").native
+    careful: list[object] = []
+    monkeypatch.setattr("kincompile.runtime.variants._Chunk.run", careful.append)
+    found = kc.solve(module, np.linspace(0, 1, 9), {"a": module.DEFAULTS[0] * np.ones(5)})
+    assert found.success
+    assert not careful

@@ -166,11 +166,6 @@ def test_axes_of_slider() -> None:
     assert "axis_i = [0.0, 0.0, 2.0]" in m.to_toml()
 
 
-def test_that_an_exercise_in_space_is_refused() -> None:
-    with pytest.raises(kc.InputError, match="in space, and exercises are of those in the plane"):
-        kc.exercise(crossed_cranks(1.0))
-
-
 COMMANDS = {
     "run": ("--points", "5"),
     "inspect": (),
