@@ -97,6 +97,7 @@ def test_that_motions_of_examples_are_those_of_the_runtime(solved, example):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::kincompile.errors.SingularConfigurationWarning")
+@pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
 @pytest.mark.parametrize("path", SPACE, ids=lambda path: path.stem)
 def test_that_motions_in_space_are_those_of_the_runtime(solved, path):
     model = kc.read_model(path)

@@ -36,6 +36,7 @@ def test_that_the_script_finds_the_same_motion(example, results_of):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
 @pytest.mark.parametrize("path", SPACE, ids=lambda path: path.stem)
 def test_that_the_script_in_space_finds_the_same_motion(octave, tmp_path, path):
     model = kc.read_model(path)

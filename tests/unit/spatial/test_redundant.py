@@ -92,10 +92,8 @@ def test_that_the_rows_that_are_solved_are_independent_along_the_motion() -> Non
     rows = [k for k, name in enumerate(module.EQUATIONS) if name not in module.REDUNDANT]
     solution = kc.solve(module, np.linspace(0, 4, 401))
     Phi_q = module.Phi_q(solution.q, solution.t)
-    ours, whole = (
-        np.linalg.svd(some, compute_uv=False)[:, -1] for some in (Phi_q[:, rows], Phi_q)
-    )
-    assert (ours > 0.03 * whole).all()
+    kept, whole = (np.linalg.svd(x, compute_uv=False)[:, -1] for x in (Phi_q[:, rows], Phi_q))
+    assert (kept > 0.03 * whole).all()
 
 
 def test_that_a_bennett_of_wrong_dimensions_is_a_structure() -> None:
