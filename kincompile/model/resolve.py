@@ -178,7 +178,7 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     check_whole(constraint, scalars, points, scope)
     if len(scope.problems) > before:
         return None
-    if problem := constraint.misplaced([body for body in bodies if body], points, scope.defaults):
+    if problem := constraint.misplaced(known, points, scope.defaults):
         scope.problems.append(f"{title}: {problem}")
         return None
     return Joint(

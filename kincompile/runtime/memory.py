@@ -27,6 +27,10 @@ KEPT = 12
 LINE = 64
 """Bytes of a cache line. Results begin at one, so that C can write whole lines."""
 
+# The C library gives blocks back to the system until one as large was freed; from then on it keeps
+# as many bytes. So one of 32 MB, its largest, is freed at once: no page of it is ever touched.
+np.empty(4_000_000)
+
 free: deque[Bytes] = deque(maxlen=KEPT)
 
 

@@ -233,7 +233,7 @@ def attach(module: ModuleType) -> Code:
     return code
 
 
-STRIP = 3000
+STRIP = 5000
 """Points at a time at most, so that intermediate arrays stay in the cache."""
 
 
