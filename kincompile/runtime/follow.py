@@ -60,7 +60,6 @@ class Motion:
     near: list[int] = field(default_factory=list)
     note: str = ""  # a remark for the message of the solution
     is_folded: bool = False  # whether the guess shows no branch
-    index: int = 0  # the next point
 
     @classmethod
     def over(cls, inputs: Inputs) -> Motion:
@@ -80,11 +79,11 @@ class Motion:
             {"coarse": 0, "marched": 0},
         )
 
-    def forget(self) -> None:
+    def forget(self, index: int) -> None:
         """Clear the results of a grid after the last point reached."""
         for values in (self.q, self.q_dot, self.q_ddot, self.residual):
-            values[self.index :] = np.nan
-        self.iterations[self.index :] = 0
+            values[index:] = np.nan
+        self.iterations[index:] = 0
 
     def put(self, index: int, outcome: Outcome) -> None:
         """Write down what became of a point."""
@@ -128,12 +127,12 @@ def follow(
 
 
 class _Way:
-    """The way along a motion, by a march."""
+    """How far a motion was followed: `index` is the next point, found by `march`."""
 
     _march: March
 
     def __init__(self, inputs: Inputs, motion: Motion, progress: Progress | None) -> None:
-        self._inputs, self._motion, self._times = inputs, motion, inputs.t
+        self._inputs, self._motion, self._times, self._index = inputs, motion, inputs.t, 0
         self._progress = progress or (lambda done, total: None)
 
     def start(self) -> Outcome:
@@ -188,21 +187,21 @@ class _Way:
     def run(self, outcome: Outcome) -> Outcome:
         """Follow the motion as far as it goes."""
         trusted = self._solve_grid(outcome)
-        while self._motion.index < len(self._times) and outcome.status is Status.CONVERGED:
+        while self._index < len(self._times) and outcome.status is Status.CONVERGED:
             state = outcome.state
             assert state is not None
-            rest = trusted[self._motion.index :]
+            rest = trusted[self._index :]
             if rest[0] and self._continues(state):
                 outcome = self._take_up(rest.size if rest.all() else int(np.argmin(rest)))
             else:
                 outcome = self._advance(state)
-            self._progress(self._motion.index, len(self._times))
+            self._alive()
         return outcome
 
     def explain(self, outcome: Outcome) -> Passage | None:
         """Find the event that ends the motion; return the way through it if there is one."""
         motion, equations, state = self._motion, self._march.equations, outcome.state
-        t = float(self._times[self._motion.index - 1])
+        t = float(self._times[self._index - 1])
         if not self._may_be_dense or outcome.exhausted:
             return None
         if state is None:
@@ -221,7 +220,7 @@ class _Way:
 
     def judged(self, outcome: Outcome) -> Outcome:
         """Give a failed point the status of the event that ends the motion before it."""
-        motion, index = self._motion, self._motion.index - 1
+        motion, index = self._motion, self._index - 1
         if motion.events and motion.events[-1] not in motion.passed:
             t = float(self._times[index])
             outcome = replace(outcome, status=status_after(motion.events[-1], outcome, t))
@@ -230,7 +229,7 @@ class _Way:
 
     def _locate_from_point(self, t: float) -> tuple[Event, Passage | None] | None:
         """Find the event that ends the motion from the last of the times that was reached."""
-        index = self._motion.index - 2
+        index = self._index - 2
         if index < 0:
             return None
         q = np.ascontiguousarray(self._motion.q[index])
@@ -241,26 +240,24 @@ class _Way:
         """Fill the points within the passage through a bifurcation, and take the next one."""
         self._motion.passed.append(self._motion.events[-1])
         equations, times, after = self._march.equations, self._times, passage.after
-        self._motion.index -= 1
+        self._index -= 1
         forward = math.copysign(1.0, after.t - passage.before.t)
-        while (
-            self._motion.index < len(times) and (times[self._motion.index] - after.t) * forward <= 0
-        ):
-            t = float(times[self._motion.index])
+        while self._index < len(times) and (times[self._index] - after.t) * forward <= 0:
+            t = float(times[self._index])
             q, q_dot, q_ddot = passage.at(t)
             point = equations.at(q, t)
             if point is None or not equations.holds(point, RESIDUAL_FACTOR * self._march.tolerance):
-                self._motion.index += 1
+                self._index += 1
                 return Outcome(Status.SINGULAR, 0, passage.before, None)
             state = State(t, point, q_dot, q_ddot, after.determinants)
             self._put(Outcome(Status.CONVERGED, 0, state, point))
-        if self._motion.index == len(times):
+        if self._index == len(times):
             return Outcome(Status.CONVERGED, 0, after, after.point)
         return self._advance(after)
 
     def end(self) -> None:
         """Clear the results of a grid after the last point reached."""
-        self._motion.forget()
+        self._motion.forget(self._index)
         self._count_pivoted()
 
     def _count_pivoted(self) -> None:
@@ -285,40 +282,40 @@ class _Way:
         """Return the march of the mechanism, whose scales are those at a position."""
         inputs, time = self._inputs, float(self._times[0]) if t is None else t
         equations = problem(inputs.code.module, inputs.p, q, time, staged=True, engine=engine)
-        march = March(equations, equations.engine, inputs.tolerance)
-        # A cycle of references would keep the results' memory until somebody collects garbage.
-        motion, progress, count = self._motion, self._progress, len(self._times)
-        march.alive = lambda: progress(motion.index, count)
-        return march
+        return March(equations, equations.engine, inputs.tolerance)
 
     def _leave_stages(self, q: NDArray[np.float64]) -> None:
         """Solve dense matrices from here on: they have the last word."""
         self._count_pivoted()
         self._march = self._march_at(q, Dense(self._inputs.code, self._inputs.p))
 
+    def _alive(self) -> None:
+        self._progress(self._index, len(self._times))
+
     def _put(self, outcome: Outcome) -> None:
-        self._motion.put(self._motion.index, outcome)
-        self._motion.index += 1
-        if self._motion.index == 1:
-            self._progress(1, len(self._times))
+        self._motion.put(self._index, outcome)
+        self._index += 1
+        if self._index == 1:
+            self._alive()
 
     def _advance(self, state: State) -> Outcome:
         """Go to the next time point by point."""
         march, most = self._march, self._inputs.max_iterations
-        t = float(self._times[self._motion.index])
-        outcome = march.advance(state, t, most)
+        t = float(self._times[self._index])
+        # A march that kept this call would keep the results until somebody collects garbage.
+        outcome = march.advance(state, t, most, self._alive)
         doubtful = outcome.state is None or outcome.state.sensitivity > TOO_NEAR
         doubtful = doubtful or outcome.status is not Status.CONVERGED
         if doubtful and not outcome.exhausted and self._measure_again(state):
             again = self._advance(state)
-            self._motion.iterations[self._motion.index - 1] += outcome.iterations
+            self._motion.iterations[self._index - 1] += outcome.iterations
             return again
         if self._is_staged and doubtful and not outcome.exhausted:
             self._leave_stages(state.point.q)
             known = self._state(state.point.q, state.t)
             careful = known if known.state is None else self._advance(known.state)
             spent = careful.iterations + outcome.iterations
-            self._motion.iterations[self._motion.index - 1] = spent
+            self._motion.iterations[self._index - 1] = spent
             return replace(careful, iterations=spent)
         if outcome.position is None and self._may_be_dense:
             outcome = give_up(march, outcome, t, self._inputs)
@@ -343,7 +340,7 @@ class _Way:
 
     def _solve_grid(self, outcome: Outcome) -> NDArray[np.bool_]:
         """Solve all points from the last one on together; return which can be trusted."""
-        motion, index, first = self._motion, self._motion.index - 1, outcome.state
+        motion, index, first = self._motion, self._index - 1, outcome.state
         trusted = np.zeros(len(self._times), dtype=bool)
         if not self._inputs.on_grid or outcome.status is not Status.CONVERGED or first is None:
             return trusted
@@ -366,7 +363,7 @@ class _Way:
         After trusted points it does. Where the march went on by itself, the grid's next point must
         be near its prediction.
         """
-        motion, index = self._motion, self._motion.index
+        motion, index = self._motion, self._index
         if motion.status[index - 1] == Status.CONVERGED and motion.statistics["marched"] == 0:
             return True
         reference = self._march.equations.reference
@@ -374,10 +371,10 @@ class _Way:
 
     def _take_up(self, count: int) -> Outcome:
         """Take so many points of the grid; return the last as one to go on from."""
-        motion, stop = self._motion, self._motion.index + count
+        motion, stop = self._motion, self._index + count
         last = stop - 1
-        motion.status[self._motion.index : stop] = Status.CONVERGED
-        self._motion.index = stop
+        motion.status[self._index : stop] = Status.CONVERGED
+        self._index = stop
         if stop < len(self._times):
             return self._state(np.ascontiguousarray(motion.q[last]), float(self._times[last]))
         nothing = np.empty(0)

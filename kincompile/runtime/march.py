@@ -105,7 +105,6 @@ class March:
     def __init__(self, equations: Problem, engine: Engine, tolerance: float) -> None:
         self.equations, self.engine = equations, engine
         self.tolerance = max(tolerance, equations.floor)
-        self.alive: Callable[[], object] = lambda: None
         self._residual = max(RESIDUAL_FACTOR * tolerance, ROUNDING)
         # Factors of Phi_q a rounding error away serve the rates; a dense matrix has none to save.
         self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
@@ -262,17 +261,20 @@ class March:
         speed, growth = (np.abs(x) / reference for x in (state.q_dot, state.q_ddot))
         return float(1 / max(speed.max(), math.sqrt(growth.max()), 1e-300))
 
-    def advance(self, state: State, t: float, most: int) -> Outcome:
+    def advance(
+        self, state: State, t: float, most: int, alive: Callable[[], object] = bool
+    ) -> Outcome:
         """Follow the motion from a good state to time `t`, in sub-steps where need be.
 
-        Where it does not get there, the last good state on the way is in the outcome.
+        Where it does not get there, the last good state on the way is in the outcome. Where there
+        are many sub-steps, `alive` is called now and then.
         """
         step, iterations, wait = t - state.t, 0, 0
         smallest = min(abs(step), self.time_of(state)) * SMALLEST_PART
         status = Status.NOT_CONVERGED
         for count in range(MAX_SUBSTEPS):
             if count % SIGN_OF_LIFE == SIGN_OF_LIFE - 1:
-                self.alive()
+                alive()
             whole = abs(step) >= abs(t - state.t)
             outcome = self.step(state, t if whole else state.t + step, most)
             iterations += outcome.iterations
